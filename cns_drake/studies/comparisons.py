@@ -26,6 +26,7 @@ from cns_drake.studies.experiment import (
 )
 from cns_drake.traffic.vehicles import room_for_vehicles
 from evaluation.recognition.protocol import RetrievalProtocol
+from evaluation.report.rows import LAST, OWN
 
 # Fields of a side that are no fields of a scenario.
 FAMILY_FIELDS = ("missing", "scattered", "towards")
@@ -36,7 +37,7 @@ _DATABASE_FIELDS = ("distractors", "lateral")
 _SEEDED = ("transient", "traffic", "ride", "driver")
 _RETURNS = ("ideal", "calibrated")
 # Stages by their place in the life of a map.
-OWN, LAST, FIRST, EARLIER = "own", "last", "first", "earlier "
+FIRST, EARLIER = "first", "earlier "
 # Number of names for earlier stages: `earlier 1` to `earlier 4`.
 _STEPS = 4
 # No driver keeps exactly to a line: the LiDAR of the database is this far ahead

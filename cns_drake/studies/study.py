@@ -25,8 +25,6 @@ from cns_drake.scenarios.shipped import (
 )
 from cns_drake.simulation.simulated_drive import DriveSimulation
 from cns_drake.studies.comparisons import (
-    LAST,
-    OWN,
     Compared,
     MissingError,
     PairOfDrives,
@@ -58,7 +56,7 @@ from cns_drake.studies.tasks.task import Jobs, NamedDrive, Pair, Task
 from cns_drake.studies.tasks.update import MapTask
 from evaluation.methods import optional_methods
 from evaluation.recognition.protocol import RetrievalProtocol
-from evaluation.results.charts import draw
+from evaluation.report.rows import LAST, OWN, STAGE
 from evaluation.results.page import write_page
 from evaluation.results.table import (
     QUERIES,
@@ -84,7 +82,6 @@ TASKS: Mapping[str, type[Task]] = {
         *(MapTask, ChangeTask, CostTask),
     )
 }
-_STAGE = "both.stage"
 # A study that takes longer is announced [s].
 _LONG = 3600.0
 # Tables that earlier versions wrote.
@@ -233,23 +230,11 @@ class Study:
             self.output,
             title=self.experiment.name,
             about=self.experiment.about,
-            charts=self._charts(results),
+            charts=self.experiment.charts,
             experiment_text=self.experiment.text,
             notes=[self._protocol.to_text()],
+            on_note=self.on_note,
         )
-
-    def _charts(self, results: Results) -> list[Mapping[str, Any]]:
-        """Returns the charts that the table allows, and notes others."""
-        found: list[Mapping[str, Any]] = []
-        for chart in self.experiment.charts:
-            try:
-                draw(chart, results)
-            except InputError as error:
-                # Other tasks or maps may be measured than those of the file.
-                self.on_note(f"{self.source}: {error}: left out")
-            else:
-                found.append(chart)
-        return found
 
     def _choose_methods(self) -> dict[str, tuple[MethodChoice, MethodVariant]]:
         """Returns key -> method of the experiment, with its variant."""
@@ -539,7 +524,7 @@ class Study:
             given = [f"{side}.{name}" for side in sides for name in sides[side]]
             given += [CAUSE] if condition.causes else []
             for name in given:
-                if name != _STAGE:
+                if name != STAGE:
                     name = next(
                         (n for n in condition.factors if n.startswith(name)),
                         name,
@@ -551,7 +536,7 @@ class Study:
             stage = sides["both"].get("stage", OWN)
             if stage not in (OWN, LAST):
                 raise InputError(
-                    f"{self.source}: {_STAGE}: {stage!r}: recordings have"
+                    f"{self.source}: {STAGE}: {stage!r}: recordings have"
                     f" {OWN} and {LAST}"
                 )
 

@@ -2,6 +2,7 @@
 
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
+from typing import Any
 
 from evaluation.change.drive_change import ChangeResult
 from evaluation.recognition.metrics import Mode
@@ -130,15 +131,17 @@ class Reference:
         rows = []
         for key, value in self.recognitions.items():
             city, *stages, method, _ = key
-            change = self.change(city, stages)
-            for task, name, metric, number in (
-                ("place", method, "auc", value.auc),
-                ("change", "", "tcr_sym", change),
-            ):
-                if number is not None:
-                    pair = city, *stages
-                    where = (self.title, *pair, 0, {}, task, name, False, "")
-                    rows.append(Row(*where, metric, number))
+            where: dict[str, Any] = {
+                **dict(zip(("database", "query"), stages, strict=True)),
+                **{"experiment": self.title, "map": city, "seed": 0},
+                **{"factors": {}, "gate": False, "protocol": ""},
+            }
+            place: dict[str, Any] = {"task": "place", "method": method}
+            rows.append(Row(**where, **place, metric="auc", value=value.auc))
+            if (change := self.change(city, stages)) is not None:
+                whole: dict[str, Any] = {"task": "change", "method": ""}
+                whole |= {"metric": "tcr_sym", "value": change}
+                rows.append(Row(**where, **whole))
         return Results.of(rows)
 
     def _ran(self, result: RecognitionResult) -> bool:

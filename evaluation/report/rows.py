@@ -50,17 +50,23 @@ def place_rows(
         )
 
     outcomes = [
-        (changed, unchanged and outcome(unchanged), outcome(changed))
+        (
+            changed,
+            outcome(changed),
+            None if unchanged is None else outcome(unchanged),
+        )
         for changed, unchanged in pairs
     ]
-    for stage, k in ((LAST, 1), (OWN, 2)):
-        for one in outcomes:
-            changed, now, before = one[0], one[k], one[1]
+    for stage in (LAST, OWN):
+        for changed, after, before in outcomes:
+            now = before if stage == LAST else after
+            if now is None:
+                continue
             for task, numbers in (
                 ("place", place_numbers),
                 ("pose", pose_numbers),
             ):
-                for number in numbers(now, before) if now is not None else ():
+                for number in numbers(now, before):
                     yield Row.of(
                         number,
                         experiment=EXPERIMENT,

@@ -44,7 +44,10 @@ def survivals(rows: Iterable[Row], stages: Mapping[str, str]) -> list[Survival]:
 
     The stages are those of drives.
     """
-    found: dict[tuple, tuple[dict[str, Row], dict[str, Row]]] = {}
+    found: dict[
+        tuple[tuple[str, str, str], str],
+        tuple[dict[str, Row], dict[str, Row]],
+    ] = {}
     for row in rows:
         if row.task == "place":
             pair = row.map, stages[row.database], stages[row.query]
@@ -53,7 +56,10 @@ def survivals(rows: Iterable[Row], stages: Mapping[str, str]) -> list[Survival]:
     pairs = list(dict.fromkeys(pair for pair, _ in found))
     methods = tables.in_table_order(method for _, method in found)
     return sorted(
-        (Survival(*key, *sides) for key, sides in found.items()),
+        (
+            Survival(pair, method, before, after)
+            for (pair, method), (before, after) in found.items()
+        ),
         key=lambda s: (pairs.index(s.pair), methods.index(s.method)),
     )
 
@@ -82,7 +88,7 @@ def interval_text(kept: Row) -> str:
 
 def survival_numbers(survivals: Sequence[Survival]) -> tables.Table:
     """Returns all numbers, as `survival.csv` has them."""
-    numbers = {
+    numbers: dict[str | tuple[str, str], tuple[str, ...]] = {
         "auc_unchanged": ("before", "auc"),
         "auc_changed": ("after", "auc"),
         "kept": ("after", "kept"),
@@ -136,9 +142,11 @@ def _shown(
 
     def share(one: Survival) -> str | None:
         row = one.after.get(str(kept))
-        return row and f"{percent(row.value)} {interval_text(row)}".rstrip()
+        if row is None:
+            return None
+        return f"{percent(row.value)} {interval_text(row)}".rstrip()
 
-    columns: dict[tuple[str, str], Callable[[Survival], object]] = {
+    columns: dict[str | tuple[str, str], Callable[[Survival], object]] = {
         (group, "without change"): lambda s: (
             s.number("before", metric) if s.before else NO_CONTROL
         ),

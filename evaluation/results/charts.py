@@ -179,7 +179,7 @@ def draw(
                 options: dict = {"linestyle": style, "marker": marker}
                 options["label"] = plain(one)
                 handles.append(Line2D([], [], color=colour, **options))
-            figure.legend(handles=handles, loc="outside right center")
+            figure.legend(handles=handles, loc="outside lower center", ncols=3)
     return Drawn(message, figure, legend)
 
 
@@ -249,7 +249,10 @@ def _dumbbell(chart: _Chart) -> tuple[str, Figure]:
         places.append((name, len(places)))
         for pair in pairs:
             y = float(len(places))
-            label = pair[0] if of_map[pair[0]] == 1 else " → ".join(pair[1:])
+            label = pair[0]
+            if of_map[label] > 1:
+                ways = (n.removeprefix(f"{label}_") for n in pair[1:])
+                label = f"{label} {' → '.join(ways)}"
             places.append((label, y))
             ends = [
                 found.get((name, *pair, v), math.nan) for v in (before, after)
@@ -266,12 +269,8 @@ def _dumbbell(chart: _Chart) -> tuple[str, Figure]:
         if label.get_text() in map(plain, chart.styles):
             label.set_fontweight("bold")
     axes.set_ylim(len(places) - 0.4, -0.7)
-    axes.set_xlabel(
-        plain(
-            f"{words(chart.metric)}; {words(over)} {before} (hollow), {after}"
-            " (filled)"
-        )
-    )
+    text = f"{words(chart.metric)}; {words(over)} {before} (hollow), {after}"
+    figure.supxlabel(plain(f"{text} (filled)"), fontsize=_FONT)
     axes.grid(axis="x", alpha=0.3)
     axes.tick_params(length=0)
     shares = {}
@@ -281,7 +280,7 @@ def _dumbbell(chart: _Chart) -> tuple[str, Figure]:
             for v in (before, after)
         ]
         shares[name] = (
-            float(kept_share(both[1], both[0])),
+            float(kept_share(float(both[1]), float(both[0]))),
             f"{both[1]:.2f} of {both[0]:.2f}",
         )
     best, worst = _ends(shares)
@@ -470,17 +469,24 @@ def _scatter(chart: _Chart) -> tuple[str, Figure]:
     return message, figure
 
 
-def smooth(x: np.ndarray, y: np.ndarray, grid: np.ndarray) -> np.ndarray:
+def smooth(
+    x: np.ndarray,
+    y: np.ndarray,
+    grid: np.ndarray,
+    counts: np.ndarray | None = None,
+) -> np.ndarray:
     """Returns the local linear regression of y over x at places (M,).
 
     Not all x are equal. Gaussian weights; Fan and Gijbels, Local Polynomial
-    Modelling (1996), equation 3.1 with p = 1.
+    Modelling (1996), equation 3.1 with p = 1. How often each point counts in B
+    samples may be given, (B, N), for B regressions (B, M).
     """
+    counts = np.ones(len(x)) if counts is None else counts
     width = _BANDWIDTH * max(np.ptp(grid), 1e-12)
-    offset = x[None, :] - grid[:, None]
+    offset = x[:, None] - grid[None, :]
     weight = np.exp(-0.5 * (offset / width) ** 2)
-    s0, s1, s2 = ((weight * offset**power).sum(axis=1) for power in (0, 1, 2))
-    t0, t1 = ((weight * offset**power) @ y for power in (0, 1))
+    s0, s1, s2 = (counts @ (weight * offset**power) for power in (0, 1, 2))
+    t0, t1 = ((counts * y) @ (weight * offset**power) for power in (0, 1))
     determinant = s0 * s2 - s1**2
     # One distinct value of x has no slope, only a mean.
     flat = determinant <= 1e-12 * s0 * width**2 * s0
@@ -492,11 +498,9 @@ def smooth_band(
     x: np.ndarray, y: np.ndarray, grid: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray]:
     """Returns the 95 % band of `smooth` by resampling points."""
-    rng = np.random.default_rng(0)
-    curves = np.empty((_RESAMPLES, len(grid)))
-    for k in range(_RESAMPLES):
-        drawn = rng.integers(len(x), size=len(x))
-        curves[k] = smooth(x[drawn], y[drawn], grid)
+    draws = np.random.default_rng(0).integers(len(x), size=(_RESAMPLES, len(x)))
+    counts = np.stack([np.bincount(d, minlength=len(x)) for d in draws])
+    curves = smooth(x, y, grid, counts)
     low, high = np.percentile(curves, [2.5, 97.5], axis=0)
     return low, high
 

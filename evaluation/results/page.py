@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 import math
 from pathlib import Path
 import re
@@ -54,6 +54,7 @@ def write_page(
     charts: Sequence[Mapping[str, Any]] = (),
     experiment_text: str = "",
     notes: Iterable[str] = (),
+    on_note: Callable[[str], None] = lambda text: None,
 ) -> Path:
     """Writes `index.html`, which needs no other file.
 
@@ -70,6 +71,7 @@ def write_page(
             whose rows the table lacks is left out, and a note says so.
         experiment_text: the experiment as YAML.
         notes: what else a reader has to know, such as settings.
+        on_note: takes a note on each chart that is left out.
 
     Returns:
         The path of the page.
@@ -85,6 +87,7 @@ def write_page(
         except InputError as error:
             # What was measured does not depend on it.
             notes.append(f"Chart {number} is left out: {error}.")
+            on_note(notes[-1])
             continue
         save(alone.figure, folder / f"chart_{number}", ("pdf", "png"))
         svgs = {

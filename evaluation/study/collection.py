@@ -59,25 +59,28 @@ Pair = tuple[RecordingInfo, RecordingInfo]
 
 
 @dataclass(frozen=True)
-class Repetition:
-    """A method on a pair by the protocol of published numbers.
+class Run:
+    """A method on a pair of drives by a protocol.
 
-    Places are shared if the study's own protocol describes them alike.
+    Descriptions of the places and of the queries have a name each; that of the
+    queries is also the run's. A run that repeats another one is by the protocol
+    of published numbers.
     """
 
     method: MethodChoice
     protocol: RetrievalProtocol
-    shares_places: bool
+    places: str
+    queries: str
 
     @property
-    def key(self) -> str:
-        """The `described_key` of the repetition."""
-        return described_key(self.method.key, self.protocol)
+    def repeats(self) -> bool:
+        """Whether it repeats that by the study's own protocol."""
+        return self.queries != self.method.key
 
     @property
-    def places_key(self) -> str:
-        """That of its places."""
-        return self.method.key if self.shares_places else self.key
+    def shares_places(self) -> bool:
+        """Whether its places are those of the study's own protocol."""
+        return self.places == self.method.key
 
 
 @dataclass(frozen=True)
@@ -116,16 +119,19 @@ class City:
             pairs += [(one, one) for one in self.stages.values()]
         return pairs
 
-    def repetitions(
+    def runs(
         self,
         pair: Pair,
         methods: Iterable[MethodChoice],
         protocol: RetrievalProtocol,
-    ) -> list[Repetition]:
-        """Returns the methods to compare with published numbers of a pair."""
+    ) -> list[Run]:
+        """Returns the runs of methods on a pair, then those that repeat them.
+
+        Places are shared if both protocols describe them alike.
+        """
         database, query = (one.stage for one in pair)
-        found = []
-        for choice in methods:
+        runs = [Run(one, protocol, one.key, one.key) for one in methods]
+        for choice in [one.method for one in runs]:
             published = self.reference.protocol_of(
                 self.name, database, query, choice.name
             )
@@ -137,21 +143,13 @@ class City:
                 published != ours
                 and ours.asked_like(published).of(method) == published
             ):
-                same = ours.described(queries=False) == published.described(
+                key = places = described_key(choice.key, published)
+                if ours.described(queries=False) == published.described(
                     queries=False
-                )
-                found.append(Repetition(choice, published, same))
-        return found
-
-    def control(
-        self, first: RecordingInfo, second: RecordingInfo
-    ) -> RecordingInfo | None:
-        """Returns a drive on the route of one, in the stage of the other."""
-        for other in self.others:
-            for stage, way in ((second, first), (first, second)):
-                if other.stage == stage.stage and other.drives_like(way):
-                    return other
-        return None
+                ):
+                    places = choice.key
+                runs.append(Run(choice, published, places, key))
+        return runs
 
     def unchanged_pair(
         self, database: RecordingInfo, query: RecordingInfo

@@ -2,26 +2,14 @@
 
 from pathlib import Path
 
-from matplotlib.colors import to_rgb
-
-from cns_drake.base.errors import InputError
 from cns_drake.base.files import file_name, make_folder
 from cns_drake.base.jobs.step import Reporter
 from evaluation.report import figures
-from evaluation.report.page import Report
 from evaluation.report.page_data import Illustration, PageDrive, make_drive
-from evaluation.report.rows import STAGE
-from evaluation.results.charts import NARROW, draw
-from evaluation.results.drawing import PIXELS, save
+from evaluation.results.drawing import PIXELS
 from evaluation.study.collection import City, RecordingInfo
 from evaluation.study.parts import Part
 
-_SCATTER = {"kind": "scatter", "x": "tcr_sym", "y": "auc"}
-_DUMBBELL = {"kind": "dumbbell", "over": STAGE, "metric": "auc"}
-_SURVIVAL = (
-    "AUC without the change (hollow) and with it (filled), and the share that"
-    " is kept"
-)
 # Format of pictures on the page.
 _PAGE_KIND = PIXELS[-1]
 
@@ -152,42 +140,6 @@ def illustrations(city: City, folder: Path) -> list[Illustration]:
                 f"Precision over recall in {city.name}; numbers are AUC",
                 "svg",
                 num_panels=num_pairs,
-            )
-        )
-    return shown
-
-
-def chart_illustrations(report: Report, folder: Path) -> list[Illustration]:
-    """Draws the charts of all cities; returns those that have data.
-
-    A reference has its own, beside ours.
-    """
-    title = "AUC against TCR_sym"
-    charts = [("auc_over_tcr", title, "figures", _SCATTER, report.results)]
-    if report.compared:
-        published = report.reference.to_results()
-        name = f"{title}, of {report.reference.title}"
-        stem = "auc_over_tcr_published"
-        charts.insert(0, (stem, name, "figures", _SCATTER, published))
-    if any(control for _, control in report.pairs):
-        charts.append(
-            ("survival", _SURVIVAL, "survival", _DUMBBELL, report.results)
-        )
-    shown = []
-    for stem, title, section, chart, results in charts:
-        gates = {"gate": tuple(results.distinct("gate"))}
-        try:
-            drawn = draw(chart | gates, results, NARROW, alone=True)
-        except InputError:
-            continue  # Nothing was compared, or no change is defined.
-        save(drawn.figure, folder / stem)
-        legend = tuple(
-            (tuple(round(255 * part) for part in to_rgb(colour)), name)
-            for name, (colour, *_) in drawn.legend.items()
-        )
-        shown.append(
-            Illustration(
-                folder / stem, title, "svg", section=section, legend=legend
             )
         )
     return shown

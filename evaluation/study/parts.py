@@ -477,22 +477,6 @@ class SurveyFiles:
 
 
 @dataclass(frozen=True)
-class RecognitionFiles:
-    """The parts that hold the results of methods on two recordings."""
-
-    folder: Path
-
-    def result(self, key: str) -> Part:
-        """Returns the part with the result of a method or a `described_key`."""
-        return Part(self.folder / f"{file_name(key)}.data")
-
-    @property
-    def evidence(self) -> Part:
-        """The `PairEvidence` of all methods."""
-        return Part(self.folder / "why" / "evidence.data")
-
-
-@dataclass(frozen=True)
 class StudyFiles:
     """The files of a study."""
 
@@ -507,11 +491,6 @@ class StudyFiles:
         """Returns the parts of the survey of a recording."""
         folder = self.output / "parts" / "surveys"
         return SurveyFiles(folder / file_name(recording))
-
-    def recognition(self, database: str, query: str) -> RecognitionFiles:
-        """Returns the parts of the results on two recordings."""
-        name = f"{file_name(database)},{file_name(query)}"
-        return RecognitionFiles(self.output / "parts" / "recognition" / name)
 
     def part(self, kind: str, *names: str) -> Part:
         """Returns the part of a kind, such as `changes`, of drives."""

@@ -14,21 +14,21 @@ from cns_drake.base.version import __version__
 from evaluation.recognition.description import Role
 from evaluation.recognition.protocol import FAIR_PROTOCOL, RetrievalProtocol
 from evaluation.report import page, result_tables
-from evaluation.report.curve_figures import draw_pr_curves
+from evaluation.report.curve_figures import chart_illustrations, draw_pr_curves
 from evaluation.report.reference import NO_REFERENCE, Reference
-from evaluation.report.rows import Controlled
 from evaluation.study import figures, measurements
 from evaluation.study.chosen_methods import MethodChoice, choose_methods
 from evaluation.study.collection import (
     City,
     Pair,
     RecordingInfo,
+    Run,
     find_recordings,
     group_cities,
     nothing_to_compare,
 )
 from evaluation.study.fault_evidence import explain_faults
-from evaluation.study.parts import MakePart, StudyFiles
+from evaluation.study.parts import MakePart, Part, StudyFiles
 from evaluation.study.surveys import Further, Survey
 
 # Expected seconds: for the maps of a drive of 3000 scans, for its places or
@@ -133,11 +133,23 @@ class Study:
         report.differences = result_tables.method_differences(
             report.recognitions
         )
-        for shown in figures.chart_illustrations(report, folder):
+        for shown in chart_illustrations(report, folder):
             report.illustrations.insert(0, shown)
         if self._costed_pairs:
             report.costs = self._files.part("costs", "costs").read()
         return page.write_report(report, self.output)
+
+    def _runs(self, city: City, pair: Pair) -> list[Run]:
+        return city.runs(pair, self.methods, self.protocol)
+
+    def _result(self, pair: Pair, key: str) -> Part:
+        """Returns the part with the result of a run by name."""
+        names = (one.name for one in pair)
+        return self._files.part("recognition", *names, key)
+
+    def _evidence(self, pair: Pair) -> Part:
+        """Returns the part with the `PairEvidence` of all methods."""
+        return self._files.part("why", *(one.name for one in pair))
 
     def _pairs(self, city: City) -> list[Pair]:
         return city.recognition_pairs(
@@ -157,10 +169,6 @@ class Study:
         }
         drives = {one.name: one for one in city.stages.values()}
         roles: dict[str, set[Role]] = defaultdict(set)
-        for pair in city.change_pairs():
-            control = city.control(*pair)
-            if control is not None:
-                drives[control.name] = control
         for database, query in (*pairs.values(), *controls.values()):
             drives |= {database.name: database, query.name: query}
             roles[database.name].add("places")
@@ -193,15 +201,15 @@ class Study:
 
     def _further(self, city: City, drive: RecordingInfo) -> tuple[Further, ...]:
         """Returns what repetitions describe of a drive."""
-        roles: dict[tuple[MethodChoice, RetrievalProtocol], set[Role]] = {}
+        roles: dict[tuple[MethodChoice, RetrievalProtocol], set[Role]]
+        roles = defaultdict(set)
         for pair in city.recognition_pairs():
-            database, query = pair
-            for one in city.repetitions(pair, self.methods, self.protocol):
-                key = one.method, one.protocol
-                if query is drive:
-                    roles.setdefault(key, set()).add("queries")
-                if database is drive and not one.shares_places:
-                    roles.setdefault(key, set()).add("places")
+            for run in self._runs(city, pair):
+                key = run.method, run.protocol
+                if run.repeats and pair[1] is drive:
+                    roles[key].add("queries")
+                if run.repeats and pair[0] is drive and not run.shares_places:
+                    roles[key].add("places")
         return tuple(
             (method, frozenset(needed), protocol)
             for (method, protocol), needed in roles.items()
@@ -226,8 +234,8 @@ class Study:
         )
 
     def _change_job(self, city: City, pair: Pair) -> Job:
-        control = city.control(*pair)
-        drives = [*pair] if control is None else [*pair, control]
+        both = city.unchanged_pair(*pair) or ()
+        drives = [*pair, *(one for one in both if one not in pair)]
         earlier, later = pair
         surveys = tuple(self._files.survey(one.name) for one in drives)
         change = self._files.part("changes", earlier.name, later.name)
@@ -271,41 +279,39 @@ class Study:
         """
         database, query = pair
         surveys = [self._files.survey(one.name) for one in pair]
-        results = self._files.recognition(database.name, query.name)
-        runs = [(one, self.protocol, one.key, one.key) for one in self.methods]
-        if explains:
-            runs += [
-                (one.method, one.protocol, one.places_key, one.key)
-                for one in city.repetitions(pair, self.methods, self.protocol)
-            ]
         steps = [
             MakePart(
-                results.result(key),
+                self._result(pair, run.queries),
                 measurements.recognise_places,
                 (
                     city.name,
                     (database.stage, query.stage),
-                    (surveys[0].described(places), surveys[1].described(key)),
-                    method,
-                    protocol,
+                    (
+                        surveys[0].described(run.places),
+                        surveys[1].described(run.queries),
+                    ),
+                    run.method,
+                    run.protocol,
                 ),
             )
-            for method, protocol, places, key in runs
+            for run in self._runs(city, pair)
+            if explains or not run.repeats
         ]
         if explains:
+            own = [self._result(pair, one.key) for one in self.methods]
             evidence = MakePart(
-                results.evidence,
+                self._evidence(pair),
                 explain_faults,
                 (
                     tuple(one.scans for one in surveys),
                     self.methods,
-                    tuple(results.result(one.key) for one in self.methods),
+                    tuple(own),
                     self.protocol,
                 ),
             )
-            steps.insert(len(self.methods), evidence)
+            steps.insert(len(own), evidence)
         cost = _RECOGNITION_COST * (1 + len(steps))
-        step = Steps(results.folder, tuple(steps))
+        step = Steps(steps[0].output, tuple(steps))
         return Job(name, step, _survey_names(pair), cost)
 
     def _cost_job(self, pair: Pair, needs: tuple[str, ...]) -> Job:
@@ -329,38 +335,33 @@ class Study:
         for earlier, later in city.change_pairs():
             change = files.part("changes", earlier.name, later.name).read()
             report.changes.append(change)
-        pairs: list[Controlled] = []
-        closures = []
+        compared = []
         for pair in self._pairs(city):
             control = city.unchanged_pair(*pair)
-            results = files.recognition(*(one.name for one in pair))
-            for method in self.methods:
-                changed = results.result(method.key).read()
-                if pair[0] is pair[1]:
-                    if changed is not None:
-                        closures.append(changed)
-                    continue
-                unchanged = None
-                if control is not None:
-                    beside = files.recognition(*(one.name for one in control))
-                    unchanged = beside.result(method.key).read()
-                pairs.append((changed, unchanged))
-            for again in city.repetitions(pair, self.methods, self.protocol):
-                report.repeated.append(results.result(again.key).read())
-            evidence = results.evidence.read()
+            for run in self._runs(city, pair):
+                result = self._result(pair, run.queries).read()
+                if run.repeats:
+                    report.repeated.append(result)
+                elif result is not None:
+                    compared.append(result)
+                    if pair[0] is not pair[1]:
+                        unchanged = None
+                        if control is not None:
+                            beside = self._result(control, run.queries)
+                            unchanged = beside.read()
+                        report.pairs.append((result, unchanged))
+            evidence = self._evidence(pair).read()
             if evidence is not None:
                 report.evidence[pair[0].name, pair[1].name] = evidence
-            for drive in (*pair, *(control or ())):
-                if drive.name not in report.tracks:
-                    survey = files.survey(drive.name).drive.read()
-                    report.tracks[drive.name] = result_tables.DriveTrack(
-                        survey.stamps_ns, survey.X_WS
-                    )
-        compared = [*(changed for changed, _ in pairs), *closures]
+            names = {one.name for one in (*pair, *(control or ()))}
+            for name in sorted(names - report.tracks.keys()):
+                survey = files.survey(name).drive.read()
+                report.tracks[name] = result_tables.DriveTrack(
+                    survey.stamps_ns, survey.X_WS
+                )
         if compared:
             stem = files.figures / figures.curves_stem(city)
             draw_pr_curves(city.name, compared, stem)
-        report.pairs += pairs
         report.recognitions += compared
         report.drives.update(files.part("pages", city.name).read())
         report.illustrations += figures.illustrations(city, files.figures)

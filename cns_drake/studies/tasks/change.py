@@ -12,7 +12,6 @@ from cns_drake.base.jobs.step import Reporter
 from cns_drake.studies.tasks.task import (
     Jobs,
     NamedDrive,
-    Number,
     Pair,
     Task,
     positive,
@@ -20,6 +19,7 @@ from cns_drake.studies.tasks.task import (
 from evaluation.change.drive_change import Surveyed, compare
 from evaluation.drives.sampling import sample_frames
 from evaluation.maps.voxel_maps import VoxelAccumulator, VoxelMap
+from evaluation.recognition.place_outcome import Number
 from evaluation.study.parts import Part
 from evaluation.study.surveys import DriveSource
 

@@ -6,8 +6,9 @@ from collections.abc import Iterator
 from typing import Any
 
 from cns_drake.base.jobs.step import Reporter
-from cns_drake.studies.tasks.task import Jobs, Number, Pair, Task
+from cns_drake.studies.tasks.task import Jobs, Pair, Task
 from evaluation.recognition.costs import cpu_ms, query_ms
+from evaluation.recognition.place_outcome import Number
 from evaluation.study.chosen_methods import MethodChoice
 from evaluation.study.parts import Part
 from evaluation.study.place_outcomes import TIMED, joined_places

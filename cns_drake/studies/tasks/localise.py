@@ -15,14 +15,13 @@ from cns_drake.base.jobs.step import Reporter
 from cns_drake.studies.tasks.task import (
     Answers,
     Jobs,
-    Number,
     Pair,
     Task,
     positive,
 )
 from evaluation.localisation import estimators, localise
 from evaluation.localisation.localise import Starts
-from evaluation.recognition.place_outcome import kept_share
+from evaluation.recognition.place_outcome import Number, kept_share
 from evaluation.study.parts import Part
 from evaluation.study.surveys import DriveSource
 

@@ -4,8 +4,9 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 
-from cns_drake.studies.tasks.task import Answers, Jobs, Number, Pair, Task
+from cns_drake.studies.tasks.task import Answers, Jobs, Pair, Task
 from evaluation.recognition.place_outcome import (
+    Number,
     PlaceOutcome,
     place_numbers,
     pose_numbers,

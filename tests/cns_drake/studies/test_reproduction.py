@@ -79,7 +79,8 @@ def test_planned_files_are_the_written_ones(drives, tmp_path):
         (city,) = group_cities(recordings)
         (pair,) = city.change_pairs()
         assert [one.name for one in pair] == ["town_01", "town_04"]
-        assert city.control(*pair).name == "town_01_stage_04"
+        database, _ = city.unchanged_pair(*pair)
+        assert database.name == "town_01_stage_04"
 
 
 def test_everything_is_planned_before_anything_runs(
@@ -191,8 +192,8 @@ def test_quick_gives_the_same_tables(tmp_path, monkeypatch):
         assert ours.read_text() == theirs.read_text(), name
     rows = _rows(quick.parent / "place_recognition.csv")
     assert "counting" in {row["method"] for row in rows}
-    rows = _rows(quick.parent / "survival.csv")
-    assert {row["control"] for row in rows} == {"town_01_stage_04"}
+    rows = _rows(quick.parent / "queries_unchanged.csv")
+    assert {row["match_drive"] for row in rows} == {"town_01_stage_04"}
 
 
 def test_quick_reads_existing_recordings(town, drives, planned, tmp_path):

@@ -327,6 +327,7 @@ class _Page(HTMLParser):
 
 def test_a_page_stands_alone(tmp_path):
     chart = {"kind": "lines", "over": YEARS, "metric": "auc"}
+    told = []
     path = write_page(
         aged(),
         None,
@@ -336,6 +337,7 @@ def test_a_page_stands_alone(tmp_path):
         charts=[chart, {**chart, "metric": "r1"}],
         experiment_text="name: <age>\n",
         notes=["seeds 0 & 2"],
+        on_note=told.append,
     )
     text = path.read_text()
     page = _Page()
@@ -346,7 +348,11 @@ def test_a_page_stands_alone(tmp_path):
     outside = {link for link in page.links if not link.startswith("#")}
     assert outside == {"results.csv"}
     assert "name: &lt;age&gt;" in text
-    assert "Chart 2 is left out: charts: lines: the table has no r1" in text
+    (note,) = told
+    assert note.startswith(
+        "Chart 2 is left out: charts: lines: the table has no r1"
+    )
+    assert note in text
     assert "Age &amp; &lt;years&gt;" in text
     assert "At 30 years, the AUC" in text[text.index("<h1>") :][:100]
     summary, whole = page.tables

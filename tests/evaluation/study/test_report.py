@@ -70,7 +70,8 @@ def test_recordings_find_their_roles(recordings):
     assert city.stages["04"].name == "metropolis_04"
     (pair,) = city.change_pairs()
     assert [one.stage for one in pair] == ["01", "04"]
-    assert city.control(*pair).name == "metropolis_04_control"
+    database, _ = city.unchanged_pair(*pair)
+    assert database.name == "metropolis_04_control"
 
 
 def test_both_directions_where_the_paper_has_them(tmp_path):
@@ -89,7 +90,7 @@ def test_names_serve_without_scenarios(tmp_path):
     (city,) = find_cities(tmp_path)
     assert city.name == "old_town"
     assert list(city.stages) == ["1", "2"]
-    assert city.control(*city.change_pairs()[0]) is None
+    assert city.unchanged_pair(*city.change_pairs()[0]) is None
 
 
 def test_what_cannot_be_placed_is_left_out(tmp_path):
