@@ -143,9 +143,10 @@ def make_drive_page(
     - `/stage_difference/lower/<class>`: parts of the other stage above their
       height here, translucent orange, off when the page opens.
 
-    A panel has the title and a legend, others what cameras see; buttons play the drive, let the camera
-    follow the car, switch points off, and show the change: additional parts are
-    then violet. Below the time line are plots of speed, IMU and stage.
+    A panel has the title and a legend, others what cameras see; buttons play
+    the drive, let the camera follow the car, switch points off, and show the
+    change: additional parts are then violet. Below the time line are plots of
+    speed, IMU and stage.
     """
     with _quiet():
         meshcat = geometry.Meshcat(MeshcatParams(host="127.0.0.1", port=0))

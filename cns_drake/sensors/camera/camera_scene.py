@@ -49,6 +49,7 @@ from cns_drake.sensors.camera.looks import (
     HORIZON_RGB,
     LOOKS,
     SUN_W,
+    face_places,
     look_of,
     texture,
     texture_places,
@@ -162,7 +163,13 @@ class CameraScene(LeafSystem):
             if is_anchored:
                 X_FG = calc_X_WF(frame) @ X_FG
             entry = table[one.structure]
-            look = look_of(one.name, entry.semantic_class, one.rgb or _GREY)
+            surface = tessellate(one.surface, _SIDES)
+            look = look_of(
+                one.name,
+                entry.semantic_class,
+                one.rgb or _GREY,
+                len(surface.p_GVset),
+            )
             for kind, group in (("colours", look), ("classes", entry.label)):
                 key = kind, None if is_anchored else frame, group
                 members = parts.setdefault(key, [])
@@ -203,7 +210,8 @@ class CameraScene(LeafSystem):
         rgb = np.array([one.rgb or _GREY for *_, one in members])[owners]
         corners = merged.p_GVset[merged.triangles]
         middle = np.round(corners.mean(axis=(0, 1)))
-        mesh = _as_mesh(corners, middle, rgb, group)
+        fronts = np.stack([X.rotation().matrix()[:, 1] for _, X, _ in members])
+        mesh = _as_mesh(corners, middle, rgb, group, owners, fronts)
         made = GeometryInstance(RigidTransform(middle), mesh, name)
         properties = PerceptionProperties()
         is_class = kind == "classes"
@@ -259,10 +267,13 @@ def _as_mesh(
     middle: np.ndarray,
     rgb: np.ndarray,
     look: str | int,
+    owners: np.ndarray,
+    fronts: np.ndarray,
 ) -> Mesh:
     """Returns a glTF mesh of (N, 3, 3) corners of triangles, flat, of a look.
 
-    The (N, 3) colours are of screens; a class in place of a look has none.
+    The (N, 3) colours are of screens; a class in place of a look has none. The
+    (N,) owners are geometries, which look along (M, 3) `fronts`.
 
     The mesh is about `middle`. The axes of glTF are right, up and backwards: y
     up.
@@ -281,8 +292,19 @@ def _as_mesh(
     material, files, extra = {"doubleSided": True}, {}, {}
     if isinstance(look, str):
         files["look.png"], white = texture(look)
-        tiles = texture_places(corners, normals) / LOOKS[look].size
-        tiles -= np.floor(tiles.min(axis=1, keepdims=True))
+        if LOOKS[look].is_face:
+            tiles = face_places(corners, normals, owners)
+            rgb = np.ones_like(rgb)
+            if look == "signals":
+                front = fronts[owners]
+                tiles = tiles * (0.5, 1.0)
+                tiles[abs(front[:, 0]) > abs(front[:, 1]), :, 0] += 0.5
+                tiles[(front * normals).sum(axis=1) < 0.9] = 0.01
+                glow = {"emissiveFactor": [1.0] * 3}
+                material |= glow | {"emissiveTexture": {"index": 0}}
+        else:
+            tiles = texture_places(corners, normals) / LOOKS[look].size
+            tiles -= np.floor(tiles.min(axis=1, keepdims=True))
         light = np.minimum(rgb**GAMMA * white, 1.0)
         arrays += [tiles.reshape(-1, 2), np.repeat(light, 3, axis=0)]
         kinds += ["VEC2", "VEC3"]
