@@ -11,6 +11,7 @@ import functools
 import json
 import subprocess
 import sys
+from typing import Any
 
 import numpy as np
 from pydrake.common import MemoryFile
@@ -289,7 +290,9 @@ def _as_mesh(
         for a in (places, np.repeat(normals, 3, axis=0))
     ]
     kinds, attributes = ["VEC3", "VEC3"], {"POSITION": 0, "NORMAL": 1}
-    material, files, extra = {"doubleSided": True}, {}, {}
+    material: dict[str, Any] = {"doubleSided": True}
+    files: dict[str, bytes] = {}
+    extra: dict[str, Any] = {}
     if isinstance(look, str):
         files["look.png"], white = texture(look)
         if LOOKS[look].is_face:
@@ -300,8 +303,8 @@ def _as_mesh(
                 tiles = tiles * (0.5, 1.0)
                 tiles[abs(front[:, 0]) > abs(front[:, 1]), :, 0] += 0.5
                 tiles[(front * normals).sum(axis=1) < 0.9] = 0.01
-                glow = {"emissiveFactor": [1.0] * 3}
-                material |= glow | {"emissiveTexture": {"index": 0}}
+                material["emissiveFactor"] = [1.0] * 3
+                material["emissiveTexture"] = {"index": 0}
         else:
             tiles = texture_places(corners, normals) / LOOKS[look].size
             tiles -= np.floor(tiles.min(axis=1, keepdims=True))
@@ -327,7 +330,7 @@ def _as_mesh(
     parts = [a.astype("<f4") for a in arrays]
     parts.append(np.arange(number, dtype="<u4"))
     ends = np.cumsum([0, *(part.nbytes for part in parts)]).tolist()
-    document = {
+    document: dict[str, Any] = {
         "asset": {"version": "2.0"},
         "scene": 0,
         "scenes": [{"nodes": [0]}],

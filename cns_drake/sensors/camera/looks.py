@@ -122,8 +122,8 @@ def _leaves(rng: np.random.Generator) -> np.ndarray:
             for dy in (-_SIDE, 0, _SIDE):
                 x, y = leaf.real + place[0] + dx, leaf.imag + place[1] + dy
                 pen.polygon(list(zip(x, y, strict=True)), fill=shade)
-    shade = np.asarray(picture)[:, :, None]
-    return np.concatenate([shade * (1.05, 1.2, 0.6), shade > 0.0], axis=2)
+    light = np.asarray(picture)[:, :, None]
+    return np.concatenate([light * (1.05, 1.2, 0.6), light > 0.0], axis=2)
 
 
 def _face(
