@@ -39,12 +39,13 @@ from pydrake.systems.framework import Context, DiagramBuilder, LeafSystem
 from pydrake.systems.sensors import CameraInfo, ImageRgba8U
 
 from cns_drake.base.errors import InputError
-from cns_drake.scene.perception_geometry import (
-    PerceptionGeometry,
-    read_perception_geometry,
-)
+from cns_drake.scene.perception_geometry import read_perception_geometry
 from cns_drake.scene.structure_table import StructureTable
-from cns_drake.scene.surfaces import merge_triangles, tessellate
+from cns_drake.scene.surfaces import (
+    TriangleSurface,
+    merge_triangles,
+    tessellate,
+)
 from cns_drake.sensors.camera.looks import (
     GAMMA,
     HORIZON_RGB,
@@ -90,6 +91,8 @@ _LIGHTS = [
 ]
 # Numbers of glTF 2.0: float, unsigned int; what buffers are for.
 _FLOAT, _UINT, _VERTICES, _CORNERS = 5126, 5125, 34962, 34963
+# Pose, colour and surface of a geometry.
+_Member = tuple[RigidTransform, tuple[float, float, float], TriangleSurface]
 
 
 class CameraScene(LeafSystem):
@@ -156,25 +159,19 @@ class CameraScene(LeafSystem):
             scene_graph.model_inspector(), lambda frame: frame not in vehicle
         )
         table = structures.completed(one.structure for one in geometries)
-        parts: dict[tuple, list[tuple[int, RigidTransform, PerceptionGeometry]]]
-        parts = {}
+        parts: dict[tuple, list[_Member]] = {}
         for one in geometries:
             frame, X_FG = one.frame_id, one.X_FG
             is_anchored = frame in anchored
             if is_anchored:
                 X_FG = calc_X_WF(frame) @ X_FG
-            entry = table[one.structure]
+            entry, rgb = table[one.structure], one.rgb or _GREY
             surface = tessellate(one.surface, _SIDES)
-            look = look_of(
-                one.name,
-                entry.semantic_class,
-                one.rgb or _GREY,
-                len(surface.p_GVset),
-            )
+            corners = len(surface.p_GVset)
+            look = look_of(one.name, entry.semantic_class, rgb, corners)
             for kind, group in (("colours", look), ("classes", entry.label)):
                 key = kind, None if is_anchored else frame, group
-                members = parts.setdefault(key, [])
-                members.append((len(members), X_FG, one))
+                parts.setdefault(key, []).append((X_FG, rgb, surface))
         moving = dict.fromkeys([base, *(key[1] for key in parts if key[1])])
         self.frames = {
             frame: GeometryFrame(f"frame_{k}") for k, frame in enumerate(moving)
@@ -202,16 +199,16 @@ class CameraScene(LeafSystem):
         kind: str,
         frame: FrameId | None,
         group: str | int,
-        members: list[tuple[int, RigidTransform, PerceptionGeometry]],
+        members: list[_Member],
     ) -> None:
         """Registers one mesh; without a frame it stays."""
         merged, owners = merge_triangles(
-            [(k, X, tessellate(g.surface, _SIDES)) for k, X, g in members]
+            [(k, X, surface) for k, (X, _, surface) in enumerate(members)]
         )
-        rgb = np.array([one.rgb or _GREY for *_, one in members])[owners]
+        rgb = np.array([rgb for _, rgb, _ in members])[owners]
         corners = merged.p_GVset[merged.triangles]
         middle = np.round(corners.mean(axis=(0, 1)))
-        fronts = np.stack([X.rotation().matrix()[:, 1] for _, X, _ in members])
+        fronts = np.stack([X.rotation().matrix()[:, 1] for X, *_ in members])
         mesh = _as_mesh(corners, middle, rgb, group, owners, fronts)
         made = GeometryInstance(RigidTransform(middle), mesh, name)
         properties = PerceptionProperties()
