@@ -73,6 +73,7 @@ def test_pictures_do_not_depend_on_the_blocks_of_their_rows(monkeypatch):
     np.testing.assert_array_equal(pictures[1], pictures[2])
 
 
+@pytest.mark.slow
 def test_stages_are_drawn_side_by_side(small_map, tmp_path):
     view = load_views(shipped_maps()["metropolis"] / "views.yaml")["street"]
     stages = {name: small_map / f"stage_{name}.sdf" for name in ("01", "04")}
