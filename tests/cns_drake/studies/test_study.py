@@ -93,6 +93,7 @@ STAGES = {
 }
 
 
+@pytest.mark.slow
 def test_the_numbers_are_those_of_the_single_commands(
     town, tmp_path, jobs_done
 ):
@@ -165,6 +166,7 @@ def test_the_numbers_are_those_of_the_single_commands(
         )
 
 
+@pytest.mark.slow
 def test_finished_work_is_not_repeated(town, tmp_path, jobs_done):
     folder = shutil.copytree(town, tmp_path / "town")
     wanted = experiment(folder, **STAGES, tasks=["place", "change"])
@@ -198,6 +200,7 @@ class InterruptedHereError(Exception):
     """An interruption between two jobs."""
 
 
+@pytest.mark.slow
 def test_an_interrupted_study_goes_on(town, tmp_path, jobs_done, monkeypatch):
     wanted = experiment(town, **STAGES, tasks=["place", "change"])
     measure(wanted, tmp_path / "whole")
@@ -242,6 +245,7 @@ def test_processes_change_nothing(town, tmp_path, jobs_done, capsys):
     assert contents(tmp_path / "there") == contents(tmp_path / "here")
 
 
+@pytest.mark.slow
 def test_protocols_are_factors(town, tmp_path, jobs_done):
     """Each radius has numbers and a baseline of its own."""
     fields = STAGES | {"protocol": {"base": "recorded", "radius": [2.0, 9.0]}}
@@ -298,6 +302,7 @@ def test_descriptions_are_shared(town, tmp_path):
     assert len(set(outputs)) == len(outputs)
 
 
+@pytest.mark.slow
 def test_a_condition_without_draws_is_measured_once(town, tmp_path, jobs_done):
     wanted = experiment(
         town,
@@ -402,6 +407,7 @@ def test_pairs_of_maps_begin_with_the_first_drive(town, tmp_path):
     assert (one.names, stages) == (("town_01", "town_04"), ["01", "04"])
 
 
+@pytest.mark.slow
 def test_maps_are_labelled(town, tmp_path, jobs_done, monkeypatch):
     from cns_drake.studies.tasks import update
 
@@ -434,6 +440,7 @@ def test_maps_are_labelled(town, tmp_path, jobs_done, monkeypatch):
     assert after["gone"] + after["new"] > 0.0
 
 
+@pytest.mark.slow
 def test_scans_are_localised(town, tmp_path, jobs_done):
     own = tmp_path / "stay.py"
     own.write_text("def stay(map, scan, start):\n    return start, 1.0\n")
@@ -482,6 +489,7 @@ def test_scans_are_localised(town, tmp_path, jobs_done):
     assert len(jobs_done[-1]) == 2
 
 
+@pytest.mark.slow
 def test_costs_follow_the_number_of_places(town, tmp_path, jobs_done):
     results = measure(experiment(town, tasks=["cost", "place"]), tmp_path)
     cost, place = (

@@ -254,6 +254,7 @@ def test_free_space_sees_past_what_is_gone(tmp_path):
     assert (labels[n + 200 :] == Label.UNOBSERVED).all()
 
 
+@pytest.mark.slow
 def test_m3c2_measures_a_moved_plane(tmp_path, monkeypatch, capsys):
     monkeypatch.chdir(tmp_path)
     from evaluation.map_update.baselines import by_m3c2
