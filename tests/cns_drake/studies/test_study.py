@@ -20,7 +20,7 @@ from cns_drake.studies import study as study_module
 from cns_drake.studies.experiment import Experiment, load_experiment
 from cns_drake.studies.study import Study, run_study
 from evaluation.change.drive_change import Surveyed, compare
-from evaluation.maps.voxel_maps import VoxelAccumulator
+from evaluation.maps.voxel_maps import CELL_SIZE, VoxelAccumulator
 from evaluation.methods import make_method
 from evaluation.recognition.place_recognition import run
 from evaluation.recognition.protocol import FAIR_PROTOCOL, RetrievalProtocol
@@ -118,7 +118,7 @@ def test_the_numbers_are_those_of_the_single_commands(
     }
     mapped = {}
     for name, drive in drives.items():
-        voxels = VoxelAccumulator()
+        voxels = VoxelAccumulator(CELL_SIZE)
         for frame in range(len(drive)):
             voxels.add(drive.scan(frame), drive.X_WS[frame])
         mapped[name] = Surveyed(name, voxels.to_map(), drive.X_WS[:, :3, 3])
