@@ -82,6 +82,22 @@ def values(results, **columns):
     return {row.metric: row.value for row in found}
 
 
+def test_a_long_study_says_so_before_its_parts_are_there(
+    town, tmp_path, jobs_done, monkeypatch
+):
+    """A job may need descriptions that another one has yet to write."""
+    monkeypatch.setattr(study_module, "_LONG", 1e-9)
+    notes = []
+    wanted = experiment(
+        town,
+        drives="stages",
+        database={"transient": [{}, {"leaves": 0.0}]},
+        protocol={"base": "recorded", "query_spacing": 5},
+    )
+    measure(wanted, tmp_path, on_note=notes.append)
+    assert any("the same command goes on" in note for note in notes)
+
+
 def contents(folder):
     return [(folder / name).read_bytes() for name in TABLES]
 
