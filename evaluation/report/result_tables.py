@@ -108,6 +108,8 @@ def change_table(
             "unchanged": lambda r: r.report.change.num_unchanged,
             "visible change": lambda r: visible(r)[0],
             "queries": lambda r: visible(r)[1],
+            "least of the grids": lambda r: r.report.spread[0],
+            "greatest": lambda r: r.report.spread[1],
         },
         CAPTIONS["change"],
     )

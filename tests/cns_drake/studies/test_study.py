@@ -20,7 +20,7 @@ from cns_drake.studies import study as study_module
 from cns_drake.studies.experiment import Experiment, load_experiment
 from cns_drake.studies.study import Study, run_study
 from evaluation.change.drive_change import Surveyed, compare
-from evaluation.maps.voxel_maps import VoxelAccumulator
+from evaluation.maps.voxel_maps import CELL_SIZE, VoxelAccumulator
 from evaluation.methods import make_method
 from evaluation.recognition.place_recognition import run
 from evaluation.recognition.protocol import FAIR_PROTOCOL, RetrievalProtocol
@@ -82,6 +82,22 @@ def values(results, **columns):
     return {row.metric: row.value for row in found}
 
 
+def test_a_long_study_says_so_before_its_parts_are_there(
+    town, tmp_path, jobs_done, monkeypatch
+):
+    """A job may need descriptions that another one has yet to write."""
+    monkeypatch.setattr(study_module, "_LONG", 1e-9)
+    notes = []
+    wanted = experiment(
+        town,
+        drives="stages",
+        database={"transient": [{}, {"leaves": 0.0}]},
+        protocol={"base": "recorded", "query_spacing": 5},
+    )
+    measure(wanted, tmp_path, on_note=notes.append)
+    assert any("the same command goes on" in note for note in notes)
+
+
 def contents(folder):
     return [(folder / name).read_bytes() for name in TABLES]
 
@@ -119,7 +135,7 @@ def test_the_numbers_are_those_of_the_single_commands(
     }
     mapped = {}
     for name, drive in drives.items():
-        voxels = VoxelAccumulator()
+        voxels = VoxelAccumulator(CELL_SIZE)
         for frame in range(len(drive)):
             voxels.add(drive.scan(frame), drive.X_WS[frame])
         mapped[name] = Surveyed(name, voxels.to_map(), drive.X_WS[:, :3, 3])
