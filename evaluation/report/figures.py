@@ -155,7 +155,15 @@ def draw_routes(
     routes: Sequence[np.ndarray],
     stem: Path,
 ) -> None:
-    """Draws routes (M, 3) [m] over views from above, red to blue."""
+    """Draws routes over views from above, from red to blue, and saves them.
+
+    Args:
+        map_name: name of the map, for the titles.
+        stages: stage of each view.
+        views: picture of each stage from above.
+        routes: (M, 3) positions in W along the route through each stage [m].
+        stem: path of the files without the ending.
+    """
     _draw_panels(
         [f"{map_name} {stage}" for stage in stages],
         views,

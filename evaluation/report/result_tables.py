@@ -169,8 +169,15 @@ def recognition_table(
 ) -> Table:
     """Returns Table II: a row for each pair, some columns for each method.
 
-    F1 is only in the form that is compared with the reference. Without a mode,
-    each method is counted in that which the reference used for it.
+    F1 is only in the form that is compared with the reference.
+
+    Args:
+        results: results of one protocol.
+        changes: change between the drives of each pair.
+        mode: which queries count; by default those that the reference counts
+            for each method.
+        reference: published results to compare with.
+        evidence: names of a database and a query -> why queries went wrong.
 
     Raises:
         InputError: results of two protocols.

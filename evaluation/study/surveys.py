@@ -237,9 +237,21 @@ def survey_recording(
 ) -> RecordingSurvey:
     """Maps a recording and describes its places and queries.
 
-    Each scan is read once, in order; without a map, only those of places and
-    queries, which are kept if asked. The drive may have no role; there are then
-    no further descriptions, which are by another protocol.
+    Each scan is read once, in order.
+
+    Args:
+        recording: the drive.
+        roles: whether it makes a database, asks queries, or both; it may have
+            no role.
+        methods: methods that describe it.
+        protocol: protocol of the descriptions.
+        track: reports progress.
+        with_scans: whether to keep the scans of places and queries.
+        with_map: whether to make a map; without one, only the scans of places
+            and queries are read.
+        further: descriptions by other protocols; none without a role.
+        keys: names of the descriptions, those of `methods` first; by default
+            made from the names of the methods.
 
     Raises:
         InputError: if it cannot be read, or holds no point.
