@@ -24,7 +24,6 @@ from evaluation.change.tcr import (
     HULL_MARGIN,
     TAU,
     TemporalChange,
-    counted_together,
     covered,
     temporal_change,
 )
@@ -53,7 +52,7 @@ class Surveyed:
     Attributes:
         name: name of the drive or file.
         voxels: the map in cells of `CELL_SIZE`, of which the voxels of the
-            TCR are made.
+            TCR are made, on any grid.
         positions: (N, 3) of the sensor [m]; None for a map file.
         drive: the drive, or its world frame and map; None for a map file.
         notes: notes on how it was read.
@@ -73,8 +72,8 @@ class ChangeReport:
     Attributes:
         source: name of A.
         target: name of B.
-        change: over the whole maps, the points of all grids together.
-        spread: least and greatest TCR_sym of a single grid.
+        change: over the whole maps.
+        spread: least and greatest TCR_sym on this grid and on `GRIDS`.
         masked: over the parts that both drives passed within the coverage
             radius; None if a map has no drive.
         control: between two drives on the two routes in one stage; None if
@@ -221,29 +220,22 @@ def compare(
     """
     if source.drive is not None and target.drive is not None:
         check_same_world(source.drive, target.drive)
-    clouds = _on_grids(source, target)
-    changes = [temporal_change(*pair) for pair in clouds]
-    values = [one.symmetric for one in changes]
+    change, clouds = _change(source, target)
+    values = [change.symmetric]
+    values += [_change(source, target, at)[0].symmetric for at in GRIDS]
     masked = None
     if source.positions is not None and target.positions is not None:
         both = (source.positions, target.positions)
-        masked = counted_together(
-            [
-                one.restricted(covered(a, both), covered(b, both))
-                for one, (a, b) in zip(changes, clouds, strict=True)
-            ]
-        )
+        masked = change.restricted(*(covered(one, both) for one in clouds))
     control_change = control_names = None
     if control is not None:
         partner = _same_stage_partner(source, target, control)
-        control_change = counted_together(
-            [temporal_change(*pair) for pair in _on_grids(control, partner)]
-        )
+        control_change, _ = _change(control, partner)
         control_names = (control.name, partner.name)
     return ChangeReport(
         source.name,
         target.name,
-        counted_together(changes),
+        change,
         (float(np.min(values)), float(np.max(values))),
         masked,
         control_change,
@@ -252,17 +244,16 @@ def compare(
     )
 
 
-def _on_grids(
-    source: Surveyed, target: Surveyed
-) -> list[tuple[np.ndarray, np.ndarray]]:
-    """Returns the voxel centroids of both maps on each grid [m]."""
-    return [
-        (
-            source.voxels.merged(shift=shift).centroids_W,
-            target.voxels.merged(shift=shift).centroids_W,
-        )
-        for shift in GRIDS
+def _change(
+    source: Surveyed,
+    target: Surveyed,
+    shift: tuple[float, float, float] = (0.0, 0.0, 0.0),
+) -> tuple[TemporalChange, list[np.ndarray]]:
+    """Returns the change on a shifted grid [m], and both maps' centroids."""
+    clouds = [
+        one.voxels.merged(shift=shift).centroids_W for one in (source, target)
     ]
+    return temporal_change(*clouds), clouds
 
 
 def open_source(

@@ -5,9 +5,8 @@ are open in the paper.
 
 - X is the map of a whole drive in world coordinates, as the centroids of
   the voxels of a grid that is fixed in the world (see `evaluation.maps`).
-- The place of that grid alone moves TCR_sym by up to 0.04. The sets of
-  `GRIDS`, which are spread evenly over a voxel, are therefore counted
-  together.
+- The place of that grid alone moves TCR_sym. The least and the greatest
+  value on `GRIDS`, which are spread evenly over a voxel, show by how much.
 - The hull is wider by `HULL_MARGIN` to all sides. Flat ground is a face of
   the hull, so that a millimetre would decide whether it counts.
 - O, the unchanged points, is counted inside H, the points in the other map's
@@ -18,8 +17,7 @@ are open in the paper.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from dataclasses import dataclass, fields
+from dataclasses import dataclass
 import math
 
 import numpy as np
@@ -262,23 +260,6 @@ def temporal_change(
     return TemporalChange(
         _directed(source, target, tau, margin, restrict_to_hull),
         _directed(target, source, tau, margin, restrict_to_hull),
-    )
-
-
-def counted_together(changes: Sequence[TemporalChange]) -> TemporalChange:
-    """Returns the change with the points of all, which are at least one."""
-
-    def joined(sides: Sequence[DirectedChange]) -> DirectedChange:
-        return DirectedChange(
-            *(
-                np.concatenate([getattr(one, name.name) for one in sides])
-                for name in fields(DirectedChange)
-            )
-        )
-
-    return TemporalChange(
-        joined([one.source_to_target for one in changes]),
-        joined([one.target_to_source for one in changes]),
     )
 
 

@@ -465,7 +465,7 @@ def _change_rows(report: ChangeReport) -> Iterator[tuple[str, str]]:
     source, target = report.source, report.target
     yield "pair", f"{source} <-> {target}"
     yield "TCR_sym", number(change.symmetric)
-    yield "  on single grids", " to ".join(map(number, report.spread))
+    yield "  on shifted grids", " to ".join(map(number, report.spread))
     if change.undefined_because:
         yield "  because", change.undefined_because
     for names, side in (
