@@ -5,7 +5,7 @@ are open in the paper.
 
 - X is the map of a whole drive in world coordinates, as the centroids of
   the voxels of a grid that is fixed in the world (see `evaluation.maps`).
-- The place of that grid alone moves TCR_sym by up to 0.04. The sets of
+- The place of that grid alone moves TCR_sym by up to 0.06. The sets of
   `GRIDS`, which are spread evenly over a voxel, are therefore counted
   together.
 - The hull is wider by `HULL_MARGIN` to all sides. Flat ground is a face of

@@ -206,6 +206,11 @@ def place_numbers(
             right, was = outcomes.is_right, before.outcomes.is_right
             yield "lost", float((was & ~right).sum()), UNKNOWN
             yield "found", float((right & ~was).sum()), UNKNOWN
+            # What two viewpoints hide from each other is in both.
+            added = before.overlaps - now.overlaps
+            added = added[~np.isnan(added)]
+            if len(added):
+                yield "visible_change_added", float(added.mean()), UNKNOWN
     yield "with_match", float(with_match), UNKNOWN
     yield "places", float(outcomes.num_places), UNKNOWN
     why = now.faults()
