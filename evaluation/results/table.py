@@ -76,7 +76,7 @@ _RANGES = (
         0.0,
         1.0,
     ),
-    (r"visible_change", -1.0, 1.0),
+    (r"visible_change\w*", -1.0, 1.0),
     (
         r"kept\w*|with_match|places|no_\w+|other_city|too_far|elsewhere|lost"
         r"|found|translation_\w+|rotation_\w+|\w+_ms",

@@ -167,6 +167,10 @@ def test_the_numbers_are_those_of_the_single_commands(
             )
     # Stage 01 lacks towers that the query sees.
     assert found["visible_change"] > before["visible_change"]
+    assert found["visible_change_added"] == pytest.approx(
+        found["visible_change"] - before["visible_change"], abs=1e-6
+    )
+    assert before["visible_change_added"] == 0.0
     # Answers of a method are those that its numbers count.
     queries = QueryRows.read(tmp_path / "queries.csv")
     # Two gates, two stages, three methods.
