@@ -8,8 +8,10 @@ import gc
 import os
 import signal
 import sys
+import time
 from types import ModuleType
 
+from _pytest.runner import runtestprotocol
 import pytest
 
 from cns_drake.base.process import look_seldom, num_cores
@@ -38,6 +40,70 @@ _LONGEST = (
 )
 
 
+# Processor time that a quick test may take, without its fixtures [s].
+_BUDGET = 1.0
+# What quick tests do not do: start processes, and read a stage of a city.
+_STARTS = ("subprocess.Popen", "os.fork", "os.posix_spawn")
+_WORLDS = os.path.join(os.path.dirname(os.path.dirname(__file__)), "worlds", "")
+_TAKEN = pytest.StashKey[float]()
+_seen: list[str] = []
+
+
+def _look(event, arguments):
+    """Notes what is done that no quick test may."""
+    if event in _STARTS:
+        _seen.append("starts a process")
+    elif event == "open":
+        path = str(arguments[0])
+        name = os.path.basename(path)
+        if path.startswith(_WORLDS) and name.startswith("stage_"):
+            _seen.append(f"reads {path.removeprefix(_WORLDS)}")
+
+
+sys.addaudithook(_look)
+
+
+@pytest.hookimpl(wrapper=True)
+def pytest_runtest_call(item):
+    started = time.process_time()
+    result = yield
+    item.stash[_TAKEN] = time.process_time() - started
+    return result
+
+
+@pytest.hookimpl(tryfirst=True)
+def pytest_runtest_protocol(item, nextitem):
+    """Fails a quick test that does what only slow ones may.
+
+    One that takes long runs again, and the second run counts: the first test
+    that needs a library loads it, and the first that needs a compiled loop
+    compiles it.
+    """
+    if item.get_closest_marker("slow"):
+        return None
+    where = {"nodeid": item.nodeid, "location": item.location}
+    item.ihook.pytest_runtest_logstart(**where)
+    _seen.clear()
+    for _ in range(2):
+        item.stash[_TAKEN] = 0.0
+        reports = runtestprotocol(item, nextitem=nextitem, log=False)
+        is_long = item.stash[_TAKEN] > _BUDGET
+        has_passed = all(report.passed for report in reports)
+        if not (is_long and has_passed):
+            break
+    if has_passed and (is_long or _seen):
+        taken = f"takes {item.stash[_TAKEN]:.1f} s of processor time"
+        fault = _seen[0] if _seen else taken
+        reports[1].outcome = "failed"
+        reports[
+            1
+        ].longrepr = f"{item.nodeid} {fault}; mark it slow, or make it quicker"
+    for report in reports:
+        item.ihook.pytest_runtest_logreport(report=report)
+    item.ihook.pytest_runtest_logfinish(**where)
+    return True
+
+
 def pytest_xdist_auto_num_workers(config):
     """One more than cores: tests wait for disks, servers and browsers."""
     if "PYTEST_XDIST_AUTO_NUM_WORKERS" in os.environ:
@@ -63,6 +129,9 @@ def pytest_collection_modifyitems(items):
     None of them is then left for one process at the end.
     """
     for item in items:
+        recorded = "short_recording" in item.fixturenames
+        if recorded or hasattr(item.module, "simulate"):
+            item.add_marker("slow")
         if not item.get_closest_marker("slow"):
             item.add_marker("unit")
     slow = {item.path for item in items if item.get_closest_marker("slow")}
@@ -78,10 +147,15 @@ def pytest_collection_finish():
 
 @pytest.fixture(scope="session", autouse=True)
 def cities_of_this_run(tmp_path_factory, pytestconfig):
-    """Lets all processes of a run share the cities, see `shipped_cities`."""
+    """Lets all processes share the cities, also those of later runs.
+
+    See `shipped_cities`. Without pytest's cache they last for one run.
+    """
     folder = tmp_path_factory.getbasetemp()
     if hasattr(pytestconfig, "workerinput"):
         folder = folder.parent
+    if hasattr(pytestconfig, "cache"):
+        folder = pytestconfig.cache.mkdir("cities")
     with pytest.MonkeyPatch.context() as patch:
         patch.setenv("CNS_DRAKE_TEST_CITIES", str(folder))
         yield

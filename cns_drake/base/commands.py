@@ -16,7 +16,7 @@ Jobs = Annotated[
     int | None,
     typer.Option(
         metavar="N",
-        help="Work on this machine, on N jobs side by side; by default one "
+        help="Number of jobs that run at once on this machine; by default one "
         "for each core.",
     ),
 ]
@@ -24,9 +24,9 @@ Scheduler = Annotated[
     str | None,
     typer.Option(
         metavar="ADDRESS",
-        help="Work on the cluster of this Dask scheduler, which shares the "
-        "file system, such as tcp://10.0.0.1:8786; by default "
-        "DASK_SCHEDULER_ADDRESS, if set.",
+        help="Address of a Dask scheduler, such as tcp://10.0.0.1:8786, whose "
+        "cluster runs the jobs. Its machines must share this file system. By "
+        "default the variable DASK_SCHEDULER_ADDRESS, if set.",
     ),
 ]
 SessionSpacing = Annotated[
@@ -34,7 +34,7 @@ SessionSpacing = Annotated[
     typer.Option(
         metavar="METRES",
         min=0.01,
-        help="Distance along the way between two scans of a map.",
+        help="Distance driven between two scans that enter a map [m].",
     ),
 ]
 MethodSettings = Annotated[
@@ -42,16 +42,16 @@ MethodSettings = Annotated[
     typer.Option(
         "--set",
         metavar="METHOD.NAME=VALUE",
-        help="A parameter of a method; may be repeated. Several numbers are"
-        " separated by commas.",
+        help="Setting of a method, such as btc.candidates=20; may be repeated. "
+        "Separate several numbers by commas.",
     ),
 ]
 Costs = Annotated[
     bool,
     typer.Option(
         "--costs/--no-costs",
-        help="Also measure what methods cost in time and memory, which "
-        "differs from run to run.",
+        help="Also measure the time and memory that each method needs. These "
+        "numbers differ from run to run.",
     ),
 ]
 

@@ -41,21 +41,22 @@ def train(
 ) -> None:
     """Train the method learned.
 
-    Cities, their younger stages, effects and drivers are drawn along the
-    streets of Riverside, Suburbia and Downtown. Nothing is recorded. The same
-    command gives the same weights on the same machine. It needs the extra
-    `train` (JAX).
+    The training drives run along the streets of Riverside, Suburbia and
+    Downtown, through cities that are drawn at random, at different stages and
+    with different drivers. They are not recorded. On one machine, the same
+    command always gives the same weights. Needs the optional packages of the
+    extra `train` (JAX).
 
     Args:
-        output: Weights to write; the curve goes to FILE.png, and
-            FILE.npz.training keeps what an interrupted training goes on with.
-        minutes: Sets the number of cities and steps, by about so many minutes
-            of one core. The clock does not matter.
-        cities: Number of cities, if not by --minutes.
-        steps: Number of steps, if not by --minutes.
-        seed: Seed of everything.
-        without: Leave out change between drives, calibrated returns, or drivers
-            who wander; may be repeated.
+        output: File for the weights. The training curve goes to FILE.png;
+            FILE.npz.training lets an interrupted training resume.
+        minutes: Rough computing time on one core, in minutes, from which the
+            numbers of cities and steps follow. No clock stops the training.
+        cities: Number of cities; by default it follows from --minutes.
+        steps: Number of training steps; by default it follows from --minutes.
+        seed: Seed of all random draws.
+        without: Kind of variation to leave out: change between drives,
+            calibrated returns, or the driver's wandering; may be repeated.
     """
     with uninterrupted():
         from cns_drake.base.jobs.cluster import choose_cluster
@@ -93,23 +94,25 @@ def export_pairs(
     jobs: Jobs = None,
     scheduler: Scheduler = None,
 ) -> None:
-    """Export sets of scans for other trainers.
+    """Export training data for other programs.
 
-    Drives are simulated without a recording; positives, negatives and overlaps
-    are exact. After an interruption the same command goes on.
+    Simulates the drives without recording them. Positives, negatives and
+    overlaps are exact. To resume after an interruption, run the same command
+    again.
 
     Args:
-        format: Clouds and pickles of PointNetVLAD; scans with exact overlaps;
-            or only the table of exact overlaps that cns-eval pr
-            --exact-overlaps reads, of a database and a query.
-        output: Folder of the set; created if need be.
-        vary: Export the members of a family, too.
-        held_out: A drive for the evaluation alone, also among the others; may
-            be repeated.
-        spacing: Between two clouds of a drive.
-        scans: Merge N consecutive scans into each cloud, a submap.
-        max_range: Leave out points with a greater x, y or z; by default 50, for
-            the table 100.
+        format: Kind of data to write: pointnetvlad (clouds and pickle files of
+            PointNetVLAD), overlap (scans with exact overlaps) or overlap-table
+            (only the overlaps of a database and a query, for cns-eval pr
+            --exact-overlaps).
+        output: Folder for the data; created if it does not exist.
+        vary: File of a family of drives, whose members are exported as well.
+        held_out: Drive to use only for evaluation, even if it is also named as
+            training data; may be repeated.
+        spacing: Distance driven between two clouds [m].
+        scans: Number of consecutive scans merged into each cloud (a submap).
+        max_range: Largest x, y or z of a point in the LiDAR's frame [m];
+            farther points are left out. By default 50, and 100 for the table.
     """
     with uninterrupted():
         from cns_drake.base.jobs.cluster import choose_cluster
@@ -158,15 +161,19 @@ def map_truth(
     output: Annotated[Path, typer.Option(metavar="DIR")],
     spacing: SessionSpacing = 1.0,
 ) -> None:
-    """Label the maps of two drives by rays.
+    """Label what changed between the maps of two drives.
 
-    A is the older drive and B the newer one, of one place: recordings made by
-    cns-drake, or scenarios, which are simulated. Each point of A's map is kept,
-    gone or unobserved by B; each of B's kept, new or newly seen. The worlds of
-    both drives decide. cns-eval map-update scores labels of others.
+    A is the older and B the newer drive through one place: recordings of
+    cns-drake, or scenarios, which are simulated. Every point of A's map is
+    labelled kept, gone or unobserved by B; every point of B's map kept, new or
+    newly seen. The labels are exact, because rays are cast in the worlds of
+    both drives. To score labels of your own against them, run cns-eval
+    map-update.
 
     Args:
-        output: Folder to write.
+        a: Older drive: a recording, a shipped drive or a scenario file.
+        b: Newer drive, likewise.
+        output: Folder to write; it must not exist yet.
     """
     with uninterrupted():
         from cns_drake.base.files import check_new_folder

@@ -57,23 +57,26 @@ FirstYear = Annotated[
     typer.Option(
         "--years",
         metavar="YEAR ...",
-        help="Years from today, ascending, at most 200; before today where "
-        "buildings have years.",
+        help="Years after today at which stages are made, ascending, at most "
+        "200. Negative years lie before today; they need buildings with "
+        "years of construction.",
     ),
 ]
 
 RateFactor = Annotated[
     float,
     typer.Option(
-        min=0.0, metavar="FACTOR", help="Factor for all yearly rates."
+        min=0.0,
+        metavar="FACTOR",
+        help="Factor by which all yearly rates are multiplied.",
     ),
 ]
 RatesFile = Annotated[
     Path | None,
     typer.Option(
         metavar="FILE.yaml",
-        help="Rates of your own: event: rate a year, from 0 to 1; the others "
-        "keep theirs.",
+        help="File of rates of your own, one event: rate per line, with yearly "
+        "rates from 0 to 1. Events that it leaves out keep their rates.",
     ),
 ]
 
@@ -83,14 +86,14 @@ def list_drives(
         list[Path] | None, typer.Argument(metavar="FOLDER")
     ] = None,
 ) -> None:
-    """List drives and their figures.
+    """List drives with their lengths, times and sizes.
 
-    Shows length and time of each drive, its recorded frames, and the structures
-    and triangles of its stage. A narrow terminal shows fewer columns; a file or
-    pipe gets all of them.
+    The columns are the length and duration of each drive, the frames recorded,
+    and the structures and triangles of its stage. A narrow terminal shows fewer
+    columns; a file or pipe gets all of them.
 
     Args:
-        folders: Folders of your own maps; the shipped ones by default.
+        folders: Folders of maps of your own; by default the shipped maps.
     """
     with uninterrupted():
         from cns_drake.scenarios.drive_table import drive_rows
@@ -164,28 +167,34 @@ def import_city(
     ] = None,
     plain: Annotated[bool, typer.Option("--plain")] = False,
 ) -> None:
-    """Make a map of a real city.
+    """Make a map from data of a real city.
 
-    Writes its stages, two drives along its streets and a picture from above.
+    Writes the stages of the map, two drives along its streets and a picture
+    from above.
 
     Args:
-        source: CityJSON 1.0 to 2.0 (.json), CityJSONSeq (.jsonl), OpenStreetMap
-            (.osm, .pbf), or OpenDRIVE (.xodr).
-        output: Map folder to write; its name is the map's.
-        years: A stage for each year, with the buildings built until then.
-        year_attribute: Attribute that holds the year; a usual name by default.
-        undated: First stage with the buildings that have no year.
-        lod: Level of detail; the highest of each object by default.
-        seed: Seed of the draws of --grow, and of buildings drawn along roads
-            without any (OpenDRIVE).
-        along: CSV file of your own drive, x and y in the map, in place of the
-            two proposed ones.
-        within: Leave out structures farther from the drives, to save memory.
-        drive_on: Side of the street on which cars drive; by default the file's,
-            or else the right.
-        grow: Add a first stage that lacks this share of the buildings, drawn at
-            random, or has them lower; 0.3 without --years.
-        plain: Only the content of the file; draw nothing at random.
+        source: File of the city: CityJSON 1.0 to 2.0 (.json), CityJSONSeq
+            (.jsonl), OpenStreetMap (.osm, .pbf) or OpenDRIVE (.xodr).
+        output: Folder of the map to write; its name becomes the map's name.
+        years: Years of the stages, ascending. Each stage has the buildings
+            built by then.
+        year_attribute: Name of the attribute with the year in which a building
+            was built; by default one of the usual names.
+        undated: Stage in which buildings without a year first stand: the first,
+            the last or never.
+        lod: Level of detail of the buildings; by default each building's
+            highest.
+        seed: Seed of the random draws: the buildings that --grow removes, and
+            those drawn along roads that have none (OpenDRIVE).
+        along: CSV file with the path of a drive of your own, x and y in the map
+            [m], to use instead of the two proposed drives.
+        within: Greatest distance of structures from the drives [m]; farther
+            ones are left out to save memory. By default no limit.
+        drive_on: Side of the street on which cars drive; by default as the file
+            says, or else right.
+        grow: Share of the buildings, drawn at random, that an additional first
+            stage lacks or has lower. By default 0.3 without --years.
+        plain: Use only what the file contains; draw nothing at random.
     """
     # The years that follow the first of --years come as arguments.
     paths = [word for word in source if not word.isdecimal()]
@@ -294,17 +303,17 @@ def city(
     check: Annotated[bool, typer.Option("--check")] = False,
     repair_stages: Annotated[bool, typer.Option("--repair-stages")] = False,
 ) -> None:
-    """Build a city from its roads and plan.
+    """Build the stages of a city from its roads and plan.
 
     Args:
-        folder: Folder with roads.yaml, city.yaml and stages.yaml, and the
-            drives of the city, whose figures are brought up to date.
-        start: First write the missing files besides roads.yaml: a plan with a
-            district for each block, two stages, a drive for each.
-        seed: Seed of --start's draws.
-        check: Write nothing; exit with 1 if a file would change.
+        folder: Folder with roads.yaml, city.yaml and stages.yaml. The lengths
+            and times in its drive files are updated too.
+        start: First write the files that are missing, except roads.yaml: a plan
+            with a district for each block, two stages, and a drive for each.
+        seed: Seed of the plan that --start draws.
+        check: Write nothing, and exit with status 1 if a file would change.
         repair_stages: Update stages.yaml after the plan has grown: structures
-            that have kept their place in structures.csv get their new names.
+            that are still at their place in structures.csv get their new names.
     """
     with uninterrupted():
         from cns_drake.city.generation.generate import (
@@ -358,17 +367,17 @@ def age(
     rates: RatesFile = None,
     pictures: Annotated[bool, typer.Option("--pictures/--no-pictures")] = True,
 ) -> None:
-    """Let a city live for some years.
+    """Simulate years of change in a city.
 
-    Every year each lot, tree and thing meets its rate: buildings are built,
-    torn down and replaced, trees die, lamps and signs move. Writes a map with
-    a stage for today and for each year, its history, the rates that came about,
-    and pictures.
+    Every year, every lot, tree and street object may change, with a given
+    probability: buildings are built, torn down and replaced, trees die, lamps
+    and signs move. Writes a map with a stage for today and one for each year, a
+    table of all events, the rates observed, and pictures.
 
     Args:
-        source: A shipped map by name, or a map's folder.
-        output: Map folder to write; its name is the map's.
-        seed: Seed of everything that happens.
+        source: Name of a shipped map, or folder of a map.
+        output: Folder of the map to write; its name becomes the map's name.
+        seed: Seed of all events.
         pictures: Draw the city from the air and from three streets.
     """
     maps, wanted = maps_and_years(source, years)

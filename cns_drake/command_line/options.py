@@ -6,41 +6,52 @@ from typing import Annotated
 import typer
 
 Output = Annotated[
-    Path, typer.Option(help="Folder for recordings; created if need be.")
+    Path,
+    typer.Option(
+        help="Folder for the recordings; created if it does not exist."
+    ),
 ]
 Results = Annotated[
-    Path, typer.Option(help="Folder for the results; created if need be.")
+    Path,
+    typer.Option(help="Folder for the results; created if it does not exist."),
 ]
 Frames = Annotated[
     int | None,
     typer.Option(
         min=1,
         metavar="N",
-        help="Record only the first N frames (20 a second by default).",
+        help="Number of frames to record, counted from the start of the drive; "
+        "by default 20 frames are a second.",
     ),
 ]
 LIDAR_OPTION = typer.Option(
     metavar="PRESET",
-    help="Replace the LiDAR: cns, os0-128, os1-32, os1-64, os1-128, os1-64-33,"
-    " os1-128-42, vlp-16, hdl-64e, hdl-32e, alpha-prime, hesai-pandar64,"
-    " hesai-pandar-xt32, hokuyo-ust-20lx, mid-70, avia or mid-360.",
+    help="Preset of the LiDAR to simulate: cns, os0-128, os1-32, os1-64,"
+    " os1-128, os1-64-33, os1-128-42, vlp-16, hdl-64e, hdl-32e, alpha-prime,"
+    " hesai-pandar64, hesai-pandar-xt32, hokuyo-ust-20lx, mid-70, avia or"
+    " mid-360.",
 )
 LidarPreset = Annotated[str | None, LIDAR_OPTION]
 Recording = Annotated[
     Path | None,
-    typer.Option(help="Also save a web page of the drive, FILE.html."),
+    typer.Option(
+        help="Web page of the drive to save as well; its name ends in .html."
+    ),
 ]
 Graphviz = Annotated[
-    Path | None, typer.Option(help="Also save the Diagram as Graphviz text.")
+    Path | None,
+    typer.Option(
+        help="File to which to save Drake's Diagram as well, as Graphviz text."
+    ),
 ]
 Overwrite = Annotated[
-    bool, typer.Option("--overwrite", help="Replace an existing recording.")
+    bool, typer.Option("--overwrite", help="Replace existing recordings.")
 ]
 Maps = Annotated[
     list[str] | None,
     typer.Argument(
         metavar="MAP",
-        help="Maps, by name or folder; all shipped ones by default.",
+        help="Names or folders of maps; by default all shipped maps.",
     ),
 ]
 
@@ -48,7 +59,7 @@ Maps = Annotated[
 MethodFiles = Annotated[
     list[Path] | None,
     typer.Option(
-        help="Python file that registers a method to run besides those of "
-        "cns-eval; may be repeated."
+        help="Python file that registers a method of yours, to run in addition "
+        "to the shipped ones; may be repeated."
     ),
 ]

@@ -25,27 +25,33 @@ Kind = Literal["ideal", "calibrated"]
 Returns = Annotated[
     Kind | None,
     typer.Option(
-        help="Ideal returns, or those of the unit's data sheet with noise, "
-        "losses and calibrated reflectivity as intensity."
+        help="Model of the LiDAR's returns: ideal, or calibrated with the "
+        "noise, the lost points and the intensities of the unit's data sheet."
     ),
 ]
 DriveNames = Annotated[
     list[str] | None,
     typer.Argument(
         metavar="NAME",
-        help="Shipped drives or scenario files; all shipped ones by default.",
+        help="Names of shipped drives, or scenario files; by default all "
+        "shipped drives.",
     ),
 ]
 Fog = Annotated[
     float | None,
     typer.Option(
         metavar="METRES",
-        help="Visibility in fog. Weather switches calibrated returns on.",
+        help="Visibility in fog [m]. Any weather turns on calibrated returns.",
     ),
 ]
-Rain = Annotated[float, typer.Option(metavar="MM_H", help="Rate of rain.")]
+Rain = Annotated[
+    float, typer.Option(metavar="MM_H", help="Rate of rain [mm/h].")
+]
 Snowfall = Annotated[
-    float, typer.Option(metavar="MM_H", help="Rate of snowfall, as water.")
+    float,
+    typer.Option(
+        metavar="MM_H", help="Rate of snowfall, as melted water [mm/h]."
+    ),
 ]
 
 
@@ -126,20 +132,23 @@ def simulate(
 ) -> None:
     """Simulate a drive and record it.
 
-    The recording is a rosbag2 folder of MCAP.
+    Writes a rosbag2 folder: an MCAP file and its metadata.
 
     Args:
-        scenario: A shipped drive, or a scenario file of your own.
-        traffic: Numbers of vehicles and of walkers, in place of the scenario's.
-        transient: A passing change and its strength: parked_cars, leaves, snow,
-            scaffolds, works, furniture, roadsides, seed; may be repeated.
-        driver: A driver like those of published drives, who wanders and changes
-            lanes, or one who keeps to the middle of his lane.
-        ride: Put the car on springs, on a road of a class of ISO 8608 from A
-            (new) to E (very poor).
-        imu_rate: Samples of the IMU a second, in place of the scenario's.
-        camera: A camera that looks ahead, of so many pixels, images a second,
-            such as 640x480@2; with depths and classes.
+        scenario: Name of a shipped drive, or a scenario file of your own.
+        traffic: Number of moving vehicles, and also of walkers; by default the
+            scenario's.
+        transient: Temporary changes to the city and their strengths, from
+            parked_cars, leaves, snow, scaffolds, works, furniture, roadsides
+            and seed; may be repeated.
+        driver: Driver of the car: real wanders and changes lanes as drivers of
+            published data sets do; none keeps to the middle of the lane.
+        ride: Class of the road surface after ISO 8608, from A (new) to E (very
+            poor), on which the car moves on its springs; none keeps the car
+            steady.
+        imu_rate: Rate of the IMU [Hz]; by default the scenario's.
+        camera: Size and rate of a camera that looks ahead, in pixels and images
+            a second, such as 640x480@2. It also records depths and classes.
     """
     with uninterrupted():
         from cns_drake.command_line.drive_script import run_drive
@@ -207,15 +216,15 @@ def scan(
         list[Path] | None, typer.Option(metavar="DIR")
     ] = None,
 ) -> None:
-    """Take one scan of any SDF world.
+    """Take one LiDAR scan of an SDF world.
 
     Args:
-        world: Any SDF world.
-        pose: The sensor's pose in the world [m, rad].
-        output: Where to save: .pcd, .bin or .npy.
-        seed: Seed of noise and weather.
-        model_path: Folder to search for model://, before GZ_SIM_RESOURCE_PATH
-            and SDF_PATH; may be repeated.
+        world: SDF file of the world.
+        pose: Pose of the LiDAR in the world [m, rad].
+        output: File for the scan; its name ends in .pcd, .bin or .npy.
+        seed: Seed of the noise and the weather.
+        model_path: Folder in which to look for model:// files, before those of
+            GZ_SIM_RESOURCE_PATH and SDF_PATH; may be repeated.
     """
     with uninterrupted():
         import numpy as np
@@ -264,12 +273,12 @@ def generate(
 ) -> None:
     """Record many drives.
 
-    Finished recordings are skipped; interrupted ones go on where they were.
+    Skips finished recordings and resumes interrupted ones.
 
     Args:
-        vary: Record the members of a family besides the named drives. Their
-            scenario files go to <output>/scenarios, cities of their own to
-            <output>/cities.
+        vary: File of a family of drives, whose members are recorded in addition
+            to the named drives. Their scenario files go to <output>/scenarios,
+            and cities drawn for them to <output>/cities.
     """
     with uninterrupted():
         from cns_drake.base.jobs.cluster import choose_cluster
@@ -302,19 +311,19 @@ def export(
         int | None, typer.Option(metavar="NN", min=0, max=999)
     ] = None,
 ) -> None:
-    """Export a recording to a common layout.
+    """Convert a recording to a common data format.
 
     Args:
-        drive: A recorded folder, or its .mcap file.
-        layout: Layout: CNS data set, KITTI odometry, MulRan, or TUM (the
-            trajectory alone).
-        output: Folder of drives: new, empty, or of earlier exports.
-        sensor: Name of the LiDAR, if there are several.
-        absent_in: Label points on structures that this stage of the map lacks
-            with SemanticKITTI's labels of moving objects (252 to 259); with
+        drive: Folder of a recording, or its .mcap file.
+        layout: Format to write: cns (the CNS data set), kitti (KITTI odometry),
+            mulran (MulRan) or tum (only the trajectory).
+        output: Folder for exported drives: new, empty, or with earlier exports.
+        sensor: Name of the LiDAR to export, if the recording has several.
+        absent_in: Stage of the map. Points on structures that this stage lacks
+            get SemanticKITTI's labels of moving objects (252 to 259). Only with
             kitti.
-        sequence: Number of the drive, sequences/NN; with kitti. By default the
-            digits at the end of its name.
+        sequence: Number of the drive, as in sequences/NN. By default the digits
+            at the end of its name. Only with kitti.
     """
     with uninterrupted():
         from cns_drake.export.exporting import export_drive
@@ -338,11 +347,11 @@ def repair(
     file: Annotated[Path, typer.Argument(metavar="FILE")],
     output: Path | None = None,
 ) -> None:
-    """Save what is readable of an MCAP file.
+    """Recover the readable part of a damaged MCAP file.
 
     Args:
-        file: Any MCAP file, whole or damaged.
-        output: The new file; <name>_repaired.mcap by default.
+        file: MCAP file, whole or damaged.
+        output: File to write; by default <name>_repaired.mcap.
     """
     with uninterrupted():
         from cns_drake.recording.repair import repair_mcap

@@ -28,11 +28,16 @@ def reproduce(
     costs: commands.Costs = True,
     protocol: RetrievalProtocol,
 ) -> None:
-    """Simulate a map, evaluate it and report.
+    """Simulate the drives of maps and report on them.
+
+    Records the drives, evaluates place recognition and change on them, and
+    writes a report.
 
     Args:
-        pages: Also make a web page of each drive; the default without --quick.
-        quick: Only the report: simulate without recording.
+        pages: Also write a web page of each drive. This is the default without
+            --quick.
+        quick: Write only the report; simulate the drives without recording
+            them.
     """
     with uninterrupted():
         from cns_drake.base.jobs.cluster import choose_cluster
@@ -77,25 +82,27 @@ def study(
 ) -> None:
     """Measure what a change costs each method.
 
-    An experiment is a file that says what differs between two drives, that of
-    the database and that of the query; which tasks to measure; and by which
-    methods. The drives are simulated, and not recorded. Writes results.csv (a
-    row a number), queries.csv (a row a query) and a page, index.html. After an
-    interruption the same command goes on where it was.
+    An experiment is a file that says what differs between two drives, the one
+    that makes the database and the one that queries it, which tasks to measure
+    and with which methods. The drives are simulated but not recorded. Writes
+    results.csv (one number per row), queries.csv (one query per row) and a
+    page, index.html. To resume after an interruption, run the same command
+    again.
 
     Args:
-        name: A shipped experiment, or a file of your own.
-        maps: Maps, by name or folder, in place of the experiment's.
-        output: Folder for the results; created if need be.
-        quick: Measure less, as the experiment's section `quick` says.
-        task: Measure only this task: place, pose, localise, map, change or
-            cost; may be repeated.
-        method: Run only this method, by name, or one of your own by its Python
-            file; may be repeated.
-        override: Replace a field of the experiment, nested ones with dots, such
-            as database.years=[0,5]; may be repeated.
-        list_all: List the shipped experiments, and stop.
-        show: Print the experiment's file, ready to copy, and stop.
+        name: Name of a shipped experiment, or an experiment file of your own.
+        maps: Names or folders of maps to use instead of the experiment's.
+        output: Folder for the results; created if it does not exist.
+        quick: Measure less, as the section `quick` of the experiment says.
+        task: Task to measure: place, pose, localise, map, change or cost; by
+            default the experiment's; may be repeated.
+        method: Method to run: the name of a shipped one, or the Python file of
+            your own; by default the experiment's; may be repeated.
+        override: Field of the experiment to replace, such as seeds=[1,2];
+            separate nested names by dots, as in database.years=[0,5]; may be
+            repeated.
+        list_all: List the shipped experiments and stop.
+        show: Print the file of the experiment, to copy and change, and stop.
     """
     with uninterrupted():
         from cns_drake.studies.experiment import (

@@ -117,6 +117,9 @@ class MadeMap(Section):
             experiment.
         sha256: digest of that file.
         grow: share of the imported buildings that the first stage lacks.
+        plain: whether an imported city stays without the windows, roofs and
+            kerbs that its file lacks; else they are drawn, as by
+            `cns-drake import`.
         seed: seed of all draws.
     """
 
@@ -126,6 +129,7 @@ class MadeMap(Section):
     import_file: str | None = Field(default=None, alias="import")
     sha256: str | None = None
     grow: float | None = Field(default=None, ge=0.0, le=1.0)
+    plain: bool = False
     seed: int = Field(ge=0)
 
     @model_validator(mode="after")

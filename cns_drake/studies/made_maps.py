@@ -225,5 +225,7 @@ def made_map_step(
         digest = hashlib.sha256(read_bytes(path)).hexdigest()
         if digest != made.sha256:
             raise InputError(f"{path}: not the file of {made.name}: its sha256")
-    options = ImportOptions(seed=made.seed, grow=made.grow)
+    options = ImportOptions(
+        seed=made.seed, grow=made.grow, dressed=not made.plain
+    )
     return ImportCity(folder, path.resolve(), options)

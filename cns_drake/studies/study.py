@@ -546,7 +546,7 @@ class Study:
         longest = _LONG * workers
         if sum(job.cost for job in jobs.values()) <= longest:
             return
-        left = sum(job.cost for job in jobs.values() if not job.step.is_done())
+        left = sum(job.cost for job in jobs.values() if not _is_done(job))
         if left > longest:
             hours = left / workers / 3600.0
             self.on_note(
@@ -623,6 +623,13 @@ class Study:
     def _protocol_of(self, condition: Condition) -> RetrievalProtocol:
         fields = condition.changes.get("protocol", {})
         return base_protocol(fields, self.source)
+
+
+def _is_done(job: Job) -> bool:
+    try:
+        return job.step.is_done()
+    except InputError:
+        return False  # It needs what another job has yet to write.
 
 
 def _recording(info: RecordingInfo) -> NamedDrive:

@@ -318,6 +318,17 @@ def train(
         weights: Any,
         counts: Any,
     ) -> Any:
+        """Takes one step of Adam; jitted.
+
+        Args:
+            values: weights of the network.
+            first: running means of the gradients.
+            second: running means of their squares.
+            step: number of the step, from 0.
+            images: images of the scans of a batch.
+            weights: targets: how much each pair of scans shows one place.
+            counts: pairs that count.
+        """
         (value, right), slope = jax.value_and_grad(loss, has_aux=True)(
             values, images, weights, counts
         )

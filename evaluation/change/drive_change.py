@@ -20,14 +20,18 @@ from cns_drake.base.json_text import json_number
 from cns_drake.base.progress import Track, silent
 from evaluation.change.tcr import (
     COVERAGE_RADIUS,
+    GRIDS,
+    HULL_MARGIN,
     TAU,
     TemporalChange,
+    counted_together,
     covered,
     temporal_change,
 )
 from evaluation.clouds.cloud_files import is_cloud, read_blocks
 from evaluation.drives import Drive, Placed, check_same_world, open_drive
 from evaluation.maps.voxel_maps import (
+    CELL_SIZE,
     VOXEL_SIZE,
     VoxelAccumulator,
     VoxelMap,
@@ -48,7 +52,8 @@ class Surveyed:
 
     Attributes:
         name: name of the drive or file.
-        voxels: the map on the grid of the TCR.
+        voxels: the map in cells of `CELL_SIZE`, of which the voxels of the
+            TCR are made.
         positions: (N, 3) of the sensor [m]; None for a map file.
         drive: the drive, or its world frame and map; None for a map file.
         notes: notes on how it was read.
@@ -68,7 +73,8 @@ class ChangeReport:
     Attributes:
         source: name of A.
         target: name of B.
-        change: over the whole maps.
+        change: over the whole maps, the points of all grids together.
+        spread: least and greatest TCR_sym of a single grid.
         masked: over the parts that both drives passed within the coverage
             radius; None if a map has no drive.
         control: between two drives on the two routes in one stage; None if
@@ -80,6 +86,7 @@ class ChangeReport:
     source: str
     target: str
     change: TemporalChange
+    spread: tuple[float, float]
     masked: TemporalChange | None
     control: TemporalChange | None
     control_names: tuple[str, str] | None
@@ -96,6 +103,8 @@ class ChangeReport:
             "source": self.source,
             "target": self.target,
             "tcr_sym": json_number(change.symmetric),
+            "tcr_sym_least": json_number(self.spread[0]),
+            "tcr_sym_greatest": json_number(self.spread[1]),
             "tcr_source_to_target": json_number(sides["source"].ratio),
             "tcr_target_to_source": json_number(sides["target"].ratio),
             "in_hull": change.num_in_hull,
@@ -104,7 +113,9 @@ class ChangeReport:
             "in_hull_of": {k: one.num_in_hull for k, one in sides.items()},
             "unchanged_of": {k: one.num_unchanged for k, one in sides.items()},
             "voxel_size": VOXEL_SIZE,
+            "grids": len(GRIDS),
             "tau": TAU,
+            "hull_margin": HULL_MARGIN,
             "coverage_masked": None,
             "control": None,
             "alignment": None,
@@ -182,7 +193,7 @@ def survey_in_one_world(
 
 
 def survey_drive(drive: Drive, voxels: VoxelMap) -> Surveyed:
-    """Returns a drive with its map on the grid of the TCR."""
+    """Returns a drive with its map in cells of the TCR."""
     return Surveyed(
         drive.name, voxels, drive.X_WS[:, :3, 3], drive, drive.notes
     )
@@ -210,32 +221,48 @@ def compare(
     """
     if source.drive is not None and target.drive is not None:
         check_same_world(source.drive, target.drive)
-    change = temporal_change(
-        source.voxels.centroids_W, target.voxels.centroids_W
-    )
+    clouds = _on_grids(source, target)
+    changes = [temporal_change(*pair) for pair in clouds]
+    values = [one.symmetric for one in changes]
     masked = None
     if source.positions is not None and target.positions is not None:
         both = (source.positions, target.positions)
-        masked = change.restricted(
-            covered(source.voxels.centroids_W, both),
-            covered(target.voxels.centroids_W, both),
+        masked = counted_together(
+            [
+                one.restricted(covered(a, both), covered(b, both))
+                for one, (a, b) in zip(changes, clouds, strict=True)
+            ]
         )
     control_change = control_names = None
     if control is not None:
         partner = _same_stage_partner(source, target, control)
-        control_change = temporal_change(
-            control.voxels.centroids_W, partner.voxels.centroids_W
+        control_change = counted_together(
+            [temporal_change(*pair) for pair in _on_grids(control, partner)]
         )
         control_names = (control.name, partner.name)
     return ChangeReport(
         source.name,
         target.name,
-        change,
+        counted_together(changes),
+        (float(np.min(values)), float(np.max(values))),
         masked,
         control_change,
         control_names,
         alignment,
     )
+
+
+def _on_grids(
+    source: Surveyed, target: Surveyed
+) -> list[tuple[np.ndarray, np.ndarray]]:
+    """Returns the voxel centroids of both maps on each grid [m]."""
+    return [
+        (
+            source.voxels.merged(shift=shift).centroids_W,
+            target.voxels.merged(shift=shift).centroids_W,
+        )
+        for shift in GRIDS
+    ]
 
 
 def open_source(
@@ -256,9 +283,9 @@ def _survey(
     source: Drive | Path, track: Track, columns: int | None = None
 ) -> Surveyed:
     if isinstance(source, Drive):
-        voxels = map_drive(source, VOXEL_SIZE, track)
+        voxels = map_drive(source, CELL_SIZE, track)
         return survey_drive(source, voxels)
-    accumulator = VoxelAccumulator(VOXEL_SIZE)
+    accumulator = VoxelAccumulator(CELL_SIZE)
     notes: list[str] = []
     for points in read_blocks(source, columns, notes.append):
         accumulator.add(points)

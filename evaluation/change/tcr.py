@@ -5,6 +5,11 @@ are open in the paper.
 
 - X is the map of a whole drive in world coordinates, as the centroids of
   the voxels of a grid that is fixed in the world (see `evaluation.maps`).
+- The place of that grid alone moves TCR_sym by up to 0.04. The sets of
+  `GRIDS`, which are spread evenly over a voxel, are therefore counted
+  together.
+- The hull is wider by `HULL_MARGIN` to all sides. Flat ground is a face of
+  the hull, so that a millimetre would decide whether it counts.
 - O, the unchanged points, is counted inside H, the points in the other map's
   convex hull; otherwise the ratio could become negative.
 - The two united sets are of different clouds. The union is a concatenation:
@@ -13,15 +18,31 @@ are open in the paper.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Sequence
+from dataclasses import dataclass, fields
 import math
 
 import numpy as np
 from scipy.spatial import ConvexHull, QhullError, cKDTree
 
+from evaluation.maps.voxel_maps import VOXEL_SIZE
+
 # Tolerance of the boundary and of flatness, relative to the extent of the
 # cloud. Without it, rounding would put the hull's own corners outside.
 _TOLERANCE = 1e-9
+# Points so far outside of a hull count as in it [m]: a tenth of a voxel.
+HULL_MARGIN = 0.5
+# Shifts of the grid [m]: the points of a lattice of rank 1, each of whose
+# coordinates are evenly spaced.
+_NUM_GRIDS = 16
+GRIDS = tuple(
+    (
+        VOXEL_SIZE * (k + 0.5) / _NUM_GRIDS,
+        VOXEL_SIZE * (5 * k % _NUM_GRIDS + 0.5) / _NUM_GRIDS,
+        VOXEL_SIZE * (7 * k % _NUM_GRIDS + 0.5) / _NUM_GRIDS,
+    )
+    for k in range(_NUM_GRIDS)
+)
 # The distances of so many points to all facets stay in the cache.
 _CHUNK = 1 << 8
 # Distance up to which a point has a counterpart in the other map [m].
@@ -30,7 +51,9 @@ TAU = 4.5
 COVERAGE_RADIUS = 40.0
 
 
-def in_convex_hull(points: np.ndarray, vertices: np.ndarray) -> np.ndarray:
+def in_convex_hull(
+    points: np.ndarray, vertices: np.ndarray, margin: float = 0.0
+) -> np.ndarray:
     """Returns which points lie in the convex hull, boundary included.
 
     Clouds without volume have a hull as well: a polygon in its plane, a
@@ -40,6 +63,7 @@ def in_convex_hull(points: np.ndarray, vertices: np.ndarray) -> np.ndarray:
     Args:
         points: (N, 3) float64.
         vertices: (M, 3) float64, the points whose hull it is.
+        margin: by which each face of the hull is moved outwards [m].
 
     Returns:
         (N,) bool; all false if there are no vertices.
@@ -55,6 +79,7 @@ def in_convex_hull(points: np.ndarray, vertices: np.ndarray) -> np.ndarray:
     axes = np.linalg.svd(hull.T @ hull)[2]
     spread = np.ptp(hull @ axes.T, axis=0)
     rank = int(np.count_nonzero(spread > 2.0 * tolerance))
+    tolerance += margin
     while rank > 1:
         try:
             facets = ConvexHull(hull @ axes[:rank].T).equations
@@ -207,6 +232,7 @@ def temporal_change(
     target: np.ndarray,
     *,
     tau: float = TAU,
+    margin: float = HULL_MARGIN,
     restrict_to_hull: bool = True,
 ) -> TemporalChange:
     """Compares two maps.
@@ -215,6 +241,7 @@ def temporal_change(
         source: (N, 3) float64 voxel centroids, in the frame of both [m].
         target: (M, 3) float64.
         tau: distance up to which a point is unchanged, inclusive [m].
+        margin: of the hulls, see `in_convex_hull` [m].
         restrict_to_hull: whether O is counted inside H. False is the literal
             equation 2, under which values may be negative.
 
@@ -233,8 +260,25 @@ def temporal_change(
         if not np.isfinite(points).all():
             raise ValueError("a coordinate of the map is not finite")
     return TemporalChange(
-        _directed(source, target, tau, restrict_to_hull),
-        _directed(target, source, tau, restrict_to_hull),
+        _directed(source, target, tau, margin, restrict_to_hull),
+        _directed(target, source, tau, margin, restrict_to_hull),
+    )
+
+
+def counted_together(changes: Sequence[TemporalChange]) -> TemporalChange:
+    """Returns the change with the points of all, which are at least one."""
+
+    def joined(sides: Sequence[DirectedChange]) -> DirectedChange:
+        return DirectedChange(
+            *(
+                np.concatenate([getattr(one, name.name) for one in sides])
+                for name in fields(DirectedChange)
+            )
+        )
+
+    return TemporalChange(
+        joined([one.source_to_target for one in changes]),
+        joined([one.target_to_source for one in changes]),
     )
 
 
@@ -270,9 +314,13 @@ def covered(
 
 
 def _directed(
-    source: np.ndarray, target: np.ndarray, tau: float, restrict: bool
+    source: np.ndarray,
+    target: np.ndarray,
+    tau: float,
+    margin: float,
+    restrict: bool,
 ) -> DirectedChange:
-    in_hull = in_convex_hull(source, target)
+    in_hull = in_convex_hull(source, target, margin)
     if len(source) and len(target):
         centre = target.mean(axis=0)
         distances, _ = cKDTree(target - centre).query(source - centre)

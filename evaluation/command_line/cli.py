@@ -65,15 +65,18 @@ def tcr(
     columns: options.Columns = None,
     json: options.Json = False,
 ) -> None:
-    """Measure change between drives or maps.
+    """Measure how much changed between two drives or maps.
 
     A and B are recorded drives (MCAP, MulRan, HeLiPR, NCLT, Boreas, KITTI
-    odometry, CNS) or maps (.pcd .ply .npy .bin). A is the source and B the
-    target of the directed ratios. Drives in different world frames are aligned.
+    odometry, CNS) or maps (.pcd .ply .npy .bin). The directed ratios take A as
+    source and B as target. Drives in different world frames are aligned first.
 
     Args:
-        control: A recording of A's route in B's stage, or of B's route in A's
-            stage. It gives the TCR_sym that the routes alone cause.
+        source: Drive or map before the change.
+        target: Drive or map after the change.
+        control: Recording of A's route in B's stage, or of B's route in A's
+            stage. It measures how much TCR_sym the different routes alone
+            cause.
     """
     from evaluation.change import drive_change as change
 
@@ -139,28 +142,32 @@ def pr(
     *,
     protocol: RetrievalProtocol,
 ) -> None:
-    """Recognise the places of another drive.
+    """Measure place recognition between two drives.
 
-    Measures how well the scans of QUERY find their place in DATABASE. Both are
-    recorded drives (MCAP, MulRan, HeLiPR, NCLT, Boreas, KITTI odometry, CNS).
-    Drives in different world frames are aligned.
+    Measures how well a method finds the places of QUERY's scans in DATABASE.
+    Both are recorded drives (MCAP, MulRan, HeLiPR, NCLT, Boreas, KITTI
+    odometry, CNS). Drives in different world frames are aligned first.
 
     Args:
-        mode: Count all queries, or those that have a match.
-        across_maps: Allow drives of maps with different names, such as another
-            draw of a city along the same streets.
-        truth: Definition of a match: a place within the radius, or one whose
-            scan shows at least this part of the query's scan.
-        overlaps: Write the overlap of each query with each place.
-        exact_overlaps: Read exact overlaps from this table, which cns-drake
-            export-pairs writes; by default they are found from the scans.
-        turn_queries: Turn each query by a random yaw, or not; by default as
-            the protocol has it.
-        tilt_queries: Tilt each query by a random roll and pitch of up to this,
-            likewise.
-        hide_sector: Hide a random sector of this angle from each query, as a
-            truck beside it would.
-        seed: Seed of the changes of queries.
+        database: Drive whose places are known.
+        query: Drive whose scans are to be recognised.
+        mode: Which queries count: all, or only those that have a match
+            (filtered).
+        across_maps: Allow drives through maps with different names, such as
+            another city drawn along the same streets.
+        truth: What counts as a match: a place within the radius, or a place
+            whose scan shows at least this part of the query's scan.
+        overlaps: File to which to write the overlap of each query with each
+            place.
+        exact_overlaps: Table of exact overlaps to read, from cns-drake
+            export-pairs; by default overlaps are estimated from the scans.
+        turn_queries: Turn each query by a random yaw; by default as --protocol
+            says.
+        tilt_queries: Largest random roll and pitch by which each query is
+            tilted [deg]; by default as --protocol says.
+        hide_sector: Angle of a random sector that is hidden from each query
+            [deg], as by a truck beside the car.
+        seed: Seed of the random turns, tilts and hidden sectors.
     """
     from cns_drake.base import files
     from cns_drake.base.errors import InputError
@@ -258,20 +265,20 @@ def scores(
     radius: float = DEFAULT_PROTOCOL.radius,
     columns: options.Columns = None,
 ) -> None:
-    """Score all pairs of scans of two folders.
+    """Score every pair of scans from two folders.
 
     Scans are .bin, .pcd, .npy or .ply files. Every query is compared with every
-    place; searches that only save time are left out. An empty score means that
-    the place is no candidate.
+    place: searches that only save time are skipped. An empty score means that
+    the method does not consider the place a candidate.
 
     Args:
-        database: Folder of single scans.
-        query: Folder of single scans.
+        database: Folder of the scans of places, one file each.
+        query: Folder of the scans of queries, one file each.
         output: CSV file to write.
-        gate: Reject, among the best places of a query, those that are beyond
-            the radius by the method's own pose; for methods that estimate
+        gate: Reject top-ranked places that lie beyond the radius according to
+            the method's own pose estimate. Only for methods that estimate
             poses.
-        radius: A place is a match within this distance [m].
+        radius: Greatest distance between a query and its match [m].
     """
     from evaluation.recognition import scan_folders
 
@@ -320,13 +327,14 @@ def report(
     *,
     protocol: RetrievalProtocol,
 ) -> None:
-    """Report on all recordings in a folder.
+    """Evaluate all recordings in a folder and write a report.
 
-    Writes tables, figures and report.html. After an interruption the same
-    command goes on where it was.
+    Writes tables, figures and report.html. To resume after an interruption, run
+    the same command again.
 
     Args:
-        output: Folder to write.
+        recordings: Folder of the recordings.
+        output: Folder for the report.
     """
     from cns_drake.base.jobs.cluster import choose_cluster
     from evaluation.paper import reference_for
@@ -360,20 +368,21 @@ def compare(
     rankings: Annotated[bool, typer.Option("--rankings")] = False,
     json: options.Json = False,
 ) -> None:
-    """Rank the methods of tables of results.
+    """Rank the methods in tables of results.
 
     RESULTS are files like results.csv, or folders that hold one. Their methods
-    are ranked beside those that ship, by means over the conditions that all
-    tables have, with 95 % intervals. Where methods have a queries.csv beside
-    them, their differences have p-values. Kendall's tau says how far two tables
-    rank alike.
+    are ranked together with the shipped ones, by the mean over the conditions
+    that all tables share, with 95 % intervals. Differences between methods get
+    p-values if a queries.csv lies next to each table. Kendall's tau measures
+    how similarly two tables rank the methods.
 
     Args:
-        metric: Column metric of the rows to compare.
-        protocol: Compare only rows by this protocol.
-        gate: Compare rows with the gate, instead of those without.
-        rankings: Only compare the rankings, each of its own conditions, as
-            those of simulated and of real drives.
+        tables: Tables of results, or folders with a results.csv.
+        metric: Metric to rank by, as in the column metric of the tables.
+        protocol: Protocol whose rows to compare; by default all protocols.
+        gate: Compare the rows with the gate instead of those without.
+        rankings: Compare only the rankings, each over its own conditions, such
+            as those of simulated and of real drives.
     """
     from evaluation.results import comparing
 
@@ -456,6 +465,7 @@ def _change_rows(report: ChangeReport) -> Iterator[tuple[str, str]]:
     source, target = report.source, report.target
     yield "pair", f"{source} <-> {target}"
     yield "TCR_sym", number(change.symmetric)
+    yield "  on single grids", " to ".join(map(number, report.spread))
     if change.undefined_because:
         yield "  because", change.undefined_because
     for names, side in (

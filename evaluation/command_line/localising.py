@@ -17,8 +17,7 @@ def localise(
         str,
         typer.Option(
             "--method",
-            metavar="icp|plane-icp|gicp|vgicp|robust-plane-icp|robust-gicp"
-            "|kiss-matcher|FILE.py",
+            metavar="NAME|FILE.py",
         ),
     ],
     start: float = 0.5,
@@ -38,22 +37,30 @@ def localise(
     """Localise scans in a map.
 
     MAP and QUERY are drives (MCAP, MulRan, HeLiPR, NCLT, Boreas, KITTI
-    odometry, CNS) or clouds (.pcd .ply .npy .bin). The map is made of a drive's
-    scans at their true poses. A cloud as QUERY is one scan at the origin of the
-    map. Each scan is aligned from its true pose, moved by --start in a random
-    direction and turned by --start-turn about a random axis.
+    odometry, CNS) or point clouds (.pcd .ply .npy .bin). A drive becomes a map
+    by placing its scans at their true poses. A cloud as QUERY is one scan at
+    the origin of the map. Each scan is aligned to the map from a start near its
+    true pose, moved by --start in a random direction and turned by --start-turn
+    about a random axis.
 
     Args:
-        method: Estimator; a Python file holds one's own function.
-        start: Distance of a start from the truth [m].
-        start_turn: Angle of a start to the truth [deg].
-        seed: Seed of the starts.
-        query_spacing: Distance between two queries along the path [m].
-        follow: Follow the whole drive, each scan from the end of the last.
-        odometry_drift: Drift of the odometry of --track: part of the way, and
-            as many degrees for each metre.
-        output: Write results by query, localisation.csv, and with --track a
-            picture.
+        place: Drive or cloud that makes the map.
+        query: Drive or cloud whose scans are localised.
+        method: Registration method: icp, plane-icp, gicp, vgicp,
+            robust-plane-icp, robust-gicp or kiss-matcher; or a Python file with
+            a function of your own.
+        start: Distance of each start from the true pose [m].
+        start_turn: Angle by which each start is turned from the true pose
+            [deg].
+        seed: Seed of the random starts.
+        query_spacing: Distance driven between two queries [m].
+        follow: Track the whole drive: each scan starts from the estimated pose
+            of the one before.
+        odometry_drift: Drift of the odometry that --track uses, as a share of
+            the distance driven; the heading drifts by as many degrees per
+            metre.
+        output: Folder for the result of each query, localisation.csv, and with
+            --track a picture.
     """
     import math
 

@@ -31,19 +31,21 @@ def map_update(
     output: Annotated[Path | None, typer.Option(metavar="FOLDER")] = None,
     json: Json = False,
 ) -> None:
-    """Score what a map must forget and learn.
+    """Score labels of what changed between two maps.
 
-    DIR is a folder of cns-drake map-truth, or one with the same files for real
-    drives: A/map.ply, A/truth.npy, B/map.ply, B/truth.npy, and scans and poses
-    for a baseline; 255 in a truth leaves a point out. Scores the labels of a
-    file, or those of a baseline.
+    DIR is a folder that cns-drake map-truth wrote, or one with the same files
+    for real drives: A/map.ply, A/truth.npy, B/map.ply and B/truth.npy; a
+    baseline also needs scans and poses. Points with the truth 255 are ignored.
+    Scores either labels from files or those of a baseline.
 
     Args:
-        baseline: Score this one; free-space without labels.
-        labels_a: Labels of A's map: 0 unobserved, 1 kept, 2 gone (.npy, or .ply
-            with a property prediction).
-        labels_b: Labels of B's map: 1 kept, 3 new, 4 newly seen.
-        output: Write the baseline's labels, A and B.
+        folder: Folder with the maps and their true labels.
+        baseline: Change detector to score; by default free-space, if no labels
+            are given.
+        labels_a: File of labels of A's map: 0 unobserved, 1 kept, 2 gone (.npy,
+            or .ply with a property prediction).
+        labels_b: File of labels of B's map: 1 kept, 3 new, 4 newly seen.
+        output: Folder for the baseline's labels of A and B.
     """
     from cns_drake.base.errors import InputError
     from cns_drake.base.files import make_folder
@@ -88,13 +90,16 @@ def map_sessions(
     lidar: LidarName = None,
     columns: Columns = None,
 ) -> None:
-    """Make the maps of two recorded drives.
+    """Make maps of two recorded drives, without labels.
 
-    Writes maps, scans and poses as cns-drake map-truth does, but no labels: for
-    drives whose world is not known, such as real ones. Both are in one world.
+    Writes the maps, scans and poses that cns-drake map-truth writes, but no
+    labels. Use it for drives whose world is unknown, such as real ones. Both
+    drives must be in one world frame.
 
     Args:
-        output: Folder to write.
+        a: Older drive.
+        b: Newer drive.
+        output: Folder for both maps.
     """
     from cns_drake.base.drives.drive import check_same_world
     from cns_drake.base.files import draft_folder

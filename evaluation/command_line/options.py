@@ -21,15 +21,19 @@ When = Literal["auto", "always", "never"]
 Align = Annotated[
     When,
     typer.Option(
-        help="Align drives: those whose world frames differ, all, or none."
+        help="Which drives to align to one world: auto aligns those whose "
+        "world frames differ."
     ),
 ]
-Json = Annotated[bool, typer.Option("--json", help="Print one JSON object.")]
+Json = Annotated[
+    bool, typer.Option("--json", help="Print the results as one JSON object.")
+]
 MethodName = Annotated[
     str,
     typer.Option(
         "--method",
-        help="Place-recognition method, or a Python file that registers one.",
+        help="Name of a place-recognition method, or a Python file that "
+        "registers one.",
     ),
 ]
 Parameters = Annotated[
@@ -37,8 +41,8 @@ Parameters = Annotated[
     typer.Option(
         "--set",
         metavar="NAME=VALUE",
-        help="A parameter of the method; may be repeated. Several numbers"
-        " are separated by commas.",
+        help="Setting of the method, such as candidates=20; may be repeated. "
+        "Separate several numbers by commas.",
     ),
 ]
 SensorHeight = Annotated[
@@ -49,8 +53,8 @@ LidarName = Annotated[
     typer.Option(
         "--lidar",
         metavar="NAME",
-        help="LiDAR to read, of recordings with several: its topic is "
-        "/NAME/points.",
+        help="Name of the LiDAR to read, if a recording has several; its topic "
+        "is /NAME/points.",
     ),
 ]
 Columns = Annotated[
@@ -59,15 +63,15 @@ Columns = Annotated[
         "--columns",
         metavar="N",
         min=3,  # x, y, z
-        help="Number of float32 of a point in .bin files, x y z first; by "
-        "default as their values show.",
+        help="Number of float32 values per point in .bin files, x y z first; "
+        "by default it is guessed from the values.",
     ),
 ]
 OwnMethods = Annotated[
     list[Path] | None,
     typer.Option(
-        help="Method to run besides the shipped ones: a Python file that "
-        "registers it, map-closures, probe, svt-net or dpa-net; may be "
+        help="Method to run in addition to the standard ones: map-closures, "
+        "probe, svt-net, dpa-net, or a Python file that registers one; may be "
         "repeated."
     ),
 ]

@@ -14,19 +14,21 @@ def real(
     method: list[str] | None = None,
     simulated: Annotated[Path | None, typer.Option(metavar="DIR")] = None,
 ) -> None:
-    """Measure on real scans what a study measures.
+    """Measure place recognition and registration on real scans.
 
-    DIR holds excerpts of public data sets, each in a folder of its name, as the
+    DIR holds excerpts of public data sets, each in a folder named as the
     documentation lists them: KITTI 00 and its revisits, nuScenes 1072, Newer
-    College, NCLT and HeLiPR. Those that are missing are named and skipped.
-    Writes results.csv and queries.csv, which compare reads.
+    College, NCLT and HeLiPR. Missing data sets are named and skipped. Writes
+    results.csv and queries.csv, which cns-eval compare reads.
 
     Args:
-        output: Folder to write.
-        method: Run only this method or estimator, by name, or a method of your
-            own by its Python file; may be repeated.
-        simulated: Folder of recordings. Those of the same LiDAR add places, and
-            a classifier tells the real scans from them.
+        folder: Folder with the excerpts.
+        output: Folder for the results.
+        method: Method or estimator to run: the name of a shipped one, or the
+            Python file of your own; by default all; may be repeated.
+        simulated: Folder of simulated recordings. Those of the same LiDAR add
+            places to the database, and a classifier is trained to tell them
+            from the real scans.
     """
     from cns_drake.base.files import make_folder
     from evaluation.real.measuring import Measuring

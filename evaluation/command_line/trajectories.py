@@ -24,11 +24,15 @@ def drives(
     columns: options.Columns = None,
     json: options.Json = False,
 ) -> None:
-    """Compare the ways of two drives.
+    """Compare the paths of two drives.
 
-    Offsets, lanes, headings, heights and stops of B at a stop of A every 5 m,
-    beside those of two pairs of real drives along one route (Boreas, 28 days
-    apart; KAIST 01 and 02 of MulRan).
+    Takes a point of A every 5 m and measures how B passes it: offset, lane,
+    heading, height and stops. The same figures are shown for two pairs of real
+    drives along one route (Boreas, 28 days apart; KAIST 01 and 02 of MulRan).
+
+    Args:
+        first: Recorded drive.
+        second: Recorded drive along the same streets.
     """
     from evaluation.drives.comparison import compare_drives
 
@@ -48,16 +52,18 @@ def trajectory(
     columns: options.Columns = None,
     json: options.Json = False,
 ) -> None:
-    """Measure the errors of a trajectory.
+    """Measure the errors of an estimated trajectory.
 
-    They are those of evo and KITTI. The estimate is a TUM file: seconds, x y z,
-    and a quaternion x y z w. Prints ATE, the root mean square of its distances
-    from DRIVE after rigid alignment, and drift, the error of its motion over
-    100 m of path.
+    The estimate is a TUM file: time [s], x y z and a quaternion x y z w. Prints
+    the errors as evo and KITTI define them: ATE, the root mean square of the
+    distances from DRIVE after rigid alignment, and drift, the error of the
+    motion over 100 m of path.
 
     Args:
+        drive: Recorded drive with the true trajectory.
+        estimate: File of the estimated trajectory.
         frame: Frame whose poses are estimated: the LiDAR's or the vehicle's.
-        time_offset: Time to add to that of the estimate [s].
+        time_offset: Time to add to the times of the estimate [s].
     """
     from evaluation.alignment.trajectory_errors import trajectory_errors
     from evaluation.drives.text_tables import read_tum

@@ -2,7 +2,7 @@
 
 IoU of a class is that of the points that have it by truth and by prediction,
 in both maps together: `unobserved` includes what B sees newly. A class that
-neither has is left out of the mean, `miou`.
+the truth lacks is left out of the mean, `miou`.
 
 Precision and recall of gone (in A) and new (in B) are those of points; within
 0.2 m and 0.5 m, a point is right if a point of the other set lies that near;
@@ -109,7 +109,7 @@ def _of_points(both: _Labelled) -> dict[str, float]:
     # By truth and by prediction.
     table = cells.reshape(size, size)
     right, true, found = np.diag(table), table.sum(axis=1), table.sum(axis=0)
-    known = (true + found) > 0
+    known = true > 0
     result = {"miou": math.nan}
     for k, name in enumerate(_CLASSES):
         union = true[k] + found[k] - right[k]

@@ -6,6 +6,8 @@ starts at z = -2.5 m, so that ground at z = 0 is in the middle of a 5 m voxel. A
 voxel is represented by the centroid of its points.
 """
 
+from __future__ import annotations
+
 from dataclasses import dataclass
 
 import numpy as np
@@ -34,6 +36,9 @@ SLOT = np.dtype(
 FARTHEST = 2.0**31
 VOXEL_SIZE = 5.0
 Z_ORIGIN = -2.5
+_ORIGIN = (0.0, 0.0, Z_ORIGIN)
+# Length of the cells of which larger voxels, on any grid, are made [m].
+CELL_SIZE = 1.0
 
 # Number of points in a batch; the table grows between batches.
 _BATCH = 1 << 15
@@ -176,6 +181,7 @@ class VoxelMap:
         counts: (V,) int64 points in each voxel.
         voxel_size: length of a voxel's side [m].
         num_ignored: number of points left out as not finite.
+        origin_W: a corner of voxel (0, 0, 0) [m].
 
     Example:
         from evaluation import map_drive, open_drive
@@ -189,6 +195,7 @@ class VoxelMap:
     counts: np.ndarray
     voxel_size: float
     num_ignored: int = 0
+    origin_W: tuple[float, float, float] = _ORIGIN
 
     def __len__(self) -> int:
         return len(self.counts)
@@ -196,7 +203,44 @@ class VoxelMap:
     @property
     def centres_W(self) -> np.ndarray:
         """(V, 3) middle of each voxel [m]."""
-        return _corners(self.indices, self.voxel_size) + 0.5 * self.voxel_size
+        corners = _corners(self.indices, self.voxel_size, self.origin_W)
+        return corners + 0.5 * self.voxel_size
+
+    def merged(
+        self,
+        voxel_size: float = VOXEL_SIZE,
+        shift: tuple[float, float, float] = (0.0, 0.0, 0.0),
+    ) -> VoxelMap:
+        """Returns the map on a grid of larger voxels.
+
+        A voxel belongs to the larger one that holds its centroid.
+
+        Args:
+            voxel_size: length of the larger ones' side [m].
+            shift: of their grid [m].
+        """
+        x, y, z = np.add(self.origin_W, shift).tolist()
+        origin = x, y, z
+        found = np.floor((self.centroids_W - origin) / voxel_size)
+        order = np.lexsort(found.T[::-1])
+        indices = found[order].astype(np.int32)
+        is_first = np.ones(len(order), bool)
+        is_first[1:] = (np.diff(indices, axis=0) != 0).any(axis=1)
+        rows = np.cumsum(is_first) - 1
+        counts = np.zeros(int(is_first.sum()), np.int64)
+        np.add.at(counts, rows, self.counts[order])
+        corners = _corners(indices, voxel_size, origin)
+        sums = np.zeros((len(counts), 3))
+        offsets = self.centroids_W[order] - corners
+        np.add.at(sums, rows, offsets * self.counts[order, None])
+        return VoxelMap(
+            indices[is_first],
+            corners[is_first] + sums / counts[:, None],
+            counts,
+            voxel_size,
+            self.num_ignored,
+            origin,
+        )
 
     def find(self, points_W: np.ndarray) -> np.ndarray:
         """Returns the voxels of points (N, 3) [m].
@@ -206,7 +250,7 @@ class VoxelMap:
         """
         if len(self) == 0 or len(points_W) == 0:
             return np.full(len(points_W), -1)
-        lifted = points_W - np.array([0.0, 0.0, Z_ORIGIN])
+        lifted = points_W - np.array(self.origin_W)
         wanted = np.floor(lifted / self.voxel_size).astype(np.int64)
         # Both become numbers with the order of rows of indices.
         low, high = self.indices.min(axis=0), self.indices.max(axis=0)
@@ -377,8 +421,12 @@ def map_drive(
     return accumulator.to_map()
 
 
-def _corners(indices: np.ndarray, voxel_size: float) -> np.ndarray:
-    return np.array([0.0, 0.0, Z_ORIGIN]) + indices * voxel_size
+def _corners(
+    indices: np.ndarray,
+    voxel_size: float,
+    origin_W: tuple[float, float, float] = _ORIGIN,
+) -> np.ndarray:
+    return np.array(origin_W) + indices * voxel_size
 
 
 def thin(points: np.ndarray, voxel_size: float) -> np.ndarray:

@@ -253,8 +253,8 @@ def _token_attention(weights: Weights, x: np.ndarray) -> np.ndarray:
     q, k, p = (x @ weights[f"att_token.{s}_conv.kernel"] for s in "qkp")
     tokens = softmax(k, axis=0).T @ q
     values, keys, queries = (
-        _linear(weights, f"att_token.conv{s}", tokens)
-        for s in ("values", "keys", "quries")
+        _linear(weights, f"att_token.{s}", tokens)
+        for s in ("convvalues", "convkeys", "convquries")
     )
     mixed = softmax(keys @ queries.T, axis=1) @ values
     tokens = tokens + _linear(weights, "att_token.embedding1", mixed)

@@ -18,8 +18,9 @@ _NAMED: Options = {
             Literal["fair", "paper", "recorded"],
             typer.Option(
                 "--protocol",
-                help="Queries turned and tilted at random, as the paper asked "
-                "them, or as recorded.",
+                help="How queries are made: fair turns and tilts them at "
+                "random, paper follows the paper's protocol, recorded leaves "
+                "the scans as recorded.",
             ),
         ],
         "fair",
@@ -32,44 +33,45 @@ _FIELDS: Options = {
             "radius",
             float,
             DEFAULT_PROTOCOL.radius,
-            "A place is a match within this distance [m].",
+            "Greatest distance between a query and its match [m].",
             None,
         ),
         (
             "query_spacing",
             float,
             DEFAULT_PROTOCOL.query_spacing,
-            "Distance between two queries along the path [m].",
+            "Distance driven between two queries [m].",
             None,
         ),
         (
             "place_spacing",
             float,
             DEFAULT_PROTOCOL.place_spacing,
-            "Distance between two places of the database [m].",
+            "Distance driven between two places of the database [m].",
             None,
         ),
         (
             "max_range",
             float,
             DEFAULT_PROTOCOL.max_range,
-            "Leave out points farther than this along an axis [m].",
+            "Largest x, y or z of a point in the LiDAR's frame [m]; farther "
+            "points are left out.",
             None,
         ),
         (
             "scans_per_place",
             int | None,
             None,
-            "Merge N scans for every method; by default each method has its "
-            "own number.",
+            "Number of consecutive scans that are merged into one, for every "
+            "method; by default each method's own number.",
             "N",
         ),
         (
             "exclude_recent",
             float | None,
             None,
-            "Loop closure: each drive is also its own database, with places it "
-            "passed at least S seconds before.",
+            "Least time since a drive passed a place of its own [s], for loop "
+            "closure: each drive is then compared with itself, too.",
             "S",
         ),
     )
@@ -80,9 +82,9 @@ _GATE: Options = {
             bool,
             typer.Option(
                 "--gate",
-                help="Reject, among the best places of a query, those that are "
-                "beyond the radius by the method's own pose; for methods that "
-                "estimate poses.",
+                help="Reject top-ranked places that lie beyond the radius "
+                "according to the method's own pose estimate. Only for methods "
+                "that estimate poses.",
             ),
         ],
         False,

@@ -19,7 +19,12 @@ from scipy.ndimage import maximum_filter
 from scipy.spatial import cKDTree
 
 from evaluation.change.drive_change import ChangeResult
-from evaluation.change.tcr import TAU, in_convex_hull
+from evaluation.change.tcr import (
+    HULL_MARGIN,
+    TAU,
+    in_convex_hull,
+    temporal_change,
+)
 from evaluation.maps.voxel_maps import VoxelMap
 from evaluation.results.drawing import PIXELS, Legend, plain, save, unit
 
@@ -124,7 +129,7 @@ def judge_points(
     # A distance beyond the bound only counts as far away, so the search stops
     # there.
     distances, _ = cKDTree(other).query(points, distance_upper_bound=2.0 * tau)
-    return distances > tau, in_convex_hull(points, other)
+    return distances > tau, in_convex_hull(points, other, HULL_MARGIN)
 
 
 def top_view(points: np.ndarray, positions: np.ndarray) -> Picture:
@@ -150,7 +155,15 @@ def draw_routes(
     routes: Sequence[np.ndarray],
     stem: Path,
 ) -> None:
-    """Draws routes (M, 3) [m] over views from above, red to blue."""
+    """Draws routes over views from above, from red to blue, and saves them.
+
+    Args:
+        map_name: name of the map, for the titles.
+        stages: stage of each view.
+        views: picture of each stage from above.
+        routes: (M, 3) positions in W along the route through each stage [m].
+        stem: path of the files without the ending.
+    """
     _draw_panels(
         [f"{map_name} {stage}" for stage in stages],
         views,
@@ -174,10 +187,10 @@ def draw_change(
     without a counterpart in the other map. It is pale where the point lies
     outside the other map's hull: the other drive may not have passed there, and
     the TCR does not count the point. The second shows the sets H and O in both
-    orders and united; a point has the colour of its voxel.
+    orders and united; a point has the colour of its voxel on one of the grids.
 
-    The clouds (K, 3) in W [m], and the maps on the grid of the TCR, are those
-    of the earlier and of the later stage.
+    The clouds (K, 3) in W [m], and the maps on that grid, are those of the
+    earlier and of the later stage.
     """
     titles, pictures = [], []
     for one, other in ((0, 1), (1, 0)):
@@ -214,8 +227,10 @@ def _draw_sets(
 ) -> None:
     change = result.report.change
     sides = (change.source_to_target, change.target_to_source)
+    shown = temporal_change(*(one.centroids_W for one in maps))
+    labels = (shown.source_to_target, shown.target_to_source)
     colours = []
-    for cloud, coarse, side in zip(clouds, maps, sides, strict=True):
+    for cloud, coarse, side in zip(clouds, maps, labels, strict=True):
         rgb = np.full((len(coarse), 3), _OUTSIDE_H, dtype=np.uint8)
         rgb[side.in_hull] = _ONLY_IN_H
         rgb[side.unchanged] = _IN_O

@@ -85,8 +85,12 @@ def make_drive(
 ) -> PageDrive:
     """Returns a drive as the page shows it.
 
-    X_WS (N, 4, 4) are the poses of the sensor at all frames. K of the frames
-    are places or queries, with K reduced scans.
+    Args:
+        name: name of the drive.
+        view: picture of its stage from above.
+        X_WS: (N, 4, 4) poses of the LiDAR at all frames.
+        frames: numbers of the K frames that are places or queries.
+        thumbnails: K reduced scans, one for each of these frames.
     """
     positions = X_WS[:, :3, 3]
     stream = io.BytesIO()
@@ -115,8 +119,15 @@ def browser_data(
     """Returns what the query browser reads, ready for JSON.
 
     The maps from above are not included; the browser takes them from the
-    pictures that `evaluation.report.page.route_picture` makes. Drives without a
-    page, and pairs (database, query) without evidence, may be left out.
+    pictures that `evaluation.report.page.route_picture` makes.
+
+    Args:
+        recognitions: results of methods on pairs of drives.
+        drives: name of a drive -> what the page shows of it.
+        changes: map, database and query -> change between the drives.
+        pages: name of a drive -> its web page; some may be absent.
+        evidence: names of database and query -> why queries went wrong; some
+            may be absent.
     """
     pairs: dict[tuple, list[RecognitionResult]] = {}
     for result in recognitions:

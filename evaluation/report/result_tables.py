@@ -108,6 +108,8 @@ def change_table(
             "unchanged": lambda r: r.report.change.num_unchanged,
             "visible change": lambda r: visible(r)[0],
             "queries": lambda r: visible(r)[1],
+            "least of the grids": lambda r: r.report.spread[0],
+            "greatest": lambda r: r.report.spread[1],
         },
         CAPTIONS["change"],
     )
@@ -167,8 +169,15 @@ def recognition_table(
 ) -> Table:
     """Returns Table II: a row for each pair, some columns for each method.
 
-    F1 is only in the form that is compared with the reference. Without a mode,
-    each method is counted in that which the reference used for it.
+    F1 is only in the form that is compared with the reference.
+
+    Args:
+        results: results of one protocol.
+        changes: change between the drives of each pair.
+        mode: which queries count; by default those that the reference counts
+            for each method.
+        reference: published results to compare with.
+        evidence: names of a database and a query -> why queries went wrong.
 
     Raises:
         InputError: results of two protocols.

@@ -44,9 +44,14 @@ def explain_faults(
     results: tuple[Part, ...],
     protocol: RetrievalProtocol,
 ) -> PairEvidence | None:
-    """Returns the evidence of two drives; None if a drive closes no loop.
+    """Returns why queries of a pair went wrong; None if a drive closes no loop.
 
-    The database and the query are each a `KeptDrive`.
+    Args:
+        reporter: reports progress.
+        drives: database and query, each a `KeptDrive`.
+        methods: methods of the results.
+        results: result of each method on the pair.
+        protocol: protocol of the results.
     """
     found = []
     for choice, part in zip(methods, results, strict=True):
@@ -66,7 +71,14 @@ def find_evidence(
     protocol: RetrievalProtocol,
     track: Track = silent,
 ) -> PairEvidence:
-    """Compares the scans of queries, of their matches and of wrong answers.
+    """Compares the scans of queries with those of matches and wrong places.
+
+    Args:
+        database: drive of the places.
+        query: drive whose scans asked.
+        results: results of methods on this pair.
+        protocol: protocol of the results.
+        track: reports progress.
 
     Raises:
         InputError: a scan cannot be read.

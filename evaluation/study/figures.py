@@ -57,7 +57,7 @@ def draw_changes(
     figures.draw_change(
         change.read(),
         (earlier[1].read(), later[1].read()),
-        (earlier[0].read().coarse, later[0].read().coarse),
+        (earlier[0].read().coarse.merged(), later[0].read().coarse.merged()),
         stems,
     )
 

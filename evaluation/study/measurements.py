@@ -54,6 +54,14 @@ def recognise_places(
     """Returns the result of a method on two drives of one world.
 
     It is None if a drive is compared with itself and closes no loop.
+
+    Args:
+        reporter: reports progress.
+        map_name: name of the map.
+        stages: stages of the database and of the query.
+        described: descriptions of the database and of the query.
+        choice: the method.
+        protocol: protocol of the comparison.
     """
     # The method comes first, because it registers the type of its
     # descriptions.
@@ -79,9 +87,15 @@ def measure_costs(
     described: tuple[tuple[Part, Part], ...],
     protocol: RetrievalProtocol,
 ) -> list[Cost]:
-    """Returns the cost of each method, measured on one core.
+    """Returns the time and memory that each method needs on one core.
 
-    Each method described a database and the query drive.
+    Args:
+        reporter: reports progress.
+        source: opens the query drive.
+        surveyed: survey of the query drive, with its poses.
+        methods: the methods.
+        described: descriptions of a database and the query, by each method.
+        protocol: protocol of the comparison.
     """
     drive, known = source(), surveyed.read()
     # A recording would be unpacked as a whole for its poses.

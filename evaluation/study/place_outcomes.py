@@ -47,9 +47,17 @@ def measure_places(
 ) -> list[PlaceOutcome]:
     """Returns two outcomes of each method, without the gate and with it.
 
-    The drives are in one world. A number of places of distractors, described
-    drives through other cities, is added to the database. A method that would
-    take over an hour for all queries has no outcome.
+    A method that would take over an hour for all queries has no outcome.
+
+    Args:
+        reporter: reports progress.
+        database: described drive of the places.
+        query: described drive in the same world, whose scans ask.
+        distractors: described drives through other cities, one part for each
+            method.
+        num_distractors: number of their places that are added to the database.
+        methods: the methods.
+        protocol: the protocol of the comparison.
     """
     place_scans, places = _describe(
         database, "places", methods, protocol, reporter

@@ -23,15 +23,15 @@ from evaluation.drives import Drive, PlacedDrive, open_drive
 from evaluation.drives.drive_views import RecentScans
 from evaluation.drives.sampling import cropped, within_range
 from evaluation.maps.thumbnails import thumbnail
-from evaluation.maps.voxel_maps import VOXEL_SIZE, VoxelAccumulator, VoxelMap
+from evaluation.maps.voxel_maps import CELL_SIZE, VoxelAccumulator, VoxelMap
 from evaluation.methods import Method, MethodConfig
 from evaluation.recognition import description
 from evaluation.recognition.protocol import FAIR_PROTOCOL, RetrievalProtocol
 from evaluation.study.chosen_methods import MethodChoice
 from evaluation.study.parts import Part, SurveyFiles
 
-# Divisions of a voxel's side for pictures, with a point in each 0.5 m.
-PICTURE_DIVISIONS = 10
+# Divisions of a cell's side for pictures, with a point in each 0.5 m.
+PICTURE_DIVISIONS = 2
 # A method, and what it describes of a drive by a second protocol.
 Further: TypeAlias = (
     "tuple[MethodChoice, frozenset[description.Role], RetrievalProtocol]"
@@ -49,7 +49,7 @@ class MappedDrive(RecentScans):
 
     def __init__(self, drive: Drive, kept: int):
         super().__init__(drive, kept)
-        self._accumulator = VoxelAccumulator(VOXEL_SIZE, PICTURE_DIVISIONS)
+        self._accumulator = VoxelAccumulator(CELL_SIZE, PICTURE_DIVISIONS)
         self._num_mapped = 0
 
     def scan(self, index: int) -> np.ndarray:
@@ -61,8 +61,8 @@ class MappedDrive(RecentScans):
         """Reads the scans that have not been read yet.
 
         Returns:
-            The map of all scans on the grid of the TCR, as `map_drive`
-            makes it; a finer cloud of them for pictures (K, 3) in W [m].
+            The map of all scans in cells of the TCR, as `map_drive` makes
+            it of that size; a finer cloud of them for pictures (K, 3) in W [m].
         """
         left = range(self._num_mapped, len(self))
         for _ in track(left, f"mapping {self.name}", len(left)):
@@ -148,7 +148,7 @@ class RecordedDrive:
 
 @dataclass(frozen=True)
 class SurveyedDrive:
-    """A drive with its map on the grid of the TCR.
+    """A drive with its map in cells of the TCR.
 
     There are N stamps (N,) int64, and poses (N, 4, 4) of the sensor. K frames,
     increasing, are places or queries, and have reduced scans (see
@@ -237,9 +237,21 @@ def survey_recording(
 ) -> RecordingSurvey:
     """Maps a recording and describes its places and queries.
 
-    Each scan is read once, in order; without a map, only those of places and
-    queries, which are kept if asked. The drive may have no role; there are then
-    no further descriptions, which are by another protocol.
+    Each scan is read once, in order.
+
+    Args:
+        recording: the drive.
+        roles: whether it makes a database, asks queries, or both; it may have
+            no role.
+        methods: methods that describe it.
+        protocol: protocol of the descriptions.
+        track: reports progress.
+        with_scans: whether to keep the scans of places and queries.
+        with_map: whether to make a map; without one, only the scans of places
+            and queries are read.
+        further: descriptions by other protocols; none without a role.
+        keys: names of the descriptions, those of `methods` first; by default
+            made from the names of the methods.
 
     Raises:
         InputError: if it cannot be read, or holds no point.

@@ -6,6 +6,7 @@ import re
 
 from helpers import documents
 from mcap.reader import make_reader
+import pytest
 import typer
 import yaml
 
@@ -110,6 +111,7 @@ def test_examples_of_options_that_multiply_families():
     assert set(family.lidars) <= LIDAR_PRESETS.keys()
 
 
+@pytest.mark.slow
 def test_only_uses_of_lots_end_from_stage_to_stage():
     """As the glossary and the page on cities have it."""
     ended = []
@@ -130,6 +132,7 @@ def test_only_uses_of_lots_end_from_stage_to_stage():
     assert [name for name in ended if "_lot_" not in name] == []
 
 
+@pytest.mark.slow
 def test_the_tutorial_names_the_colours_that_its_page_shows():
     folder = map_folder(load_scenario("riverside_01"))
     here, last = (read_parts(load_world(folder.stage(n))) for n in ("01", "02"))

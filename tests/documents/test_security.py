@@ -57,6 +57,7 @@ def test_an_array_of_objects_is_not_unpickled(tmp_path):
     assert (tmp_path / "ran").exists()
 
 
+@pytest.mark.slow
 def test_a_mesh_reader_that_crashes_is_a_fault(tmp_path, monkeypatch):
     (tmp_path / "crashing.py").write_text("import os\nos.abort()\n")
     monkeypatch.setattr(foreign_meshes, "__name__", "crashing")

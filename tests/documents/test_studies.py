@@ -17,6 +17,7 @@ from cns_drake.studies.experiment import (
     shipped_experiments,
 )
 from cns_drake.studies.study import TASKS
+from evaluation.localisation import localise
 from evaluation.recognition import place_outcome
 from evaluation.recognition.protocol import RetrievalProtocol
 from evaluation.results.table import Answers, QueryRows, Results, Row
@@ -109,6 +110,7 @@ def test_metrics_are_those_of_the_tasks():
     }
     for name in ("place", "pose"):
         tasks[name] += inspect.getsource(place_outcome)
+    tasks["localise"] += inspect.getsource(localise)
     task = ""
     for row in documents.table(PAGE, "| task | metric | meaning |"):
         task = (codes(row[0]) or [task])[0]

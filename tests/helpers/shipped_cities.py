@@ -3,6 +3,7 @@
 from dataclasses import dataclass
 import fcntl
 from functools import cache
+import hashlib
 import os
 from pathlib import Path
 import pickle
@@ -12,6 +13,7 @@ from pydrake.geometry import Role, SceneGraph
 from pydrake.multibody.parsing import Parser
 from pydrake.multibody.plant import MultibodyPlant
 
+from cns_drake.base.jobs.fingerprint import code_digest, fingerprint
 from cns_drake.city.generation.city_structures import City, make_city
 from cns_drake.city.geometry.structures import Structure, part_triangles
 from cns_drake.city.ground.streets import GROUND_TAG
@@ -51,8 +53,20 @@ def world_of(name: str) -> Path:
 
 @cache
 def city(name: str) -> City:
-    """Returns the generated city; the first process makes it."""
-    file = Path(os.environ["CNS_DRAKE_TEST_CITIES"]) / f"{name}.pickle"
+    """Returns the generated city; the first process makes it.
+
+    It is kept until the code or the files change that it is made of.
+    """
+    inputs = {
+        path.name: hashlib.sha256(path.read_bytes()).hexdigest()
+        for path in sorted(world_of(name).glob("*.yaml"))
+    }
+    inputs["code"] = code_digest(make_city.__module__)
+    folder = Path(os.environ["CNS_DRAKE_TEST_CITIES"])
+    file = folder / f"{name}_{fingerprint(inputs)}.pickle"
+    for other in folder.glob(f"{name}_*.pickle"):
+        if other != file:
+            other.unlink(missing_ok=True)
     # The file is opened without truncation, for processes that wait.
     with file.open("a+b") as stream:
         fcntl.flock(stream, fcntl.LOCK_EX)

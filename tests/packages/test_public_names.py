@@ -39,6 +39,7 @@ def private_imports(code):
     return found
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("package", PACKAGES)
 def test_importing_a_package_loads_nothing_heavy(package):
     code = f"import {package}, sys; print(*sys.modules)"
@@ -49,6 +50,7 @@ def test_importing_a_package_loads_nothing_heavy(package):
     assert {"numpy", "pydrake", "pydantic", "typer"}.isdisjoint(loaded)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("module", "slow"),
     [

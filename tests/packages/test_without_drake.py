@@ -4,6 +4,8 @@ from pathlib import Path
 import subprocess
 import sys
 
+import pytest
+
 ROOT = Path(__file__).parents[2]
 # Finds no pydrake, and imports every module of the packages that follow.
 IMPORT_ALL = """
@@ -32,6 +34,7 @@ def import_all(*packages):
     )
 
 
+@pytest.mark.slow
 def test_cities_roads_and_imports_need_no_drake():
     packages = ("city", "imports", "roads")
     done = import_all(*(f"cns_drake.{name}" for name in packages))
@@ -40,6 +43,7 @@ def test_cities_roads_and_imports_need_no_drake():
     assert found == set(packages)
 
 
+@pytest.mark.slow
 def test_drake_is_really_absent():
     done = import_all("cns_drake.scene")
     assert done.returncode != 0

@@ -256,7 +256,16 @@ class Assembly:
         count: int,
         rgb: Rgb | None = None,
     ) -> None:
-        """Adds a mesh and places it `count` times, one above another."""
+        """Adds a mesh and places it several times, one above another.
+
+        Args:
+            part: stem of the visuals' names.
+            mesh: the mesh in the building's frame [m].
+            z0: height of the lowest copy [m].
+            step: distance between two copies [m].
+            count: number of copies.
+            rgb: colour; by default the building's.
+        """
         shape = MeshShape(self.define(part, mesh))
         for k in range(count):
             z = z0 + k * step
@@ -277,7 +286,15 @@ class Assembly:
         yaw: float = 0.0,
         rgb: Rgb | None = None,
     ) -> None:
-        """Places a shape as one visual."""
+        """Places a shape as one visual.
+
+        Args:
+            part: name of the visual.
+            shape: the shape.
+            xyz: its position in the building's frame [m].
+            yaw: its heading [rad].
+            rgb: colour; by default the building's.
+        """
         x, y, z = (round(float(v), 3) for v in xyz)
         rpy = (0.0, 0.0, round(float(yaw), 5))
         self.parts.append(Part(part, shape, (x, y, z), rpy, rgb or self.rgb))

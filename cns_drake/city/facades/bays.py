@@ -88,7 +88,18 @@ def arched(
     rise: float | None = None,
     pier: float = 0.3,
 ) -> Bay:
-    """A round-headed recess; a half circle unless `rise` flattens it."""
+    """Returns a bay with a round-headed recess in its middle.
+
+    The head is a half circle unless `rise` flattens it.
+
+    Args:
+        width: width of the recess, less if the bay is too narrow [m].
+        bottom: height of its foot above the wall's [m].
+        spring: height at which the arch begins [m].
+        depth: how far it lies behind the wall [m].
+        rise: height of the arch; by default half the width [m].
+        pier: least width of wall on each side [m].
+    """
 
     def bay(x0: float, x1: float) -> list[Relief]:
         a, b = _centred(x0, x1, min(width, x1 - x0 - 2 * pier))
@@ -108,7 +119,17 @@ def shop_front(
     pier: float = 0.3,
     door: bool = True,
 ) -> Bay:
-    """A shop: glass up to `head` over a low riser, and a recessed door."""
+    """Returns a bay with a shop front: glass over a low riser, and a door.
+
+    The door is recessed. Bays without 1.6 m of room stay plain.
+
+    Args:
+        head: top of the glass above the wall's foot [m].
+        depth: how far the glass lies behind the wall [m].
+        riser: height of the riser below the glass [m].
+        pier: width of wall on each side [m].
+        door: whether there is a door; else a post divides the glass.
+    """
 
     def bay(x0: float, x1: float) -> list[Relief]:
         a, b = _centred(x0, x1, x1 - x0 - 2 * pier)
@@ -190,7 +211,15 @@ def gate(width: float, height: float, depth: float = 0.3) -> Bay:
 def loggia(
     width: float, depth: float, rail: float, head: float, *, pier: float = 0.15
 ) -> Bay:
-    """A room-wide balcony inside the wall, behind a solid rail."""
+    """Returns a bay with a balcony inside the wall, behind a solid rail.
+
+    Args:
+        width: width of the balcony, less if the bay is too narrow [m].
+        depth: how far its back lies behind the wall [m].
+        rail: top of the rail above the wall's foot [m].
+        head: top of the opening, likewise [m].
+        pier: least width of wall on each side [m].
+    """
 
     def bay(x0: float, x1: float) -> list[Relief]:
         a, b = _centred(x0, x1, min(width, x1 - x0 - 2 * pier))

@@ -79,7 +79,17 @@ def front_canopy(
 
 
 def awning(x0: float, x1: float, reach: float, z0: float, z1: float) -> Mesh:
-    """A sloped shop awning with a hanging front edge, z1 at the wall."""
+    """Returns a sloped shop awning with a hanging front edge.
+
+    Coordinates are those of the wall: x along it, y out of it.
+
+    Args:
+        x0: left end [m].
+        x1: right end [m].
+        reach: how far it reaches out of the wall [m].
+        z0: lower edge of the front [m].
+        z1: height at the wall [m].
+    """
     lip = 0.25
     profile = [(0.0, z1), (reach, z0 + lip), (reach, z0), (0.0, z1 - 0.12)]
     vertices = [(x, y, z) for x in (x0, x1) for y, z in profile]
@@ -97,11 +107,16 @@ def awnings(
     shape: tuple[float, float, float, float],
     door: float = -math.inf,
 ) -> list[Mesh]:
-    """Awnings above a share of the shops along a wall.
+    """Returns awnings above a share of the shops along a wall.
 
-    The shape is how much narrower than its shop an awning is on either side,
-    its reach, lower and upper edge; within `door` of the wall's middle are none
-    [m].
+    Args:
+        wall: the wall.
+        cells: start and end of each shop along the wall [m].
+        rng: draws which shops have one.
+        share: probability that a shop has one.
+        shape: how much narrower than its shop an awning is on either side, its
+            reach, its lower and its upper edge [m].
+        door: distance from the wall's middle within which shops have none [m].
     """
     narrower, reach, z0, z1 = shape
     middle, pieces = wall.length / 2, []
@@ -116,7 +131,17 @@ def awnings(
 def balcony(
     x0: float, x1: float, reach: float, z: float, rail: float = 1.05
 ) -> Mesh:
-    """A slab with a solid balustrade on its three free sides."""
+    """Returns a slab with a solid balustrade on its three free sides.
+
+    Coordinates are those of the wall: x along it, y out of it.
+
+    Args:
+        x0: left end [m].
+        x1: right end [m].
+        reach: how far it reaches out of the wall [m].
+        z: height of its floor [m].
+        rail: height of the balustrade above the floor [m].
+    """
     t, low, high = 0.12, z - 0.2, z + rail
     outer = [(x0, 0.0), (x0, reach), (x1, reach), (x1, 0.0)]
     inner = [(x0 + t, 0.0), (x0 + t, reach - t)]
@@ -145,12 +170,21 @@ def piers(
     entrance: float = 0.0,
     skip: Collection[int] = (),
 ) -> Mesh:
-    """Upright fins or pilasters along all walls of an outline.
+    """Returns upright fins or pilasters along all walls of an outline.
 
-    They stand about `pitch` apart, reach out of the wall, and go into it by
-    `depth`, past recessed glass. The outermost ones have their middle `margin`
-    from the ends; a width of `entrance` in the middle of the front stays free
-    [m]. Edges to `skip` get none.
+    Args:
+        outline: (N, 2) corners of the walls in the building's frame,
+            anticlockwise [m].
+        pitch: distance between two of them, about [m].
+        width: width of each [m].
+        reach: how far they reach out of the wall [m].
+        z0: height of their feet [m].
+        z1: height of their tops [m].
+        depth: how far they go into the wall, past recessed glass [m].
+        margin: distance of the outermost ones' middles from the wall's ends
+            [m].
+        entrance: width in the middle of the front that stays free [m].
+        skip: edges of the outline that get none.
     """
     pieces = []
     for edge in range(len(np.asarray(outline))):
@@ -183,9 +217,19 @@ def pilasters(
     z1: float,
     skip: Collection[int] = (),
 ) -> Mesh:
-    """Pilasters between the bays that `bays.rhythm` gives these walls.
+    """Returns pilasters between the bays that `bays.rhythm` lays out.
 
-    There is one each `every` bays, none on edges to `skip`.
+    Args:
+        outline: (N, 2) corners of the walls in the building's frame,
+            anticlockwise [m].
+        pitch: width of a bay, as of `bays.rhythm` [m].
+        margin: distance of the bays from corners, likewise [m].
+        every: number of bays from one pilaster to the next.
+        width: width of a pilaster [m].
+        reach: how far it reaches out of the wall [m].
+        z0: height of its foot [m].
+        z1: height of its top [m].
+        skip: edges of the outline that get none.
     """
     pieces = []
     for edge in range(len(np.asarray(outline))):
@@ -207,10 +251,17 @@ def corner_piers(
     z1: float,
     skip: Collection[int] = (),
 ) -> Mesh:
-    """Angled piers around the convex corners of an outline.
+    """Returns angled piers around the convex corners of an outline.
 
-    Each flank is `width` long, reaches out of the walls, and goes into them by
-    `depth`, past recessed glass [m]. Corners of edges to `skip` get none.
+    Args:
+        outline: (N, 2) corners of the walls in the building's frame,
+            anticlockwise [m].
+        width: length of each flank [m].
+        reach: how far they reach out of the walls [m].
+        depth: how far they go into the walls, past recessed glass [m].
+        z0: height of their feet [m].
+        z1: height of their tops [m].
+        skip: edges whose corners get none.
     """
     outline = np.asarray(outline, dtype=float)
     outer = massing.inset(outline, -reach)
@@ -253,7 +304,17 @@ def _pier(
 
 
 def steps(x0: float, x1: float, reach: float, rise: float, count: int) -> Mesh:
-    """Entrance steps: `count` treads from y = reach up to the wall."""
+    """Returns entrance steps that rise towards a wall.
+
+    Coordinates are those of the wall: x along it, y out of it.
+
+    Args:
+        x0: left end [m].
+        x1: right end [m].
+        reach: distance of the lowest step from the wall [m].
+        rise: height of the top step [m].
+        count: number of treads.
+    """
     pieces = []
     for k in range(count):
         y = reach * (count - k) / count
@@ -263,7 +324,15 @@ def steps(x0: float, x1: float, reach: float, rise: float, count: int) -> Mesh:
 
 
 def column(x: float, y: float, z0: float, z1: float, radius: float) -> Mesh:
-    """A round column with base and capital, in the building's frame."""
+    """Returns a round column with base and capital.
+
+    Args:
+        x: x of its axis in the building's frame [m].
+        y: y of its axis in the building's frame [m].
+        z0: height of its foot [m].
+        z1: height of its top [m].
+        radius: radius of the shaft at its foot [m].
+    """
     shaft = massing.regular_polygon(radius, 10, (x, y))
     top = massing.regular_polygon(0.85 * radius, 10, (x, y))
     r = 1.25 * radius
@@ -308,11 +377,22 @@ def add_porch(
     roof: str = "shed",
     posts: int = 2,
 ) -> None:
-    """Adds a roofed porch in front of a wall, as `trim` and `roof`.
+    """Adds a roofed porch in front of a wall.
 
-    The roof is `shed`, `gable` (a pediment over all of it) or `flat`, and ends
-    0.25 m further out than the `reach` of the posts, at least 2. `deck` is the
-    height of the floor, `eaves` of the underside of the beam on the posts [m].
+    Its materials are `trim` and `roof`. The roof ends 0.25 m further out than
+    the posts.
+
+    Args:
+        out: the building under assembly, which gets the parts.
+        wall: the wall.
+        x0: left end along the wall [m].
+        x1: right end along the wall [m].
+        reach: how far the posts stand from the wall [m].
+        deck: height of the floor [m].
+        eaves: height of the underside of the beam on the posts [m].
+        top: height of the top of the roof [m].
+        roof: `shed`, `gable` (a pediment over all of it) or `flat`.
+        posts: number of posts, at least 2.
     """
     pieces = [massing.box(x0, x1, -0.05, reach, -massing.FOUNDATION_M, deck)]
     y, half = reach - 0.15, _POST_M / 2
@@ -343,7 +423,19 @@ def add_steps(
     rise: float,
     room: float = 9.0,
 ) -> None:
-    """Adds steps, as `base`, down from y = start within `room` metres."""
+    """Adds steps that lead down and away from a wall.
+
+    Their material is `base`.
+
+    Args:
+        out: the building under assembly, which gets the parts.
+        wall: the wall.
+        x0: left end along the wall [m].
+        x1: right end along the wall [m].
+        start: distance of the top step from the wall [m].
+        rise: height of the top step [m].
+        room: greatest length of the flight [m].
+    """
     count = max(1, round(rise / 0.17))
     run = min(0.29 * count, room)
     if run > 0.05 and rise > 0.05:
@@ -376,7 +468,14 @@ def add_railing(
 ) -> None:
     """Places the shared panel of railing between two points of a wall.
 
-    The points are in the wall's coordinates, the floor at z [m].
+    Args:
+        out: the building under assembly, which gets the parts.
+        part: name of the visual.
+        wall: the wall.
+        start: first point, along and out of the wall [m].
+        end: last point, likewise [m].
+        z: height of the floor [m].
+        rgb: colour.
     """
     p, q = wall.point(*start), wall.point(*end)
     length = float(np.hypot(*(q - p)))
@@ -401,11 +500,21 @@ def add_bay_window(
     storeys: int = 1,
     canted: bool = True,
 ) -> None:
-    """Adds a bay window, on the ground (z0 = 0) or hung on the wall.
+    """Adds a bay window, on the ground or hung on the wall.
 
-    It has a row of windows for each of the `storeys` between z0 and z1, and
-    slanted sides if it is `canted`, else it is a box. It becomes `glass`,
-    `roof` and `walls`.
+    It has a row of windows for each storey, and becomes `glass`, `roof` and
+    `walls`.
+
+    Args:
+        out: the building under assembly, which gets the parts.
+        wall: the wall.
+        x: middle of the window along the wall [m].
+        width: width along the wall [m].
+        reach: how far it reaches out of the wall [m].
+        z0: height of its foot; 0 stands it on the ground [m].
+        z1: height of its top [m].
+        storeys: number of storeys between foot and top.
+        canted: whether its sides are slanted; else it is a box.
     """
     a, b = x - width / 2, x + width / 2
     if canted:
@@ -453,7 +562,15 @@ def add_bay_window(
 def chimney_breast(
     wall: WallFrame, x: float, width: float, reach: float, top: float
 ) -> Mesh:
-    """A chimney up a wall, slimmer above its shoulders."""
+    """Returns a chimney up a wall, slimmer above its shoulders.
+
+    Args:
+        wall: the wall.
+        x: middle of the chimney along the wall [m].
+        width: width at the foot [m].
+        reach: how far it reaches out of the wall [m].
+        top: height of its top [m].
+    """
     a, b = x - width / 2, x + width / 2
     neck = 0.62 * width / 2
     shoulder = 0.5 * top
@@ -513,7 +630,15 @@ def _ring(r: walls.Relief, width: float, reach: float) -> Mesh:
 
 
 def board(x0: float, x1: float, z0: float, z1: float, reach: float) -> Mesh:
-    """A board on a wall, without its back, in wall coordinates."""
+    """Returns a board on a wall, without its back, in wall coordinates.
+
+    Args:
+        x0: left end along the wall [m].
+        x1: right end along the wall [m].
+        z0: lower height [m].
+        z1: upper height [m].
+        reach: thickness out of the wall [m].
+    """
     v = [(x, y, z) for y in (0.0, reach) for z in (z0, z1) for x in (x0, x1)]
     faces = ((4, 6, 7, 5), (0, 4, 5, 1), (2, 3, 7, 6),
              (0, 2, 6, 4), (1, 5, 7, 3))  # fmt: skip

@@ -339,7 +339,15 @@ def standing(*limits: float, bottom: bool = False) -> Mesh:
 def post(
     x: float, y: float, half: float, z1: float, z0: float = -FOUNDATION_M
 ) -> Mesh:
-    """Returns a square post about (x, y), its foot out of sight [m]."""
+    """Returns a square post whose foot is out of sight below the ground.
+
+    Args:
+        x: x of its middle in the building's frame [m].
+        y: y of its middle in the building's frame [m].
+        half: half its side [m].
+        z1: height of its top [m].
+        z0: height of its foot [m].
+    """
     return box(x - half, x + half, y - half, y + half, z0, z1, bottom=False)
 
 
@@ -390,9 +398,16 @@ def _replaced(
 def stadium(
     x0: float, y0: float, x1: float, y1: float, step: float = 3.0
 ) -> np.ndarray:
-    """A rectangle, longer along x, whose short ends are half circles.
+    """Returns (N, 2) the outline of a rectangle whose short ends are arcs [m].
 
-    The longest chord of the half circles is `step` [m].
+    The rectangle is longer along x, and its ends are half circles.
+
+    Args:
+        x0: left end [m].
+        y0: front [m].
+        x1: right end [m].
+        y1: back [m].
+        step: longest chord of the half circles [m].
     """
     radius, middle = (y1 - y0) / 2, (y0 + y1) / 2
     count = max(2, math.ceil(math.pi * radius / step))
@@ -407,7 +422,18 @@ def stadium(
 def u_shape(
     x0: float, y0: float, x1: float, y1: float, wing: float, back: float
 ) -> np.ndarray:
-    """A court open to the back: wings left and right of it, front closed."""
+    """Returns (8, 2) the outline of a building with a court open to the back.
+
+    Its wings are left and right of the court [m].
+
+    Args:
+        x0: left end [m].
+        y0: front [m].
+        x1: right end [m].
+        y1: back [m].
+        wing: width of each wing [m].
+        back: depth of the front range [m].
+    """
     a, b, c = x0 + wing, x1 - wing, y0 + back
     xs = (x0, x1, x1, b, b, a, a, x0)
     return np.column_stack([xs, (y0, y0, y1, y1, c, c, y1, y1)])
@@ -416,7 +442,16 @@ def u_shape(
 def l_shape(
     x0: float, y0: float, x1: float, y1: float, wing: float, back: float
 ) -> np.ndarray:
-    """A front range and one wing on the left."""
+    """Returns (6, 2) the outline of a front range with a wing on the left [m].
+
+    Args:
+        x0: left end [m].
+        y0: front [m].
+        x1: right end [m].
+        y1: back [m].
+        wing: width of the wing [m].
+        back: depth of the front range [m].
+    """
     a, c = x0 + wing, y0 + back
     return np.column_stack([(x0, x1, x1, a, a, x0), (y0, y0, c, c, y1, y1)])
 

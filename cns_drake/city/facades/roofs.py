@@ -26,9 +26,14 @@ _INTO_ROOF = 0.03
 def gable_line(
     a: float, b: float, z: float, top: float, ridge: float = 0.5
 ) -> list[tuple[float, float]]:
-    """Two slopes over a..b from z to the ridge at `top`.
+    """Returns (across, height) points [m] of a roof with two slopes.
 
-    `ridge` is its place between a and b, as a part of the span.
+    Args:
+        a: where the line begins across the roof [m].
+        b: where it ends [m].
+        z: height of both ends [m].
+        top: height of the ridge [m].
+        ridge: place of the ridge between a and b, as a share of the span.
     """
     return [(a, z), (a + ridge * (b - a), top), (b, z)]
 
@@ -36,9 +41,16 @@ def gable_line(
 def gambrel_line(
     a: float, b: float, z: float, top: float, knee: bays.Span = (0.24, 0.66)
 ) -> list[tuple[float, float]]:
-    """Steep slopes up to a knee, flatter ones above.
+    """Returns (across, height) points [m] of a gambrel roof.
 
-    `knee` gives its place as parts of the half span and of the rise.
+    Its slopes are steep up to a knee, and flatter above.
+
+    Args:
+        a: where the line begins across the roof [m].
+        b: where it ends [m].
+        z: height of both ends [m].
+        top: height of the ridge [m].
+        knee: place of the knee, as shares of the half span and of the rise.
     """
     half = (b - a) / 2
     run, up = knee[0] * half, z + knee[1] * (top - z)
@@ -48,7 +60,15 @@ def gambrel_line(
 def barrel_line(
     a: float, b: float, z: float, top: float, count: int = 8
 ) -> list[tuple[float, float]]:
-    """A circular vault over a..b in an even `count` of chords."""
+    """Returns (across, height) points [m] of a circular vault.
+
+    Args:
+        a: where the line begins across the roof [m].
+        b: where it ends [m].
+        z: height of both ends [m].
+        top: height of the crown [m].
+        count: number of chords, even.
+    """
     half, middle, rise = (b - a) / 2, (a + b) / 2, top - z
     radius = (half**2 + rise**2) / (2 * rise)
     span = math.atan2(half, radius - rise)
@@ -81,7 +101,15 @@ def shell(
     *,
     along_y: bool = False,
 ) -> Mesh:
-    """Returns a roof of even thickness, measured upright, over a line."""
+    """Returns a roof over a line, of even thickness measured upright.
+
+    Args:
+        line: (across, height) points of its upper surface [m].
+        start: where the roof begins along its ridge [m].
+        end: where it ends along its ridge [m].
+        thickness: vertical thickness [m].
+        along_y: whether the ridge is along y instead of x.
+    """
     n = len(line)
     vertices = np.array(
         [
@@ -110,10 +138,15 @@ def shell(
 def gable_wall(
     line: Line, a: float, b: float, z: float, holes: Sequence[Patch] = ()
 ) -> Mesh:
-    """Returns the wall between z and a roof line, in wall coordinates.
+    """Returns the wall between a height and a roof line, in wall coordinates.
 
-    `line` is the underside of the roof, across as the wall's x, from a to b at
-    least at z. Holes lie beside one another; `gable_glass` closes them.
+    Args:
+        line: underside of the roof, as (along the wall, height), from a to b at
+            least at z [m].
+        a: left end along the wall [m].
+        b: right end along the wall [m].
+        z: height of the wall's foot [m].
+        holes: openings beside one another; `gable_glass` closes them.
     """
     bounds = {a, b, *(u for u, _ in line if a < u < b)}
     bounds.update(x for hole in holes for x in (hole.x0, hole.x1))
@@ -154,8 +187,12 @@ def hip(
 ) -> Mesh:
     """Returns a hipped roof over a rectangle, boxed in below its eaves.
 
-    The underside of the eaves is at z, the ridge at `top`; `fascia` is the
-    height of their upright edge. `eaves` is one overhang or one per edge [m].
+    Args:
+        outline: (4, 2) corners in the building's frame [m].
+        z: height of the underside of the eaves [m].
+        top: height of the ridge [m].
+        eaves: overhang, one for all edges or one for each [m].
+        fascia: height of the upright edge of the eaves [m].
     """
     outer = massing.inset(outline, -np.asarray(eaves))
     slopes = massing.skirt(outer, _ridge(outer), z + fascia, top)
@@ -205,9 +242,17 @@ def add_chimney(
     yaw: float = 0.0,
     scale: tuple[float, float, float] = (1.0, 1.0, 1.0),
 ) -> None:
-    """Stands a shared `chimney` or `chimney_row` on a pitched roof.
+    """Stands a shared chimney on a pitched roof.
 
-    Its foot is at `xyz`, below the roof's surface [m].
+    Args:
+        out: the building under assembly, which gets the parts.
+        part: name of the visual.
+        xyz: position of its foot, below the roof's surface, in the building's
+            frame [m].
+        rgb: colour.
+        item: `chimney` or `chimney_row`.
+        yaw: its heading [rad].
+        scale: factors of its size along x, y and z.
     """
     out.place(part, out.shared(f"roof_{item}", scale), xyz, yaw, rgb=rgb)
 
@@ -222,9 +267,15 @@ def equip_roof(
 ) -> None:
     """Stands equipment on a flat roof without overlaps, as far as it fits.
 
-    The building's `rng` draws places, headings and sizes. The first items are
-    the most important; all keep `clear` from the edge of the roof [m]. Names of
-    visuals start with `prefix`.
+    The random generator of `out` draws places, headings and sizes.
+
+    Args:
+        out: the building under assembly, which gets the parts.
+        roof: (N, 2) outline of the roof in the building's frame [m].
+        z: height of the roof [m].
+        items: names of the equipment, the most important first.
+        clear: least distance to the edge of the roof [m].
+        prefix: begin of the visuals' names.
     """
     room, rng = Polygon(roof), out.rng
     x0, y0, x1, y1 = room.bounds

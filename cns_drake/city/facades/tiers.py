@@ -50,7 +50,16 @@ def add_ground(
     extras: Sequence[Mesh] = (),
     part: str = "ground",
 ) -> float:
-    """Adds the ground floor on its foundation; returns its top [m]."""
+    """Adds the ground floor on its foundation; returns its top [m].
+
+    Args:
+        out: the building under assembly, which gets the parts.
+        outline: (N, 2) corners of the walls in the building's frame,
+            anticlockwise [m].
+        facade: the walls and their openings.
+        extras: further meshes of the floor, in the building's frame.
+        part: name of the visual.
+    """
     base = massing.foundation(outline)
     walls = facade_mesh(outline, facade)
     out.add(part, base, walls, *extras)
@@ -72,7 +81,18 @@ def add_storeys(
 
     If all glass has one depth, one pane behind the walls closes all windows;
     nothing else may then be deeper. Glass of several depths is repeated with
-    the storeys. `extras` belong to one storey, in its own height.
+    the storeys.
+
+    Args:
+        out: the building under assembly, which gets the parts.
+        outline: (N, 2) corners of the walls in the building's frame,
+            anticlockwise [m].
+        facade: the walls of one storey.
+        z0: height of the lowest floor [m].
+        groups: number of visuals, one above another.
+        per_group: storeys in the mesh of one visual.
+        extras: further meshes of each storey, with z from its floor.
+        part: stem of the visuals' names.
     """
     pieces = [facade_mesh(outline, facade.stacked(per_group))]
     for k in range(per_group):
@@ -177,9 +197,15 @@ def shaft_walls(
 ) -> Facade:
     """Returns the walls of a stair: one bay in front, one behind.
 
-    Both are in the middle of their walls and get `room`. `rim` is height and
-    reach of a band at the top. Bays at depths of `glass` are glazed on their
-    own [m].
+    Both bays are in the middle of their walls.
+
+    Args:
+        height: height of the walls [m].
+        entry: the bay in front.
+        slit: the bay behind.
+        room: width of each bay [m].
+        rim: height and reach of the band at the top [m].
+        glass: depths of the openings that are glazed [m].
     """
     layouts = {0: bays.alone(entry, room), 2: bays.alone(slit, room)}
     layout = bays.by_edge(layouts, bays.plain)
@@ -200,8 +226,16 @@ def add_crown(
 ) -> float:
     """Adds the top of the walls and the roof; returns the roof's height [m].
 
-    The roof lies `parapet` below the top of the facade, with the items of its
-    equipment, see `equip_roof`.
+    Args:
+        out: the building under assembly, which gets the parts.
+        outline: (N, 2) corners of the walls in the building's frame,
+            anticlockwise [m].
+        facade: the topmost walls.
+        z0: height of their foot [m].
+        parapet: height of the walls above the roof [m].
+        part: name of the visual.
+        thickness: thickness of the parapet [m].
+        items: equipment on the roof, as for `equip_roof`.
     """
     roof = round(facade.height - parapet, 3)
     mesh = merge_meshes(

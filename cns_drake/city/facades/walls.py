@@ -95,7 +95,15 @@ class WallCells:
         bands: Sequence[Band],
         reliefs: Sequence[Relief],
     ) -> WallCells:
-        """Paints bands, then reliefs, on a wall that `zs` cuts into rows.
+        """Returns the cells of a wall with its bands, reliefs and arches.
+
+        Args:
+            length: length of the wall [m].
+            zs: rising heights that cut the wall into rows [m].
+            groups: (rows,) group of each row; only rows of one group share a
+                face.
+            bands: strips along the whole wall.
+            reliefs: openings and arches, later ones over earlier ones.
 
         Raises:
             ValueError: a relief leaves the wall, or an arch lies on cells

@@ -77,6 +77,13 @@ class Wing:
         """Returns a wing with its walls on whole centimetres.
 
         Whole centimetres keep the meshes' text short.
+
+        Args:
+            area: x0, y0, x1, y1 in the building's frame [m].
+            wall_top: height of the walls [m].
+            top: height of the ridge [m].
+            roof: kind of the roof.
+            blind: edges whose walls have no openings.
         """
         a, b, c, d, e = (round(float(v), 2) for v in (*area, wall_top))
         return Wing(a, b, c, d, e, round(float(top), 3), roof, frozenset(blind))
@@ -236,7 +243,15 @@ def _fits(hole: walls.Patch, under: list[bays.Span]) -> bool:
 def attic_window(
     width: float, z0: float, z1: float, depth: float, count: int = 1
 ) -> Attic:
-    """Returns windows side by side in the middle of a gable."""
+    """Returns windows side by side in the middle of a gable.
+
+    Args:
+        width: width of each window [m].
+        z0: height of their sills [m].
+        z1: height of their heads [m].
+        depth: how far they lie behind the wall [m].
+        count: number of windows.
+    """
 
     def holes(a: float, b: float) -> list[walls.Patch]:
         step = 1.5 * width
@@ -278,10 +293,17 @@ def add_dormer(
 ) -> None:
     """Adds a dormer on the slope that rises behind a wall, if it fits.
 
-    Its middle x and its width are along the wall. The slope's upper surface is
-    `base` above the wall and rises by `slope` per run up to the `ridge`. The
-    front is `setback` from the wall, its height above the slope [m]. The roof
-    is `gable`, `shed` or `flat`.
+    Args:
+        out: the building under assembly, which gets the parts.
+        wall: the wall.
+        x: middle of the dormer along the wall [m].
+        width: its width along the wall [m].
+        base: height of the slope's upper surface at the wall [m].
+        slope: rise of the slope per run.
+        ridge: height of the ridge [m].
+        setback: distance of the dormer's front behind the wall [m].
+        height: height of the front above the slope [m].
+        roof: `gable`, `shed` or `flat`.
     """
     a, b = x - width / 2, x + width / 2
     foot = base + slope * setback
@@ -331,10 +353,17 @@ def add_dormers(
 ) -> None:
     """Adds dormers side by side on the front slope of a wing.
 
-    They stand above the stretch from `start` to `end` of the front wall, at
-    most `count`, and `pitch` apart [m]. The wing has a `gable` or `gambrel`
-    roof along the front. On a gambrel roof they stand on the steep part,
-    without a pitched roof.
+    The wing has a `gable` or `gambrel` roof along the front. On a gambrel roof
+    they stand on the steep part, without a pitched roof.
+
+    Args:
+        out: the building under assembly, which gets the parts.
+        wing: the wing.
+        start: where they begin along the front wall [m].
+        end: where they end along the front wall [m].
+        count: the most dormers.
+        roof: their roof: `gable`, `shed` or `flat`.
+        pitch: greatest distance between the middles of two dormers [m].
     """
     (u0, z0), (u1, z1) = wing.line[:2]
     slope, room = (z1 - z0) / (u1 - u0), z1 - z0
@@ -400,9 +429,15 @@ class Openings:
     ) -> None:
         """Repeats bays along the free parts of walls.
 
-        Bays take turns from both ends towards the middle, about `pitch` wide
-        and `margin` from the ends of a part. Parts that other wings hide at z
-        are not free [m].
+        Bays take turns from both ends towards the middle. Parts that other
+        wings hide at the height z are not free.
+
+        Args:
+            edges: numbers of the walls.
+            z: height at which a wall must be free [m].
+            pitch: width of a bay, about [m].
+            choices: bays that take turns.
+            margin: distance of the bays from the ends of a free part [m].
         """
         for edge in edges:
             for a, b in free_stretches(self._wing, edge, self._others, z):
@@ -433,7 +468,15 @@ class Openings:
     def clear(
         self, edge: int, x0: float, x1: float, z0: float, z1: float
     ) -> None:
-        """Removes the reliefs that meet a part of a wall."""
+        """Removes the reliefs that touch a part of a wall.
+
+        Args:
+            edge: number of the wall.
+            x0: start of the part along the wall [m].
+            x1: end of the part along the wall [m].
+            z0: lower height of the part [m].
+            z1: upper height of the part [m].
+        """
         self._reliefs[edge] = [
             r
             for r in self._reliefs[edge]
@@ -502,8 +545,17 @@ class Openings:
     ) -> None:
         """Adds a row of windows to each storey of a wing.
 
-        Windows of the ground floor are the widest. They are kept `margin` from
-        corners; `head` is their top above the floor [m].
+        Windows of the ground floor are a quarter wider.
+
+        Args:
+            edges: numbers of the walls.
+            floor: height of the lowest floor [m].
+            storey: height of a storey [m].
+            count: number of storeys.
+            pitch: distance between two windows, about [m].
+            width: width of a window [m].
+            margin: least distance of windows from corners [m].
+            head: top of a window above its floor [m].
         """
         for k in range(count):
             z = floor + k * storey
@@ -522,7 +574,17 @@ class Openings:
         lights: float = 0.0,
         material: str = "accent",
     ) -> None:
-        """Adds a door with its leaf, between windows of `lights` width."""
+        """Adds a door with its leaf, and windows beside it if wanted.
+
+        Args:
+            edge: number of the wall.
+            x: middle of the door along the wall [m].
+            floor: height of its threshold [m].
+            width: width of the door [m].
+            height: height of the door [m].
+            lights: width of a window on each side; 0 for none [m].
+            material: material of the leaf.
+        """
         half, top = width / 2, round(floor + height, 2)
 
         def bay(x0: float, x1: float) -> list[walls.Relief]:
@@ -580,9 +642,16 @@ class Openings:
     ) -> None:
         """Adds shops side by side between two points of a wall.
 
-        They are about `width` wide, in a ground floor of some `height`; a part
-        of them has `awnings` with a reach out of the wall [m]. Fascias are
-        `sign`, blades `trim`, awnings `awning`.
+        Fascias have the material `sign`, blades `trim`, awnings `awning`.
+
+        Args:
+            edge: number of the wall.
+            start: where the shops begin along the wall [m].
+            end: where they end along the wall [m].
+            height: height of the ground floor [m].
+            width: width of a shop, about [m].
+            awnings: share of the shops that have an awning.
+            reach: how far an awning reaches out of the wall [m].
         """
         wall = self._wing.wall(edge)
         head = round(height - 1.15, 2)
@@ -617,7 +686,15 @@ GLASS_M, DOOR_M = 0.12, 0.2
 def sash(
     width: float, z: float, sill: float, head: float, bars: int = 0
 ) -> bays.Bay:
-    """A window of a storey whose floor is at z; sill and head above it."""
+    """Returns a bay with a window of a storey.
+
+    Args:
+        width: width of the window [m].
+        z: height of the storey's floor [m].
+        sill: height of the sill above the floor [m].
+        head: height of the top above the floor [m].
+        bars: number of mullions.
+    """
     low, high = round(z + sill, 2), round(z + head, 2)
     return bays.window(width, low, high, GLASS_M, mullions=bars, pier=0.25)
 

@@ -375,8 +375,15 @@ def render_stages(
 ) -> dict[str, str]:
     """Returns the text of the files of some stages by their relative paths.
 
-    `source` is the file of the stages, for messages; `origin`, one line for
-    readers of the files, says where the city is from.
+    Args:
+        world: name of the map.
+        city: the whole city.
+        stages: what the stages lack.
+        wanted: names of the stages to write.
+        source: the file of the stages, for messages.
+        progress: takes a line for the user after each file.
+        origin: comment for readers of the files that says where the city is
+            from.
 
     Raises:
         InputError: if a structure cannot be lower or under construction as

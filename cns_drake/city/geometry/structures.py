@@ -157,7 +157,15 @@ def post(
     xy: tuple[float, float] = (0.0, 0.0),
     rgb: tuple[float, float, float] | None = None,
 ) -> Part:
-    """Returns an upright cylinder from below the ground to `height` [m]."""
+    """Returns an upright cylinder that begins below the ground.
+
+    Args:
+        name: name of the part.
+        radius: its radius [m].
+        height: height of its top above the ground [m].
+        xy: position of its axis in the structure's frame [m].
+        rgb: colour; by default the structure's.
+    """
     return Part(
         name,
         CylinderShape(radius, height + ROOT_DEPTH),
@@ -173,7 +181,15 @@ def bar(
     radius: float,
     rgb: tuple[float, float, float] | None = None,
 ) -> Part:
-    """Returns a cylinder between two points [m]."""
+    """Returns a cylinder between two points.
+
+    Args:
+        name: name of the part.
+        start: (3,) centre of one end in the structure's frame [m].
+        end: (3,) centre of the other end [m].
+        radius: its radius [m].
+        rgb: colour; by default the structure's.
+    """
     start, end = np.asarray(start, float), np.asarray(end, float)
     along = end - start
     length = float(np.linalg.norm(along))
@@ -195,7 +211,15 @@ def block(
     yaw: float = 0.0,
     rgb: tuple[float, float, float] | None = None,
 ) -> Part:
-    """Returns a box of the given size about `center` [m]."""
+    """Returns a box.
+
+    Args:
+        name: name of the part.
+        size: its lengths along its own x, y and z [m].
+        center: (3,) its centre in the structure's frame [m].
+        yaw: its heading [rad].
+        rgb: colour; by default the structure's.
+    """
     return Part(
         name,
         BoxShape(triple(size)),

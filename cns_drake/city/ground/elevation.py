@@ -75,12 +75,16 @@ class SlopingGround:
         bounds: tuple[float, float, float, float],
         pads: Sequence[Pad] = (),
     ):
-        """Shapes the ground.
+        """Fits the ground to the streets and pads.
 
-        Sidewalks are `kerb_height` above the surface of the roads; `streets`
-        are carriageways, sidewalks and medians, and `bounds` x0, y0, x1, y1 of
-        the city, in W [m]. Pads lie outside the streets; of two that meet the
-        first wins.
+        Args:
+            surface: heights of the roads.
+            kerb_height: height of sidewalks above the roads [m], one or by
+                place.
+            streets: area of carriageways, sidewalks and medians in W [m].
+            bounds: x0, y0, x1, y1 of the city in W [m].
+            pads: level areas outside the streets; of two that meet, the first
+                wins.
         """
         self.pads = tuple(pads)
         self._surface = surface
@@ -186,9 +190,16 @@ def make_ground(
     bounds: tuple[float, float, float, float],
     pads: Sequence[Pad] = (),
 ) -> Ground:
-    """Returns level ground where all roads and pads are level, else slopes.
+    """Returns the ground of a city.
 
-    The arguments are those of `SlopingGround`.
+    It is level if all roads and pads are, and otherwise slopes.
+
+    Args:
+        surface: heights of the roads.
+        kerb_height: height of sidewalks above the roads [m], one or by place.
+        streets: area of carriageways, sidewalks and medians in W [m].
+        bounds: x0, y0, x1, y1 of the city in W [m].
+        pads: level areas outside the streets; of two that meet, the first wins.
     """
     if callable(kerb_height):
         return SlopingGround(surface, kerb_height, streets, bounds, pads)

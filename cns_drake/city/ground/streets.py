@@ -127,11 +127,18 @@ def street_surfaces(
     coverings: Sequence[Covering],
     kerbless: BaseGeometry | None = None,
 ) -> list[Structure]:
-    """Returns the ground of streets.
+    """Returns the structures of the ground of streets.
 
-    Kinds of ground that are absent from these streets are left out. Sidewalks
-    and medians lie `kerb` above the carriageway, which the coverings are a part
-    of. Where streets lead onto bridges, an area in W is `kerbless` [m].
+    They are the carriageway, its coverings, kerbs, sidewalks and medians. Kinds
+    that these streets do not have are left out.
+
+    Args:
+        areas: the areas of the streets in W [m].
+        surface: heights of the carriageway.
+        kerb: height of sidewalks and medians above the carriageway [m], one or
+            by place.
+        coverings: parts of the carriageway with a surface of their own.
+        kerbless: area in W without kerbs, where streets lead onto bridges.
     """
     road, walk = _heights(surface, kerb)
     medians = snap(areas.medians)

@@ -144,7 +144,16 @@ def place_car(
     rng: Generator,
     tags: tuple[str, ...],
 ) -> None:
-    """Places a parked car, one of `cars` by their weights, if it has room."""
+    """Places a parked car if there is room for it.
+
+    Args:
+        draft: the city so far, which gets the car.
+        cars: name of a car -> its weight in the draw.
+        xy: position of its middle in W [m].
+        yaw: its heading [rad].
+        rng: draws the car.
+        tags: tags of the structure.
+    """
     name = pick(cars, rng)
     draft.place(name, OBJECTS[name].build(rng), xy, yaw, tags)
 

@@ -106,23 +106,6 @@ class Stages(_Model):
             for name in group.structures
         }
 
-    def on_its_own(self, stage: str) -> Stage:
-        """Returns a stage with all its differences to the whole city.
-
-        Raises:
-            KeyError: if there is no such stage.
-        """
-        absent = sorted(self.absent(stage))
-        return Stage(
-            story=self.stages[stage].story,
-            absent={"": absent} if absent else {},
-            lower={
-                name: Growth(height=height, structures=[name])
-                for name, height in self.heights(stage).items()
-            },
-            sites=self.stages[stage].sites,
-        )
-
     def _onwards(self, stage: str) -> list[Stage]:
         """Returns a stage and all later ones."""
         names = list(self.stages)

@@ -11,6 +11,7 @@ import functools
 import json
 import subprocess
 import sys
+from typing import Any
 
 import numpy as np
 from pydrake.common import MemoryFile
@@ -38,17 +39,19 @@ from pydrake.systems.framework import Context, DiagramBuilder, LeafSystem
 from pydrake.systems.sensors import CameraInfo, ImageRgba8U
 
 from cns_drake.base.errors import InputError
-from cns_drake.scene.perception_geometry import (
-    PerceptionGeometry,
-    read_perception_geometry,
-)
+from cns_drake.scene.perception_geometry import read_perception_geometry
 from cns_drake.scene.structure_table import StructureTable
-from cns_drake.scene.surfaces import merge_triangles, tessellate
+from cns_drake.scene.surfaces import (
+    TriangleSurface,
+    merge_triangles,
+    tessellate,
+)
 from cns_drake.sensors.camera.looks import (
     GAMMA,
     HORIZON_RGB,
     LOOKS,
     SUN_W,
+    face_places,
     look_of,
     texture,
     texture_places,
@@ -88,6 +91,8 @@ _LIGHTS = [
 ]
 # Numbers of glTF 2.0: float, unsigned int; what buffers are for.
 _FLOAT, _UINT, _VERTICES, _CORNERS = 5126, 5125, 34962, 34963
+# Pose, colour and surface of a geometry.
+_Member = tuple[RigidTransform, tuple[float, float, float], TriangleSurface]
 
 
 class CameraScene(LeafSystem):
@@ -154,19 +159,19 @@ class CameraScene(LeafSystem):
             scene_graph.model_inspector(), lambda frame: frame not in vehicle
         )
         table = structures.completed(one.structure for one in geometries)
-        parts: dict[tuple, list[tuple[int, RigidTransform, PerceptionGeometry]]]
-        parts = {}
+        parts: dict[tuple, list[_Member]] = {}
         for one in geometries:
             frame, X_FG = one.frame_id, one.X_FG
             is_anchored = frame in anchored
             if is_anchored:
                 X_FG = calc_X_WF(frame) @ X_FG
-            entry = table[one.structure]
-            look = look_of(one.name, entry.semantic_class, one.rgb or _GREY)
+            entry, rgb = table[one.structure], one.rgb or _GREY
+            surface = tessellate(one.surface, _SIDES)
+            corners = len(surface.p_GVset)
+            look = look_of(one.name, entry.semantic_class, rgb, corners)
             for kind, group in (("colours", look), ("classes", entry.label)):
                 key = kind, None if is_anchored else frame, group
-                members = parts.setdefault(key, [])
-                members.append((len(members), X_FG, one))
+                parts.setdefault(key, []).append((X_FG, rgb, surface))
         moving = dict.fromkeys([base, *(key[1] for key in parts if key[1])])
         self.frames = {
             frame: GeometryFrame(f"frame_{k}") for k, frame in enumerate(moving)
@@ -194,16 +199,17 @@ class CameraScene(LeafSystem):
         kind: str,
         frame: FrameId | None,
         group: str | int,
-        members: list[tuple[int, RigidTransform, PerceptionGeometry]],
+        members: list[_Member],
     ) -> None:
         """Registers one mesh; without a frame it stays."""
         merged, owners = merge_triangles(
-            [(k, X, tessellate(g.surface, _SIDES)) for k, X, g in members]
+            [(k, X, surface) for k, (X, _, surface) in enumerate(members)]
         )
-        rgb = np.array([one.rgb or _GREY for *_, one in members])[owners]
+        rgb = np.array([rgb for _, rgb, _ in members])[owners]
         corners = merged.p_GVset[merged.triangles]
         middle = np.round(corners.mean(axis=(0, 1)))
-        mesh = _as_mesh(corners, middle, rgb, group)
+        fronts = np.stack([X.rotation().matrix()[:, 1] for X, *_ in members])
+        mesh = _as_mesh(corners, middle, rgb, group, owners, fronts)
         made = GeometryInstance(RigidTransform(middle), mesh, name)
         properties = PerceptionProperties()
         is_class = kind == "classes"
@@ -259,10 +265,13 @@ def _as_mesh(
     middle: np.ndarray,
     rgb: np.ndarray,
     look: str | int,
+    owners: np.ndarray,
+    fronts: np.ndarray,
 ) -> Mesh:
     """Returns a glTF mesh of (N, 3, 3) corners of triangles, flat, of a look.
 
-    The (N, 3) colours are of screens; a class in place of a look has none.
+    The (N, 3) colours are of screens; a class in place of a look has none. The
+    (N,) owners are geometries, which look along (M, 3) `fronts`.
 
     The mesh is about `middle`. The axes of glTF are right, up and backwards: y
     up.
@@ -278,11 +287,24 @@ def _as_mesh(
         for a in (places, np.repeat(normals, 3, axis=0))
     ]
     kinds, attributes = ["VEC3", "VEC3"], {"POSITION": 0, "NORMAL": 1}
-    material, files, extra = {"doubleSided": True}, {}, {}
+    material: dict[str, Any] = {"doubleSided": True}
+    files: dict[str, bytes] = {}
+    extra: dict[str, Any] = {}
     if isinstance(look, str):
         files["look.png"], white = texture(look)
-        tiles = texture_places(corners, normals) / LOOKS[look].size
-        tiles -= np.floor(tiles.min(axis=1, keepdims=True))
+        if LOOKS[look].is_face:
+            tiles = face_places(corners, normals, owners)
+            rgb = np.ones_like(rgb)
+            if look == "signals":
+                front = fronts[owners]
+                tiles = tiles * (0.5, 1.0)
+                tiles[abs(front[:, 0]) > abs(front[:, 1]), :, 0] += 0.5
+                tiles[(front * normals).sum(axis=1) < 0.9] = 0.01
+                material["emissiveFactor"] = [1.0] * 3
+                material["emissiveTexture"] = {"index": 0}
+        else:
+            tiles = texture_places(corners, normals) / LOOKS[look].size
+            tiles -= np.floor(tiles.min(axis=1, keepdims=True))
         light = np.minimum(rgb**GAMMA * white, 1.0)
         arrays += [tiles.reshape(-1, 2), np.repeat(light, 3, axis=0)]
         kinds += ["VEC2", "VEC3"]
@@ -305,7 +327,7 @@ def _as_mesh(
     parts = [a.astype("<f4") for a in arrays]
     parts.append(np.arange(number, dtype="<u4"))
     ends = np.cumsum([0, *(part.nbytes for part in parts)]).tolist()
-    document = {
+    document: dict[str, Any] = {
         "asset": {"version": "2.0"},
         "scene": 0,
         "scenes": [{"nodes": [0]}],

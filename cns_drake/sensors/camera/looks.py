@@ -4,7 +4,7 @@ A texture says how light a place is beside the colour of its surface, whose mean
 stays. It repeats in the world; a wall has its height in the rows.
 """
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 import functools
 import io
@@ -29,11 +29,13 @@ class Look:
         paint: makes (N, N, 1 or 3) light, of any mean, from random numbers;
             a fourth channel is 0 where there is nothing.
         roughness: 0 of a mirror to 1 of chalk.
+        is_face: whether it covers each geometry once, with colours of its own.
     """
 
     size: float
     paint: Callable[[np.random.Generator], np.ndarray]
     roughness: float = 1.0
+    is_face: bool = False
 
 
 def _noise(rng: np.random.Generator, slope: float) -> np.ndarray:
@@ -120,11 +122,79 @@ def _leaves(rng: np.random.Generator) -> np.ndarray:
             for dy in (-_SIDE, 0, _SIDE):
                 x, y = leaf.real + place[0] + dx, leaf.imag + place[1] + dy
                 pen.polygon(list(zip(x, y, strict=True)), fill=shade)
-    shade = np.asarray(picture)[:, :, None]
-    return np.concatenate([shade * (1.05, 1.2, 0.6), shade > 0.0], axis=2)
+    light = np.asarray(picture)[:, :, None]
+    return np.concatenate([light * (1.05, 1.2, 0.6), light > 0.0], axis=2)
+
+
+def _face(
+    ground: str,
+    shape: Sequence[tuple[float, float]] = (),
+    colour: str = "white",
+    text: str = "",
+) -> Callable[[np.random.Generator], np.ndarray]:
+    """Returns what paints the face of a sign: a polygon, and white text."""
+    from PIL import Image, ImageDraw, ImageFont
+
+    def paint(_rng: np.random.Generator) -> np.ndarray:
+        picture = Image.new("RGB", (_SIDE, _SIDE), ground)
+        pen = ImageDraw.Draw(picture)
+        if shape:
+            pen.polygon([(_SIDE * x, _SIDE * y) for x, y in shape], colour)
+        font = ImageFont.load_default(_SIDE / max(3.0, len(text) * 0.7))
+        middle = _SIDE / 2, _SIDE / 2
+        pen.text(middle, text, "white", font, "mm", stroke_width=6)
+        return (np.asarray(picture) / 255.0) ** GAMMA
+
+    return paint
+
+
+def _ring(radius: float) -> list[tuple[float, float]]:
+    turn = np.pi / 8.0 + np.arange(8) * np.pi / 4.0
+    x, y = 0.5 + radius * np.cos(turn), 0.5 + radius * np.sin(turn)
+    return list(zip(x.tolist(), y.tolist(), strict=True))
+
+
+def _signals(_rng: np.random.Generator) -> np.ndarray:
+    """Returns two signals side by side: one shows red, the other green."""
+    y, x = np.indices((_SIDE, _SIDE)) / _SIDE
+    light = np.full((_SIDE, _SIDE, 3), 0.006)
+    for row, rgb in enumerate(((1, 0.03, 0.02), (1, 0.5, 0), (0.02, 0.9, 0.4))):
+        for column, lit in enumerate((0, 2)):
+            away = np.hypot(
+                (2.0 * x - column - 0.5) * 0.52, (y - (row + 0.5) / 3.0) * 1.18
+            )
+            shown = np.array(rgb) * (1.0 if row == lit else 0.03)
+            light[away < 0.13] = shown
+    return light
 
 
 LOOKS = {
+    "stop": Look(1.0, _face("white", _ring(0.5), "#b01818", "STOP"), 0.6, True),
+    "yield": Look(
+        1.0,
+        _face("#b01818", [(0.2, 0.12), (0.8, 0.12), (0.5, 0.72)]),
+        0.6,
+        True,
+    ),
+    "way": Look(
+        1.0,
+        _face(
+            "#164a9c",
+            [
+                (0.42, 0.82),
+                (0.42, 0.45),
+                (0.28, 0.45),
+                (0.5, 0.17),
+                (0.72, 0.45),
+                (0.58, 0.45),
+                (0.58, 0.82),
+            ],
+        ),
+        0.6,
+        True,
+    ),
+    "name": Look(1.0, _face("#164a9c", text="MAIN STREET"), 0.6, True),
+    "signals": Look(1.0, _signals, 0.6, True),
     "asphalt": Look(6.0, _asphalt),
     "paving": Look(
         4.8, lambda rng: _cells(rng, 8, 8, (0.004, 0.6), lag=0.5, spread=0.06)
@@ -134,12 +204,16 @@ LOOKS = {
     ),
     "grass": Look(5.0, _grass),
     "plaster": Look(9.0, _plaster),
+    "paint": Look(9.0, _plaster, 0.4),
     "bark": Look(1.5, _bark),
     "panes": Look(16.0, _panes, 0.3),
     "leaves": Look(2.0, _leaves),
     "hedge": Look(2.0, lambda rng: np.maximum(_leaves(rng)[:, :, :3], 0.3)),
 }
 _OF_CLASSES = {
+    "car": "paint",
+    "bus": "paint",
+    "truck": "paint",
     "road": "asphalt",
     "parking": "asphalt",
     "sidewalk": "paving",
@@ -151,10 +225,25 @@ _OF_CLASSES = {
 
 
 def look_of(
-    name: str, semantic_class: str, rgb: tuple[float, float, float]
+    name: str,
+    semantic_class: str,
+    rgb: tuple[float, float, float],
+    corners: int,
 ) -> str:
-    """Returns the name of the look of a geometry, by name, class and colour."""
+    """Returns the name of the look of a geometry.
+
+    It depends on name, class, colour, and the number of corners.
+    """
     red, green, blue = rgb
+    part = name.rpartition("/")[2]
+    if part.startswith("signal"):
+        return "signals"
+    if part.startswith("blade"):
+        return "name"
+    if part == "plate" and blue > 1.3 * red:
+        return "way"
+    if part == "plate" and red > 2.0 * blue:
+        return "stop" if corners > 8 else "yield"
     if "marking" in name or "kerb" in name or "gravel" in name:
         return "plaster"
     if "hedge" in name:
@@ -178,11 +267,13 @@ def texture(name: str) -> tuple[bytes, float]:
 
     seed = sum(name.encode())
     light = LOOKS[name].paint(np.random.default_rng(seed))
+    white = 1.0
     if light.shape[2] == 1:
         light = np.repeat(light, 3, axis=2)
-    shown = light[:, :, :3].mean(axis=2) > 0.0
-    light[:, :, :3] /= light[shown][:, :3].mean()
-    white = float(np.quantile(light[:, :, :3], 0.995))
+    if not LOOKS[name].is_face:
+        shown = light[:, :, :3].mean(axis=2) > 0.0
+        light[:, :, :3] /= light[shown][:, :3].mean()
+        white = float(np.quantile(light[:, :, :3], 0.995))
     light[:, :, :3] = np.clip(light[:, :, :3] / white, 0.0, 1.0) ** (1 / GAMMA)
     stream = io.BytesIO()
     Image.fromarray(np.round(255.0 * light).astype(np.uint8)).save(
@@ -225,3 +316,21 @@ def texture_places(corners: np.ndarray, normals: np.ndarray) -> np.ndarray:
     along = np.einsum("nca,na->nc", corners[:, :, :2], across)
     height = np.where(is_flat[:, None], corners[:, :, 1], corners[:, :, 2])
     return np.stack([along, -height], axis=2)
+
+
+def face_places(
+    corners: np.ndarray, normals: np.ndarray, owners: np.ndarray
+) -> np.ndarray:
+    """Returns (N, 3, 2) places from 0 to 1 in the faces of owners (N,).
+
+    The (N, 3, 3) corners and (N, 3) normals are as in `texture_places`.
+    """
+    low = np.full((owners.max() + 1, 3), np.inf)
+    high = -low
+    np.minimum.at(low, owners, corners.min(axis=1))
+    np.maximum.at(high, owners, corners.max(axis=1))
+    middle = (low + high) / 2.0
+    places = texture_places(corners - middle[owners][:, None], normals)
+    half = np.full((len(middle), 2), 1e-3)
+    np.maximum.at(half, owners, np.abs(places).max(axis=1))
+    return 0.5 + 0.5 * places / half[owners][:, None]

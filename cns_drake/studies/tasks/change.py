@@ -18,7 +18,7 @@ from cns_drake.studies.tasks.task import (
 )
 from evaluation.change.drive_change import Surveyed, compare
 from evaluation.drives.sampling import sample_frames
-from evaluation.maps.voxel_maps import VoxelAccumulator, VoxelMap
+from evaluation.maps.voxel_maps import CELL_SIZE, VoxelAccumulator, VoxelMap
 from evaluation.recognition.place_outcome import Number
 from evaluation.study.parts import Part
 from evaluation.study.surveys import DriveSource
@@ -63,7 +63,7 @@ class ChangeTask(Task):
 def map_city(
     reporter: Reporter, source: DriveSource, spacing: float | None
 ) -> tuple[VoxelMap, np.ndarray]:
-    """Maps a drive on the grid of the TCR.
+    """Maps a drive in cells of the TCR.
 
     Scans are `spacing` apart [m]; None for all of them.
 
@@ -75,7 +75,7 @@ def map_city(
     frames = np.arange(len(drive))
     if spacing is not None:
         frames = sample_frames(positions, spacing)
-    voxels = VoxelAccumulator()
+    voxels = VoxelAccumulator(CELL_SIZE)
     for frame in reporter.track(frames, "mapping", len(frames)):
         voxels.add(drive.scan(frame), drive.X_WS[frame])
     return voxels.to_map(), positions

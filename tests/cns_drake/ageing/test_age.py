@@ -63,6 +63,7 @@ def _rows(folder, name="history.csv"):
         return list(csv.DictReader(file))
 
 
+@pytest.mark.slow
 def test_histories_are_nested_and_repeatable(town, long):
     short = town.parent / "short"
     age_map(town, [3], 5, _BUSY, short)
@@ -77,6 +78,7 @@ def test_histories_are_nested_and_repeatable(town, long):
         assert ids[row["name"]] == row["instance"]
 
 
+@pytest.mark.slow
 def test_another_seed_is_another_history(town, long):
     other = town.parent / "other"
     age_map(town, [3], 6, _BUSY, other)
@@ -138,6 +140,7 @@ def test_drives_of_an_aged_map(long):
     assert not load_world(long / "stage_03.sdf").notes
 
 
+@pytest.mark.slow
 def test_nothing_stands_in_another_or_on_a_street(long):
     things = read_structures(load_world(long / "stage_03.sdf"))
     new = [
@@ -192,6 +195,7 @@ def test_replacements_are_of_another_kind(long):
         assert kinds[0] != kinds[1]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("seed", [1, 2])
 def test_rates_come_about(town, seed):
     """Numbers of 30 years are Poisson's, at one in a thousand for each."""
@@ -215,6 +219,7 @@ def test_rates_come_about(town, seed):
     assert logged.count("extended") == tally.number["extended"]
 
 
+@pytest.mark.slow
 def test_nothing_happens_at_rate_zero(town):
     city = City(
         OldWorld(MapFolder(town)),
@@ -258,6 +263,7 @@ def test_furniture_moves_as_far_as_allowed(town, farthest, least):
     assert (by[~stays] > least - 0.01).all()
 
 
+@pytest.mark.slow
 def test_the_past_lacks_younger_buildings(town, tmp_path):
     folder = tmp_path / "dated"
     folder.mkdir()
@@ -327,6 +333,7 @@ def test_rates_of_a_file_and_a_factor(tmp_path):
         read_rates(path, 100.0)
 
 
+@pytest.mark.slow
 def test_faulty_maps(town, tmp_path):
     def age(source, years=(1,), seed=1, output=None):
         age_map(source, years, seed, _BUSY, output or tmp_path / "new")
@@ -437,6 +444,7 @@ def test_each_stage_is_what_the_history_tells(long):
     assert not rows
 
 
+@pytest.mark.slow
 def test_a_scaffold_stands_before_its_building(town):
     world = OldWorld(MapFolder(town))
     city = City(world, _BUSY, 3, shapely.Polygon())
@@ -458,6 +466,7 @@ def test_a_scaffold_stands_before_its_building(town):
     assert seen
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("offset", "stands"), [(-0.03, False), (0.03, True)])
 def test_a_scaffold_stands_in_nothing_however_thin(town, offset, stands):
     city = City(OldWorld(MapFolder(town)), _BUSY, 3, shapely.Polygon())
@@ -520,6 +529,7 @@ def test_a_map_of_others_writes_nothing_outside(town, tmp_path, uri):
     assert [path.name for path in output.parent.iterdir()] == ["evil.obj"]
 
 
+@pytest.mark.slow
 def test_waypoints_of_any_names_are_kept_apart(town, tmp_path):
     folder = copied(town, tmp_path / "town")
     (folder / "stage_01.sdf").write_bytes((town / "stage_02.sdf").read_bytes())

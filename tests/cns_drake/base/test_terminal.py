@@ -129,6 +129,7 @@ def test_what_an_earlier_run_did_is_no_speed(monkeypatch):
     assert line == "drive: 1100/1200 frames, 10 s left"
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("program", ["cns_drake", "evaluation"])
 @pytest.mark.parametrize(
     ("closed", "status"), [((), 0), ((1,), 2), ((0, 2), 0), ((0, 1, 2), 2)]
@@ -150,6 +151,7 @@ def test_streams_that_are_closed(tmp_path, program, closed, status):
         assert result.stderr.count("\n") == 1
 
 
+@pytest.mark.slow
 def test_an_argument_that_is_no_text(tmp_path):
     result = subprocess.run(
         [sys.executable, "-m", "evaluation", "tcr", b"\xff.npy", "b.npy"],

@@ -43,6 +43,7 @@ def standing(city: City, district: str) -> dict:
     }
 
 
+@pytest.mark.slow
 def test_it_builds_rows_along_the_streets(lay_out_text):
     city = lay_out_text(PLAN)
     houses = [s for s in city.structures if s.tags[0] == "north_block"]
@@ -69,6 +70,7 @@ def test_it_builds_rows_along_the_streets(lay_out_text):
         assert sides[1] > sides[0] + 5
 
 
+@pytest.mark.slow
 def test_relief_leaves_paths_buildings_and_borders_level(lay_out_text):
     city = lay_out_text(PLAN)
     ground = {s.name: s for s in city.structures if s.tags == ("ground",)}
@@ -96,6 +98,7 @@ def test_relief_leaves_paths_buildings_and_borders_level(lay_out_text):
     assert max(s.xyz[2] for s in trees) > 0.5
 
 
+@pytest.mark.slow
 def test_things_stand_on_the_ground_and_cars_in_bays(lay_out_text):
     city = lay_out_text(PLAN)
     check_things_stand_on_the_ground(city.structures)
@@ -107,6 +110,7 @@ def test_things_stand_on_the_ground_and_cars_in_bays(lay_out_text):
     assert {s.xyz[2] for s in signs} == {0.12}
 
 
+@pytest.mark.slow
 def test_a_district_does_not_disturb_another(lay_out_text):
     before = lay_out_text(PLAN)
     after = lay_out_text(
@@ -126,6 +130,7 @@ def test_a_district_does_not_disturb_another(lay_out_text):
         assert model.footprint.equals(same[key].footprint)
 
 
+@pytest.mark.slow
 def test_the_seed_matters_and_nothing_else_does(lay_out_text):
     first, again = lay_out_text(PLAN), lay_out_text(PLAN)
     other = lay_out_text(PLAN.replace("seed: 3", "seed: 4"))

@@ -66,12 +66,6 @@ def test_what_a_later_stage_raises_is_low_before(tmp_path):
     assert stages.sites("02") == {"tower_002": 12.0}
     assert stages.sites("01") == {}
     assert stages.lots == {"market": ["tower_001"]}
-    alone = stages.on_its_own("01")
-    assert {
-        name: group.height
-        for group in alone.lower.values()
-        for name in group.structures
-    } == stages.heights("01")
 
 
 def test_there_is_no_stage_03(tmp_path):

@@ -44,6 +44,7 @@ def test_same_generator_same_bytes(name):
     }
 
 
+@pytest.mark.slow
 def test_every_mesh_is_used():
     used = {f"{name}_x{count}" for name in RUN_KINDS for count in (1, 2, 4, 8)}
     for name in OBJECTS:

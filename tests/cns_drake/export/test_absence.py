@@ -221,6 +221,7 @@ def test_points_without_instances(town, tmp_path):
         )
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("name", "only_grows"),
     [("downtown", True), ("riverside", True), ("metropolis", False)],

@@ -194,6 +194,7 @@ def test_colours(value, rgb):
     assert tagged_colour({"building:material": "wood"}, "building") is not None
 
 
+@pytest.mark.slow
 def test_a_house_is_the_same_whatever_else_the_file_holds(row, tmp_path):
     after, _ = dressed(row)
     again, _ = dressed(row)

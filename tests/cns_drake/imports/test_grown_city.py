@@ -70,6 +70,7 @@ def test_a_part_is_not_there_yet_or_lower(tmp_path, part, seed):
     assert len(listed) == len(set(listed)) == 51 + len(lower)
 
 
+@pytest.mark.slow
 def test_the_lot_is_that_of_the_seed(tmp_path):
     source = write_rows(tmp_path / "city.json")
     drawn = []

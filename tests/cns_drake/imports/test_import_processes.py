@@ -39,6 +39,7 @@ def contents(folder):
     }
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("line", ["dressing", "writing"])
 def test_an_interrupted_import_leaves_nothing(tmp_path, line):
     write_corner(tmp_path / "city.osm")
@@ -51,6 +52,7 @@ def test_an_interrupted_import_leaves_nothing(tmp_path, line):
     assert [path.name for path in Path(tmp_path).iterdir()] == ["city.osm"]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("line", ["reading", "dressing", "writing"])
 def test_an_import_after_a_killed_one_succeeds(tmp_path, line):
     write_corner(tmp_path / "city.osm")

@@ -59,6 +59,7 @@ def test_only_structures_near_an_own_drive_are_kept(tmp_path, within):
     assert path.length == pytest.approx(90.0, abs=0.1)
 
 
+@pytest.mark.slow
 def test_structures_near_the_proposed_drives(tmp_path):
     source = write_blocks(tmp_path / "blocks.json")
     options = ImportOptions(within=8.0)

@@ -37,6 +37,7 @@ SIGNS = """<signals>
 </objects>"""
 
 
+@pytest.mark.slow
 def test_signals_and_objects_stand_at_their_places(tmp_path):
     path = write_roads(
         tmp_path / "a.xodr", straight("1", 0, 0, 200, 0, more=SIGNS)
@@ -76,6 +77,7 @@ def test_signals_and_objects_stand_at_their_places(tmp_path):
     assert all(one.disjoint(house.footprint_W) for one in drawn)
 
 
+@pytest.mark.slow
 def test_a_road_over_another_is_a_bridge(tmp_path):
     rise = cubic("elevation", 0, 6.0, 0, 0, 0, "s")
     path = write_roads(
@@ -114,6 +116,7 @@ def test_a_road_over_another_is_a_bridge(tmp_path):
     assert all(one.disjoint(box(-5, -20, 5, 20)) for one in walls)
 
 
+@pytest.mark.slow
 def test_bridges_and_tunnels_that_are_not_built_are_counted(tmp_path):
     rise = cubic("elevation", 0, 6.0, 0, 0, 0, "s")
     spans = "".join(

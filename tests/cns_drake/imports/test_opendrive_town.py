@@ -272,6 +272,7 @@ def test_heights_follow_grade_and_roll(tmp_path):
     assert not surface.is_level
 
 
+@pytest.mark.slow
 def test_kerbs_are_closed_where_a_slope_begins(tmp_path):
     # The slope begins within a tile; the road's edges cross several.
     rise = cubic("elevation", 0, 0.0, 0, 0, 0, "s") + cubic(
@@ -292,6 +293,7 @@ def test_kerbs_are_closed_where_a_slope_begins(tmp_path):
     assert upright == pytest.approx(0.1 * rim, rel=2e-3)
 
 
+@pytest.mark.slow
 def test_parking_lanes_are_parking(tmp_path):
     lanes = (
         lane(1, "driving", 3.5), lane(-1, "driving", 3.5),
@@ -386,6 +388,7 @@ def upper_side(built, *names):
     return lambda x, y: float(sides.heights(np.array([[x, y]]))[0])
 
 
+@pytest.mark.slow
 def test_lanes_have_the_heights_of_the_file(tmp_path):
     """A dropped kerb from 50 m on, a sidewalk that rises, a raised lane."""
     rising, dropped = height(0, 0.1, 0.3), height(0, 0.15, 0.15)
@@ -415,6 +418,7 @@ def test_lanes_have_the_heights_of_the_file(tmp_path):
     assert ground(20.3, 5.6) == pytest.approx(0.3, abs=0.02)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("roll", [0.1, -0.08])
 def test_a_level_lane_is_not_banked(tmp_path, roll):
     lanes = (

@@ -274,6 +274,7 @@ def boxes(places, yaw, size):
     return shapely.polygons(np.array(corners).transpose(2, 0, 1))
 
 
+@pytest.mark.slow
 def test_nobody_meets_anybody(blocks):
     """Two minutes with the ego car on the southern street."""
     city, (graph, walkways, _) = blocks
@@ -319,6 +320,7 @@ def test_nobody_meets_anybody(blocks):
     assert (travelled.sum(axis=1) > 50.0).mean() > 0.8
 
 
+@pytest.mark.slow
 def test_an_import_carries_traffic(tmp_path):
     path = write_blocks(tmp_path / "a.osm")
     folder = tmp_path / "town"
@@ -331,6 +333,7 @@ def test_an_import_carries_traffic(tmp_path):
         plan_scenario_traffic(scenario.with_traffic(900), plan_drive(scenario))
 
 
+@pytest.mark.slow
 def test_things_in_the_lanes_give_way_to_traffic(tmp_path):
     """Parked cars on a lane are there without traffic only."""
     path = write_blocks(tmp_path / "a.osm")

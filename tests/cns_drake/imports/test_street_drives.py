@@ -264,6 +264,7 @@ def test_a_place_on_another_continent_is_no_way_to_go(tmp_path):
     assert all(length < 300.0 for length in report.drives)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("barrier", ["house", "house around", "fence"])
 def test_no_drive_goes_through_a_wall(tmp_path, barrier):
     streets = write_grid(tmp_path / "plain.osm")
@@ -321,6 +322,7 @@ def test_a_path_is_as_the_vehicle_drives_it():
         )
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("columns", [2, 3, 5])
 def test_no_import_refuses_its_own_drives(tmp_path, columns):
     write_grid(
@@ -337,6 +339,7 @@ def test_no_import_refuses_its_own_drives(tmp_path, columns):
             assert plan_drive(load_scenario(path)).length > 80.0
 
 
+@pytest.mark.slow
 def test_an_import_that_fails_leaves_no_folder(tmp_path):
     write_grid(tmp_path / "city.osm")
 

@@ -57,6 +57,7 @@ def test_polyhedron_contains_the_shape_with_a_gap(surface):
     assert outside.max() < -5e-4
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("surface", SHAPES)
 def test_nearness_covers_the_polyhedron(surface):
     hull = circumscribe(surface)

@@ -95,6 +95,39 @@ def test_a_scene_sees_what_a_new_one_sees(with_motions):
     assert np.mean(seen) > 0.05
 
 
+@pytest.mark.parametrize("lengths", [(3, 5, 2, 4), (4, 1, 3, 5), (1, 2, 60, 6)])
+def test_ray_i_takes_entry_i_of_each_array_modulo_its_length(lengths):
+    rng = np.random.default_rng(5)
+    poses = random_poses(rng)
+    motions = {
+        frame: Motion(rng.normal(size=3), rng.normal(size=3), 2.0)
+        for frame in FRAMES
+    }
+    scene = RayCastingScene(
+        make_geometries(), {WORLD}, lambda f: poses[ROWS[f]]
+    )
+    scene.set_frame_poses(lambda f: poses[ROWS[f]], motions)
+    num = 6000
+    d = rng.normal(size=(num, 3)) * [1.0, 1.0, 0.1]
+    d /= np.linalg.norm(d, axis=1, keepdims=True)
+    k, m, n, t = lengths
+    arrays = (
+        np.column_stack([*rng.uniform(-15.0, 15.0, (2, k)), np.zeros(k)]),
+        rng.uniform(5.0, 60.0, m),
+        np.array([RollPitchYaw(0, 0, a).ToRotationMatrix().matrix()
+                  for a in rng.uniform(0, 6, n)]),
+        np.linspace(0.0, 1.0, t),
+    )  # fmt: skip
+    whole = [one[np.arange(num) % len(one)] for one in arrays]
+    found, expected = (
+        scene.cast_rays(p, d, reach, R_WSset=R, times=times, with_normals=True)
+        for p, reach, R, times in (arrays, whole)
+    )
+    assert 0.02 < np.isfinite(found.ranges).mean() < 0.98
+    np.testing.assert_array_equal(found.ranges, expected.ranges)
+    np.testing.assert_array_equal(found.normals_W, expected.normals_W)
+
+
 def test_only_what_moves_in_sight_is_placed():
     geometries = make_geometries()
     places = np.zeros((len(FRAMES), 3))

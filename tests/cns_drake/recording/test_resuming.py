@@ -38,6 +38,7 @@ def leave(folder, content):
     (folder / "drive_01_0.mcap.part").write_bytes(content)
 
 
+@pytest.mark.slow
 def test_cut_off_at_any_byte(folder, whole):
     mcap = whole["drive_01_0.mcap"]
     found = []
@@ -50,6 +51,7 @@ def test_cut_off_at_any_byte(folder, whole):
     assert set(found) == {0, 16, 32, 48, FRAMES}
 
 
+@pytest.mark.slow
 def test_damaged_at_any_byte(folder, whole):
     mcap = whole["drive_01_0.mcap"]
     rng = np.random.default_rng(2)

@@ -76,6 +76,7 @@ def test_wander_keeps_between_bounds_and_away_from_the_nearer_one():
     assert offset.mean() == pytest.approx(0.35, abs=0.03)
 
 
+@pytest.mark.slow
 def test_changes_of_lane_have_their_rate_and_lengths():
     path = straight(30_000.0, (0.0, 3.5))
     rng = np.random.default_rng(3)
@@ -123,6 +124,7 @@ def test_a_departing_path_keeps_limits_ends_and_heights():
     assert np.ptp(moved.points[:, 1]) > 0.3
 
 
+@pytest.mark.slow
 def test_a_driver_follows_from_seed_or_name_alone(small_map):
     scenario = make_scenario(scenario_values(small_map), "test")
 
@@ -144,6 +146,7 @@ def test_a_driver_follows_from_seed_or_name_alone(small_map):
     np.testing.assert_array_equal(points(wander=0.3), named.positions([8, 16]))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("name", "seed"), [("downtown_03", 1), ("riverside_01", 2)]
 )
@@ -167,6 +170,7 @@ def test_drivers_keep_clear_of_kerbs(name, seed):
     assert np.quantile(cKDTree(still).query(p)[0], 0.9) > 0.2
 
 
+@pytest.mark.slow
 def test_pairs_of_drives_differ_as_real_ones_do():
     scenario = load_scenario("metropolis_04")
     offsets = []

@@ -62,6 +62,7 @@ def driven(trajectory):
     return moments.jet.p[:, :2], moments.jet.turn / moments.jet.speed
 
 
+@pytest.mark.slow
 def test_the_wheels_of_the_shipped_car_keep_to_their_limits(tmp_path):
     plant = MultibodyPlant(time_step=0.0)
     vehicle = Parser(plant).AddModels(str(vehicle_file()))[0]
@@ -88,6 +89,7 @@ def steering_rows(plant):
     ]
 
 
+@pytest.mark.slow
 def test_bends_are_driven_down_to_the_limit_of_steering(tmp_path):
     angle = np.linspace(0, 3 * np.pi, 300)
     refused, driven_ = [], []

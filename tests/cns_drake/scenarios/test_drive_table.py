@@ -86,6 +86,7 @@ def test_a_drive_is_measured_again_when_its_base_changes(folder):
     assert (before[1].frames > 7, after[1].frames) == (True, 7)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("text", ["", "drive\nboxes_01\n", "\0,\x80"])
 def test_a_spoilt_table_is_measured_anew(folder, text):
     write_table(folder)
@@ -102,6 +103,7 @@ def test_a_drive_that_is_no_mapping_is_named(folder):
         drive_rows(folder)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", sorted(shipped_maps()))
 def test_the_shipped_tables_are_up_to_date(name):
     folder = shipped_maps()[name]

@@ -71,6 +71,7 @@ def test_parts_that_are_missing_grow_out_of_one_place(tmp_path):
     assert len(set(nearest) & set(gone)) > 0.6 * len(gone)
 
 
+@pytest.mark.slow
 def test_between_two_stages_lies_what_the_earlier_one_lacks(tmp_path):
     values = {"stage": "04", "towards": "02", "missing": [0.0, 0.4, 1.0]}
     members = family(tmp_path, seeds=[0, 1], **values)
@@ -153,6 +154,7 @@ def test_a_member_is_a_scenario_file_of_its_own(tmp_path):
     assert [load_scenario(path) for path in paths] == members
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("values", "fault"),
     [

@@ -22,6 +22,7 @@ PLY = (
 DEADLY = PLY.replace("float z", "float " + "9" * 5000)
 
 
+@pytest.mark.slow
 def test_a_crash_is_reported_and_the_next_mesh_read(tmp_path, capfd):
     for name, text in [("good", PLY), ("deadly", DEADLY), ("torn", PLY[:-20])]:
         (tmp_path / f"{name}.ply").write_text(text)
@@ -36,6 +37,7 @@ def test_a_crash_is_reported_and_the_next_mesh_read(tmp_path, capfd):
     assert capfd.readouterr() == ("", "")
 
 
+@pytest.mark.slow
 def test_a_world_with_a_damaged_mesh(tmp_path):
     (tmp_path / "rock.ply").write_text(DEADLY)
     mesh = "<geometry><mesh><uri>rock.ply</uri></mesh></geometry>"

@@ -166,6 +166,7 @@ def test_missing_models_are_noted_and_left_out(tmp_path, models):
     assert "1 visuals of type heightmap ignored" in notes
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("up", "corner"),
     [("Z_UP", [1.0, 0.0, 1.5]), ("Y_UP", [1.0, -1.5, 0.0])],

@@ -125,6 +125,7 @@ def test_a_shape_is_where_drake_measures_it(name, meshes):
     assert differing <= 1
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("scale", [[1.0, 1.0, 1.0], [0.5, 2.0, -1.3]])
 def test_a_gltf_mesh_is_where_drake_renders_it(scale, meshes):
     """The depth image of Drake's renderer is the oracle."""
@@ -198,6 +199,7 @@ def look_at(d_W):
     return RotationMatrix(np.column_stack([x, np.cross(z, x), z]))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("kind", ["obj", "gltf", "vtk"])
 def test_a_mesh_in_memory_is_that_of_the_file(kind, meshes, tmp_path):
     if kind == "gltf":

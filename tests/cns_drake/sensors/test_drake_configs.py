@@ -391,6 +391,7 @@ def test_scalar_conversion_is_refused_by_name():
             convert()
 
 
+@pytest.mark.slow
 @pytest.mark.skipif(not has_chromium(), reason="needs Chromium")
 def test_meldis_draws_the_scans(tmp_path, monkeypatch):
     monkeypatch.setenv("LCM_DEFAULT_URL", "memq://")

@@ -77,6 +77,7 @@ def frames_of(messages):
     return poses
 
 
+@pytest.mark.slow
 def test_topics_and_stamps(messages):
     scans = [stamp for stamp, _ in messages["/lidar/points"]]
     assert len(scans) == FRAMES
@@ -213,6 +214,7 @@ def test_frames_have_names_of_their_own(tmp_path, name):
         tiny_scenario(tmp_path, cameras={name: {}})
 
 
+@pytest.mark.slow
 def test_there_may_be_no_renderer(tmp_path, monkeypatch):
     """Without EGL's libraries, drawing ends the process that does it."""
     monkeypatch.setenv("__EGL_VENDOR_LIBRARY_FILENAMES", "/nonexistent")
@@ -233,6 +235,7 @@ def test_camera_of_the_command_line():
             _camera_fields(text)
 
 
+@pytest.mark.slow
 def test_an_interrupted_recording_goes_on_to_the_same_bytes(
     recording, tmp_path
 ):

@@ -69,6 +69,7 @@ def test_a_map_without_sidewalks(town):
     )
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("who", "where"), [("vehicles", "roads"), ("walkers", "sidewalks")]
 )

@@ -52,6 +52,7 @@ def test_a_neutral_section_records_the_same_bytes(scenario, tmp_path):
     assert without.read_bytes() == neutral.read_bytes()
 
 
+@pytest.mark.slow
 def test_recordings_and_surveys_see_the_same_changes(scenario, tmp_path):
     """The same bytes twice, and the table of structures has the causes."""
     changed = scenario.with_transient(parked_cars=1.0, leaves=0.3)
@@ -78,6 +79,7 @@ def test_recordings_and_surveys_see_the_same_changes(scenario, tmp_path):
     assert any(name.startswith("parked_car_") for name in causes)
 
 
+@pytest.mark.slow
 def test_the_change_of_a_cause_is_that_of_its_instances_alone(scenario):
     """TCR of a cause is that of replacing the points on its instances alone."""
     changed = SimulatedDrive(scenario.with_transient(parked_cars=1.0))

@@ -100,6 +100,7 @@ def test_a_page_has_the_poses_of_the_scene_graph(scenario):
         )
 
 
+@pytest.mark.slow
 def test_imu_adds_up_to_the_trajectory(scenario):
     """The IMU, integrated twice, gives the positions of the odometry.
 

@@ -391,6 +391,7 @@ def test_drivers(query_drive):
     assert drivers[3].lidars["lidar"].rpy_deg[2] == 180.0
 
 
+@pytest.mark.slow
 def test_drivers_by_name_stay_as_their_names_change(query_drive):
     """Two names would be two ways, and no condition asks for that."""
     wandering = query_drive.with_fields({"driver": {"wander": 0.3}}, "")
@@ -481,6 +482,7 @@ def test_queries_lie_at_the_same_places_in_every_condition(query_drive):
         np.testing.assert_array_equal(X_WS, expected)
 
 
+@pytest.mark.slow
 def test_queues_stand_in_all_lanes_but_where_the_car_is(query_drive):
     rungs = Conditions(ladder("traffic", levels=(4,)), query_drive).by_cause()
     scenario = rungs["traffic", 4].query

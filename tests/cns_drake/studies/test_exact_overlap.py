@@ -97,6 +97,7 @@ def test_the_field_of_view_and_the_ranges_count(tmp_path):
     assert np.isnan(exact_overlaps(query, near, PROTOCOL)).all()
 
 
+@pytest.mark.slow
 def test_the_estimate_from_scans_is_close(short_recording):
     drive = DriveSimulation(load_scenario(short_recording / "scenario.yaml"))()
     protocol = RetrievalProtocol(query_spacing=0.1, place_spacing=0.3)
@@ -107,6 +108,7 @@ def test_the_estimate_from_scans_is_close(short_recording):
     np.testing.assert_allclose(exact, estimate, atol=0.05)
 
 
+@pytest.mark.slow
 def test_its_table_is_the_truth(short_recording, tmp_path, capsys):
     scenario = short_recording / "scenario.yaml"
     table = tmp_path / "overlaps.csv"

@@ -25,6 +25,7 @@ def planned(output, *overrides):
     return study._plan(list(study._drives(())))
 
 
+@pytest.mark.slow
 def test_the_levels_are_as_they_were_frozen(tmp_path):
     with (worlds_folder() / TABLE).open() as stream:
         frozen = {

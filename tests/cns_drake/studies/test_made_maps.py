@@ -168,12 +168,30 @@ def test_no_folder_of_others_is_replaced(town, tmp_path):
     assert [path.name for path in mine.iterdir()] == ["notes.txt"]
 
 
+@pytest.mark.parametrize("plain", [False, True])
+def test_an_import_is_dressed_as_on_the_command_line(tmp_path, plain):
+    (tmp_path / "city.json").write_text("{}")
+    wanted = Experiment.model_validate(
+        {
+            "name": "mine",
+            "files": str(tmp_path),
+            "maps": [
+                {"name": "a", "import": "city.json", "seed": 1}
+                | ({"plain": True} if plain else {})
+            ],
+        }
+    )
+    step = made_map_step(wanted.maps[0], wanted, tmp_path / "a", {})
+    assert step.options.dressed is not plain
+
+
 def test_twelve_pairs_are_frozen():
     pairs = load_experiment("map-pairs").maps
     assert len({one.name for one in pairs}) == len(pairs) == 12
     imported = [one for one in pairs if one.import_file is not None]
     assert len(imported) == 4
     assert all(len(one.sha256) == 64 for one in imported)
+    assert all(one.plain for one in imported)
     assert {one.age for one in pairs if one.years} == set(shipped_maps())
     assert {one.years for one in pairs} == {None, 5, 20}
     assert len({one.seed for one in pairs}) == 12

@@ -190,6 +190,7 @@ def test_labels_are_those_of_another_caster_but_at_edges(tmp_path):
     assert set(expected) == {0, 1, 2}
 
 
+@pytest.mark.slow
 def test_recordings_are_labelled_and_scored(short_recording, tmp_path, capsys):
     output = tmp_path / "pair"
     command = ("map-truth", short_recording, short_recording)
@@ -224,6 +225,7 @@ def test_recordings_are_labelled_and_scored(short_recording, tmp_path, capsys):
     assert "exists already" in err
 
 
+@pytest.mark.slow
 def test_an_aged_city_has_another_name(small_map, tmp_path):
     aged = shutil.copytree(small_map, tmp_path / "small_s1")
     drives = []
@@ -241,6 +243,7 @@ def test_an_aged_city_has_another_name(small_map, tmp_path):
         write_truth(*surveys, tmp_path / "out")
 
 
+@pytest.mark.slow
 def test_two_worlds_and_changed_worlds_are_refused(
     short_recording, tmp_path, small_map
 ):

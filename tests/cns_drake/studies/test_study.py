@@ -20,7 +20,7 @@ from cns_drake.studies import study as study_module
 from cns_drake.studies.experiment import Experiment, load_experiment
 from cns_drake.studies.study import Study, run_study
 from evaluation.change.drive_change import Surveyed, compare
-from evaluation.maps.voxel_maps import VoxelAccumulator
+from evaluation.maps.voxel_maps import CELL_SIZE, VoxelAccumulator
 from evaluation.methods import make_method
 from evaluation.recognition.place_recognition import run
 from evaluation.recognition.protocol import FAIR_PROTOCOL, RetrievalProtocol
@@ -82,6 +82,22 @@ def values(results, **columns):
     return {row.metric: row.value for row in found}
 
 
+def test_a_long_study_says_so_before_its_parts_are_there(
+    town, tmp_path, jobs_done, monkeypatch
+):
+    """A job may need descriptions that another one has yet to write."""
+    monkeypatch.setattr(study_module, "_LONG", 1e-9)
+    notes = []
+    wanted = experiment(
+        town,
+        drives="stages",
+        database={"transient": [{}, {"leaves": 0.0}]},
+        protocol={"base": "recorded", "query_spacing": 5},
+    )
+    measure(wanted, tmp_path, on_note=notes.append)
+    assert any("the same command goes on" in note for note in notes)
+
+
 def contents(folder):
     return [(folder / name).read_bytes() for name in TABLES]
 
@@ -93,6 +109,7 @@ STAGES = {
 }
 
 
+@pytest.mark.slow
 def test_the_numbers_are_those_of_the_single_commands(
     town, tmp_path, jobs_done
 ):
@@ -118,7 +135,7 @@ def test_the_numbers_are_those_of_the_single_commands(
     }
     mapped = {}
     for name, drive in drives.items():
-        voxels = VoxelAccumulator()
+        voxels = VoxelAccumulator(CELL_SIZE)
         for frame in range(len(drive)):
             voxels.add(drive.scan(frame), drive.X_WS[frame])
         mapped[name] = Surveyed(name, voxels.to_map(), drive.X_WS[:, :3, 3])
@@ -165,6 +182,7 @@ def test_the_numbers_are_those_of_the_single_commands(
         )
 
 
+@pytest.mark.slow
 def test_finished_work_is_not_repeated(town, tmp_path, jobs_done):
     folder = shutil.copytree(town, tmp_path / "town")
     wanted = experiment(folder, **STAGES, tasks=["place", "change"])
@@ -198,6 +216,7 @@ class InterruptedHereError(Exception):
     """An interruption between two jobs."""
 
 
+@pytest.mark.slow
 def test_an_interrupted_study_goes_on(town, tmp_path, jobs_done, monkeypatch):
     wanted = experiment(town, **STAGES, tasks=["place", "change"])
     measure(wanted, tmp_path / "whole")
@@ -242,6 +261,7 @@ def test_processes_change_nothing(town, tmp_path, jobs_done, capsys):
     assert contents(tmp_path / "there") == contents(tmp_path / "here")
 
 
+@pytest.mark.slow
 def test_protocols_are_factors(town, tmp_path, jobs_done):
     """Each radius has numbers and a baseline of its own."""
     fields = STAGES | {"protocol": {"base": "recorded", "radius": [2.0, 9.0]}}
@@ -298,6 +318,7 @@ def test_descriptions_are_shared(town, tmp_path):
     assert len(set(outputs)) == len(outputs)
 
 
+@pytest.mark.slow
 def test_a_condition_without_draws_is_measured_once(town, tmp_path, jobs_done):
     wanted = experiment(
         town,
@@ -402,6 +423,7 @@ def test_pairs_of_maps_begin_with_the_first_drive(town, tmp_path):
     assert (one.names, stages) == (("town_01", "town_04"), ["01", "04"])
 
 
+@pytest.mark.slow
 def test_maps_are_labelled(town, tmp_path, jobs_done, monkeypatch):
     from cns_drake.studies.tasks import update
 
@@ -434,6 +456,7 @@ def test_maps_are_labelled(town, tmp_path, jobs_done, monkeypatch):
     assert after["gone"] + after["new"] > 0.0
 
 
+@pytest.mark.slow
 def test_scans_are_localised(town, tmp_path, jobs_done):
     own = tmp_path / "stay.py"
     own.write_text("def stay(map, scan, start):\n    return start, 1.0\n")
@@ -482,6 +505,7 @@ def test_scans_are_localised(town, tmp_path, jobs_done):
     assert len(jobs_done[-1]) == 2
 
 
+@pytest.mark.slow
 def test_costs_follow_the_number_of_places(town, tmp_path, jobs_done):
     results = measure(experiment(town, tasks=["cost", "place"]), tmp_path)
     cost, place = (

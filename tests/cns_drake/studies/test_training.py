@@ -82,6 +82,7 @@ def test_drives_that_never_meet_are_refused():
         Sampler(away, seed=1).batch(0)
 
 
+@pytest.mark.slow
 def test_jax_scores_as_the_method_does(tmp_path):
     values = start_parameters(5)
     images = toy_scans(1, 1, 6).images
@@ -101,6 +102,7 @@ def test_jax_scores_as_the_method_does(tmp_path):
         )
 
 
+@pytest.mark.slow
 def test_the_same_seed_and_an_interruption(tmp_path, monkeypatch):
     monkeypatch.setattr(training, "_KEPT_EVERY", 2)
     monkeypatch.setattr(training, "_CLUSTERS", 1)

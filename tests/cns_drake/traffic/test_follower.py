@@ -139,6 +139,7 @@ def followed(follows=True, vehicles=40, walkers=10):
     return scenario, trajectory, plan
 
 
+@pytest.mark.slow
 def test_a_drive_among_others():
     scenario, plain, plan = followed()
     drive = plan_drive(scenario, plan.positions)

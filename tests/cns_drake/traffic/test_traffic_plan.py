@@ -132,6 +132,7 @@ def test_no_boxes_overlap(short):
     assert meetings(short, ego("metropolis_04"), np.arange(0, 60, 0.05)) == 0
 
 
+@pytest.mark.slow
 def test_equal_arguments_give_an_equal_plan(short):
     again = plan("metropolis_04", 40, 60.0)
     assert again.kinds == short.kinds
@@ -141,6 +142,7 @@ def test_equal_arguments_give_an_equal_plan(short):
     assert other.kinds != short.kinds
 
 
+@pytest.mark.slow
 def test_a_trial_given_up_early_changes_no_plan(monkeypatch):
     _, graph, walkways = roads("suburbia")
     low, high = (
@@ -221,6 +223,7 @@ def rates_of(tracks, duration):
     return tracks.at(times)[1][..., :3]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("drive", "number"), [("metropolis_04", 40), ("downtown_02", 50)]
 )
@@ -320,6 +323,7 @@ def test_walkways_are_free_where_walkers_begin_them():
     np.testing.assert_allclose(way.limits[0], [-1.0, 1.0])
 
 
+@pytest.mark.slow
 def test_walkers_pass_what_stands_on_sidewalks():
     _, graph, walkways = roads("riverside")
     rng = np.random.default_rng(3)
@@ -364,6 +368,7 @@ def test_a_third_of_walkers_walks_in_groups(short):
     assert 0.2 < (first & last).mean() < 0.7
 
 
+@pytest.mark.slow
 def test_seeds_mix_all_kinds():
     traffic = plan("downtown_03", 120, 1.0)
     classes = {kind.semantic_class for kind in traffic.kinds}
@@ -451,6 +456,7 @@ def vehicles_in_streets(graph, xy):
     return count[:, long]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     "name", ["downtown", "riverside", "suburbia", "metropolis"]
 )

@@ -233,6 +233,7 @@ def crossers(walkers, crossing):
     return int((passes & is_on[1:] & is_on[:-1]).sum())
 
 
+@pytest.mark.slow
 def test_few_walkers_cross_between_crossings_and_none_is_touched():
     name = "suburbia"
     network = load_road_network(shipped_maps()[name] / "roads.yaml")

@@ -55,6 +55,7 @@ def middle_and_bottom(thing):
     return (X_WT.inverse() @ [x, y, 0])[1], thing.bottom - ORIGIN[2]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("switch", "prefix"), [("parked_cars", "parked_"), ("furniture", "new_")]
 )
@@ -155,6 +156,7 @@ def test_cars_keep_to_their_bays_and_touch_nothing(changed):
     assert seen > 40
 
 
+@pytest.mark.slow
 def test_a_part_changes_by_the_seed_and_by_nothing_else(changed):
     _, whole = changed(parked_cars=1.0)
     counts = []
@@ -172,6 +174,7 @@ def test_a_part_changes_by_the_seed_and_by_nothing_else(changed):
         assert np.array_equal(car.p_WPs, whole[name].p_WPs)
 
 
+@pytest.mark.slow
 def test_each_switch_is_independent_of_the_others(changed):
     world, all_at_once = changed(parked_cars=0.6, leaves=0.4, furniture=0.7)
     _, parked = changed(parked_cars=0.6)

@@ -71,6 +71,7 @@ def test_a_scaffold_stands_on_the_lowest_ground_below_it(tmp_path):
         assert p_TPs[:, 2].min() == pytest.approx(foot, abs=0.02)
 
 
+@pytest.mark.slow
 def test_fronts_are_drawn_one_by_one(changed):
     counts = [
         len(new_things(changed, scaffolds=0.5, seed=seed)) for seed in range(4)
@@ -206,6 +207,7 @@ def test_banks_lie_along_kerbs_and_nowhere_else(changed):
     assert shapely.MultiPoint(banks.p_WPs[:, :2]).distance(DRIVE) > 1.3
 
 
+@pytest.mark.slow
 def test_points_that_no_changed_thing_could_hide_are_identical(sdf):
     """Beams that meet no changed object before or after have equal points."""
     pattern = make_beam_pattern("vlp-16")

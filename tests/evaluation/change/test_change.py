@@ -5,7 +5,10 @@ import numpy as np
 import pytest
 
 from cns_drake.base.errors import InputError
-from evaluation.change.drive_change import compare, survey
+from cns_drake.base.points import from_xyz
+from evaluation.change.drive_change import Surveyed, compare, survey
+from evaluation.change.tcr import GRIDS
+from evaluation.maps.voxel_maps import CELL_SIZE, voxelise
 
 
 def make_town(blocks):
@@ -98,6 +101,69 @@ def test_mask_keeps_what_both_drives_passed(drives):
     assert masked["tcr_sym"] == pytest.approx(
         1.0 - masked["unchanged"] / masked["in_hull"]
     )
+
+
+def _built_town(built, seed=3):
+    """Returns a larger town on flat ground, just above z = 0, as generated."""
+    rng = np.random.default_rng(seed)
+    ground = rng.uniform([0, 0], [220, 220], (30_000, 2))
+    parts = [np.c_[ground, np.full(len(ground), 0.0004)]]
+    for block in range(36):
+        x, y = 36.0 * (block % 6) + 5.0, 36.0 * (block // 6) + 5.0
+        size = np.array([18.0, 18.0, 12.0 + 9.0 * (block % 5)])
+        box = rng.uniform(size=(3000, 3))
+        side = rng.integers(0, 2, 3000)
+        box[np.arange(3000), side] = rng.integers(0, 2, 3000)
+        if block % 2 or built:
+            parts.append(box * size + [x, y, 0.0])
+    return np.concatenate(parts)
+
+
+def _town_survey(points):
+    return Surveyed("town", voxelise(from_xyz(points), CELL_SIZE)[0])
+
+
+@pytest.fixture(scope="module")
+def usual():
+    towns = _built_town(False), _built_town(True)
+    return towns, compare(*map(_town_survey, towns)).change.symmetric
+
+
+@pytest.mark.parametrize(
+    ("of_both", "of_one", "noise"),
+    [
+        ((0.0, 0.0, 0.0), (0.0, 0.0, 0.001), 0.0),
+        ((0.0, 0.0, 0.0), (0.0, 0.0, -0.001), 0.0),
+        ((0.0, 0.0, 0.0), (0.003, -0.002, 0.0045), 0.0),
+        ((0.0, 0.0, 0.0), (0.0, 0.0, 0.0), 0.01),
+        ((0.0, 0.0, 1.3), (0.0, 0.0, 0.0), 0.0),
+        ((2.5, 0.0, 0.0), (0.0, 0.0, 0.0), 0.0),
+        ((0.8, 1.7, 2.5), (0.0, 0.0, 0.0), 0.0),
+    ],
+    ids=["up", "down", "aligned", "noise", "z", "x", "xyz"],
+)
+def test_what_no_scan_can_measure_leaves_the_change(
+    usual, of_both, of_one, noise
+):
+    """Neither the place of the world's origin nor errors of scans matter."""
+    (a, b), before = usual
+    errors = np.random.default_rng(0).normal(0.0, noise, b.shape)
+    moved = a + np.array(of_both), b + np.add(of_both, of_one) + errors
+    after = compare(*map(_town_survey, moved)).change.symmetric
+    assert before > 0.1
+    assert after == pytest.approx(before, abs=0.002)
+
+
+def test_the_value_lies_within_that_of_single_grids(drives):
+    report = compare(drives["early", "south"], drives["late", "north"])
+    values = report.to_json()
+    assert values["tcr_sym_least"] < values["tcr_sym"]
+    assert values["tcr_sym"] < values["tcr_sym_greatest"]
+    assert values["grids"] == len(GRIDS)
+    for axis in zip(*GRIDS, strict=True):
+        assert np.allclose(np.diff(sorted(axis)), 5.0 / len(GRIDS))
+    same = drives["late", "south"]
+    assert compare(same, same).spread == (0.0, 0.0)
 
 
 def test_json_adds_up(drives):

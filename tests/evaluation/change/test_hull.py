@@ -116,3 +116,16 @@ def test_nearly_flat_clouds_have_a_hull(thickness):
     assert in_convex_hull(cloud @ R.T, cloud @ R.T).all()
     above = np.array([[0.0, 0.0, 1.0]]) @ R.T
     assert not in_convex_hull(above, cloud @ R.T).any()
+
+
+@pytest.mark.parametrize("flat", [False, True])
+def test_a_margin_moves_each_face(flat):
+    R, offset = rotation(3), np.array([352_345.0, 4_026_780.0, 40.0])
+    cube = CUBE[CUBE[:, 2] == 0.0] if flat else CUBE
+    top = 0.0 if flat else 3.0
+    at = np.array([[0.5, 1.0, top + 0.5], [1.5, 1.0, 0.0], [0.5, 2.5, 0.0]])
+    outwards = np.array([[0.0, 0, 1], [1, 0, 0], [0, 1, 0]])
+    for by, expected in ((-1e-6, True), (1e-6, False)):
+        points = (at + by * outwards) @ R.T + offset
+        found = in_convex_hull(points, cube @ R.T + offset, 0.5)
+        assert found.tolist() == [expected] * 3

@@ -57,6 +57,7 @@ def test_the_protocol_is_the_users(capsys, towns):
     assert "2 scans a place, the first scan gives the pose" in out
 
 
+@pytest.mark.slow
 def test_protocols_have_names_and_single_options_replace_their_fields(
     capsys, towns
 ):

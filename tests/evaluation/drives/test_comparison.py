@@ -115,6 +115,7 @@ def test_an_oscillation_has_its_spread_and_correlation_length():
     assert found.wander_length == pytest.approx(expected, rel=0.02)
 
 
+@pytest.mark.slow
 def test_an_ornstein_uhlenbeck_process_is_measured_as_it_is():
     rng = np.random.default_rng(RNG_SEED)
     spread, length, step = 0.35, 50.0, 0.5

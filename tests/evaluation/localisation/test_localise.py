@@ -110,6 +110,7 @@ def test_the_truth_on_a_perfect_map_stays(method):
     assert row["unmapped"] == 0.0
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     "method", ["plane-icp", "gicp", "vgicp", "robust-gicp"]
 )
@@ -340,6 +341,7 @@ def streets(tmp_path_factory):
     }
 
 
+@pytest.mark.slow
 def test_drives_with_an_oblique_mount(streets, tmp_path, capsys):
     both = ["localise", streets["map"], streets["query"], "--method", "gicp"]
     options = ["--query-spacing", "2", "--jobs", "2", "--output", tmp_path]
@@ -361,6 +363,7 @@ def test_drives_with_an_oblique_mount(streets, tmp_path, capsys):
     assert "within 0.3 m and 1 deg" in out
 
 
+@pytest.mark.slow
 def test_a_cloud_as_map_and_a_cloud_as_query(streets, tmp_path, capsys):
     X_WS = a_pose(1.0, 2.0, 1.7)
     np.save(
@@ -383,6 +386,7 @@ def test_a_cloud_as_map_and_a_cloud_as_query(streets, tmp_path, capsys):
         assert values["translation_95"] < 0.05
 
 
+@pytest.mark.slow
 def test_order_and_jobs_do_not_matter(streets):
     drive = open_drive(streets["query"])
     place = make_map(open_drive(streets["map"]), Settings())
@@ -487,6 +491,7 @@ OWN = {
 }
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", OWN)
 def test_faults_of_an_own_method(streets, tmp_path, capsys, name):
     text, fault = OWN[name]
@@ -548,6 +553,7 @@ def test_settings_are_checked():
             Settings().with_values([(name, value)])
 
 
+@pytest.mark.slow
 def test_the_method_in_the_documents(streets, capsys):
     path = PROJECT / "docs/examples/robust_plane_icp.py"
     command = ["localise", streets["map"], streets["query"], "--json"]

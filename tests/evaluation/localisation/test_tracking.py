@@ -145,6 +145,7 @@ def test_drift_moves_the_start_and_not_the_truth():
     assert math.hypot(*offsets) == pytest.approx(end)
 
 
+@pytest.mark.slow
 def test_the_command_tracks(towns, tmp_path, capsys):
     town = towns / "town_01"
     command = ["localise", town, town, "--method", "gicp", "--track"]

@@ -61,6 +61,18 @@ def test_the_truth_scores_one(tmp_path):
             assert part[f"recall_{change}"] == 1.0
 
 
+def test_a_class_that_the_truth_lacks_is_left_out_of_the_mean(tmp_path):
+    pair, truth = clouds(tmp_path)
+    truth.A[truth.A == Label.GONE] = Label.KEPT
+    guess = truth.A.copy()
+    guess[np.flatnonzero(guess == Label.KEPT)[:5]] = Label.GONE
+    found = score(pair, truth, Labels(guess, truth.B), {})
+    kept = sum(int((labels == Label.KEPT).sum()) for labels in truth)
+    assert found["iou_gone"] == 0.0
+    assert found["iou_kept"] == (kept - 5) / kept
+    assert found["miou"] == pytest.approx((found["iou_kept"] + 2.0) / 3.0)
+
+
 def test_all_kept_scores_what_counting_says(tmp_path):
     pair, truth = clouds(tmp_path)
     all_kept = np.full(400, Label.KEPT, np.uint8)
@@ -254,6 +266,7 @@ def test_free_space_sees_past_what_is_gone(tmp_path):
     assert (labels[n + 200 :] == Label.UNOBSERVED).all()
 
 
+@pytest.mark.slow
 def test_m3c2_measures_a_moved_plane(tmp_path, monkeypatch, capsys):
     monkeypatch.chdir(tmp_path)
     from evaluation.map_update.baselines import by_m3c2

@@ -3,7 +3,7 @@ import numpy as np
 import pytest
 
 from evaluation.drives import open_drive
-from evaluation.maps.voxel_maps import map_drive
+from evaluation.maps.voxel_maps import CELL_SIZE, map_drive
 from evaluation.study.surveys import MappedDrive
 
 
@@ -21,7 +21,7 @@ def test_same_map_and_scans_for_every_reader(drive, asked):
     mapped = MappedDrive(drive, kept=3)
     for index in asked:
         np.testing.assert_array_equal(mapped.scan(index), drive.scan(index))
-    expected = map_drive(drive)
+    expected = map_drive(drive, CELL_SIZE)
     result, fine = mapped.finish()
     np.testing.assert_array_equal(result.indices, expected.indices)
     np.testing.assert_array_equal(result.centroids_W, expected.centroids_W)

@@ -224,3 +224,27 @@ def test_points_find_their_voxels():
     assert min(expected[:400]) >= 0
     empty, _ = voxelise(from_xyz(np.empty((0, 3))), 5.0)
     assert empty.find(asked[:2]).tolist() == [-1, -1]
+
+
+@pytest.mark.parametrize("shift", [(0, 0, 0), (2, -1, 4)], ids=str)
+def test_cells_make_larger_voxels(shift):
+    """On aligned grids they are those of the points themselves."""
+    rng = np.random.default_rng(8)
+    points = rng.uniform(-30.0, 30.0, (5000, 3))
+    points += np.array([352_345.0, 4_026_780.0, 40.0])
+    cells, _ = voxelise(from_xyz(points), 1.0)
+    merged = cells.merged(5.0, tuple(map(float, shift)))
+    direct, _ = voxelise(from_xyz(points - shift), 5.0)
+    np.testing.assert_array_equal(merged.indices, direct.indices)
+    np.testing.assert_array_equal(merged.counts, direct.counts)
+    np.testing.assert_allclose(
+        merged.centroids_W, direct.centroids_W + shift, rtol=0, atol=1e-8
+    )
+    np.testing.assert_allclose(merged.centres_W, direct.centres_W + shift)
+    owners = merged.find(points)
+    assert (np.bincount(owners) == merged.counts).all()
+
+
+def test_an_empty_map_has_no_larger_voxels():
+    empty, _ = voxelise(from_xyz(np.empty((0, 3))), 1.0)
+    assert len(empty.merged()) == 0

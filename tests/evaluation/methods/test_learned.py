@@ -206,6 +206,7 @@ def test_weights_that_are_no_numbers_in_single_precision(tmp_path):
             make_method("learned", {"weights": path})
 
 
+@pytest.mark.slow
 def test_weights_neither_fill_the_memory_nor_wait(tmp_path):
     path = tmp_path / "w.npz"
     np.savez_compressed(

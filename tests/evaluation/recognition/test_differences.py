@@ -62,6 +62,7 @@ def test_blocks_follow_the_route():
     assert route_blocks(positions, frames).tolist() == [0, 0, 1, 1, 2, 2]
 
 
+@pytest.mark.slow
 def test_equal_methods_differ_at_the_nominal_level():
     rng = np.random.default_rng(8)
     runs = 200

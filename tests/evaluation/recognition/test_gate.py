@@ -185,6 +185,7 @@ def _offsets(outcome):
     return found.distances[rows, found.best_places]
 
 
+@pytest.mark.slow
 def test_the_option_of_pr_and_scores(capsys, towns, tmp_path):
     both = [towns / "town_01", towns / "town_02", "--method", "layered-overlap"]
     status, out, _ = run_program(capsys, "pr", *both, "--gate", "--json")

@@ -93,6 +93,7 @@ def _done(step):
     return step.part.read()
 
 
+@pytest.mark.slow
 def test_the_numbers_are_those_of_the_single_command(folder, tmp_path):
     step = pair(folder, tmp_path / "pair.data")
     found = _done(step)
@@ -141,6 +142,7 @@ def test_the_best_match_agrees_with_the_matrix_of_overlaps(folder, tmp_path):
         np.testing.assert_allclose(one.overlaps, expected, atol=1e-4)
 
 
+@pytest.mark.slow
 def test_places_of_other_cities_are_never_right(folder, tmp_path):
     others = (described(folder, "suburbia_01", "places")[1:],)
     plain = _done(pair(folder, tmp_path / "plain.data"))

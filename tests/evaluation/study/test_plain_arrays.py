@@ -91,6 +91,7 @@ def test_an_array_of_another_shape(shape, before):
         decode(data.replace(old, new))
 
 
+@pytest.mark.slow
 @pytest.mark.filterwarnings("ignore")
 def test_any_damage_of_a_header_is_a_fault_or_harmless():
     value = [np.arange(3.0), np.asfortranarray(np.ones((2, 3)))]

@@ -65,6 +65,7 @@ def test_flakes_send_back_by_their_lidar_ratio():
     assert weather.extinction / backscatter == pytest.approx(25.0, rel=0.01)
 
 
+@pytest.mark.slow
 def test_a_sky_of_moderate_snow_is_mostly_empty():
     """1 mm/h, a moderate snowfall, shows in fewer than one beam in five."""
     far = plate("far", 0.5, RigidTransform([0.0, 0.0, -300.0]), (1, 1, 1))

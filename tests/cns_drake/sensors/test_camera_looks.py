@@ -1,0 +1,90 @@
+"""Textures of what cameras see, and where they lie."""
+
+import io
+
+import numpy as np
+from PIL import Image
+import pytest
+
+from cns_drake.sensors.camera import looks
+
+
+@pytest.mark.parametrize("name", looks.LOOKS)
+def test_a_texture_keeps_the_colour_of_its_surface(name):
+    """Up to what is clipped and rounded; a face has its own colours."""
+    png, white = looks.texture(name)
+    pixels = np.asarray(Image.open(io.BytesIO(png)).convert("RGBA")) / 255.0
+    assert pixels.shape == (512, 512, 4)
+    light = white * pixels[pixels[:, :, 3] > 0.0][:, :3] ** 2.2
+    if looks.LOOKS[name].is_face:
+        assert white == 1.0
+    else:
+        assert light.mean() == pytest.approx(1.0, abs=0.02)
+    # Leaves alone have gaps.
+    assert (pixels[:, :, 3].min() == 0.0) == (name == "leaves")
+
+
+def test_the_same_seed_gives_the_same_texture():
+    first, _ = looks.texture("brick")
+    looks.texture.cache_clear()
+    assert looks.texture("brick")[0] == first
+
+
+@pytest.mark.parametrize("heading", [0.0, 0.3, 2.0, -2.5])
+def test_walls_have_heights_in_rows_and_metres_across(heading):
+    ahead = np.array([np.cos(heading), np.sin(heading), 0.0])
+    across = np.array([-ahead[1], ahead[0], 0.0])
+    corners = np.array([[100 * ahead + s * across + (0, 0, h)
+                         for s, h in ((0, 0), (2, 0), (2, 3))]])  # fmt: skip
+    places = looks.texture_places(corners, ahead[None])[0]
+    step = places - places[0]
+    # Seen from outside, left of a wall that looks ahead is its right hand.
+    np.testing.assert_allclose(step, [(0, 0), (2, 0), (2, -3)], atol=5e-3)
+
+
+def test_ground_has_places_of_a_map():
+    corners = np.array([[(5.0, 7, 1), (6.0, 7, 1), (5.0, 9, 1)]])
+    places = looks.texture_places(corners, np.array([[0.0, 0, 1]]))[0]
+    np.testing.assert_allclose(places, [(5, -7), (6, -7), (5, -9)])
+
+
+def test_faces_cover_each_owner_once():
+    """Two plates of other sizes, with the same corners in their textures."""
+    square = np.array([(0, -1, -1), (0, 1, -1), (0, 1, 1)], float)
+    corners = np.stack([square * 0.3 + (9, 8, 2), square * 2.0])
+    normals = np.tile([1.0, 0, 0], (2, 1))
+    places = looks.face_places(corners, normals, np.array([0, 1]))
+    for one in places:
+        np.testing.assert_allclose(one, [(0, 1), (1, 1), (1, 0)], atol=1e-9)
+
+
+def test_the_sky_is_brighter_below_and_brightest_at_the_sun():
+    tilt = np.deg2rad([1.0, 30.0, 85.0])
+    d_W = np.stack([np.cos(tilt), 0 * tilt, np.sin(tilt)], axis=1)
+    colours = looks.sky(np.vstack([d_W, looks.SUN_W])).astype(int)
+    assert colours[0, 0] > colours[2, 0]
+    assert (colours[3] == 255).all()
+    assert (colours[:, 2] >= colours[:, 0]).all()
+
+
+@pytest.mark.parametrize(
+    ("name", "semantic_class", "rgb", "look"),
+    [
+        ("m::carriageway/tile_1", "road", (0.3, 0.3, 0.32), "asphalt"),
+        ("m::markings/tile_1", "road", (0.9, 0.9, 0.9), "plaster"),
+        ("m::office_1/storey_1", "building", (0.56, 0.33, 0.27), "brick"),
+        ("m::office_1/storey_1", "building", (0.8, 0.79, 0.74), "plaster"),
+        ("m::office_1/storey_glass", "building", (0.2, 0.26, 0.31), "panes"),
+        ("m::tree_1/crown", "vegetation", (0.3, 0.5, 0.2), "leaves"),
+        ("m::tree_1/wood", "vegetation", (0.4, 0.3, 0.2), "bark"),
+        ("m::hedge_1/run_1", "vegetation", (0.3, 0.5, 0.2), "hedge"),
+        ("m::sign_1/plate", "traffic-sign", (0.75, 0.15, 0.15), "stop"),
+        ("m::sign_1/plate", "traffic-sign", (0.15, 0.32, 0.65), "way"),
+        ("m::light_1/signal_2", "pole", (0.1, 0.1, 0.1), "signals"),
+        ("thing", "unlabeled", (0.5, 0.5, 0.5), "plaster"),
+    ],
+)
+def test_looks_are_chosen_by_name_class_and_colour(
+    name, semantic_class, rgb, look
+):
+    assert looks.look_of(name, semantic_class, rgb, 16) == look
