@@ -35,10 +35,10 @@ _PACKAGES = {
 
 
 class InputError(Exception):
-    """Input that cannot be used; the message is one line for the user.
+    """An error in the user's input, with a message of one line.
 
-    The message names the file (or argument), the field where there is one,
-    and the fault. The command line prints it and exits with status 2.
+    The message names the file (or argument), the field where there is one, and
+    the fault. The command line prints it and exits with status 2.
 
     Attributes:
         exit_status: exit status of a command that ends with this error.

@@ -134,7 +134,7 @@ class _State(NamedTuple):
 
 
 class VehicleMotion(LeafSystem):
-    """Prescribes the motion of a vehicle, wheels included.
+    """A system that moves a vehicle along a trajectory, wheels included.
 
     It has the kinematic output ports of a MultibodyPlant, and can feed sensors
     and a SceneGraph in its place: a plant has no port for prescribed motion.
@@ -152,8 +152,8 @@ class VehicleMotion(LeafSystem):
         - body_spatial_velocities
         - body_spatial_accelerations
 
-    `position` is the plant's q; the others are lists over its bodies of
-    X_WB, V_WB and A_WB, expressed in the world. They depend on time only.
+    `position` is the plant's q; the others are lists over its bodies of X_WB,
+    V_WB and A_WB, expressed in the world. They depend on time only.
 
     Example:
         from cns_drake import VehicleMotion

@@ -34,7 +34,7 @@ def recording_topics(
     with_objects: bool = False,
     further: Iterable[Topic] = (),
 ) -> tuple[Topic, ...]:
-    """Returns the topics of a recording.
+    """Returns the topics of a recording with their types and encodings.
 
     Args:
         layouts: LiDAR name -> layout of its points, if not `cns`.

@@ -43,11 +43,14 @@ _STEEP = 0.7
 def plan_drive(
     scenario: Scenario, positions: np.ndarray | None = None
 ) -> Trajectory:
-    """Plans the drive of a scenario, along its route or its waypoints.
+    """Returns the trajectory of a scenario's vehicle along its route.
+
+    The route is a list of lanes or of waypoints.
 
     Args:
-        positions: places on the path at even times, of a car that follows
-            others; see `TrafficPlan`. By default it is as fast as it may be.
+        positions: (N,) distances along the path at even times [m], of a car
+            that follows others; see `TrafficPlan`. By default the car is as
+            fast as the limits allow.
 
     Raises:
         InputError: the roads, the waypoints or the vehicle's springs cannot

@@ -422,12 +422,12 @@ class Scenario(Section):
 
     @property
     def source(self) -> str:
-        """The beginning of errors: the scenario's file, or else its name."""
+        """The scenario's file, or else its name, for error messages."""
         return str(self._files[0] if self._files else self.name)
 
     @property
     def files(self) -> tuple[Path, ...]:
-        """The files that it was read from: its own and those of its bases."""
+        """Files from which the scenario was read, its bases included."""
         return self._files
 
     @property
@@ -437,12 +437,12 @@ class Scenario(Section):
 
     @property
     def frame_period(self) -> float:
-        """Time between frames, the scans of the first LiDAR [s]."""
+        """Time between two frames, the scans of the first LiDAR [s]."""
         return 1.0 / next(iter(self.lidars.values())).rate
 
     @property
     def further_sensors(self) -> dict[str, SensorConfig]:
-        """Sensors besides LiDARs, IMU and odometry, by the field's name."""
+        """Field's name -> sensor, for all but LiDARs, IMU and odometry."""
         return {n: one for n, one in self if isinstance(one, SensorConfig)}
 
     def with_returns(
@@ -450,12 +450,12 @@ class Scenario(Section):
         returns: Literal["ideal", "calibrated"],
         weather: WeatherConfig | None = None,
     ) -> Scenario:
-        """Returns the scenario with other returns of every LiDAR.
+        """Returns the scenario with another model of every LiDAR's returns.
 
         Args:
-            returns: see `LidarSection`. Calibrated returns drop the noise and
-                losses of ideal ones; ideal returns drop the weather.
-            weather: in place of the scenario's.
+            returns: `ideal` or `calibrated`. Calibrated returns drop the noise
+                and losses of ideal ones; ideal returns drop the weather.
+            weather: the weather; by default that of the scenario.
         """
         if returns == "ideal":
             update: dict = {"returns": returns, "echoes": Echoes.STRONGEST}
@@ -475,9 +475,9 @@ class Scenario(Section):
         list is replaced as a whole. None stands for the default.
 
         Args:
-            changes: field -> its new value, or that of some fields in it. A
-                world replaces a map and its route, a route waypoints, and the
-                other way round.
+            changes: field -> its new value, or a mapping of the fields in it.
+                Setting a world removes the map and its route, setting a route
+                removes the waypoints, and vice versa.
             source: the file or argument that errors name.
 
         Raises:
@@ -490,7 +490,7 @@ class Scenario(Section):
         return scenario
 
     def with_traffic(self, number: int) -> Scenario:
-        """Returns the scenario with so many vehicles, and walkers."""
+        """Returns the scenario with this many vehicles, and as many walkers."""
         seed = self.traffic.seed
         return self.replaced(
             traffic=TrafficConfig(vehicles=number, walkers=number, seed=seed)
@@ -505,11 +505,12 @@ class Scenario(Section):
         return self.with_fields({"transient": changes}, self.source)
 
     def with_driver(self, driver: Literal["real", "none"]) -> Scenario:
-        """Returns the scenario with another driver, of the same seed.
+        """Returns the scenario with another driver, who has the same seed.
 
         Args:
-            driver: `real` for the values of published drives; along waypoints,
-                which have no lanes, without changes of lane.
+            driver: `real` for a driver who wanders and changes lanes as in
+                published drives; along waypoints, which have no lanes, he only
+                wanders. `none` for the middle of the lane.
         """
         if driver == "none":
             return self.replaced(driver=DriverConfig())
@@ -519,9 +520,9 @@ class Scenario(Section):
         return self.replaced(driver=chosen)
 
     def with_lidar_preset(self, preset: str) -> Scenario:
-        """Returns the scenario with the unit of every LiDAR replaced.
+        """Returns the scenario with every LiDAR replaced by a unit of a preset.
 
-        Their places and settings of measurement stay as they are.
+        Their poses and the settings of their measurements stay.
 
         Raises:
             InputError: there is no such preset.

@@ -14,7 +14,7 @@ from cns_drake.sensors.imu.config import KALIBR_FILE
 
 
 def make_scenario(values: dict, source: object) -> Scenario:
-    """Validates a scenario's fields; errors name their source.
+    """Returns a scenario made from its fields, after checking them.
 
     Raises:
         InputError: a field is missing, unknown or not usable.
@@ -29,7 +29,7 @@ def make_scenario(values: dict, source: object) -> Scenario:
 
 
 def load_scenario(name_or_file: str | Path) -> Scenario:
-    """Loads a shipped drive by name, or a scenario file.
+    """Returns a shipped drive's scenario by its name, or one from a file.
 
     Raises:
         InputError: there is no such drive or file, or the file is not a

@@ -183,12 +183,13 @@ def _driven(scenario: Scenario, drive: shapely.LineString) -> BaseGeometry:
 def plan_scenario_traffic(
     scenario: Scenario, trajectory: Trajectory, world: World | None = None
 ) -> traffic_plan.TrafficPlan:
-    """Plans the traffic of a scenario.
+    """Returns the motion of all vehicles and walkers of a scenario.
 
     Args:
-        scenario: with traffic.
-        trajectory: motion of its vehicle.
-        world: its stage, if already loaded; not yet a part of a diagram.
+        scenario: scenario with traffic.
+        trajectory: motion of the scenario's vehicle.
+        world: stage of the scenario, if already loaded; not yet a part of a
+            diagram.
 
     Raises:
         InputError: the map has no roads or sidewalks, or no room for that many;

@@ -326,10 +326,11 @@ def add_traffic(
     name: str = "traffic",
     **options: Any,
 ) -> TrafficMotion:
-    """Adds vehicles and walkers to a diagram.
+    """Adds moving vehicles and walkers to a diagram; returns their system.
 
     Options are further arguments of `make_traffic`. The system has the name of
-    the source of geometry, and its port `geometry_pose` is connected.
+    the source of geometry, and its port `geometry_pose` is connected to the
+    SceneGraph.
 
     Example:
         from cns_drake import add_traffic

@@ -168,14 +168,16 @@ def enter(
 
 @dataclass(frozen=True)
 class VoxelMap:
-    """The occupied voxels of a cloud, sorted by index.
+    """A map as its occupied voxels, sorted by index.
 
     Attributes:
-        indices: (V, 3) int32 voxel number along x, y, z.
-        centroids_W: (V, 3) float64 mean of each voxel's points [m].
-        counts: (V,) int64 points in each voxel.
+        indices: (V, 3) int32 number of each voxel along x, y, z.
+        centroids_W: (V, 3) float64 mean of each voxel's points in the world
+            [m].
+        counts: (V,) int64 number of points in each voxel.
         voxel_size: length of a voxel's side [m].
-        num_ignored: number of points left out as not finite.
+        num_ignored: number of points that were left out because they are not
+            finite.
 
     Example:
         from evaluation import map_drive, open_drive
@@ -195,11 +197,13 @@ class VoxelMap:
 
     @property
     def centres_W(self) -> np.ndarray:
-        """(V, 3) middle of each voxel [m]."""
+        """(V, 3) middle of each voxel in the world [m]."""
         return _corners(self.indices, self.voxel_size) + 0.5 * self.voxel_size
 
     def find(self, points_W: np.ndarray) -> np.ndarray:
-        """Returns the voxels of points (N, 3) [m].
+        """Returns the voxel in which each of N points lies.
+
+        The points (N, 3) are in the world [m].
 
         Returns:
             (N,) index into the map, -1 where its voxel is not occupied.
@@ -336,7 +340,7 @@ class VoxelAccumulator:
 def voxelise(
     points: np.ndarray, voxel_size: float = VOXEL_SIZE
 ) -> tuple[VoxelMap, int]:
-    """Returns the voxel map of one cloud in the world frame.
+    """Returns the voxel map of a cloud (N, 3) in the world frame [m].
 
     Returns:
         The map, and how many points were left out as not finite.
@@ -356,10 +360,10 @@ def map_drive(
     voxel_size: float = VOXEL_SIZE,
     track: Track = silent,
 ) -> VoxelMap:
-    """Returns the world-frame map of all scans of a drive.
+    """Returns the voxel map of all scans of a drive, in the world frame.
 
-    One pass over the scans, one in memory at a time. The default grid is
-    the one on which structural change is defined.
+    Scans are read once, one at a time. The default voxel size is the one for
+    which structural change is defined.
 
     Raises:
         InputError: if a scan or a pose cannot be read.

@@ -377,23 +377,26 @@ def holm(p_values: np.ndarray) -> np.ndarray:
 
 @dataclass(frozen=True)
 class PlaceRecognitionMetrics:
-    """The numbers of one pair of drives and one method.
+    """The scores of one method on one pair of drives.
 
     Attributes:
-        mode: the queries that the curve counts.
-        curve: the exact precision-recall curve.
-        auc: area under it.
-        auc_strict: area with recall = TP / N at each of its points.
-        f1_max: greatest F1 on it; 0 if nothing is accepted.
-        f1_max_index: its point on the curve; None if that is empty.
+        mode: which queries the precision-recall curve counts.
+        curve: exact precision-recall curve.
+        auc: area under the curve.
+        auc_strict: area under the curve with recall = TP / N at each of its
+            points.
+        f1_max: greatest F1 on the curve; 0 if nothing is accepted.
+        f1_max_index: index of that point on the curve; None if the curve is
+            empty.
         recall_at_n: (25,) R@1 to R@25.
-        recall_at_1_percent: R@N for a hundredth of the database.
-        num_queries: queries asked.
+        recall_at_1_percent: recall R@N with N a hundredth of the places.
+        num_queries: number of queries.
         num_with_match: N, the number of queries with a match.
         num_right: TP with every candidate accepted: the queries whose best
             place is right. R@1 = num_right / N.
-        auc_interval: 95 % interval by bootstrap over blocks of the route.
-        recall_at_1_interval: likewise.
+        auc_interval: 95 % interval of `auc`, by bootstrap over blocks of the
+            route.
+        recall_at_1_interval: 95 % interval of R@1, likewise.
 
     Example:
         from evaluation import evaluate, judge
@@ -417,19 +420,19 @@ class PlaceRecognitionMetrics:
 
     @property
     def recall_at_1(self) -> float:
-        """The part of the queries with a match whose best place is one."""
+        """R@1: share of queries with a match whose best place is a match."""
         return float(self.recall_at_n[0])
 
 
 def evaluate(
     outcomes: QueryOutcomes, mode: Mode = "all", seed: int = 0
 ) -> PlaceRecognitionMetrics:
-    """Computes all numbers of one pair and method.
+    """Returns the scores of one method on one pair of drives.
 
     Args:
-        outcomes: outcomes of the queries.
-        mode: selects the queries of the precision-recall curve.
-        seed: of the bootstrap.
+        outcomes: outcome of each query.
+        mode: which queries the precision-recall curve counts.
+        seed: seed of the bootstrap.
 
     Example:
         from evaluation import evaluate, judge

@@ -47,9 +47,9 @@ class Mean(NamedTuple):
 
 
 def means(rows: Iterable[Row], *columns: str) -> list[Mean]:
-    """Returns the mean for each combination of values in columns.
+    """Returns a row of means for each combination of values in columns.
 
-    The least and the greatest value, such as those of seeds, stand beside it.
+    Each row also has the least and the greatest value, such as those of seeds.
 
     Example:
         from evaluation import Results, means

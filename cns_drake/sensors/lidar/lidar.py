@@ -290,7 +290,7 @@ class Lidar(LeafSystem):
         )
 
     def EvalScene(self, context: Context) -> RayCastingScene:
-        """Returns what the LiDAR sees in a Context, to cast other rays on."""
+        """Returns the geometry that the LiDAR sees, to cast rays on."""
         scene = self._eval_seen(context).scene
         assert scene is not None
         return scene
@@ -330,16 +330,16 @@ class Lidar(LeafSystem):
         d_W: np.ndarray,
         max_range: float | np.ndarray = np.inf,
     ) -> RayHits:
-        """Casts N rays on what the LiDAR sees in a Context.
+        """Casts N rays on the geometry that the LiDAR sees in a Context.
 
-        Neither its pattern nor its noise matters. Ranges are true to 1e-4 m for
-        rays that start within 1 km of the LiDAR.
+        The rays do not depend on the LiDAR's pattern or noise. Ranges are exact
+        to 1e-4 m for rays that start within 1 km of the LiDAR.
 
         Args:
-            context: of the LiDAR.
-            p_WR: (N, 3) origins in the world, or (3,) if they share one [m].
+            context: context of the LiDAR.
+            p_WR: (N, 3) origins in the world, or (3,) if all share one [m].
             d_W: (N, 3) unit directions in the world.
-            max_range: how far to look [m], one for all or (N,).
+            max_range: greatest range [m], one for all or (N,).
 
         Raises:
             ValueError: shapes do not match, a direction has another length than
