@@ -40,12 +40,12 @@ class RouteLeg(BaseModel):
     Attributes:
         road: name of the road.
         direction: `forward` along its centreline, or `backward`.
-        lane: 1 is next to the middle of the road; two numbers change from the
-            first to the second.
-        start: only in the first leg: the start of the drive, from the entry of
-            the road [m].
-        end: in the last leg: the end of the drive, measured likewise; in a leg
-            before one that leads back: the place where the car turns round [m].
+        lane: number of the lane, 1 next to the middle of the road. Two numbers
+            change from the first lane to the second.
+        start: start of the drive, as a distance from where the leg enters the
+            road [m]. Only in the first leg.
+        end: end of the drive, likewise [m]. In the last leg, or in a leg that
+            the next one leads back along: there the car turns round.
     """
 
     model_config = ConfigDict(extra="forbid", frozen=True, strict=True)

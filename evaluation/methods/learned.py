@@ -103,10 +103,11 @@ def polar_image(points: np.ndarray, sensor_height: float) -> np.ndarray:
 
 
 class LearnedConfig(MethodConfig):
-    """Parameters of the learned descriptor.
+    """Settings of the learned descriptor.
 
     Attributes:
-        weights: file by `cns-drake train`; None for the shipped weights.
+        weights: file of weights from `cns-drake train`; by default the shipped
+            weights.
     """
 
     weights: Path | None = None

@@ -33,8 +33,8 @@ class MethodConfig(BaseModel):
     """The parameters that all methods share, and the base of their own.
 
     Attributes:
-        sensor_height: height of the LiDAR above the ground [m]. Default: the
-            mount of the CNS vehicle.
+        sensor_height: height of the LiDAR above the ground [m]; by default as
+            on the CNS vehicle.
         place: which of the merged scans stands for a place, `middle` or
             `first`; by default the protocol decides. Methods of single scans do
             not use it.

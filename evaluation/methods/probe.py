@@ -39,16 +39,19 @@ _LEAST_BLUR, _LEAST_DENSITY = 0.1, 0.01
 
 
 class ProbeConfig(MethodConfig):
-    """Parameters of PROBE; defaults are those of the paper's Table I.
+    """Settings of PROBE; the defaults are those of the paper's Table I.
 
-    The height of the sensor is not used: heights are those in its frame.
+    The height of the sensor is not used: heights are measured in the LiDAR's
+    frame.
 
     Attributes:
-        voxel_size: cell of the thinning before, whose first point stays [m].
-        rings: cells of equal length up to `max_range`.
-        sectors: cells of equal angle.
-        max_range: farthest range [m].
-        sigma_t: standard deviation of the expected move [m].
+        voxel_size: side of the voxels to which clouds are thinned first [m];
+            the first point of each voxel is kept.
+        rings: number of equal cells up to `max_range`.
+        sectors: number of equal cells of azimuth.
+        max_range: greatest range of a point that counts [m].
+        sigma_t: standard deviation of the expected displacement between query
+            and place [m].
     """
 
     voxel_size: PositiveFloat = 0.5

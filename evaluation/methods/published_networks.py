@@ -387,12 +387,13 @@ def _deformable_attention(
 
 
 class NetworkConfig(MethodConfig):
-    """Parameters of a published network.
+    """Settings of a published neural network.
 
-    The height of the sensor is not used: the ground is found in the cloud.
+    The height of the sensor is not used: the method finds the ground in the
+    cloud.
 
     Attributes:
-        weights: file by its authors.
+        weights: file of the weights that the authors published.
     """
 
     weights: Path

@@ -40,25 +40,27 @@ _CORRELATION_SCALE = 0.15
 
 
 class RingPlusPlusConfig(MethodConfig):
-    """Parameters of RING++.
+    """Settings of RING++.
 
-    Source of all: the authors' program, with its settings for KITTI.
+    All values are from the authors' program, with its settings for KITTI.
 
     Attributes:
         half_width: half the side of the square map from above [m]; 70. The
             protocol's limit of 100 m is wider.
-        crop: the points that count, all of the `square` map, or those in the
-            `round` part within half a side of its middle. A square shows other
-            points when it is turned.
-        min_height: height above the ground from which points count [m]; 0.73
-            (z > -1.0 m from a LiDAR at 1.73 m).
-        max_height: height up to which they count [m]; 11.73 (z < 10 m).
-        height_unit: divisor of heights in the description of shape; horizontal
-            coordinates are divided by `half_width` [m]; 10.
-        neighbours: points, itself included, that describe the shape at a
-            point; 30.
-        cells: rows and columns of the map from above, and angles and rays of
-            its Radon transform; 120.
+        crop: which points of the map count: `square` uses all of them, `round`
+            those within half a side of its middle. When the LiDAR is turned, a
+            square contains other points.
+        min_height: least height above the ground of a point that counts [m];
+            0.73 (z > -1.0 m from a LiDAR at 1.73 m).
+        max_height: greatest height above the ground of a point that counts [m];
+            11.73 (z < 10 m).
+        height_unit: divisor of heights when the shape around a point is
+            described [m]; 10. Horizontal coordinates are divided by
+            `half_width`.
+        neighbours: number of points that describe the shape around a point,
+            including the point itself; 30.
+        cells: number of rows and columns of the map from above, and of angles
+            and rays of its Radon transform; 120.
     """
 
     half_width: PositiveFloat = 70.0
