@@ -13,7 +13,7 @@ def parse_rows(
     separator: str | None = None,
     first: int = 0,
 ) -> np.ndarray:
-    """Returns rows of numbers, each a line of text.
+    """Returns numbers from lines of text, one row per line.
 
     Args:
         lines: N rows.

@@ -69,7 +69,7 @@ class WheelMotion:
         return jet.speed - jet.turn * self._y, jet.turn * self._x
 
     def steering(self, moments: Moments) -> JointMotion:
-        """Returns the steering at (N,) times, positive to the left."""
+        """Returns steering angles of the wheels at (N,) times, left positive."""
         rate, acceleration, jet = moments[1:4]
         a, b, da, db, dda, ddb = self._ground_motion(jet)
         squared = a**2 + b**2
@@ -83,9 +83,9 @@ class WheelMotion:
         )
 
     def rolling(self, moments: Moments) -> JointMotion:
-        """Returns the rolling at (N,) times.
+        """Returns rolling angles of the wheels at (N,) times.
 
-        It is positive forwards and zero at the start.
+        They are positive forwards and zero at the start.
         """
         u, rate, acceleration, jet = moments[:4]
         a, b, da, db, _, _ = self._ground_motion(jet)
@@ -98,7 +98,7 @@ class WheelMotion:
         )
 
     def travel(self, moments: Moments) -> JointMotion:
-        """Returns the travel upwards in the body at (N,) times [m]."""
+        """Returns how far wheels move up in the body at (N,) times [m]."""
         ride = moments.ride
         if ride is None:
             still = np.zeros_like(moments.u)

@@ -220,7 +220,7 @@ class Drive(abc.ABC):
 
 
 def index_instances(table: Any, source: str) -> dict[int, Mapping]:
-    """Returns a table of structures, a list in JSON, by instance id.
+    """Returns a structure table from JSON as instance id -> structure.
 
     Raises:
         InputError: if it is no such table.
@@ -243,7 +243,7 @@ class PlacedDrive:
 
     @classmethod
     def of(cls, drive: Drive) -> PlacedDrive:
-        """Returns the world frame and the map of a drive."""
+        """Returns the name of a drive's world frame and of its map."""
         scenario = drive.scenario
         if scenario is not None:
             scenario = {k: v for k, v in scenario.items() if k == "map"}
@@ -257,9 +257,9 @@ Placed = Drive | PlacedDrive
 def check_same_world(
     first: Placed, second: Placed, *, across_maps: bool = False
 ) -> None:
-    """Refuses two drives whose poses cannot be compared.
+    """Raises an error if the poses of two drives cannot be compared.
 
-    Their maps may differ only `across_maps`.
+    Their maps must have the same name unless `across_maps`.
 
     Raises:
         InputError: if their world frames or their maps differ by name.
@@ -281,7 +281,7 @@ def check_same_world(
 
 
 def check_same_map(first: Placed, second: Placed) -> None:
-    """Refuses two drives whose maps have different names.
+    """Raises an error if two drives are of maps of different names.
 
     Raises:
         InputError: if their maps differ by name.

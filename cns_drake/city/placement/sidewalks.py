@@ -30,7 +30,7 @@ _SIGNS = ("sign_round", "sign_rectangular", "sign_triangular")
 
 
 def furnish_junctions(draft: Draft, network: RoadNetwork) -> None:
-    """Places lights, stop signs and name signs at all arms, then signs."""
+    """Places traffic lights, then signs, at the arms of all junctions."""
     for junction in network.junctions.values():
         rng = draft.task("junction", junction.name)
         for arm in junction.arms:
@@ -132,7 +132,7 @@ def park_along_streets(draft: Draft, network: RoadNetwork) -> None:
 
 
 def plant_medians(draft: Draft) -> None:
-    """Plants the strips between the directions, and lights them."""
+    """Places plants and lamps on the medians of roads."""
     plan = draft.plan.medians or draft.plan.street
     for index, median in enumerate(draft.areas.medians.geoms):
         rng = draft.task("median", index)

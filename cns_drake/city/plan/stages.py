@@ -86,7 +86,7 @@ class Stages(_Model):
         }
 
     def heights(self, stage: str) -> dict[str, float]:
-        """Returns the structures that are low at a stage, and how high [m].
+        """Returns the height of each structure that is lower at a stage [m].
 
         Raises:
             KeyError: if there is no such stage.
@@ -100,7 +100,7 @@ class Stages(_Model):
         return heights
 
     def sites(self, stage: str) -> dict[str, float]:
-        """Returns a stage's buildings under construction, with heights [m]."""
+        """Returns the height of each building under construction at a stage [m]."""
         return {
             name: group.height
             for group in self.stages[stage].sites.values()
@@ -108,7 +108,7 @@ class Stages(_Model):
         }
 
     def on_its_own(self, stage: str) -> Stage:
-        """Returns a stage with all its differences to the whole city.
+        """Returns a stage with all its differences from the whole city.
 
         Raises:
             KeyError: if there is no such stage.
@@ -135,7 +135,7 @@ class Stages(_Model):
 def load_stages(
     path: Path, structures: Collection[str], text: str | None = None
 ) -> Stages:
-    """Reads `stages.yaml` and checks it against the names of all structures.
+    """Returns the stages of `stages.yaml`, checked against all structures.
 
     `text` is the coming content of the file; by default the present one.
     Patterns are replaced by the names that they stand for.

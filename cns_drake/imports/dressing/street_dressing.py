@@ -84,7 +84,7 @@ _POST, _DISC, _BALL = "round_post", "round_disc", "round_ball"
 
 
 def without_curves(model: Model) -> Model:
-    """Returns a model with prisms and polyhedra for cylinders and spheres.
+    """Returns a model whose cylinders and spheres are polyhedra.
 
     Their cross-sections have the same areas.
     """
@@ -189,12 +189,12 @@ class StreetRoom:
         return bool(shapely.dwithin(LineString(line), self.paths, distance))
 
     def keep_tree(self, tree: Imported) -> None:
-        """Keeps the place of a tree's trunk free."""
+        """Marks the place of a tree's trunk as taken."""
         x, y, _ = tree.structure.xyz
         self._taken.add(Point(x, y).buffer(_TRUNK, 4))
 
     def has_tree_pit(self, xy: np.ndarray) -> bool:
-        """Returns whether a trunk at (2,) is off roads, walls and drives."""
+        """Returns whether a trunk at (2,) is clear of roads, walls and drives."""
         pit = Point(xy).buffer(_TRUNK, 2)
         around = shapely.get_coordinates(pit)
         return not (
@@ -390,10 +390,10 @@ def dress_streets(
     bottom: Sequence[Structure],
     seed: int,
 ) -> StreetThings:
-    """Returns the small things along the streets of a city.
+    """Returns the small objects along the streets of a city.
 
-    Those of the file come first. Drives are kept free of things; without any
-    nothing is placed.
+    Those of the file come first. Drives are kept free of objects; without any
+    drive nothing is placed.
 
     Args:
         structures: what stands already.

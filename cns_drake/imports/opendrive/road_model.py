@@ -200,7 +200,7 @@ class Cubics:
 
     @property
     def starts(self) -> np.ndarray:
-        """Where the pieces begin [m]."""
+        """Distances at which the pieces begin [m]."""
         return self._table[:, 0]
 
     def at(
