@@ -69,7 +69,7 @@ class WheelMotion:
         return jet.speed - jet.turn * self._y, jet.turn * self._x
 
     def steering(self, moments: Moments) -> JointMotion:
-        """Returns steering angles of the wheels at (N,) times, left positive."""
+        """Returns steering angles of wheels at (N,) times, left positive."""
         rate, acceleration, jet = moments[1:4]
         a, b, da, db, dda, ddb = self._ground_motion(jet)
         squared = a**2 + b**2

@@ -106,7 +106,7 @@ def save_meshcat_page(
 
 
 def filter_rows(data: bytes) -> bytes:
-    """Returns bytes in a form that compresses better.
+    """Returns bytes rearranged so that they compress better.
 
     Each byte becomes its difference to the byte one row before. All bytes in
     the first place of their row come first, then all in the second, and so on.

@@ -442,7 +442,7 @@ def take_over_frames(
     schedule: Schedule,
     frame_topic: str,
 ) -> int:
-    """Writes the complete frames of an interrupted run into its successor.
+    """Copies the complete frames of an interrupted run to its successor.
 
     A frame has all messages from one message on `frame_topic` until the next;
     latched topics have one message, at tick 0. Nothing has been written yet to
@@ -512,7 +512,7 @@ class BackgroundWriter:
             self._thread.shutdown(cancel_futures=True)
 
     def write(self, *message: Any) -> None:
-        """Hands a message over; waits while too many are waiting.
+        """Queues a message for writing; waits while too many are queued.
 
         Raises:
             Whatever writing an earlier message raised.

@@ -152,8 +152,8 @@ def make_odometry(
 ) -> Any:
     """Returns an Odometry message: pose in the map, twist in the vehicle.
 
-    The velocity V_WB_B is expressed in B [rad/s, m/s]. The values are exact,
-    with standard deviations of 1e-6.
+    The velocity V_WB_B is expressed in B [rad/s, m/s]. The values are exact;
+    their standard deviations are given as 1e-6.
     """
     twist = (V_WB_B.translational(), V_WB_B.rotational())
     return ros_types.make_message(
@@ -184,7 +184,7 @@ def _place(X: RigidTransform) -> tuple[np.ndarray, tuple[float, ...]]:
 
 
 def to_quat_xyzw(R: RotationMatrix) -> tuple[float, float, float, float]:
-    """Returns the unit quaternion of a rotation in ROS order."""
+    """Returns the unit quaternion of a rotation as x, y, z, w."""
     q = R.ToQuaternion()
     return q.x(), q.y(), q.z(), q.w()
 

@@ -32,7 +32,7 @@ class Topic:
 
 
 def channel_metadata(topic: Topic) -> dict[str, str]:
-    """Returns what rosbag2 wants of a channel: QoS, and the type's hash."""
+    """Returns rosbag2's metadata of a channel: QoS and the type's hash."""
     return {
         "offered_qos_profiles": _qos_yaml(topic),
         "topic_type_hash": ros_types.message_hash(topic.message_type),

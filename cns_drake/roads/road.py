@@ -224,7 +224,7 @@ class Road:
 
     @property
     def full_length(self) -> float:
-        """Length of the whole centreline, junction to junction [m]."""
+        """Length of the whole centreline, from junction to junction [m]."""
         return self._curve.length
 
     @property

@@ -83,17 +83,15 @@ def make_lane_path(
     *,
     aside: float = 0.0,
 ) -> LanePath:
-    """Joins the lanes of a route and the ways between them.
+    """Returns the path along the lanes of a route, joined at junctions.
 
     Consecutive legs must meet in a junction, and the way through it must be
     legal: a left turn from the innermost lane to the innermost, a right turn
     from the outermost lane to the outermost, straight on without a change of
     lane (`RoadNetwork.is_legal`). Lanes change only along a leg. Within a
-    junction the lower one of the two roads' speed limits holds.
-
-    If the next leg leads back on the same road, the car turns round in a loop
-    to the left: at the leg's end, or as near to the junction as the room
-    allows.
+    junction the lower one of the two roads' speed limits holds. If the next leg
+    leads back on the same road, the car turns round in a loop to the left: at
+    the leg's end, or as near to the junction as the room allows.
 
     Args:
         spacing: the distance of the points, rounded so that it divides the
@@ -357,9 +355,9 @@ _WEIGHT_OF_NEW = 6.0
 def draw_route(
     network: RoadNetwork, length: float, rng: np.random.Generator
 ) -> Route:
-    """Draws a legal route that prefers roads that it has not seen yet.
+    """Returns a random legal route that prefers new roads.
 
-    Its roads have a least length [m].
+    Its roads have a least length in total [m].
 
     Raises:
         InputError: the network has no route of any length.

@@ -18,7 +18,7 @@ class SurfaceHeights(Protocol):
 
     @property
     def is_level(self) -> bool:
-        """Whether they lie at z = 0 throughout."""
+        """Whether the surface is at z = 0 everywhere."""
 
     def heights(self, xy: ArrayLike) -> np.ndarray:
         """Returns the (N,) heights at (N, 2) places [m]."""

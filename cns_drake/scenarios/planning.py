@@ -168,10 +168,11 @@ def count_frames(scenario: Scenario, trajectory: Trajectory) -> int:
 
 
 def shown_beside(scenario: Scenario) -> tuple[Scenario | None, str]:
-    """Returns the stage that a drive's page compares with its own, and a name.
+    """Returns the stage with which a drive's page compares its own stage.
 
-    It is the last stage, or the first one if the drive is in the last. For a
-    drive without some structures it is the same stage with them.
+    Its name comes second. It is the last stage, or the first one if the drive
+    is in the last. For a drive without some structures it is the same stage
+    with them.
     """
     if scenario.without:
         return scenario.replaced(without=()), "the whole city"

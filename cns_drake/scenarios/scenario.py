@@ -146,11 +146,14 @@ class DriverConfig(Section):
 
     @property
     def departs(self) -> bool:
-        """Whether the car leaves its line."""
+        """Whether the driver ever leaves the middle of the lane."""
         return self.wander > 0 or self.lane_changes > 0
 
     def rng(self, name: str) -> np.random.Generator:
-        """Returns what decides; without a seed, by the drive's name."""
+        """Returns the random generator of the driver's decisions.
+
+        Without a seed, the name of the drive is the seed.
+        """
         seed = name if self.seed is None else self.seed
         return np.random.default_rng(
             [*seed.encode()] if isinstance(seed, str) else [seed]
@@ -248,7 +251,7 @@ class TransientConfig(Section):
 
     @property
     def is_off(self) -> bool:
-        """Whether nothing changes."""
+        """Whether there are no temporary changes."""
         return self == TransientConfig(seed=self.seed)
 
 

@@ -120,7 +120,7 @@ def _find_base(
 
 
 def find_files(values: dict, path: Path) -> None:
-    """Makes the paths in fields of a scenario or a family absolute.
+    """Returns a scenario's or a family's fields with absolute paths.
 
     Args:
         path: the file of these fields; paths are relative to it.

@@ -35,7 +35,7 @@ class Section(BaseModel):
     model_config = ConfigDict(extra="forbid", frozen=True, allow_inf_nan=False)
 
     def replaced(self, **fields: Any) -> Self:
-        """Returns a copy with other values of some fields, unchecked."""
+        """Returns a copy with some fields replaced, without checks."""
         return self.model_copy(update=fields)
 
 

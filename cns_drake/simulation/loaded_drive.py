@@ -110,7 +110,7 @@ def load_drive(scenario: Scenario) -> LoadedDrive:
 def load_stage_and_traffic(
     scenario: Scenario, trajectory: Trajectory
 ) -> tuple[World, traffic_plan.TrafficPlan | None, Trajectory]:
-    """Loads the stage of a scenario, and plans the traffic in it, if any.
+    """Returns the stage of a scenario, and its traffic, if any.
 
     The trajectory is another one if the vehicle follows others.
 
@@ -280,7 +280,7 @@ def _things(world: World) -> list[BaseGeometry]:
 
 
 def load_ways(folder: MapFolder) -> LaneFile:
-    """Returns what vehicles and walkers follow on a map.
+    """Returns the lanes and walkways that traffic follows on a map.
 
     Raises:
         InputError: the map has neither roads nor lanes.
@@ -326,7 +326,7 @@ def _check_room(
 
 
 def with_traffic(world: World, plan: traffic_plan.TrafficPlan) -> World:
-    """Returns a world with the traffic in its table and notes.
+    """Returns a world whose structure table and notes include the traffic.
 
     Raises:
         InputError: there are more structures than ids.

@@ -52,7 +52,7 @@ def _camera_rates(scenario: Scenario) -> dict[Topic, int]:
 
 
 def first_points_topic(scenario: Scenario) -> str:
-    """Returns the topic whose scans are the frames."""
+    """Returns the topic of the first LiDAR, whose scans are the frames."""
     return scenario_topics(scenario)[0].name
 
 

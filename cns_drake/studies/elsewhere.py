@@ -29,12 +29,12 @@ def distracting_drives(
     cluster: Cluster,
     on_note: Callable[[str], None] = lambda text: None,
 ) -> list[Scenario]:
-    """Returns drives through other cities with about so many places.
+    """Returns drives through other cities that distract a method.
 
-    These are the shipped drives of other maps, each through its own stage;
-    then those of this map, along the same streets between other buildings, if
-    it is shipped; then the drives of other maps through the other stages; then
-    through those cities drawn anew.
+    They have about the wanted number of places. These are the shipped drives of
+    other maps, each through its own stage; then those of this map, along the
+    same streets between other buildings, if it is shipped; then the drives of
+    other maps through the other stages; then through those cities drawn anew.
 
     Args:
         query: the drive whose LiDARs measure all of them, and whose city is

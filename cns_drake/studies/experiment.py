@@ -229,13 +229,13 @@ class Experiment(Section):
 
     @property
     def fresh(self) -> list[int]:
-        """The fresh versions of maps, of which each has its own baseline."""
+        """Freshly drawn versions of maps, each with its own baseline."""
         found = self.both.get("fresh", [])
         return found if isinstance(found, list) else [found]
 
     @property
     def text(self) -> str:
-        """The experiment as YAML, without what is default."""
+        """The experiment as YAML, without fields that have their defaults."""
         import yaml
 
         values = self.model_dump(
@@ -323,7 +323,10 @@ def _override(text: str) -> dict[str, Any]:
 
 
 def merged(values: Any, changes: Any) -> Any:
-    """Returns a tree with changes: mappings field by field, others whole."""
+    """Returns a tree of values with changes applied.
+
+    Mappings are changed field by field, other values as a whole.
+    """
     if not (isinstance(values, Mapping) and isinstance(changes, Mapping)):
         return changes
     return {

@@ -123,7 +123,7 @@ class Survey:
     scenario: Scenario
 
     def still(self) -> RayCastingScene:
-        """Returns its world without the vehicle and moving objects."""
+        """Returns the drive's world without the vehicle and moving objects."""
         if self.scenario.traffic.is_off:
             # The LiDAR does not see its own vehicle.
             return self.simulated.look(0)[0]
@@ -248,7 +248,7 @@ def label_points(
 ) -> np.ndarray:
     """Returns a label for each point of a map, (N,) uint8.
 
-    The other drive looks from its frames (K,).
+    Labels say what the other drive sees there from its frames (K,).
     """
     unobserved, kept, changed = SIDES[session.side]
     labels = np.full(len(session.points), unobserved, np.uint8)
@@ -368,7 +368,10 @@ def _spiral() -> np.ndarray:
 
 
 def is_there(points: np.ndarray, scene: RayCastingScene) -> np.ndarray:
-    """Returns (N,) bool: points (N, 3) in W [m] within `NEAR` of a surface."""
+    """Returns which points (N, 3) in W [m] lie on a surface, (N,) bool.
+
+    They are within `NEAR` of it.
+    """
     result = np.zeros(len(points), bool)
     left = np.arange(len(points))
     for axis in _AXES / np.linalg.norm(_AXES, axis=1, keepdims=True):

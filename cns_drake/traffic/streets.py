@@ -50,7 +50,7 @@ class Signals(NamedTuple):
 
 
 def make_signals(graph: LaneGraph, begin: np.ndarray) -> Signals:
-    """Returns the program of all signals.
+    """Returns the program of all traffic lights.
 
     Where ways begin to meet crossings is (P + C, P + C), see `find_conflicts`.
     """
@@ -100,7 +100,7 @@ def make_signals(graph: LaneGraph, begin: np.ndarray) -> Signals:
 
 
 def way_shares(graph: LaneGraph, lane: int) -> np.ndarray:
-    """Returns the shares of drivers that take each way behind a lane."""
+    """Returns the shares of drivers that take each way after a lane."""
     after = graph.pieces[lane].after
     likes = []
     for way in after:
@@ -521,7 +521,7 @@ def speed_on(streets: Streets, piece: int, s: float) -> float:
 def is_ego_far(
     streets: Streets, k: int, lane: int, s: float, wait: float = WAIT
 ) -> bool:
-    """Returns whether a vehicle can leave a lane before the ego car is there.
+    """Returns whether a vehicle can leave a lane before the ego car comes.
 
     Args:
         streets: all lanes, with the times of the ego car.

@@ -107,7 +107,10 @@ class LimbTable:
         self._swing = np.array([limb.swing for limb in limbs])
 
     def poses(self, states: BodyStates) -> np.ndarray:
-        """Returns X_WL (M, 4, 4) of all limbs: they turn about y, then z."""
+        """Returns the poses X_WL (M, 4, 4) of all limbs.
+
+        They turn about y, then z.
+        """
         body, p = self.body, self._joint.T
         # A forward swing turns about -y.
         pitch = states.pitch[body] - self._swing * states.swing[body]
@@ -352,7 +355,7 @@ def connect_traffic(
     lidar: System,
     goes_on: bool = False,
 ) -> None:
-    """Connects traffic with a LiDAR, which labels moving bodies as moving.
+    """Connects a LiDAR to traffic, so that it labels moving bodies as such.
 
     Its port `frame_poses` may be connected already. If traffic goes on during
     its turn, the LiDAR has the `moving_frames` of `traffic` as `moving_bodies`.

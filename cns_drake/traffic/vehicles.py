@@ -144,7 +144,7 @@ class Traffic(NamedTuple):
 def begin_traffic(
     streets: Streets, cars: np.ndarray, crossings: np.ndarray, seed: int
 ) -> Traffic:
-    """Returns traffic with room for the entries of all vehicles."""
+    """Returns the traffic at the start, with room for all vehicles' entries."""
     num_pieces = len(streets.pieces)
     entries = np.zeros(_MOST_ENTRIES * len(cars) + num_pieces, _ENTRY)
     head = np.full(num_pieces, -1)
@@ -284,7 +284,7 @@ def _places(
 
 @compiled
 def find_occupants(traffic: Traffic, k: int) -> None:
-    """Notes the places of all vehicles at the k-th time."""
+    """Finds which vehicle is where, at the k-th time step."""
     streets, cars = traffic.streets, traffic.cars
     pieces = streets.pieces
     traffic.head[:] = -1
@@ -340,9 +340,10 @@ def _enter(
 def find_ahead(
     traffic: Traffic, piece: int, s: float, who: int
 ) -> tuple[float, float]:
-    """Returns the gap to the next one ahead on a piece [m], and its speed.
+    """Returns the gap [m] to the next vehicle ahead, and its speed [m/s].
 
-    It is ahead of a vehicle of a number, whose front bumper is at s [m].
+    It is on the same piece, ahead of a vehicle of a number, whose front bumper
+    is at s [m].
     """
     gap, speed = np.inf, 0.0
     at = traffic.head[piece]
@@ -396,7 +397,9 @@ def is_walked(traffic: Traffic, c: int, way: int, is_large: bool) -> bool:
 
 @compiled
 def lane_over(streets: Streets, car: Any, c: int) -> tuple[int, float, float]:
-    """Returns where a vehicle comes to the c-th crossing, one without marks.
+    """Returns the place where a vehicle's lane meets the c-th crossing.
+
+    The crossing has no marks.
 
     Returns:
         The lane that leads over it, -1 for none on the vehicle's path; the
@@ -489,7 +492,7 @@ def rear_on_way(streets: Streets, car: Any) -> float:
 
 @compiled
 def accelerations(traffic: Traffic) -> np.ndarray:
-    """Returns the (N,) accelerations [m/s^2]."""
+    """Returns the accelerations of all vehicles, (N,) [m/s^2]."""
     streets, cars = traffic.streets, traffic.cars
     pieces = streets.pieces
     result = np.zeros(len(cars))
@@ -542,7 +545,7 @@ def accelerations(traffic: Traffic) -> np.ndarray:
 
 @compiled
 def change_lanes(traffic: Traffic, k: int) -> None:
-    """Begins the change of lane of one vehicle at most, at the k-th time."""
+    """Lets at most one vehicle begin to change lanes, at the k-th time step."""
     cars, pieces = traffic.cars, traffic.streets.pieces
     for i in range(len(cars)):
         car = cars[i]
@@ -626,7 +629,10 @@ def _is_better(traffic: Traffic, k: int, i: int, target: int) -> bool:
 
 @compiled
 def advance(traffic: Traffic, accelerations: np.ndarray) -> None:
-    """Moves all vehicles on, at (N,) accelerations [m/s^2]."""
+    """Moves all vehicles by one time step.
+
+    Their accelerations are (N,) [m/s^2].
+    """
     cars, pieces = traffic.cars, traffic.streets.pieces
     for i in range(len(cars)):
         car = cars[i]

@@ -85,7 +85,7 @@ class Bay:
         self.reach = np.repeat([lengths.max() / 2, lengths.min() / 2], 2)
 
     def box(self, beyond: np.ndarray | float = 0.0) -> Polygon:
-        """Returns the bay, extended, seen from above [m].
+        """Returns the enlarged bay as a rectangle seen from above [m].
 
         `beyond` has lengths at front, back, left and right [m].
         """
@@ -99,7 +99,7 @@ class Bay:
         )
 
     def grow(self, car: Structure, cars: Obstacles, others: Obstacles) -> None:
-        """Grows towards other things, and half the way towards other cars."""
+        """Enlarges the bay up to other objects, and half the way to other cars."""
         own = (car.name,)
         box = self.box()
         growth = np.zeros(4)

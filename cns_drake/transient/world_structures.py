@@ -265,9 +265,9 @@ class GroundSurface:
         return float(z.min()) if len(z) else default
 
     def rise(self, old: np.ndarray, new: np.ndarray) -> float:
-        """Returns how far the ground rises from a place to another (2,) [m].
+        """Returns how much higher the ground is at a new place (2,) [m].
 
-        It is 0 where either has no ground.
+        It is 0 where either place has no ground.
         """
         z = self.heights(np.array([old, new]))
         return float(z[1] - z[0]) if np.isfinite(z).all() else 0.0

@@ -100,7 +100,7 @@ class Stages(_Model):
         return heights
 
     def sites(self, stage: str) -> dict[str, float]:
-        """Returns the height of each building under construction at a stage [m]."""
+        """Returns the heights of buildings under construction at a stage [m]."""
         return {
             name: group.height
             for group in self.stages[stage].sites.values()

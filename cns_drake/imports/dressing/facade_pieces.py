@@ -99,7 +99,7 @@ class FacadePlan:
         return [o for o in self.openings if o.row == 0 and on_ground]
 
     def is_in_the_way(self, z: float, reach: float) -> bool:
-        """Returns whether a part at height z would hang over a car's path [m]."""
+        """Returns whether a part at height z hangs over a car's path [m]."""
         is_low = z - self.ground < _TALLEST_CAR
         return is_low and self.to_drive < reach + _BESIDE
 
@@ -112,10 +112,10 @@ class FacadePlan:
         return panel.place(x, z, _BEFORE)
 
     def threshold(self, door: Opening, paving: upper_sides.UpperSides) -> float:
-        """Returns the height of a door's threshold, a step above the paving [m].
+        """Returns the height of a door's threshold above the paving [m].
 
-        The highest paving before the door and in its recess counts, unless it
-        is far above or below the ground.
+        It is a step. The highest paving before the door and in its recess
+        counts, unless it is far above or below the ground.
         """
         depths = {"shop": _SHOP_DEPTH, "gate": _GATE_DEPTH}
         deep = depths.get(door.kind, self.style.depth + _DOOR_DEEPER)

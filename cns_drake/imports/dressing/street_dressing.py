@@ -194,7 +194,7 @@ class StreetRoom:
         self._taken.add(Point(x, y).buffer(_TRUNK, 4))
 
     def has_tree_pit(self, xy: np.ndarray) -> bool:
-        """Returns whether a trunk at (2,) is clear of roads, walls and drives."""
+        """Returns whether a trunk at (2,) is off roads, walls and drives."""
         pit = Point(xy).buffer(_TRUNK, 2)
         around = shapely.get_coordinates(pit)
         return not (

@@ -238,9 +238,9 @@ class CameraScene(LeafSystem):
 
 @functools.cache
 def check_renderer() -> None:
-    """Checks that Drake can draw an image.
+    """Checks that Drake can render images on this machine.
 
-    Another process draws it: without EGL, drawing ends a process.
+    A second process tries it, since without EGL rendering kills the process.
 
     Raises:
         InputError: it cannot.

@@ -51,7 +51,7 @@ class ImuSection(Mount):
 
     @property
     def is_ideal(self) -> bool:
-        """Whether it measures exactly, once a scan."""
+        """Whether the IMU has no errors, and one sample per scan."""
         return self == ImuSection(xyz=self.xyz, rpy_deg=self.rpy_deg)
 
     def sample_rate(self, scan_rate: int) -> int:
@@ -72,7 +72,7 @@ class ImuSection(Mount):
         return round(kalibr.update_rate)
 
     def noise(self, seed: int) -> ImuNoise:
-        """Returns the errors, all zero if the IMU is ideal.
+        """Returns the errors of the IMU, all zero if it is ideal.
 
         Raises:
             InputError: Kalibr's file cannot be used.
@@ -131,7 +131,7 @@ class KalibrImu(Section):
 
 
 def read_kalibr(path: Path) -> KalibrImu:
-    """Reads the noise of an IMU.
+    """Returns the noise densities and the rate from a file of Kalibr.
 
     Raises:
         InputError: the file cannot be read, or has another form.

@@ -157,7 +157,7 @@ def add_described_imu(
     scan_rate: int,
     seed: int,
 ) -> dict[str, OutputPort]:
-    """Adds the IMU that a description describes to a diagram.
+    """Adds an IMU to a diagram, given its description in a scenario.
 
     Args:
         config: the description.

@@ -101,7 +101,7 @@ class ImuErrors:
         self._block = np.empty((_BLOCK, 6))
 
     def measure(self, first: int, exact: np.ndarray) -> np.ndarray:
-        """Returns exact values with the errors of their samples.
+        """Returns exact samples with the errors of the IMU added.
 
         Samples are numbered from `first` on, 0 at time zero. The (N, 6) values
         are specific force [m/s^2] and angular velocity [rad/s].
@@ -110,7 +110,7 @@ class ImuErrors:
         return np.minimum(np.maximum(measured, -self._range), self._range)
 
     def at(self, sample: int) -> np.ndarray:
-        """Returns the error of a sample, a row as in `measure`."""
+        """Returns the (6,) error of one sample, as in `measure`."""
         return self._of_samples(sample, 1)[0]
 
     def _of_samples(self, first: int, count: int) -> np.ndarray:

@@ -224,7 +224,7 @@ def add_described_lidar(
     period: float | None = None,
     **options: Any,
 ) -> Lidar:
-    """Adds the LiDAR that a description describes to a diagram.
+    """Adds a LiDAR to a diagram, given its description in a scenario.
 
     Args:
         config: the description.

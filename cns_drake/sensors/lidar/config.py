@@ -136,7 +136,7 @@ class LidarSection(Mount):
         return self
 
     def with_preset(self, preset: str) -> LidarSection:
-        """Returns another unit with the same place and measurement.
+        """Returns another unit with the same pose and measurement settings.
 
         Raises:
             InputError: there is no such preset.
@@ -158,9 +158,10 @@ def make_lidar_config(preset: str) -> LidarSection:
 def make_pattern(
     config: LidarSection, period: float | None = None
 ) -> UnitPattern:
-    """Returns the beams of one turn, of another period [s] if it is given.
+    """Returns the beam pattern of a LiDAR.
 
-    Calibrated returns have the elevations of a real unit, if they are known.
+    A turn takes another period [s] if it is given. Calibrated returns have the
+    elevations of a real unit, if they are known.
     """
     pattern = make_beam_pattern(
         config.preset,
@@ -178,7 +179,7 @@ def make_pattern(
 
 
 def describe_unit(config: LidarSection) -> dict[str, Any]:
-    """Returns what a user gets of a unit with calibrated returns.
+    """Returns the data of a calibrated unit that its user would know.
 
     Its lasers' true angles differ from these by the errors of the unit.
     """

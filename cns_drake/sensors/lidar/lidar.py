@@ -54,7 +54,7 @@ class Structures(Protocol):
     """What gives labels and instance ids to geometries."""
 
     def labels(self, names: Sequence[str]) -> Labels:
-        """Returns those of geometries, by the names of their structures."""
+        """Returns the labels of geometries, by the names of their structures."""
 
 
 class RayHits(NamedTuple):
@@ -629,7 +629,7 @@ class SeenGeometry:
         seen: moving_groups.Ball,
         p_WS: np.ndarray,
     ) -> None:
-        """Moves moving geometry, and builds changed geometry anew.
+        """Moves geometry whose frame has moved, and rebuilds changed geometry.
 
         Args:
             query_object: has geometry and poses.
@@ -659,13 +659,13 @@ class SeenGeometry:
         self._revision = revision
 
     def labels(self, moving: np.ndarray) -> np.ndarray:
-        """Returns the class of each geometry while some instances move."""
+        """Returns the class of each geometry; moving instances have another."""
         moves = np.zeros(MAX_INSTANCE + 1, bool)
         moves[moving] = True
         return np.where(moves[self.instance], self.moving_label, self.label)
 
     def materials(self, returns: CalibratedReturns) -> Materials:
-        """Returns the materials of `scene`."""
+        """Returns how each geometry of `scene` reflects."""
         if self._materials is None:
             self._materials = returns.materials(
                 self.built, self._lidar.structures

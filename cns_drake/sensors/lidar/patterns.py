@@ -100,7 +100,7 @@ class Beams:
 
     @cached_property
     def cast_columns(self) -> np.ndarray | None:
-        """(N,) columns in packet order; None if they simply repeat."""
+        """Column (N,) of each beam in packet order; None if they repeat."""
         columns = self.column[self.packet_order]
         turns, rest = divmod(len(columns), max(len(self.column_t_ns), 1))
         once = np.arange(len(self.column_t_ns))

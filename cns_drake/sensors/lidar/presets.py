@@ -26,7 +26,7 @@ class LidarPreset(NamedTuple):
     def of(
         cls, *, source: str, ranges: tuple[float, float], **fields: Any
     ) -> LidarPreset:
-        """Returns a unit of its fields in presets.yaml."""
+        """Returns a preset from its fields in presets.yaml."""
         fields["min_range"], fields["max_range"] = ranges
         if "pattern" in fields:
             kind = getattr(patterns, fields.pop("pattern"))

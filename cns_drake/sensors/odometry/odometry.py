@@ -79,7 +79,10 @@ class OdometrySensor(LeafSystem):
     def place_of(
         self, body: BodyIndex, X_PC: RigidTransform
     ) -> RigidTransform | None:
-        """Returns X_BC of a place C on the body P; None for another body."""
+        """Returns the pose X_BC of a frame C on the body P.
+
+        It is None if C is on another body.
+        """
         return self.X_PB.inverse() @ X_PC if body == self._body else None
 
     def _calc_odometry(self, context: Context, output: AbstractValue) -> None:

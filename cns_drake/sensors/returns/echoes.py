@@ -92,7 +92,7 @@ def report_echoes(
     range_error: np.ndarray,
     gain: np.ndarray,
 ) -> Reported:
-    """Returns the reported points of the light.
+    """Returns the points that the unit reports for the light it receives.
 
     Light less than a pulse apart is one echo, whose distance is the mean by
     energy. An echo is detected by the probability of its SNR, and its distance

@@ -94,7 +94,10 @@ class Weather:
         )
 
     def drops(self, diameters_mm: np.ndarray) -> list[tuple[np.ndarray, float]]:
-        """Returns N(D) [1/(m3 mm)] and reflectivity of each kind of drops."""
+        """Returns size distribution and reflectivity of each kind of drops.
+
+        The distribution is N(D) [1/(m3 mm)].
+        """
         kinds = []
         if self.rain > 0.0:
             slope = 4.1 * self.rain**-0.21

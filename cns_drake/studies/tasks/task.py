@@ -103,7 +103,7 @@ class Jobs:
         *,
         kept: bool = False,
     ) -> DescribedSource:
-        """Returns a drive's source, or the parts of its descriptions.
+        """Returns the source of a drive, or the parts with its descriptions.
 
         Args:
             drive: the drive.
@@ -136,7 +136,7 @@ class Jobs:
     def elsewhere(
         self, pair: Pair, needs: list[str]
     ) -> tuple[tuple[Part, ...], ...]:
-        """Returns the descriptions of drives elsewhere that a pair needs."""
+        """Returns descriptions of the drives elsewhere that distract a pair."""
         if not pair.distractors:
             return ()
         found = []
@@ -211,7 +211,7 @@ class Task(abc.ABC):
             self.check(name, value, where)
 
     def check(self, name: str, value: Any, where: str) -> None:  # noqa: B027
-        """Checks a setting.
+        """Raises an error if a setting has an impossible value.
 
         Raises:
             InputError: its value is not usable.
@@ -219,11 +219,11 @@ class Task(abc.ABC):
 
     @abc.abstractmethod
     def measure(self, pair: Pair, jobs: Jobs) -> Part:
-        """Adds the jobs that measure a pair; returns what they write."""
+        """Adds the jobs that measure a pair; returns the parts they write."""
 
     @abc.abstractmethod
     def numbers(self, found: Any, before: Any | None) -> Iterable[Number]:
-        """Yields the numbers of a pair.
+        """Yields the results of a pair, one number each.
 
         Args:
             found: value of the part.
@@ -231,7 +231,7 @@ class Task(abc.ABC):
         """
 
     def answers(self, found: Any) -> Iterable[Answers]:
-        """Yields the answers to the queries; none by default."""
+        """Yields the answers to each query; by default none."""
         return ()
 
 
