@@ -72,7 +72,7 @@ class BoxMessages:
         self._who: tuple[bytes, tuple[str, ...]] | None = None
 
     def encode(self, objects: RecordedObjects, stamp_ns: int) -> bytes:
-        """Returns the message of some objects as CDR; all have one stamp [ns]."""
+        """Returns the CDR message of objects, all with one stamp [ns]."""
         who = (objects.instance.tobytes(), objects.semantic_classes)
         if who != self._who:
             self._prepare(objects)

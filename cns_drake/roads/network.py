@@ -75,7 +75,7 @@ class RoadNetwork:
     def connection(
         self, incoming: LaneRef, outgoing: LaneRef, spacing: float = 1.0
     ) -> Connection:
-        """Returns the path from one lane to another, whether or not it is legal.
+        """Returns the path from one lane to another, legal or not.
 
         Its points are about a spacing apart [m].
 

@@ -79,7 +79,7 @@ class StructureTable:
         return StructureTable(entries)
 
     def labels(self, names: Sequence[str]) -> Labels:
-        """Returns the labels of geometries, by the names of their structures."""
+        """Returns labels of geometries, by the names of their structures."""
         table = self.completed(names)
         entries = [table[name] for name in names]
         columns = (

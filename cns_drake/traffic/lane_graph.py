@@ -121,7 +121,7 @@ class Walkway:
 
     @property
     def is_narrow(self) -> np.ndarray:
-        """(N,) bool, whether walkers must walk in single file."""
+        """(N,) bool, where walkers only have room if they face along it."""
         if self.narrow is not None:
             return self.narrow
         return np.zeros(len(self.points), bool)

@@ -99,7 +99,7 @@ class Bay:
         )
 
     def grow(self, car: Structure, cars: Obstacles, others: Obstacles) -> None:
-        """Enlarges the bay up to other objects, and half the way to other cars."""
+        """Enlarges the bay up to other objects, and halfway to other cars."""
         own = (car.name,)
         box = self.box()
         growth = np.zeros(4)

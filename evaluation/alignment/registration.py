@@ -52,7 +52,7 @@ class Surface:
     tree: small_gicp.KdTree
 
     def sample(self, number: int = _NUM_SAMPLES) -> np.ndarray:
-        """Returns a number of the points, (M,) increasing indices."""
+        """Returns the increasing indices (M,) of a sample of the points."""
         count = len(self.points)
         if count <= number:
             return np.arange(count)
@@ -61,7 +61,7 @@ class Surface:
 
     @cached_property
     def covariances(self) -> np.ndarray:
-        """(N, 3, 3) of the neighbours of each point, flattened as for GICP."""
+        """(N, 3, 3) covariances of points' neighbours, flattened for GICP."""
         return covariances(self.cloud)
 
     @cached_property
@@ -98,7 +98,9 @@ def covariances(cloud: small_gicp.PointCloud) -> np.ndarray:
 def make_surface(
     points: np.ndarray, num_neighbours: int = NUM_NEIGHBOURS
 ) -> Surface:
-    """Returns a cloud with normals and covariances, of nearest neighbours.
+    """Returns a cloud with normals and covariances of its points.
+
+    They are those of nearest neighbours.
 
     Args:
         points: (N, 3) [m], N >= num_neighbours.
@@ -114,7 +116,7 @@ def make_surface(
 def register(
     source: Surface, target: Surface, guess: np.ndarray
 ) -> Registration:
-    """Moves a cloud onto another.
+    """Returns the pose that moves a cloud onto another.
 
     Args:
         source: S.

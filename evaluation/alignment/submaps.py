@@ -77,7 +77,7 @@ class Submaps:
         return self.travelled[self.frames]
 
     def bend(self, X_VK: np.ndarray) -> np.ndarray:
-        """Returns poses of all frames for new ones of the keyframes.
+        """Returns the poses of all frames after the keyframes have moved.
 
         Args:
             X_VK: (K, 4, 4).

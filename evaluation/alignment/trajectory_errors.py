@@ -128,10 +128,10 @@ def trajectory_errors(
     frame: Frame = "lidar",
     time_offset: float = 0.0,
 ) -> TrajectoryErrors:
-    """Compares an estimated trajectory with a drive.
+    """Returns the errors of an estimated trajectory of a drive.
 
-    The drive's poses are interpolated at the estimate's times. Its world does
-    not matter.
+    The drive's poses are interpolated at the estimate's times. The world frame
+    of the estimate does not matter.
 
     Args:
         drive: has the true poses.
@@ -170,7 +170,7 @@ def trajectory_errors(
 
 
 def aligned_offsets(p: np.ndarray, q: np.ndarray) -> np.ndarray:
-    """Returns distances (N,) of points p from points q, aligned with them.
+    """Returns the distances (N,) of points from others, after alignment.
 
     Args:
         p: (N, 3) true positions [m].
@@ -188,7 +188,7 @@ def aligned_offsets(p: np.ndarray, q: np.ndarray) -> np.ndarray:
 def segment_errors(
     X: np.ndarray, Y: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Returns the errors of the motion over the next 100 m.
+    """Returns the errors of the motion over 100 m, from each pose on.
 
     Args:
         X: (N, 4, 4) true poses.

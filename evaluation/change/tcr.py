@@ -31,7 +31,7 @@ COVERAGE_RADIUS = 40.0
 
 
 def in_convex_hull(points: np.ndarray, vertices: np.ndarray) -> np.ndarray:
-    """Returns which points lie in the convex hull, boundary included.
+    """Returns which points lie in a convex hull, its boundary included.
 
     Clouds without volume have a hull as well: a polygon in its plane, a
     segment, a point. Coordinates are centred first, so that large offsets (UTM)
@@ -126,7 +126,7 @@ class DirectedChange:
 
     @property
     def ratio(self) -> float:
-        """1 - |O| / |H|, the TCR of the NSS benchmark; NaN if H is empty."""
+        """TCR of the NSS benchmark, 1 - |O| / |H|; NaN if H is empty."""
         return _ratio(self.num_unchanged, self.num_in_hull)
 
     def restricted(self, kept: np.ndarray) -> DirectedChange:

@@ -48,7 +48,7 @@ class QuerySensor:
         tilt_deg: float,
         hidden_deg: float,
     ) -> QuerySensor:
-        """Draws the sensor of a query.
+        """Draws how a query is turned, tilted and hidden.
 
         All drives have the same draw at a frame, so that a query of a drive and
         the same query of its control are turned alike. Each effect has the same
@@ -82,7 +82,7 @@ class QuerySensor:
 
 
 def travelled(positions: np.ndarray) -> np.ndarray:
-    """Returns the length (N,) of the path up to each position (N, 3) [m]."""
+    """Returns the path length (N,) up to each position (N, 3) [m]."""
     steps = np.linalg.norm(np.diff(positions, axis=0), axis=1)
     return np.concatenate([[0.0], np.cumsum(steps)])
 

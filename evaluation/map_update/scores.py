@@ -152,7 +152,9 @@ def _share_near(
 def nearest(
     points: np.ndarray, others: np.ndarray, most: float = math.inf
 ) -> np.ndarray:
-    """Returns the distance (N,) to the nearest of others; inf beyond `most`.
+    """Returns the distance (N,) to the nearest other point.
+
+    It is infinite beyond `most`.
 
     Args:
         points: (N, 3).

@@ -99,7 +99,7 @@ class Session:
 
     @property
     def moves(self) -> np.ndarray:
-        """(N,) bool, points of moving and of parked vehicles and people."""
+        """(N,) bool, points on vehicles and people, also on parked ones."""
         return np.isin(self.classes, MOVES)
 
     def scan(self, index: int) -> np.ndarray:

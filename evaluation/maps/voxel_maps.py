@@ -73,7 +73,7 @@ def move(
     larger: np.ndarray,
     larger_sampled: np.ndarray,
 ) -> None:
-    """Enters all voxels of one table into another, empty one."""
+    """Moves all voxels of a table into a larger, empty one."""
     for i in range(len(table)):
         if table[i].count != 0:
             slot = _find(larger, table[i].ix, table[i].iy, table[i].iz)
@@ -104,7 +104,7 @@ def enter(
     samples: np.ndarray,
     num_samples: int,
 ) -> tuple[int, int, int]:
-    """Enters points into a table of voxels.
+    """Adds points to the voxels of a table.
 
     Args:
         points: (3, N) in the frame of a sensor [m].
@@ -255,7 +255,7 @@ class VoxelAccumulator:
         self._columns = np.zeros((3, _BATCH))
 
     def add(self, points: np.ndarray, X_WS: np.ndarray | None = None) -> int:
-        """Adds a cloud.
+        """Adds a cloud to the map.
 
         Args:
             points: structured array of shape (N,) with x, y, z [m].
@@ -311,7 +311,7 @@ class VoxelAccumulator:
         )
 
     def samples(self) -> np.ndarray:
-        """Returns the first point in each part of a voxel.
+        """Returns the first point in each subdivision of a voxel.
 
         Returns:
             (K, 3), in the order in which they came [m].
@@ -386,7 +386,9 @@ def _corners(indices: np.ndarray, voxel_size: float) -> np.ndarray:
 
 
 def thin(points: np.ndarray, voxel_size: float) -> np.ndarray:
-    """Returns the voxel centroids of a cloud in the frame of a sensor.
+    """Returns a cloud with one point per voxel, the centroid.
+
+    Points are in the frame of a sensor.
 
     Args:
         points: (N, 3) [m]; points that are not finite are left out.

@@ -260,7 +260,7 @@ class Btc(Method[BtcDescription, BtcDatabase]):
         database: BtcDatabase,
         places: Sequence[int],
     ) -> list[np.ndarray | None]:
-        """Returns the common motions of the triangles.
+        """Returns the poses on which most matching triangles agree.
 
         None if too few match or agree.
         """
@@ -303,9 +303,9 @@ class Btc(Method[BtcDescription, BtcDatabase]):
 
 
 def align(query: np.ndarray, place: np.ndarray) -> np.ndarray:
-    """Returns the motion that brings triangles closest to their partners.
+    """Returns the motion that best aligns triangles with their partners.
 
-    Kabsch's solution, without reflections.
+    It is Kabsch's solution, without reflections.
 
     Args:
         query: (..., 3, 3) vertices, one a row [m].
@@ -329,7 +329,7 @@ def align(query: np.ndarray, place: np.ndarray) -> np.ndarray:
 
 
 def find_motion(query: np.ndarray, place: np.ndarray) -> np.ndarray | None:
-    """Returns the motion with the most agreeing pairs of triangles.
+    """Returns the motion on which most pairs of triangles agree.
 
     Every pair, or every n-th of many, proposes the motion that aligns it.
 
@@ -360,7 +360,7 @@ def plane_overlap(
     normal_limit: float,
     distance_limit: float,
 ) -> float:
-    """Returns the part of a query's patches that lie on one of a place.
+    """Returns the share of a query's patches that match one of a place.
 
     Each patch is compared with the one whose center is nearest to its own.
 

@@ -113,9 +113,10 @@ def height_image(
     height_step: float,
     num_layers: int,
 ) -> HeightImage:
-    """Draws points into the cells of a grid that starts at the first.
+    """Returns an image of the heights at which each cell has points.
 
-    Its memory grows with the area that the points cover.
+    The cells are those of a grid that starts at the first. Its memory grows
+    with the area that the points cover.
 
     Args:
         points: (N, 3) [m].
@@ -177,11 +178,11 @@ def height_image(
 def peaks(
     num_heights: np.ndarray, min_heights: int
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Finds the cells that stand out, away from lines.
+    """Returns the cells of an image that stand out and are not on a line.
 
-    One a segment: the cell with most heights, the first of equal ones. It is
-    part of a line if in some direction one neighbour is nearly as high and
-    the opposite one at least half as high.
+    There is one per segment: the cell with most heights, the first of equal
+    ones. It is part of a line if in some direction one neighbour is nearly as
+    high and the opposite one at least half as high.
 
     Args:
         num_heights: (rows, columns) bits set in each cell; multiples of the
@@ -220,7 +221,7 @@ def peaks(
 def find_keypoints(
     image: HeightImage, center: np.ndarray, axes: np.ndarray, min_heights: int
 ) -> Keypoints:
-    """Returns the peaks of an image, as places on its plane.
+    """Returns the peaks of an image as points on its plane.
 
     Args:
         image: cloud seen along the normal.
@@ -236,7 +237,7 @@ def find_keypoints(
 
 
 def suppress(keypoints: Keypoints, radius: float, max_number: int) -> Keypoints:
-    """Returns keypoints with more heights than any other nearby.
+    """Returns the keypoints with more heights than any other nearby.
 
     If two are equal, neither stays.
 
@@ -381,7 +382,9 @@ def make_triangles(
 
 
 def make_table(clouds: Sequence[Triangles], resolution: float) -> TriangleTable:
-    """Returns the triangles of clouds, sorted by cell; ties in their order.
+    """Returns the triangles of several clouds, sorted by cell.
+
+    Triangles of one cell keep their order.
 
     Args:
         clouds: at least one.
@@ -411,12 +414,12 @@ def match(
     side_tolerance: float,
     min_similarity: float,
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Finds the triangles that are similar to those of a query.
+    """Returns the triangles that are similar to those of a query.
 
-    Similar are triangles whose sides differ by little, relative to their
-    length (Euclidean norms of the three), and whose vertices have about the
-    same heights: Dice similarity, mean of the three. Only cells near those of
-    the query are searched, so that large triangles must be more alike than the
+    Similar are triangles whose sides differ by little, relative to their length
+    (Euclidean norms of the three), and whose vertices have about the same
+    heights: Dice similarity, mean of the three. Only cells near those of the
+    query are searched, so that large triangles must be more alike than the
     tolerance requires.
 
     Args:

@@ -198,9 +198,9 @@ class LayeredOverlap(Method[LayeredScan, LayeredDatabase]):
         database: LayeredDatabase,
         places: Sequence[int],
     ) -> list[np.ndarray | None]:
-        """Returns turns and horizontal translations of the query.
+        """Returns the query's headings and horizontal translations.
 
-        None if one of the two shows nothing.
+        None if one of the two scans shows nothing.
         """
         scans = [database.places[place] for place in places]
         poses: list[np.ndarray | None] = [None] * len(scans)

@@ -293,7 +293,7 @@ def known_methods() -> tuple[str, ...]:
 
 
 def optional_methods() -> tuple[str, ...]:
-    """Returns the names of the methods that run only if they are named."""
+    """Returns the names of the methods that run only on request."""
     return tuple(sorted(_OPTIONAL))
 
 
@@ -341,7 +341,7 @@ def make_method(name: str, parameters: Mapping[str, Any]) -> Method:
 
 
 def load_method(path: Path) -> type[Method]:
-    """Runs a Python file and returns the method that it defines.
+    """Returns the method that a Python file defines.
 
     Exceptions in it, then and later, become one line for its author.
 
@@ -384,7 +384,7 @@ def load_method(path: Path) -> type[Method]:
 
 
 def run_module(path: Path) -> ModuleType:
-    """Runs a Python file of a method's author, and returns its module.
+    """Returns the module of a method author's Python file, after running it.
 
     Raises:
         InputError: if there is no such file, or it fails.
@@ -405,7 +405,7 @@ def run_module(path: Path) -> ModuleType:
 
 
 def with_named_faults(function: Callable, path: Path) -> Callable:
-    """Returns a function whose exceptions become one line."""
+    """Returns a function whose exceptions become one line with the file."""
 
     @functools.wraps(function)
     def call(*arguments: Any, **options: Any) -> Any:

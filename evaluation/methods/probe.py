@@ -77,7 +77,7 @@ class Probe:
     mu: np.ndarray
 
     def evidence(self) -> tuple[np.ndarray, np.ndarray]:
-        """Returns the probabilities drawn to 1/2, and their log-odds."""
+        """Returns occupancy probabilities, moved towards 1/2, and log-odds."""
         mu = self.mu.astype(np.float64)
         sigma = np.sqrt(mu * (1.0 - mu))
         p = mu * (1.0 - sigma) + 0.5 * sigma
@@ -177,7 +177,7 @@ class ProbeMethod(Method[Probe, ProbeDatabase]):
     def relative_pose(
         self, query: Probe, database: ProbeDatabase, place: int
     ) -> np.ndarray | None:
-        """Returns the turn of the query, in steps of one sector.
+        """Returns the query's heading at a place, in steps of one sector.
 
         None if one of the two has no points within range.
         """

@@ -96,7 +96,7 @@ class Ring:
     spectrum: np.ndarray
 
     def bev(self, num_cells: int) -> np.ndarray:
-        """Returns the map from above, (6, n, n) float32."""
+        """Returns the feature map from above, (6, n, n) float32."""
         image = np.zeros((_NUM_FEATURES, num_cells * num_cells), np.float32)
         image[:, self.filled] = self.features.T
         return image.reshape(_NUM_FEATURES, num_cells, num_cells)
@@ -184,9 +184,9 @@ class RingPlusPlus(Method[Ring, RingDatabase]):
     def relative_poses(
         self, query: Ring, database: RingDatabase, places: Sequence[int]
     ) -> list[np.ndarray | None]:
-        """Returns turns and horizontal translations of the query.
+        """Returns the query's headings and horizontal translations.
 
-        None if one of the two shows nothing.
+        None if one of the two scans shows nothing.
         """
         if len(query.filled) == 0:
             return [None] * len(places)
@@ -376,7 +376,7 @@ def _signed(shift: int, n: int) -> int:
 
 
 def nearest_neighbours(points: np.ndarray, k: int) -> np.ndarray:
-    """Returns for every point its k nearest, itself among them.
+    """Returns the k nearest neighbours of every point, itself included.
 
     Args:
         points: (N, 3) finite float64.
@@ -393,18 +393,15 @@ def nearest_neighbours(points: np.ndarray, k: int) -> np.ndarray:
 def local_features(points: np.ndarray, neighbours: np.ndarray) -> np.ndarray:
     """Returns six numbers that describe the shape of a cloud at each point.
 
-    A selection of the hand-made features of LPD-Net (Liu et al., ICCV 2019).
-    With the covariance of a point's neighbours, its eigenvalues l1 >= l2 >= l3,
-    their sum s, and the eigenvalues m1 >= m2 of its horizontal part:
+    They are a selection of the hand-made features of LPD-Net (Liu et al., ICCV
+    2019). With the covariance of a point's neighbours, its eigenvalues l1 >= l2
+    >= l3, their sum s, and the eigenvalues m1 >= m2 of its horizontal part:
+    change of curvature l3 / s; omnivariance (l1 l2 l3)^(1/3) / s; entropy of
+    the eigenvalues, -sum (li / s) ln (li / s); horizontal roundness m2 / m1
+    (there called linearity); range and variance of z.
 
-    - change of curvature l3 / s,
-    - omnivariance (l1 l2 l3)^(1/3) / s,
-    - entropy of the eigenvalues, -sum (li / s) ln (li / s),
-    - horizontal roundness m2 / m1 (there called linearity),
-    - range and variance of z.
-
-    Where the neighbours lie in a plane or on a line, the limits of the
-    formulas count (0 ln 0 = 0, and 0 / 0 = 0 for a vertical line).
+    Where the neighbours lie in a plane or on a line, the limits of the formulas
+    count (0 ln 0 = 0, and 0 / 0 = 0 for a vertical line).
 
     Args:
         points: (N, 3) float64.

@@ -101,12 +101,12 @@ class Contexts:
 
     @property
     def retrieval_keys(self) -> np.ndarray:
-        """(K, rows) means that do not depend on a shift of the columns."""
+        """(K, rows) row means, which a shift of the columns does not change."""
         return self.images.mean(axis=2)
 
     @property
     def aligning_keys(self) -> np.ndarray:
-        """(K, columns) means that shift with the columns."""
+        """(K, columns) column means, which shift with the columns."""
         return self.images.mean(axis=1)
 
 
@@ -196,7 +196,7 @@ class ScanContext(Method[Contexts, ContextDatabase]):
     def relative_pose(
         self, query: Contexts, database: ContextDatabase, place: int
     ) -> np.ndarray | None:
-        """Returns the turn (polar) or the lane offset (cart) of the query.
+        """Returns the query's heading (polar) or lateral offset (cart).
 
         None if the two have no filled column in common.
         """

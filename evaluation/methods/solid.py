@@ -66,7 +66,7 @@ class SolidConfig(MethodConfig):
         return self
 
     def field(self, lidar: LidarField = _CNS) -> LidarField:
-        """Returns the field of view: that given, or else the LiDAR's."""
+        """Returns the given field of view, or else that of the LiDAR."""
         elevations, lowest_deg, highest_deg = lidar
         if self.elevations is not None:
             elevations = self.elevations
@@ -189,7 +189,7 @@ class SolidMethod(Method[Solid, SolidDatabase]):
     def relative_pose(
         self, query: Solid, database: SolidDatabase, place: int
     ) -> np.ndarray | None:
-        """Returns the turn of the query, in steps of one azimuth cell.
+        """Returns the query's heading at a place, in steps of one azimuth cell.
 
         None if one of the two has no points within range.
         """

@@ -45,7 +45,7 @@ def convolve(
 
 
 def coarser(cells: np.ndarray, step: int) -> np.ndarray:
-    """Returns the cells (M, 3) of a grid with a step that have any of these.
+    """Returns the occupied cells (M, 3) of a coarser grid.
 
     They are named by their lower corners, as the finer cells are.
     """

@@ -47,7 +47,7 @@ def measure_cost(
     query: DescribedDrive,
     gate_radius: float | None = None,
 ) -> Cost:
-    """Measures a method.
+    """Returns the time and memory that a method needs.
 
     Args:
         method: to measure.
@@ -83,7 +83,9 @@ def query_ms(
     *,
     with_pose: bool = True,
 ) -> float:
-    """Returns the median time of some queries [ms]; the first does not count.
+    """Returns the median time of several queries [ms].
+
+    The first query does not count.
 
     Args:
         method: to measure.
@@ -115,7 +117,7 @@ def query_ms(
 
 
 def cpu_ms(function: Callable[[Any], object], argument: object) -> float:
-    """Returns the processor time of a call [ms]."""
+    """Returns the CPU time of a call [ms]."""
     start = process_time_ns()
     function(argument)
     return (process_time_ns() - start) * 1e-6

@@ -61,24 +61,24 @@ class PrCurve:
 
     @property
     def precision(self) -> np.ndarray:
-        """(K,); every threshold accepts at least one query."""
+        """(K,) precision; every threshold accepts at least one query."""
         return self.true_positives / (
             self.true_positives + self.false_positives
         )
 
     @property
     def recall(self) -> np.ndarray:
-        """(K,); 0 if there is nothing to recall."""
+        """(K,) recall; 0 if there is nothing to recall."""
         return recall_of(self.true_positives, self.false_negatives)
 
     @property
     def f1(self) -> np.ndarray:
-        """(K,) 2 TP / (2 TP + FP + FN)."""
+        """(K,) F1 = 2 TP / (2 TP + FP + FN)."""
         return 2.0 * self.true_positives / (self.true_positives + self.counted)
 
     @property
     def counted(self) -> np.ndarray:
-        """(K,) T = TP + FP + FN."""
+        """(K,) number of queries that count: TP + FP + FN."""
         return self.true_positives + self.false_positives + self.false_negatives
 
     @property
@@ -91,7 +91,7 @@ class PrCurve:
         return float(areas_under(self.precision[None], self.recall[None])[0])
 
     def strict_auc(self, num_with_match: int) -> float:
-        """Returns the area over recall = TP / N.
+        """Returns the area under the curve with recall = TP / N.
 
         N, the number of queries with a match, includes those whose accepted
         place is wrong; TP / (TP + FN) reaches 1 whatever they are.
@@ -108,7 +108,7 @@ class PrCurve:
 
 
 def pr_curve(outcomes: QueryOutcomes) -> PrCurve:
-    """Returns the exact curve of queries, all of which count."""
+    """Returns the exact precision-recall curve of all given queries."""
     thresholds, tp, fp, fn = weighted_counts(
         outcomes, np.ones((1, len(outcomes)))
     )
@@ -120,7 +120,7 @@ def pr_curve(outcomes: QueryOutcomes) -> PrCurve:
 def weighted_counts(
     outcomes: QueryOutcomes, weights: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
-    """Counts TP, FP and FN at every distinct score, queries weighted.
+    """Returns TP, FP and FN at every distinct score, for weighted queries.
 
     Args:
         outcomes: outcomes of Q queries.
@@ -149,7 +149,7 @@ def weighted_counts(
 
 
 def areas_under(precision: np.ndarray, recall: np.ndarray) -> np.ndarray:
-    """Returns the areas (B,) under curves (B, K), K possibly 0."""
+    """Returns the areas (B,) under curves (B, K); K can be 0."""
     if precision.shape[1] == 0:
         return np.zeros(len(precision))
     start = precision[:, 0] * recall[:, 0]
@@ -171,7 +171,7 @@ class Interval:
     high: float = math.nan
 
     def to_json(self) -> list[float | None]:
-        """Returns both limits; NaN becomes None."""
+        """Returns the lower and upper limit; NaN becomes None."""
         return [json_number(self.low), json_number(self.high)]
 
 
@@ -224,7 +224,7 @@ def resampled_weights(
 def resampled_metrics(
     outcomes: QueryOutcomes, weights: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Returns AUC, R@1 and strict AUC, each (B,), of samples of the queries.
+    """Returns AUC, R@1 and strict AUC of B samples of queries, each (B,).
 
     Args:
         outcomes: outcomes of Q queries, all of which count.
@@ -248,7 +248,7 @@ def resampled_metrics(
 def own_samples(
     outcomes: QueryOutcomes, seed: int = 0
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Returns `resampled_metrics` of one or more queries, in their own blocks.
+    """Returns `resampled_metrics` of queries, resampled in their own blocks.
 
     They are drawn once, whatever they are compared with.
     """
@@ -259,9 +259,9 @@ def own_samples(
 def paired_samples(
     outcomes: QueryOutcomes, other: QueryOutcomes
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Returns `resampled_metrics` in the blocks that `own_samples` draws.
+    """Returns `resampled_metrics` with the blocks of other queries.
 
-    Those are of the other's queries, which are as many.
+    They are the blocks that `own_samples` draws for these, which are as many.
     """
     if np.array_equal(outcomes.own_blocks, other.own_blocks):
         return own_samples(outcomes)
@@ -270,7 +270,7 @@ def paired_samples(
 
 
 def percentile_interval(samples: np.ndarray) -> Interval:
-    """Returns the interval of 95 % of the samples; NaN do not count."""
+    """Returns the interval that holds 95 % of the samples, without NaN."""
     known = samples[~np.isnan(samples)]
     if len(known) == 0:
         return UNKNOWN
@@ -319,7 +319,9 @@ class Difference:
 
 
 def auc_difference(first: QueryOutcomes, second: QueryOutcomes) -> Difference:
-    """Compares two methods on the same queries, see `mean_auc_difference`.
+    """Returns the AUC difference of two methods on the same queries.
+
+    See `mean_auc_difference`.
 
     Args:
         first: outcomes of Q queries.
@@ -331,12 +333,13 @@ def auc_difference(first: QueryOutcomes, second: QueryOutcomes) -> Difference:
 def mean_auc_difference(
     pairs: Sequence[tuple[QueryOutcomes, QueryOutcomes]],
 ) -> Difference:
-    """Compares two methods on several sets of queries (mode all).
+    """Returns the mean AUC difference of two methods, with its p-value.
 
-    The bootstrap draws the same blocks for both. Its deviation, corrected for
-    the number n of blocks, gives a t test of n - 1 degrees of freedom, whose
-    small p-values do not end at the number of samples. Sets of queries are
-    independent: their variances and degrees of freedom add up.
+    It is over several sets of queries (mode all). The bootstrap draws the same
+    blocks for both. Its deviation, corrected for the number n of blocks, gives
+    a t test of n - 1 degrees of freedom, whose small p-values do not end at the
+    number of samples. Sets of queries are independent: their variances and
+    degrees of freedom add up.
 
     Args:
         pairs: outcomes of both methods on each set; there is one or more.
@@ -363,7 +366,7 @@ def mean_auc_difference(
 
 
 def holm(p_values: np.ndarray) -> np.ndarray:
-    """Returns p-values (N,) corrected for their number, by Holm's method.
+    """Returns p-values (N,) corrected for multiple tests, by Holm's method.
 
     NaN stay, and do not count.
     """

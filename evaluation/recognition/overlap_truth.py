@@ -41,7 +41,10 @@ class Seen(Protocol):
     def reach(self) -> float: ...
 
     def share_of(self, points: np.ndarray) -> float:
-        """Returns the visible part of points (N, 3), in the sensor's frame."""
+        """Returns which share of points (N, 3) is visible.
+
+        Points are in the sensor's frame [m].
+        """
         ...
 
 
@@ -125,7 +128,7 @@ def best_overlaps(
     X_WQs: np.ndarray,
     matches: np.ndarray,
 ) -> np.ndarray:
-    """Returns the part (Q,) of each query's scan that its best match shows.
+    """Returns how much of each query's scan its best match shows, (Q,).
 
     Args:
         place_scans: D scans (N, 3), each in the frame of its sensor.
@@ -153,7 +156,7 @@ def best_overlaps(
 
 
 def sampled(points: np.ndarray) -> np.ndarray:
-    """Returns points, at most 8192 of N, drawn at random."""
+    """Returns at most 8192 of N points, drawn at random."""
     if len(points) <= _NUM_POINTS:
         return points
     rng = np.random.default_rng(len(points))
@@ -191,7 +194,7 @@ def write_overlaps(
 def read_overlaps(
     path: Path, query_frames: np.ndarray, database_frames: np.ndarray
 ) -> np.ndarray:
-    """Returns the overlaps (Q, D) of a table.
+    """Returns the overlaps (Q, D) from a CSV table.
 
     Args:
         path: path of the table.

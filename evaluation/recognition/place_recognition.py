@@ -56,11 +56,11 @@ class PlaceRecognition:
     protocol: RetrievalProtocol
 
     def counting(self, mode: Mode) -> PlaceRecognition:
-        """Returns the same outcome with its numbers in a mode."""
+        """Returns the outcome with its scores in another mode."""
         return replace(self, metrics=evaluate(self.outcomes, mode))
 
     def auc_over_radius(self) -> dict[float, float]:
-        """Returns radius of a match [m] -> AUC (mode all) with that radius.
+        """Returns radius [m] -> AUC if matches have that radius (mode all).
 
         NaN where no query has a match.
         """
@@ -128,7 +128,7 @@ def run(
     across_maps: bool = False,
     overlaps: np.ndarray | None = None,
 ) -> PlaceRecognition:
-    """Runs a method on a pair of drives.
+    """Returns the result of a method on a pair of drives.
 
     Args:
         database, query: the drives.
@@ -164,7 +164,7 @@ def judge_retrieval(
     protocol: RetrievalProtocol,
     mode: Mode = "all",
 ) -> PlaceRecognition:
-    """Returns the numbers of a method's retrieval.
+    """Returns the scores of a method, given what it retrieved.
 
     Args:
         method: the method.
@@ -229,7 +229,7 @@ class RecognitionResult:
     def of(
         cls, map_name: str, stages: tuple[str, str], outcome: PlaceRecognition
     ) -> RecognitionResult:
-        """Returns the result of an outcome, counted in both modes."""
+        """Returns the result of an outcome, with scores in both modes."""
         return cls(
             map_name,
             stages,
@@ -243,5 +243,5 @@ class RecognitionResult:
 
     @property
     def pair(self) -> tuple[str, str, str]:
-        """Map, database, query."""
+        """Names of map, database and query."""
         return (self.map_name, *self.stages)

@@ -157,8 +157,8 @@ def judge(
 def auroc(scores: np.ndarray, is_positive: np.ndarray) -> float:
     """Returns the area under the receiver operating characteristic.
 
-    The chance that a positive one has a higher score than another; equal scores
-    count half. NaN if all or none are positive.
+    It is the chance that a positive has a higher score than a negative; equal
+    scores count half. NaN if all or none are positive.
 
     Args:
         scores: (N,); NaN is the lowest.

@@ -114,7 +114,7 @@ def compare(
     track: Track = silent,
     overlaps: np.ndarray | None = None,
 ) -> Retrieval:
-    """Scores the queries of one drive against the places of another.
+    """Returns the scores of a query drive against the places of another.
 
     Args:
         method: that described both.
@@ -144,7 +144,7 @@ def compare_with_gates(
     overlaps: np.ndarray | None = None,
     is_known: np.ndarray | None = None,
 ) -> list[Retrieval]:
-    """Scores queries once; returns what is retrieved with each gate.
+    """Returns what is retrieved with each gate, scoring queries only once.
 
     Args:
         method, database, query, track, overlaps: see `compare`.

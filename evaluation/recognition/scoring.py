@@ -35,7 +35,9 @@ def ranking(scores: np.ndarray) -> np.ndarray:
 def gate_weight(
     distance: np.ndarray | float, radius: float, softness: float = SOFTNESS
 ) -> np.ndarray:
-    """Returns the part of a score that counts at a distance, from 1 to 0.
+    """Returns the factor from 1 to 0 by which the gate scales a score.
+
+    It depends on the distance of the place.
 
     Args:
         distance: between query and place by the method's own pose [m]; any
@@ -105,9 +107,10 @@ def score_places(
     exhaustive: bool = False,
     where: str = "",
 ) -> np.ndarray:
-    """Returns a method's scores for the last of some queries, (D,) float64.
+    """Returns a method's scores for the last of several queries, (D,).
 
-    Its second stage, if it has one, and the gate are included.
+    They are float64. Its second stage, if it has one, and the gate are
+    included.
 
     Args:
         method: that described queries and places.

@@ -17,7 +17,7 @@ def along_the_way(
     p_WPs: np.ndarray,
     length: float,
 ) -> np.ndarray:
-    """Returns the scores (Q, D) of places by the queries up to each one.
+    """Returns scores (Q, D) that are averaged along the path.
 
     It is the mean of the query's own score and those of the queries before it,
     each for the place that lies as far from the place as that query lies from

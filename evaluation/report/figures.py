@@ -71,7 +71,7 @@ class View:
     pixels_per_metre: float = 3.0
 
     def axes(self) -> np.ndarray:
-        """Returns rows right, up and towards the camera (3, 3), in W."""
+        """Returns directions (3, 3) right, up and towards the camera, in W."""
         azimuth = math.radians(self.azimuth_deg)
         elevation = math.radians(self.elevation_deg)
         towards = [
@@ -103,7 +103,7 @@ class Picture:
         return left, left + width / scale, bottom, bottom + height / scale
 
     def project(self, points: np.ndarray) -> np.ndarray:
-        """Returns points (N, 3) along right and up (N, 2) [m]."""
+        """Returns points (N, 3) as coordinates right and up (N, 2) [m]."""
         return points @ self.view.axes()[:2].T
 
 
@@ -176,16 +176,15 @@ def draw_change(
     maps: tuple[VoxelMap, VoxelMap],
     stems: tuple[Path, Path],
 ) -> None:
-    """Draws what changed between two stages, and the sets behind the TCR.
+    """Draws what changed between two stages, in two figures.
 
     The metric alone decides on a colour. In the first figure, red is a point
     without a counterpart in the other map. It is pale where the point lies
     outside the other map's hull: the other drive may not have passed there, and
     the TCR does not count the point. The second shows the sets H and O in both
-    orders and united; a point has the colour of its voxel.
-
-    The clouds (K, 3) in W [m], and the maps on the grid of the TCR, are those
-    of the earlier and of the later stage.
+    orders and united; a point has the colour of its voxel. The clouds (K, 3) in
+    W [m], and the maps on the grid of the TCR, are those of the earlier and of
+    the later stage.
     """
     titles, pictures = [], []
     for one, other in ((0, 1), (1, 0)):
@@ -367,7 +366,7 @@ def render(
 def shade_by_height(
     rgb: np.ndarray, heights: np.ndarray, darkest: float = 0.75
 ) -> np.ndarray:
-    """Returns colours (N, 3) uint8 that are darker the lower their points are.
+    """Returns colours (N, 3) uint8 that are darker for lower points.
 
     `darkest` is the factor at the lowest of the heights (N,) [m].
     """
@@ -380,7 +379,7 @@ def colour_by_height(
     lowest: tuple[int, int, int],
     highest: tuple[int, int, int],
 ) -> np.ndarray:
-    """Returns colours (N, 3) uint8 between two by height."""
+    """Returns colours (N, 3) uint8 that go from one to another by height."""
     part = _height_parts(heights)[:, None]
     return ((1.0 - part) * lowest + part * highest).astype(np.uint8)
 

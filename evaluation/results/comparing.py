@@ -125,7 +125,7 @@ class Comparison:
     notes: Sequence[str]
 
     def to_json(self) -> dict[str, Any]:
-        """Returns all of it; NaN becomes None."""
+        """Returns the whole comparison for JSON; NaN becomes None."""
         return {
             "metric": self.metric,
             "task": self.task,
@@ -170,7 +170,7 @@ def compare(
     gate: bool = False,
     rankings: bool = False,
 ) -> Comparison:
-    """Compares tables with each other and with those that ship.
+    """Returns a comparison of tables of results with the shipped ones.
 
     Args:
         paths: tables of results, or folders with a `results.csv`. A

@@ -139,7 +139,7 @@ class Key:
 
     @property
     def label(self) -> str:
-        """The method, with those of its settings that are factors."""
+        """Name of the method, with those of its settings that are factors."""
         start = f"{SETTINGS}{self.method}."
         settings = (
             f"{name.removeprefix(start)} {value}"
@@ -149,7 +149,7 @@ class Key:
         return ", ".join((self.method, *settings))
 
     def but(self, *names: str) -> tuple[object, ...]:
-        """Returns what identifies it, apart from some columns.
+        """Returns the key without some columns.
 
         The settings of a method, such as `methods.ring++.crop`, are left out
         with `method`.
@@ -191,7 +191,7 @@ class Row(Key):
 
     @classmethod
     def of(cls, number: Number, **key: Any) -> Row:
-        """Returns the row of a task's number; the key is all that it lacks."""
+        """Returns the row of a task's result, with the condition's key."""
         named = {"method": number.method, "gate": number.gate, **key}
         return cls(
             **named,

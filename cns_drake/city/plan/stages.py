@@ -100,7 +100,7 @@ class Stages(_Model):
         return heights
 
     def sites(self, stage: str) -> dict[str, float]:
-        """Returns the heights of buildings under construction at a stage [m]."""
+        """Returns the height of each building site at a stage [m]."""
         return {
             name: group.height
             for group in self.stages[stage].sites.values()

@@ -54,7 +54,7 @@ class Structures(Protocol):
     """What gives labels and instance ids to geometries."""
 
     def labels(self, names: Sequence[str]) -> Labels:
-        """Returns the labels of geometries, by the names of their structures."""
+        """Returns labels of geometries, by the names of their structures."""
 
 
 class RayHits(NamedTuple):
