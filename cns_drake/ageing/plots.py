@@ -154,11 +154,11 @@ def new_building(
 
     Args:
         plot: where it stands.
-        height: of the building, about [m].
+        height: height of the building, about [m].
         banned: the archetype that it does not have.
         neighbours: footprints of its neighbours in W.
         rng: draws the building.
-        ending: of its name, after the archetype.
+        ending: ending of its name, after the archetype.
     """
     x0, y0, x1, y1 = plot.room().bounds
     names = [name for name in _BUILT_TODAY if name != banned]
@@ -314,7 +314,7 @@ def annex_to(
     Args:
         plot: that of the building.
         triangles: (M, 3, 3) of the building in W [m].
-        name: of the annex.
+        name: name of the annex.
         is_free: whether an area in W may be built on.
         rng: draws its size.
     """

@@ -23,7 +23,7 @@ def read_npz(
 
     Args:
         path: the file.
-        names: of the wanted arrays; no others are read.
+        names: names of the wanted arrays; no others are read.
         most_bytes: greatest size of the file, and of each array.
 
     Raises:

@@ -17,7 +17,7 @@ def parse_rows(
 
     Args:
         lines: N rows.
-        dtype: of a row, with fields; or of each number.
+        dtype: dtype of a row, with fields; or of each number.
         separator: between numbers; None is white space.
         first: the number of rows before these, for errors.
 

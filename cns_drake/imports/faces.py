@@ -152,7 +152,7 @@ def extruded(
     Args:
         polygon: the footprint.
         low, high: heights of the lowest and the highest point [m].
-        name: of the object, for faults.
+        name: name of the object, for faults.
         faults: counts what was made otherwise.
         roof: `flat`; `pyramidal`, on any footprint; `gabled` or `hipped`, on
             one of four corners.

@@ -196,13 +196,13 @@ def make_imported(
     Args:
         name: unique in the city.
         semantic_class: a key of `scene.semantics.CLASS_IDS`.
-        kind: of object, as the file calls it.
+        kind: kind of object, as the file calls it.
         surfaces: part of its surface -> triangles (M, 3, 3) [m]; empty parts
             are left out, and not all are empty.
         colours: part -> its colour; without one it has that of the class.
         year: in which it was built; None if unknown.
         until: year until which it stands; None if unknown.
-        tags: of the object in its file.
+        tags: tags of the object in its file.
         lod: its level of detail.
     """
     filled = {part: some for part, some in surfaces.items() if len(some)}

@@ -124,9 +124,9 @@ def city_facts(
 
     Args:
         city: the city as the file has it.
-        options: of the import.
+        options: options of the import.
         stages: names of the stages.
-        changes: of the first stage, if it was drawn at random.
+        changes: changes of the first stage, if it was drawn at random.
         dressing: what was added to buildings and streets.
     """
     facts: dict[str, object] = {
@@ -203,8 +203,9 @@ def write_drives(
 ) -> None:
     """Writes the routes of a map, and a scenario of each per stage.
 
-    A stage has words for its time, which end the title. At most two routes have
-    waypoints (N, 3) [m], and a speed each [m/s].
+    `stages` maps the name of a stage to words for its time, which end the title
+    of a drive. Each of at most two routes has waypoints (N, 3) [m], and a speed
+    [m/s].
     """
     for letter, waypoints in zip("ab", routes, strict=False):
         rows = [f"{x:.3f},{y:.3f},{z:.3f}" for x, y, z in waypoints]

@@ -49,11 +49,11 @@ def describe_topic(
     """Returns the description of a topic and its messages.
 
     Args:
-        name: of the topic.
+        name: name of the topic.
         message_type: such as `sensor_msgs/msg/Imu`.
         count: number of messages.
-        metadata: of its channel in the MCAP.
-        encoding: of the messages.
+        metadata: metadata of its channel in the MCAP.
+        encoding: encoding of the messages.
     """
     return {
         "topic_metadata": {
@@ -78,7 +78,7 @@ def make_bag_information(
     """Returns the description of a recording of one file in its folder.
 
     Args:
-        file_name: of the MCAP.
+        file_name: file name of the MCAP.
         topics: as `describe_topic` returns them.
         start_ns, end_ns: times of the first and the last message.
         custom_data: what `ros2 bag info` shows besides.

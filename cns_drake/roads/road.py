@@ -174,11 +174,11 @@ class Road:
         """Makes a road between two junctions.
 
         Args:
-            name: of the road.
+            name: name of the road.
             entry: what the plan says of it.
             curve: its whole centreline.
             setbacks: distances of its two ends from their junctions [m].
-            heights: of the two junctions [m].
+            heights: heights of the two junctions [m].
 
         Raises:
             ValueError: the setbacks leave nothing of the road, or its heights

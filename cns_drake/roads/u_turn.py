@@ -48,9 +48,9 @@ def loop_corners(
     turns by more than 90 degrees. The bends at its ends have the loop's radius.
 
     Args:
-        centre: of the loop [m].
+        centre: centre of the loop [m].
         heading_in, heading_out: directions of the two lines [rad].
-        radius: of the loop [m].
+        radius: radius of the loop [m].
         aside_in, aside_out: distance of the centre to the left of each line, at
             most the radius [m].
     """

@@ -26,7 +26,7 @@ class DriveRow:
 
     Attributes:
         checksum: that of the files that the figures depend on.
-        length: of the path [m].
+        length: length of the path [m].
         duration: [s].
         structures, triangles: in the stage.
     """

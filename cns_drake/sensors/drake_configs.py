@@ -297,7 +297,7 @@ def ApplyOdometryConfig(
 
     Args:
         config: the odometry.
-        builder: of the diagram.
+        builder: builder of the diagram.
         plant, lcm_buses, lcm: as of `ApplyLidarConfig`.
         scene_graph: not used.
     """

@@ -39,8 +39,8 @@ def distracting_drives(
     Args:
         query: the drive whose LiDARs measure all of them, and whose city is
             left out.
-        number: of places, about.
-        spacing: between two places [m].
+        number: number of places, about.
+        spacing: distance between two places [m].
         output: folder for cities that are drawn anew.
         cluster: runs the jobs.
         on_note: takes what a user should know.

@@ -459,11 +459,11 @@ def write_page(
     """Writes the page: both maps from above, and the changed structures.
 
     Args:
-        path: of the page.
+        path: path of the page.
         pair: both maps.
         truth: labels of the points of each map.
         table: the changed structures.
-        names: of the two drives.
+        names: names of the two drives.
     """
     low, step, shape = _frame(pair)
     maps = []

@@ -64,7 +64,7 @@ class ExportOptions:
 
     Attributes:
         format: the trainer's.
-        spacing: between two clouds, along the path [m].
+        spacing: distance between two clouds, along the path [m].
         scans: consecutive scans that are merged into a cloud.
         max_range: points with a greater x, y or z are left out [m].
     """

@@ -287,9 +287,9 @@ def train(
     Args:
         scans: images of scans and which of them are of one place.
         steps: number of batches.
-        seed: of all draws.
+        seed: seed of all draws.
         state: file from which an interrupted training goes on.
-        digest: of the scans; a state of others is refused.
+        digest: digest of the scans; a state of others is refused.
         track: reports progress.
         on_step: takes the number of a step and the weights.
 

@@ -222,7 +222,7 @@ def play_trace(
         trace: what SUMO wrote.
         path: its file, named in errors.
         graph, walkways: of the map; they give heights.
-        seed: of the kinds of cars.
+        seed: seed of the kinds of cars.
         duration: time of the last frame [s].
         end: time at which the ego car arrives [s].
         ego: motion of the ego car.

@@ -262,13 +262,16 @@ class EgoBox(NamedTuple):
         return (self.front - self.rear) / 2, self.half_width
 
     def middles(self, xy: np.ndarray, yaw: np.ndarray) -> np.ndarray:
-        """Returns (N, 3) x, y [m], yaw of its middle at (N, 2), (N,) poses."""
+        """Returns x, y [m] and yaw (N, 3) of the box's middle.
+
+        The car's frame is at places (N, 2) with headings (N,).
+        """
         ahead = np.column_stack([cos(yaw), sin(yaw)])
         middle = (self.rear + self.front) / 2
         return np.column_stack([xy + middle * ahead, yaw])
 
     def corners(self, xy: np.ndarray, yaw: np.ndarray) -> np.ndarray:
-        """Returns (N, 4, 2) corners at (N, 2) places and (N,) headings."""
+        """Returns the box's corners (N, 4, 2) at places (N, 2), headings (N,)."""
         ahead = np.column_stack([cos(yaw), sin(yaw)])
         return outlines(xy, ahead, -self.rear, self.front, self.half_width)
 

@@ -483,8 +483,9 @@ def plan_traffic(
         graph: lanes and crossings.
         walkways: sidewalks, where walkers walk, and crossings.
         vehicles, walkers: wanted numbers.
-        seed: of kinds, places and ways.
-        duration: of the drive [s]; the longest if the ego car follows others.
+        seed: seed of kinds, places and ways.
+        duration: duration of the drive [s]; the longest if the ego car follows
+            others.
         ego: motion of the ego car; at its first place if it follows others.
         ego_box: its size.
         drive: its path and speeds if it follows others, else None.
@@ -713,8 +714,8 @@ def plan_queues(
 
     Args:
         graph: lanes and crossings.
-        seed: of kinds and gaps.
-        duration: of the drive [s].
+        seed: seed of kinds and gaps.
+        duration: duration of the drive [s].
         ego: motion of the ego car.
         ego_box: its size.
     """

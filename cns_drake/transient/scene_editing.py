@@ -177,7 +177,7 @@ class SceneEditing:
 
         Args:
             part: the other part.
-            name: of the new part.
+            name: name of the new part.
             p_WVs: (N, 3) vertices [m].
             triangles: (M, 3) indices of vertices.
             look: its colour and material.

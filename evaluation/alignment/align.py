@@ -373,7 +373,9 @@ def _motion(X_WS: np.ndarray, X_TS: np.ndarray) -> dict:
 
 
 def make_consistent(drive: Drive, track: Track) -> tuple[Submaps, float]:
-    """Returns a drive whose poses agree wherever it passes a place again.
+    """Returns a drive's submaps with poses that agree where it passes again.
+
+    They agree at places that the drive passes more than once.
 
     Returns:
         The drive, with new poses if it had drifted; its disagreement with

@@ -116,7 +116,7 @@ def make_surface(
 def register(
     source: Surface, target: Surface, guess: np.ndarray
 ) -> Registration:
-    """Returns the pose that moves a cloud onto another.
+    """Returns the motion that registers a cloud to another, and its quality.
 
     Args:
         source: S.

@@ -50,8 +50,8 @@ class TrajectoryErrors:
         drift: (K,) errors of position over 100 m [m]; empty if the path is
             shorter.
         drift_deg: (K,) errors of orientation over 100 m [deg].
-        length: of the true path along the poses [m].
-        drive_length: of the path of the whole drive [m].
+        length: length of the true path along the poses [m].
+        drive_length: length of the path of the whole drive [m].
         num_outside: number of estimated poses that are left out, before or
             after the drive.
     """

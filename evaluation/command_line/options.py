@@ -41,8 +41,8 @@ Parameters = Annotated[
     typer.Option(
         "--set",
         metavar="NAME=VALUE",
-        help="Setting of the method, such as candidates=20; may be repeated. "
-        "Separate several numbers by commas.",
+        help="Setting of the method; may be repeated. Separate several numbers "
+        "by commas.",
     ),
 ]
 SensorHeight = Annotated[

@@ -55,7 +55,7 @@ class QuerySensor:
         draw with the others as without.
 
         Args:
-            seed: of the drawing.
+            seed: seed of the drawing.
             frame: frame of the query.
             turns: whether it has any yaw.
             tilt_deg: greatest roll, and greatest pitch [deg].
@@ -92,7 +92,7 @@ def sample_frames(positions: np.ndarray, spacing: float) -> np.ndarray:
 
     Args:
         positions: (N, 3) [m], N >= 1.
-        spacing: between two frames, along the path [m].
+        spacing: distance between two frames, along the path [m].
 
     Returns:
         (K,) increasing frame numbers; the first is 0.

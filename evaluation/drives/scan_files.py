@@ -172,8 +172,8 @@ def list_stamped(
     """Returns the files in a folder whose names are times.
 
     Args:
-        folder: of the files.
-        suffix: of their names.
+        folder: folder of the files.
+        suffix: suffix of their names.
         parse: returns times [ns] of texts.
 
     Returns:

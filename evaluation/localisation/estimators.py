@@ -118,7 +118,7 @@ class LocalisationMap:
     """A map to be localised in.
 
     Attributes:
-        name: of its drive or file.
+        name: name of its drive or file.
         surface: the thinned points in W, with normals and covariances.
     """
 
@@ -245,7 +245,7 @@ class Fit:
     """The fit of a scan at a pose.
 
     Attributes:
-        share: of its points that lie on a surface of the map.
+        share: share of its points that lie on a surface of the map.
         residual: root mean square of the distances of pairs off their planes
             [m]; NaN without a pair.
         covariance: (6, 6) of a small motion about the LiDAR, in axes of W:
@@ -454,7 +454,8 @@ def make_estimator(method: str, settings: Settings) -> Estimator:
 
     Args:
         method: one of `METHODS`, or the name of a Python file.
-        settings: of a shipped method; an own one has those of its file.
+        settings: settings of a shipped method; an own one has those of its
+            file.
 
     Raises:
         InputError: if there is no such method, its package is not installed,

@@ -92,7 +92,7 @@ class Starts:
     Attributes:
         radius: distance to the true position [m].
         turn_deg: angle to the true orientation [deg].
-        seed: of all directions.
+        seed: seed of all directions.
 
     Raises:
         InputError: if a value is out of range.
@@ -310,7 +310,7 @@ def localise(
     Args:
         localiser: the map and the estimator.
         query: the drive.
-        frames: of the scans, in any order.
+        frames: frames of the scans, in any order.
         starts: the draw of starts.
         jobs: number of processes, where the system can fork.
         track: reports progress.

@@ -53,7 +53,7 @@ def drifting_steps(
         X_WS: (N, 4, 4) true poses.
         way: (N,) length of the way up to each [m].
         drift: share of the way; 0 for none.
-        seed: of the draw.
+        seed: seed of the draw.
 
     Returns:
         (N - 1, 4, 4) poses of each LiDAR in the one before.

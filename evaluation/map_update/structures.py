@@ -88,7 +88,7 @@ def write_structures(
     A structure that only one world has is there without a point, too.
 
     Args:
-        path: of the CSV file.
+        path: path of the CSV file.
         pair: both sessions.
         truth: labels of each.
         tables: instance -> name and class, of each.

@@ -21,7 +21,7 @@ def thumbnail(
     Args:
         points: (N, 3) in the frame of the sensor [m].
         sensor_height: above the ground [m].
-        seed: of the order, and so of the choice if there are too many.
+        seed: seed of the order, and so of the choice if there are too many.
 
     Returns:
         (M, 3) uint8, M <= 2000: cells along x and along y, of which 128 is

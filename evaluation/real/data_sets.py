@@ -33,7 +33,7 @@ class DataSet(NamedTuple):
         scans: its files there, as a pattern.
         world: what data sets of one place share.
         unit: name of the LiDAR's unit.
-        height: of the LiDAR above the ground [m].
+        height: height of the LiDAR above the ground [m].
         origin: repository, and path in it.
         licence: terms of use.
         digest: SHA-256 of all scans behind each other, by name.

@@ -200,7 +200,7 @@ def resampled_weights(
 
     Args:
         num_queries: Q, one or more.
-        seed: of the drawing; equal ones draw the same queries.
+        seed: seed of the drawing; equal ones draw the same queries.
         blocks: (Q,) the block of each query; whole blocks are drawn, as many
             as there are. Each query is a block by default, and on a route
             that is shorter than two blocks.

@@ -83,7 +83,7 @@ class PlaceOutcome:
             drives: D names of the drives of the places; that of the query's
                 own city comes first.
             overlaps: (Q,) of the best match of each query.
-            radius: of a match [m].
+            radius: radius of a match [m].
         """
         best = retrieval.best_places
         rows = np.arange(len(best))

@@ -66,7 +66,10 @@ class SeenSurfaces:
 
     @classmethod
     def of(cls, points: np.ndarray) -> SeenSurfaces:
-        """Returns the surfaces that a scan (N, 3) in the sensor's frame shows."""
+        """Returns the surfaces that a scan shows.
+
+        The scan is (N, 3) in the sensor's frame [m].
+        """
         x, y, z = points.T.astype(np.float64)
         elevation = np.degrees(np.arctan2(z, np.hypot(x, y))) + 90.0
         azimuth = np.degrees(np.arctan2(y, x)) + 180.0

@@ -83,9 +83,9 @@ def _draw_curve(
 
 
 def chart_illustrations(report: Report, folder: Path) -> list[Illustration]:
-    """Returns the charts over all cities that have data, and draws them.
+    """Draws the charts over all cities; returns those that have data.
 
-    Those of a reference stand next to ours.
+    The charts of a reference stand next to ours.
     """
     name = "AUC against TCR_sym"
     charts: list[tuple[str, str, Section, dict[str, str], Results]] = [

@@ -146,7 +146,7 @@ def draw(
     Args:
         chart: a mapping as above.
         results: the table.
-        width: of the drawing [px].
+        width: width of the drawing [px].
         alone: whether it has its message and legend with it.
 
     Raises:

@@ -111,8 +111,9 @@ class Comparison:
         ranked: methods, the best first. One that also ships, or is in two
             tables, has the name of its table behind its own. For rankings, the
             methods of each table over its own conditions.
-        differences: of each two methods whose answers are there.
-        agreements: of each two tables with two or more methods of one name.
+        differences: differences of each two methods whose answers are there.
+        agreements: agreements of each two tables with two or more methods of
+            one name.
         notes: what was left out.
     """
 

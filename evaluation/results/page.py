@@ -65,7 +65,7 @@ def write_page(
         results: the table, beside the page as `results.csv`.
         queries: that of queries, beside it as `queries.csv`; None without.
         folder: to write into.
-        title: of the page.
+        title: title of the page.
         about: the question, in words.
         charts: see `charts`; the headline is what the first one shows. One
             whose rows the table lacks is left out, and a note says so.

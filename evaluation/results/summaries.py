@@ -179,7 +179,7 @@ class Lifetime:
     Attributes:
         row: one that has the map, the drives and the method.
         share: that is left.
-        value: of the mean over seeds; infinite if more is left at `last`.
+        value: value of the mean over seeds; infinite if more is left at `last`.
         low, high: the least and the greatest of a seed.
         last: greatest value of the factor that was measured.
     """
@@ -311,7 +311,7 @@ class Correlation:
 
     Attributes:
         method: with its settings.
-        number: of conditions.
+        number: number of conditions.
         rho: Spearman's rank correlation of 1 less the metric with each number,
             and its 95 % interval by bootstrap over conditions.
         difference: the second correlation less the first; None of one number.

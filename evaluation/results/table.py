@@ -112,7 +112,7 @@ class Key:
         map: name of the map.
         database: name of the drive that makes the database.
         query: name of the drive that asks.
-        seed: of everything that is random.
+        seed: seed of everything that is random.
         factors: column -> value of those that apply.
         task: `place`, `pose`, `localise`, `map`, `change`, `cost` or another.
         method: method, estimator or baseline; "" for the task `change`.

@@ -242,7 +242,7 @@ def keyed(
 ) -> Columns[_Item]:
     """Returns one table column for each key.
 
-    Its value is that of an item and the key.
+    `value` computes a cell from an item, the table's row, and the key.
     """
 
     def column(key: _Key) -> Callable[[_Item], object]:

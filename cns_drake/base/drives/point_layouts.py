@@ -187,8 +187,8 @@ def to_layout(
             0 to 1, or, if one is larger, calibrated ones up to 255.
         layout: one of `LAYOUT_NAMES`; `cns` is the layout that the points
             have.
-        num_rings: of the unit. In `velodyne`, whose driver counts rings from
-            below, they are then turned round.
+        num_rings: number of rings of the unit. In `velodyne`, whose driver
+            counts rings from below, they are then turned round.
 
     Returns:
         (N,). Ranges are in millimetres for `ouster`; `t` and `time_stamp` in

@@ -253,7 +253,7 @@ def dress_buildings(
         drives: the drives, whose distance decides the detail.
         streets: the streets that doors and shops face.
         ground: the ground on which buildings stand.
-        seed: of all random draws.
+        seed: seed of all random draws.
         always: structures that stand in all stages and hide what is behind
             them; all structures if None.
         paving: triangles (M, 3, 3) of terrain, streets and sidewalks, above
@@ -430,7 +430,7 @@ def dress_city(
         city: the city as the file has it.
         drives: the drives, whose distance decides the detail.
         ground: the ground.
-        seed: of all random draws.
+        seed: seed of all random draws.
 
     Raises:
         InputError: if there are more structures than a map may have.

@@ -216,8 +216,8 @@ class StreetRoom:
         Only cars stand on carriageways.
 
         Args:
-            name: of the new structure.
-            kind: of object, the name of its mesh.
+            name: name of the new structure.
+            kind: kind of object, the name of its mesh.
             xy: its place [m].
             yaw: its heading [rad].
             rng: draws its variant and colours.
@@ -402,7 +402,7 @@ def dress_streets(
         drives: the drives, which are kept free.
         ground: the ground on which things stand.
         bottom: structures of the ground.
-        seed: of all random draws.
+        seed: seed of all random draws.
     """
     found = StreetThings()
     if not drives:

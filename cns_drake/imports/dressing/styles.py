@@ -116,9 +116,9 @@ def make_style(
 
     Args:
         tags: tags of the building, as in OpenStreetMap.
-        year: of construction; None if unknown.
-        area: of its footprint, about [m^2].
-        height: of its walls [m].
+        year: year of construction; None if unknown.
+        area: area of its footprint, about [m^2].
+        height: height of its walls [m].
         is_flat: whether its roof is flat.
         rng: draws everything that no tag says.
     """

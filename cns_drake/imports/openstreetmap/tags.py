@@ -107,8 +107,8 @@ def tag_value(
     """Returns the parsed value of a tag; None if it has no valid one.
 
     Args:
-        tags: of a thing.
-        key: of the tag.
+        tags: tags of a thing.
+        key: key of the tag.
         read: reads the text; None if it cannot.
         most, least: limits of a plausible value. Others are counted.
         where: name of the thing and counts of faults; None to count nothing.

@@ -161,12 +161,12 @@ def add_described_imu(
 
     Args:
         config: the description.
-        builder: of the diagram.
+        builder: builder of the diagram.
         body: that carries the IMU.
         trajectory: motion of that body.
         motion: the system that moves it.
         scan_rate: scans per second, the rate of an IMU without one.
-        seed: of its errors.
+        seed: seed of its errors.
 
     Returns:
         The ports `specific_force` and `angular_velocity`; and `imu_samples`

@@ -234,7 +234,7 @@ def add_described_lidar(
         X_PS: pose of the sensor in P.
         name: name of the system.
         seed: seed of noise and returns.
-        weather: of calibrated returns.
+        weather: weather of calibrated returns.
         period: duration of a turn [s]; by default by the description's rate.
         options: further arguments of `add_lidar`.
     """

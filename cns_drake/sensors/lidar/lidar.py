@@ -633,9 +633,9 @@ class SeenGeometry:
 
         Args:
             query_object: has geometry and poses.
-            revision: of `geometry_revision_port`; without it all geometries are
-                compared.
-            motions: of frames that move during the turn.
+            revision: revision of `geometry_revision_port`; without it all
+                geometries are compared.
+            motions: motions of frames that move during the turn.
             known: poses that replace calls of the query object.
             seen: the ball in which beams can meet geometry.
             p_WS: the place of the sensor [m].

@@ -320,12 +320,12 @@ class CalibratedTurn:
         """Takes the attributes, all in firing order.
 
         Args:
-            beams: of the pattern.
+            beams: beams of the pattern.
             d_Sset: their directions.
             reported: directions that the unit reports.
-            height: of each laser above the origin [m].
-            range_error: of each laser [m].
-            gain: of each laser.
+            height: height of each laser above the origin [m].
+            range_error: range error of each laser [m].
+            gain: gain of each laser.
         """
         self.range_error, self.gain = range_error, gain
         self.reported = reported

@@ -100,8 +100,8 @@ def report_echoes(
 
     Args:
         light: what came back.
-        receiver: of the unit.
-        key: of the random draws.
+        receiver: receiver of the unit.
+        key: key of the random draws.
         range_error: (N,) error of range of each beam's laser [m].
         gain: (N,) gain of each beam's laser.
     """

@@ -122,7 +122,7 @@ def reflect(
         distance: (N,) whole way of the light to the surface [m].
         geometry: (N,) number of the geometry that each ray meets.
         cosine: (N,) cosine of the angle of incidence.
-        materials: of the geometries.
+        materials: materials of the geometries.
     """
     energy = np.empty(len(beam))
     for k in range(len(beam)):

@@ -156,7 +156,7 @@ def tabulate_scattering(
 
     Args:
         weather: fog, rain and snowfall.
-        budget: of the unit: SNR by distance and reflectivity.
+        budget: budget of the unit: SNR by distance and reflectivity.
         divergence: half the angle of a beam [rad].
         resolution: length of a pulse, there and back [m].
         min_range: least range of the unit [m].

@@ -141,7 +141,7 @@ def measure_localisation(
         methods: names, or Python files.
         texts: contents of those files, which make them other inputs.
         starts: how far away and how often each query starts.
-        spacing: between two queries [m].
+        spacing: distance between two queries [m].
 
     Returns:
         (K,) of `QUERY` for each method and start, the starts of a method side

@@ -161,9 +161,9 @@ class Jobs:
         Args:
             part: its file and name.
             function: what the job runs.
-            arguments: of the function.
+            arguments: arguments of the function.
             needs: names of jobs that come first.
-            cost: of the job, about [s].
+            cost: cost of the job, about [s].
         """
         name = f"{part.path.parent.name} {part.path.stem}"
         step = MakePart(part, function, arguments)
