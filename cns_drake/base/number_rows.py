@@ -18,7 +18,7 @@ def parse_rows(
     Args:
         lines: N rows.
         dtype: dtype of a row, with fields; or of each number.
-        separator: between numbers; None is white space.
+        separator: text between numbers; None for white space.
         first: the number of rows before these, for errors.
 
     Returns:

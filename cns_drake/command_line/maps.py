@@ -306,8 +306,8 @@ def city(
     """Build the stages of a city from its roads and plan.
 
     Args:
-        folder: Folder with roads.yaml, city.yaml and stages.yaml. The lengths
-            and times in its drive files are updated too.
+        folder: Folder with roads.yaml, city.yaml and stages.yaml. The table of
+            its drives is updated too.
         start: First write the files that are missing, except roads.yaml: a plan
             with a district for each block, two stages, and a drive for each.
         seed: Seed of the plan that --start draws.

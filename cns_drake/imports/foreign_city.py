@@ -200,7 +200,7 @@ def make_imported(
         surfaces: part of its surface -> triangles (M, 3, 3) [m]; empty parts
             are left out, and not all are empty.
         colours: part -> its colour; without one it has that of the class.
-        year: in which it was built; None if unknown.
+        year: year in which it was built; None if unknown.
         until: year until which it stands; None if unknown.
         tags: tags of the object in its file.
         lod: its level of detail.

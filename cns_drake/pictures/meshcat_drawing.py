@@ -52,7 +52,7 @@ def draw_parts(
 ) -> None:
     """Draws parts of a city as one mesh for each class, `<path>/<class>`.
 
-    Without a colour for all of it, each part has its own.
+    Without `rgba`, each part keeps its own colour.
     """
     by_class: dict[str, list[Part]] = {}
     for part in parts:

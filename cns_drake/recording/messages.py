@@ -113,8 +113,8 @@ def make_imu(
         angular_velocity: w_WI_I, shape (3,) [rad/s].
         specific_force: expressed in I, shape (3,) [m/s^2]; at rest on level
             ground +9.81 along z.
-        variances: those of each axis of the specific force [m^2/s^4] and the
-            angular velocity [rad^2/s^2].
+        variances: variance of each axis of the specific force [m^2/s^4] and of
+            the angular velocity [rad^2/s^2].
 
     Returns:
         The message. A value without noise has a standard deviation of 1e-6.

@@ -50,7 +50,7 @@ def describe_topic(
 
     Args:
         name: name of the topic.
-        message_type: such as `sensor_msgs/msg/Imu`.
+        message_type: ROS type, such as `sensor_msgs/msg/Imu`.
         count: number of messages.
         metadata: metadata of its channel in the MCAP.
         encoding: encoding of the messages.
@@ -79,7 +79,7 @@ def make_bag_information(
 
     Args:
         file_name: file name of the MCAP.
-        topics: as `describe_topic` returns them.
+        topics: descriptions of topics, from `describe_topic`.
         start_ns, end_ns: times of the first and the last message.
         custom_data: what `ros2 bag info` shows besides.
     """

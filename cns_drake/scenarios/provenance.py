@@ -45,7 +45,7 @@ def digest_inputs(
     files they name.
 
     Args:
-        watch: also notes each file, before it is read.
+        watch: notes the status of each file before it is read.
 
     Returns:
         `world`, `vehicle`, and `structures`, `suspension`, `roads`, `lanes`,
@@ -126,7 +126,7 @@ def digest_file(path: Path, watch: FileWatch | None = None) -> str:
     """Returns the SHA-256 digest of a model and of the files that it names.
 
     Args:
-        watch: also notes each file, before it is read.
+        watch: notes the status of each file before it is read.
 
     Raises:
         InputError: a file cannot be read.

@@ -195,7 +195,8 @@ def write_truth(
     Args:
         output: the folder, new or empty.
         spacing: length of the way between two scans [m].
-        across_maps: their maps may have different names, as an aged one has.
+        across_maps: whether the drives' maps may have different names, as an
+            aged map has.
 
     Returns:
         Side -> label -> number of points; what became of the structures.

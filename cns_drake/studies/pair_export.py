@@ -118,8 +118,8 @@ def export_pairs(
 
     Args:
         scenarios: the drives to learn from.
-        held_out: those for the evaluation alone; without any, that is of the
-            others.
+        held_out: drives for evaluation only; without any, all drives are
+            evaluated.
         output: the folder of the set.
         options: what is exported.
         cluster: runs the work.

@@ -64,7 +64,7 @@ def redraw_cities(
     kept.
 
     Args:
-        map_folder: has `roads.yaml` and `city.yaml`.
+        map_folder: folder of the map, with `roads.yaml` and `city.yaml`.
         stage: the stage that is drawn.
         seeds: one for each city.
         output: folder for the cities.

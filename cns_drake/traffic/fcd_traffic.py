@@ -220,13 +220,13 @@ def play_trace(
 
     Args:
         trace: what SUMO wrote.
-        path: its file, named in errors.
+        path: file of the trace, for errors.
         graph, walkways: of the map; they give heights.
         seed: seed of the kinds of cars.
         duration: time of the last frame [s].
         end: time at which the ego car arrives [s].
         ego: motion of the ego car.
-        ego_box: its size.
+        ego_box: size of the ego car.
 
     Raises:
         InputError: the trace is shorter than the drive, or is of another map.

@@ -271,7 +271,10 @@ class EgoBox(NamedTuple):
         return np.column_stack([xy + middle * ahead, yaw])
 
     def corners(self, xy: np.ndarray, yaw: np.ndarray) -> np.ndarray:
-        """Returns the box's corners (N, 4, 2) at places (N, 2), headings (N,)."""
+        """Returns the box's corners (N, 4, 2) as the car moves.
+
+        The car's frame is at places (N, 2) with headings (N,).
+        """
         ahead = np.column_stack([cos(yaw), sin(yaw)])
         return outlines(xy, ahead, -self.rear, self.front, self.half_width)
 
@@ -527,7 +530,7 @@ def is_ego_far(
     """Returns whether a vehicle can leave a lane before the ego car comes.
 
     Args:
-        streets: all lanes, with the times of the ego car.
+        streets: arrays of all lanes, with the times of the ego car.
         k: number of the time.
         lane: number of the lane.
         s: distance of the vehicle along the lane [m].

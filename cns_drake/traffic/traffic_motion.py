@@ -296,7 +296,7 @@ def make_traffic(
     Args:
         scene_graph: takes the geometry, on frames of a source of its own.
         seed: seed of colours and sizes.
-        structures: has an instance id for each body; by default
+        structures: table with an instance id for each body; by default
             `traffic_structures` of the plan.
         turn: duration of a LiDAR's turn with motion distortion [s].
         name: that of the source.

@@ -487,7 +487,7 @@ def plan_traffic(
         duration: duration of the drive [s]; the longest if the ego car follows
             others.
         ego: motion of the ego car; at its first place if it follows others.
-        ego_box: its size.
+        ego_box: size of the ego car.
         drive: its path and speeds if it follows others, else None.
     """
     # Traffic goes on after the drive, for a LiDAR that is turning then.
@@ -717,7 +717,7 @@ def plan_queues(
         seed: seed of kinds and gaps.
         duration: duration of the drive [s].
         ego: motion of the ego car.
-        ego_box: its size.
+        ego_box: size of the ego car.
     """
     rng = np.random.default_rng(seed)
     kinds, rows = [], []

@@ -258,7 +258,7 @@ class GroundSurface:
     def lowest(self, area: BaseGeometry, default: float) -> float:
         """Returns the least height at the corners of an area [m].
 
-        It is the default without ground there.
+        Without ground there, it is `default`.
         """
         z = self.heights(shapely.get_coordinates(area))
         z = z[np.isfinite(z)]

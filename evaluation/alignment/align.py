@@ -158,7 +158,8 @@ def in_one_world(
         when: `auto` aligns drives whose world frames differ by name; `always`,
             `never`.
         track: reports progress.
-        hold_first: as of `align`.
+        hold_first: whether the first drive must stay where it is, as of
+            `align`.
         across_maps: whether the drives may be of maps of different names.
 
     Raises:

@@ -134,7 +134,7 @@ def trajectory_errors(
     of the estimate does not matter.
 
     Args:
-        drive: has the true poses.
+        drive: drive with the true poses.
         estimate: poses of the frame in any world.
         frame: the frame whose poses are estimated: that of the LiDAR, or the
             vehicle's.

@@ -21,7 +21,7 @@ When = Literal["auto", "always", "never"]
 Align = Annotated[
     When,
     typer.Option(
-        help="Which drives to align to one world: auto aligns those whose "
+        help="Whether to align drives to one world: auto aligns those whose "
         "world frames differ."
     ),
 ]

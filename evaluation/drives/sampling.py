@@ -106,7 +106,7 @@ def within_range(points: np.ndarray, max_range: float) -> np.ndarray:
     """Returns which points (N, 3) are finite and within a range, (N,) bool.
 
     Args:
-        points: in the frame of the sensor [m].
+        points: (N, 3) points in the frame of the sensor [m].
         max_range: greatest absolute value of each coordinate [m].
     """
     kept = np.ones(len(points), dtype=bool)

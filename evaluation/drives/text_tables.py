@@ -34,7 +34,7 @@ def read_stamped_rows(
     Args:
         path: the file.
         width: number of values after the time.
-        separator: between columns; None is white space.
+        separator: text between columns; None for white space.
         parse: reads times; `parse_stamps_ns` by default.
 
     Returns:
@@ -64,7 +64,7 @@ def read_numbers(
     Args:
         path: the file.
         columns: NumPy type of a row, or of every number.
-        separator: between columns; None is white space.
+        separator: text between columns; None for white space.
 
     Returns:
         (N,) records, or (N, width) numbers; N >= 1.

@@ -240,8 +240,8 @@ class Localiser:
         """Localises one scan and compares the result with the truth.
 
         Args:
-            frame: its number.
-            stamp_ns: its time.
+            frame: number of the scan.
+            stamp_ns: time of the scan [ns].
             scan: structured array, in S.
             X_WS: the truth.
             R_WT: see `way_axes`.

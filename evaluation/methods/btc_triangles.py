@@ -242,9 +242,10 @@ def suppress(keypoints: Keypoints, radius: float, max_number: int) -> Keypoints:
     If two are equal, neither stays.
 
     Args:
-        keypoints: all.
-        radius: distance that is nearby [m].
-        max_number: greatest number of kept ones, those with most heights.
+        keypoints: all keypoints.
+        radius: distance within which keypoints are compared [m].
+        max_number: largest number of keypoints to keep, those with the most
+            heights.
     """
     tree = cKDTree(keypoints.positions)
     pairs = tree.query_pairs(radius, output_type="ndarray")
@@ -387,7 +388,7 @@ def make_table(clouds: Sequence[Triangles], resolution: float) -> TriangleTable:
     Triangles of one cell keep their order.
 
     Args:
-        clouds: at least one.
+        clouds: triangles of each cloud; at least one.
         resolution: length that is one unit of the sides [m].
     """
     triangles = Triangles(
@@ -423,8 +424,8 @@ def match(
     tolerance requires.
 
     Args:
-        query: from one cloud.
-        table: to search for its triangles.
+        query: triangles of one cloud.
+        table: table in which similar triangles are sought.
         side_tolerance: upper limit of the sides' relative difference.
         min_similarity: lower limit of the similarity.
 

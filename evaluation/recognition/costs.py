@@ -50,12 +50,13 @@ def measure_cost(
     """Returns the time and memory that a method needs.
 
     Args:
-        method: to measure.
+        method: method to measure.
         clouds: clouds to describe, two or more; the time of the first is not
             counted, since it includes loading and compiling.
         scans_per_place: number of merged scans.
-        database: with places.
-        query: with queries; as many are used as there are clouds.
+        database: described drive with places.
+        query: described drive with queries; as many are used as there are
+            clouds.
         gate_radius: see `score_places`.
     """
     describing = [cpu_ms(method.describe, cloud) for cloud in clouds]
@@ -88,9 +89,9 @@ def query_ms(
     The first query does not count.
 
     Args:
-        method: to measure.
-        places: all are candidates.
-        queries: to ask.
+        method: method to measure.
+        places: described places, all of them candidates.
+        queries: described queries.
         number: how many are asked, two or more.
         gate_radius: see `score_places`.
         with_pose: whether the pose of the best place is estimated, too.

@@ -175,7 +175,7 @@ def write_overlaps(
     query without a point.
 
     Args:
-        path: to write.
+        path: CSV file to write.
         query_frames: (Q,) of the queries.
         database_frames: (D,) of the places.
         overlaps: (Q, D), see `overlap_truth`.
@@ -198,8 +198,8 @@ def read_overlaps(
 
     Args:
         path: path of the table.
-        query_frames: (Q,) that it must have.
-        database_frames: (D,) likewise.
+        query_frames: (Q,) frames of the queries, which the table must have.
+        database_frames: (D,) frames of the places, which the table must have.
 
     Raises:
         InputError: the file cannot be read, a number is impossible, or the

@@ -134,10 +134,11 @@ def run(
         database, query: the drives.
         method: the method.
         mode: which queries count.
-        protocol: as for `retrieve`.
+        protocol: protocol of the comparison.
         track: reports progress.
         across_maps: whether the drives may be of maps of different names.
-        overlaps: as for `retrieve`.
+        overlaps: (Q, D) part of each query's scan that each place's scan shows;
+            by default computed from the scans. Only for matches by overlap.
 
     Raises:
         InputError: as `retrieve` does, or if no query has a match.
@@ -170,7 +171,7 @@ def judge_retrieval(
         method: the method.
         database, query: names of the drives.
         retrieval: what the method found.
-        protocol: by which it was asked.
+        protocol: protocol of the retrieval.
         mode: which queries count.
 
     Raises:

@@ -118,8 +118,8 @@ def compare(
 
     Args:
         method: that described both.
-        database: with its places described.
-        query: with its queries described; in the same world frame.
+        database: drive with described places.
+        query: drive with described queries, in the same world frame.
         protocol: that both were described by.
         track: reports progress.
         overlaps: (Q, D), see `overlap_matrix`; needed for matches by overlap.
@@ -148,7 +148,7 @@ def compare_with_gates(
 
     Args:
         method, database, query, track, overlaps: see `compare`.
-        protocol: likewise; whether it has a gate does not matter.
+        protocol: protocol of the comparison; its own gate does not matter.
         gate_radii: radius of each gate [m]; None is no gate.
         is_known: (Q, D) bool, which places each query may find; by default as
             the protocol says.

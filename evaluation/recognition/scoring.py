@@ -40,8 +40,8 @@ def gate_weight(
     It depends on the distance of the place.
 
     Args:
-        distance: between query and place by the method's own pose [m]; any
-            shape.
+        distance: distances from query to place by the method's own pose [m], an
+            array of any shape.
         radius: radius of a match [m].
         softness: half the width of the ramp, as a part of the radius.
     """

@@ -97,7 +97,7 @@ class SeenSurfaces:
         """Returns the share of points (N, 3) that is shown; NaN without points.
 
         Args:
-            points: in this sensor's frame.
+            points: (N, 3) points in this sensor's frame [m].
         """
         return self.shares_of(points).shown
 
@@ -105,7 +105,7 @@ class SeenSurfaces:
         """Returns the shares of points (N, 3) that are shown, and hidden.
 
         Args:
-            points: in this sensor's frame.
+            points: (N, 3) points in this sensor's frame [m].
         """
         if len(points) == 0:
             return Shares(math.nan, math.nan)
@@ -123,7 +123,7 @@ class SeenSurfaces:
         near, and NaN for a point between two surfaces.
 
         Args:
-            points: in this sensor's frame.
+            points: (N, 3) points in this sensor's frame [m].
         """
         return self._look(points)[1]
 

@@ -30,7 +30,7 @@ def along_the_way(
         scores: (Q, D) of single queries, NaN for no candidate.
         is_known: (Q, D) bool, places that may be found.
         p_WQs: (Q, 3) positions of the queries, in the order of the drive [m].
-        p_WPs: (D, 3) positions of the places, likewise [m].
+        p_WPs: (D, 3) positions of the places in the world [m].
         length: greatest distance of a voting query, along its way [m].
     """
     of_query, of_place = travelled(p_WQs), travelled(p_WPs)

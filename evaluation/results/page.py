@@ -64,7 +64,7 @@ def write_page(
     Args:
         results: the table, beside the page as `results.csv`.
         queries: that of queries, beside it as `queries.csv`; None without.
-        folder: to write into.
+        folder: folder in which the page is written.
         title: title of the page.
         about: the question, in words.
         charts: see `charts`; the headline is what the first one shows. One

@@ -43,7 +43,7 @@ def window(
     """Returns a bay with a recessed window.
 
     Args:
-        width: at most this, less where the bay is narrow [m].
+        width: width of the window, less where the bay is narrow [m].
         sill: bottom of the glass above the floor [m].
         head: top of the glass [m].
         depth: depth of the glass behind the wall [m].
@@ -220,7 +220,7 @@ def loggia(
         width: width of the balcony, less if the bay is too narrow [m].
         depth: how far its back lies behind the wall [m].
         rail: top of the rail above the wall's foot [m].
-        head: top of the opening, likewise [m].
+        head: top of the opening above the wall's foot [m].
         pier: least width of wall on each side [m].
     """
 

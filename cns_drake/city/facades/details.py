@@ -223,7 +223,7 @@ def pilasters(
         outline: (N, 2) corners of the walls in the building's frame,
             anticlockwise [m].
         pitch: width of a bay, as of `bays.rhythm` [m].
-        margin: distance of the bays from corners, likewise [m].
+        margin: distance of the bays from corners, as of `bays.rhythm` [m].
         every: number of bays from one pilaster to the next.
         width: width of a pilaster [m].
         reach: how far it reaches out of the wall [m].
@@ -473,7 +473,7 @@ def add_railing(
         part: name of the visual.
         wall: the wall.
         start: first point, along and out of the wall [m].
-        end: last point, likewise [m].
+        end: last point, along and out of the wall [m].
         z: height of the floor [m].
         rgb: colour.
     """

@@ -147,7 +147,7 @@ class Draft:
         Args:
             xy, yaw: position and heading in W [m, rad].
             kind: stem of the structure's name; the object's by default.
-            clearance: to all objects placed before [m].
+            clearance: least distance to all objects placed before [m].
             crown_part: how much of the reach of a tree's crown must be
                 clear of buildings, from 0 to 1.
             within: where given, the footprint must lie in this area.

@@ -153,9 +153,10 @@ class DriveViews:
         return np.asarray(self._tree.query(middles)[0] <= reach + distance)
 
     def distances(self, panels: Sequence[Panel], most: float) -> np.ndarray:
-        """Returns distances (N,) of panels from where a drive sees them [m].
+        """Returns distances (N,) from panels to the nearest viewing place [m].
 
-        They are infinite if no place within `most` sees the panel.
+        Viewing places lie on the drives. The distance is infinite if no place
+        within `most` sees the panel.
         """
         pairs = [self._looks(panel, most) for panel in panels]
         counts = [len(distance) for _, distance in pairs]

@@ -218,7 +218,7 @@ class StreetRoom:
         Args:
             name: name of the new structure.
             kind: kind of object, the name of its mesh.
-            xy: its place [m].
+            xy: position of its middle in W [m].
             yaw: its heading [rad].
             rng: draws its variant and colours.
         """

@@ -122,7 +122,7 @@ class CameraScene(LeafSystem):
         """Copies a scene.
 
         Args:
-            scene_graph: has the geometry, of the perception role.
+            scene_graph: SceneGraph with geometry of the perception role.
             structures: gives classes to it.
             calc_X_WF: gives the poses of anchored frames.
             anchored: frames that never move, the world's included.

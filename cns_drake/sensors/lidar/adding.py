@@ -228,7 +228,7 @@ def add_described_lidar(
 
     Args:
         config: the description.
-        builder: holds `scene_graph`.
+        builder: builder of a diagram with `scene_graph`.
         scene_graph: the SceneGraph to scan.
         body: P, or a frame on it.
         X_PS: pose of the sensor in P.

@@ -632,7 +632,8 @@ class SeenGeometry:
         """Moves geometry whose frame has moved, and rebuilds changed geometry.
 
         Args:
-            query_object: has geometry and poses.
+            query_object: query object of the SceneGraph, with geometry and
+                poses.
             revision: revision of `geometry_revision_port`; without it all
                 geometries are compared.
             motions: motions of frames that move during the turn.

@@ -75,7 +75,8 @@ def make_beam_pattern(
             unit that fires at a fixed rate has as many as fit into the period.
         min_range: nearest range that is measured [m]; by default that of the
             data sheet.
-        max_range: farthest range that is measured [m]; likewise.
+        max_range: farthest range that is measured [m]; by default that of the
+            data sheet.
 
     Raises:
         KeyError: there is no preset of that name.

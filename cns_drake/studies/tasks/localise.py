@@ -139,7 +139,7 @@ def measure_localisation(
         database: the drive of the map.
         query: the drive whose scans are localised.
         methods: names, or Python files.
-        texts: contents of those files, which make them other inputs.
+        texts: contents of those files; a job is done again if they change.
         starts: how far away and how often each query starts.
         spacing: distance between two queries [m].
 

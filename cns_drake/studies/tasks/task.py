@@ -159,7 +159,7 @@ class Jobs:
         """Adds the job of a part, named like it; returns the part.
 
         Args:
-            part: its file and name.
+            part: file and name of the part.
             function: what the job runs.
             arguments: arguments of the function.
             needs: names of jobs that come first.
