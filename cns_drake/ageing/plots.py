@@ -312,7 +312,7 @@ def annex_to(
     """Returns an annex of one storey behind a building; None without room.
 
     Args:
-        plot: that of the building.
+        plot: plot of the building.
         triangles: (M, 3, 3) of the building in W [m].
         name: name of the annex.
         is_free: whether an area in W may be built on.

@@ -53,7 +53,7 @@ def interpolate(
     Rotations are interpolated by SLERP, positions linearly.
 
     Args:
-        X_0, X_1: (N, 4, 4).
+        X_0, X_1: (N, 4, 4) poses at both ends.
         fraction: (N,) share of the way from the one to the other.
 
     Returns:

@@ -106,7 +106,7 @@ def read_elements(
 
     Args:
         root: tag of its outermost element; any if None.
-        encoding: that of the file; what it says itself if None.
+        encoding: encoding of the file; by default the one that it declares.
 
     Raises:
         InputError: if it cannot be read, is no XML, has another root, holds

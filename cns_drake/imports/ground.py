@@ -46,7 +46,7 @@ class Ground:
     def height(self, xy: np.ndarray) -> np.ndarray:
         """Returns the height of the ground at places (N, 2) [m].
 
-        It is interpolated between those of the grid.
+        Between the points of the grid it is interpolated.
         """
         column = np.clip(
             (xy[:, 0] - self.xs[0]) / self.cell, 0, len(self.xs) - 1.001

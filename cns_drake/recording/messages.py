@@ -203,7 +203,8 @@ def make_image(
     """Returns an Image message.
 
     Args:
-        pixels: (height, width, channels), little-endian; depth in metres.
+        pixels: (height, width, channels) values, little-endian; depths in
+            metres.
         encoding: one of `ENCODINGS`.
         frame_id: the camera's frame, z ahead and y down.
     """

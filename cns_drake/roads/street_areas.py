@@ -53,7 +53,7 @@ class RoadSurface:
 
     @property
     def is_level(self) -> bool:
-        """Whether all roads lie at z = 0 throughout."""
+        """Whether all roads are at z = 0 everywhere."""
         return not self._places[:, 2].any()
 
     def heights(self, xy: ArrayLike) -> np.ndarray:

@@ -110,9 +110,9 @@ def load_drive(scenario: Scenario) -> LoadedDrive:
 def load_stage_and_traffic(
     scenario: Scenario, trajectory: Trajectory
 ) -> tuple[World, traffic_plan.TrafficPlan | None, Trajectory]:
-    """Returns the stage of a scenario, and its traffic, if any.
+    """Returns the stage of a scenario, its traffic, and the trajectory.
 
-    The trajectory is another one if the vehicle follows others.
+    The trajectory differs from the given one if the vehicle follows others.
 
     Raises:
         InputError: the scenario cannot be run.

@@ -112,9 +112,10 @@ def export_pairs(
     cluster: Cluster,
     on_note: Callable[[str], None] = lambda note: None,
 ) -> list[Path]:
-    """Writes a set for a trainer; returns the files that name the pairs.
+    """Writes training data for other programs; returns the index files.
 
-    Finished drives are not simulated again.
+    The index files name the pairs of scans. Finished drives are not simulated
+    again.
 
     Args:
         scenarios: the drives to learn from.

@@ -299,7 +299,7 @@ def make_traffic(
         structures: table with an instance id for each body; by default
             `traffic_structures` of the plan.
         turn: duration of a LiDAR's turn with motion distortion [s].
-        name: that of the source.
+        name: name of the source of geometry.
     """
     if structures is None:
         structures = traffic_structures(plan)

@@ -369,9 +369,9 @@ def free_acceleration(car: Any, v0: float) -> float:
 
 @compiled
 def interaction(car: Any, gap: float, approach: float) -> float:
-    """Returns the loss of acceleration behind a vehicle [m/s^2].
+    """Returns how much a vehicle ahead reduces acceleration [m/s^2].
 
-    That is a (s* / gap)^2 with s* = s0 + max(0, v T + v dv / (2 sqrt(a b))),
+    It is a (s* / gap)^2 with s* = s0 + max(0, v T + v dv / (2 sqrt(a b))),
     where the gap is that from bumper to bumper [m], and dv is the speed minus
     that of the vehicle ahead [m/s].
     """

@@ -257,10 +257,10 @@ _WAVES = (9.0, 3.7)
 
 
 def lay_snow(around: Surroundings, ground: GroundSurface, depth: float) -> None:
-    """Lays snow of a depth [m], except on roads, plants and thin things.
+    """Lays snow of a depth [m], except on roads, plants and thin objects.
 
-    Ground, which is that before earlier changes, is raised. Roads are cleared,
-    with banks along their kerbs.
+    The snow raises `ground`, the surface before all earlier changes. Roads are
+    cleared, with banks along their kerbs.
     """
     editing = around.editing
     for thing in around.things.values():

@@ -337,7 +337,7 @@ def fit_anchor(
     """Returns the pose X_TS (4, 4) with the most agreeing loops.
 
     Args:
-        loops: M >= 1 from a source to a target.
+        loops: one or more loops (M) from a source to a target.
         X_TL: poses (L, 4, 4) of the target's keyframes in its world T.
         X_SK: poses (K, 4, 4) of the source's keyframes in its world S.
     """
@@ -370,7 +370,7 @@ def fit_bent(
     """Returns poses X_TK (K, 4, 4) of a drifting source, fitted to loops.
 
     Args:
-        loops: M >= 1 from the source to a target.
+        loops: one or more loops (M) from the source to a target.
         X_TL: poses of the target's keyframes in its world.
         source: the drive.
         X_TS: (4, 4) anchor to start from.

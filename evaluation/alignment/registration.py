@@ -100,11 +100,12 @@ def make_surface(
 ) -> Surface:
     """Returns a cloud with normals and covariances of its points.
 
-    They are those of nearest neighbours.
+    They are computed from the nearest neighbours of each point.
 
     Args:
-        points: (N, 3) [m], N >= num_neighbours.
-        num_neighbours: that they are fitted to, the point among them.
+        points: (N, 3) points [m], N >= num_neighbours.
+        num_neighbours: number of points to which each normal is fitted,
+            including the point itself.
     """
     cloud = small_gicp.PointCloud(points)
     tree = small_gicp.KdTree(cloud)

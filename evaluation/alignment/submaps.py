@@ -80,7 +80,7 @@ class Submaps:
         """Returns the poses of all frames after the keyframes have moved.
 
         Args:
-            X_VK: (K, 4, 4).
+            X_VK: (K, 4, 4) new poses of the keyframes.
 
         Returns:
             (N, 4, 4); between keyframes, the moves of both are blended along

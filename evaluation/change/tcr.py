@@ -38,8 +38,8 @@ def in_convex_hull(points: np.ndarray, vertices: np.ndarray) -> np.ndarray:
     do not cost precision.
 
     Args:
-        points: (N, 3) float64.
-        vertices: (M, 3) float64, the points whose hull it is.
+        points: (N, 3) float64 points to test.
+        vertices: (M, 3) float64 points whose hull it is.
 
     Returns:
         (N,) bool; all false if there are no vertices.

@@ -91,7 +91,7 @@ def sample_frames(positions: np.ndarray, spacing: float) -> np.ndarray:
     """Returns frames at equal distances along a trajectory.
 
     Args:
-        positions: (N, 3) [m], N >= 1.
+        positions: (N, 3) positions of the sensor [m], at least one.
         spacing: distance between two frames, along the path [m].
 
     Returns:
@@ -183,7 +183,8 @@ def cropped(
     Args:
         scan: structured array (N,) in the frame S of a sensor.
         max_range: see `within_range`, in the frame F of the cloud.
-        X_FS: (4, 4); identity if left out.
+        X_FS: (4, 4) pose of the sensor in the frame F of the result; by default
+            F is S.
         fields: fields of the points, beside their coordinates.
         source: name of the drive, for messages.
 

@@ -78,7 +78,7 @@ class FileDrive(Drive):
             world_frame: name of W.
             files: N scans.
             stamps_ns: (N,) int64 [ns], strictly increasing.
-            X_WS: (N, 4, 4).
+            X_WS: (N, 4, 4) poses of the LiDAR in the world.
             notes: see `Drive.notes`.
             datum: see `Drive.datum`.
             scenario: see `Drive.scenario`.

@@ -382,7 +382,7 @@ def pose_matrices(path: Path, values: np.ndarray) -> np.ndarray:
 
     Args:
         path: file of the numbers, for messages.
-        values: (N, 12).
+        values: (N, 12) numbers.
 
     Returns:
         (N, 4, 4) with the rotations as they are in the text, rounded.

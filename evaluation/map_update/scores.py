@@ -157,8 +157,8 @@ def nearest(
     It is infinite beyond `most`.
 
     Args:
-        points: (N, 3).
-        others: (M, 3).
+        points: (N, 3) points [m].
+        others: (M, 3) other points [m].
         most: greatest distance [m].
     """
     if len(others) == 0:

@@ -391,7 +391,7 @@ def thin(points: np.ndarray, voxel_size: float) -> np.ndarray:
     Points are in the frame of a sensor.
 
     Args:
-        points: (N, 3) [m]; points that are not finite are left out.
+        points: (N, 3) points [m]; those that are not finite are left out.
         voxel_size: length of a voxel's side [m].
 
     Returns:

@@ -67,7 +67,7 @@ def voxel_planes(
     points.
 
     Args:
-        points: (N, 3) [m].
+        points: (N, 3) points [m].
         voxel_size: side of a voxel [m].
         max_points: only voxels with more points are used.
         flatness: upper limit of the variance along the normal [m^2].
@@ -157,7 +157,7 @@ def group_alike(
     or both found a new one; two groups never become one.
 
     Args:
-        centers: (P, 3) [m].
+        centers: (P, 3) centres of the patches [m].
         normals: (P, 3) unit.
         normal_limit: see `base_plane`.
         distance_limit: see `base_plane`.

@@ -119,7 +119,7 @@ def height_image(
     with the area that the points cover.
 
     Args:
-        points: (N, 3) [m].
+        points: (N, 3) points [m].
         center: (3,) a point of the plane [m].
         axes: (3, 3) directions of the image, one a row.
         resolution: length of a cell [m].
@@ -187,7 +187,7 @@ def peaks(
     Args:
         num_heights: (rows, columns) bits set in each cell; multiples of the
             segment.
-        min_heights: that a peak needs.
+        min_heights: number of heights that a peak needs.
 
     Returns:
         Rows (C,) and columns (C,), by segment along rows, then columns.
@@ -227,7 +227,7 @@ def find_keypoints(
         image: cloud seen along the normal.
         center: (3,) with which the image was drawn [m].
         axes: (3, 3) likewise.
-        min_heights: that a keypoint needs.
+        min_heights: number of heights that a keypoint needs.
     """
     cells = peaks(count_bits(image.heights), min_heights)
     return Keypoints(

@@ -60,7 +60,7 @@ def layer_cells(
         points: (N, 3) in the frame of the LiDAR [m].
         sensor_height: above the ground [m].
         cell: length of a cell [m].
-        least_points: that fill a cell.
+        least_points: number of points that fill a cell.
 
     Returns:
         (M,) uint16 numbers of cells, layer by layer and increasing in each,

@@ -52,7 +52,7 @@ def prepare(points: np.ndarray) -> np.ndarray:
     """Returns a cloud in the form that PointNetVLAD's networks expect.
 
     Args:
-        points: (N, 3), x ahead, y left, z up [m].
+        points: (N, 3) points, x ahead, y left, z up [m].
 
     Returns:
         (4096, 3) float32, or (0, 3) if nothing stands on the ground.

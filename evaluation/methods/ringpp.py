@@ -404,7 +404,7 @@ def local_features(points: np.ndarray, neighbours: np.ndarray) -> np.ndarray:
     count (0 ln 0 = 0, and 0 / 0 = 0 for a vertical line).
 
     Args:
-        points: (N, 3) float64.
+        points: (N, 3) float64 points.
         neighbours: (N, K) indices, K >= 2, of points that are not all in
             one place.
 

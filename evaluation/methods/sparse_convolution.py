@@ -23,8 +23,8 @@ def convolve(
 
     Args:
         cells: (N, 3) int64, different ones, each below 2^20.
-        features: (N, channels in).
-        kernel: (offsets, channels in, channels out).
+        features: (N, channels in) features of the cells.
+        kernel: (offsets, channels in, channels out) weights.
         step: distance of neighbouring cells.
         at: (M, 3) cells of the result; None for the same ones.
     """

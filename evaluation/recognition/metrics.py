@@ -261,7 +261,8 @@ def paired_samples(
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Returns `resampled_metrics` with the blocks of other queries.
 
-    They are the blocks that `own_samples` draws for these, which are as many.
+    `own_samples` draws the same blocks for the other queries, of which there
+    are as many.
     """
     if np.array_equal(outcomes.own_blocks, other.own_blocks):
         return own_samples(outcomes)

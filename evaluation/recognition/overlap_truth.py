@@ -178,7 +178,7 @@ def write_overlaps(
         path: CSV file to write.
         query_frames: (Q,) of the queries.
         database_frames: (D,) of the places.
-        overlaps: (Q, D), see `overlap_truth`.
+        overlaps: (Q, D) overlaps, see `overlap_truth`.
 
     Raises:
         InputError: if the file cannot be written.

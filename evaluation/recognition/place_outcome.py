@@ -76,7 +76,7 @@ class PlaceOutcome:
         """Returns the outcome of each query from the scores of all pairs.
 
         Args:
-            method: that made the scores.
+            method: method that made the scores.
             is_gated: whether they were gated.
             retrieval: retrieval of Q queries and D places.
             query: (Q,) stamps [ns] and (Q, 3) places [m] of the queries.

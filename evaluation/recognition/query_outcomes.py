@@ -161,7 +161,7 @@ def auroc(scores: np.ndarray, is_positive: np.ndarray) -> float:
     scores count half. NaN if all or none are positive.
 
     Args:
-        scores: (N,); NaN is the lowest.
+        scores: (N,) scores; NaN is the lowest.
         is_positive: (N,) bool.
     """
     num_with = int(is_positive.sum())

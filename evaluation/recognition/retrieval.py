@@ -117,12 +117,13 @@ def compare(
     """Returns the scores of a query drive against the places of another.
 
     Args:
-        method: that described both.
+        method: method that described both drives.
         database: drive with described places.
         query: drive with described queries, in the same world frame.
-        protocol: that both were described by.
+        protocol: protocol by which both drives were described.
         track: reports progress.
-        overlaps: (Q, D), see `overlap_matrix`; needed for matches by overlap.
+        overlaps: (Q, D) overlaps, see `overlap_matrix`; needed for matches by
+            overlap.
 
     Raises:
         InputError: if the method returns an invalid result.

@@ -113,7 +113,7 @@ def score_places(
     included.
 
     Args:
-        method: that described queries and places.
+        method: method that described queries and places.
         queries: descriptors, from the first of the drive to the current one.
         query_cloud: cloud of the current query, for a second stage.
         database: the result of `build_database` for the places.

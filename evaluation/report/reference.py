@@ -92,7 +92,7 @@ class Reference:
     ) -> Sequence[tuple[str, str, float]]:
         """Returns the published changes without place recognition.
 
-        They are for a report on one of the source's maps.
+        Only a report on a map of the source shows them.
         """
         return () if self.city_names.isdisjoint(map_names) else self.further
 

@@ -63,7 +63,7 @@ def write_page(
 
     Args:
         results: the table, beside the page as `results.csv`.
-        queries: that of queries, beside it as `queries.csv`; None without.
+        queries: table of queries, written as `queries.csv`; None without one.
         folder: folder in which the page is written.
         title: title of the page.
         about: the question, in words.

@@ -465,9 +465,9 @@ def summarised(
 ) -> list[Summary]:
     """Returns the numbers behind an experiment's charts.
 
-    They are the lifetimes of lines of `kept`, of which the range is that of
-    seeds, the growth of lines of times, the correlations of scatters, and what
-    two causes cost together.
+    They are lifetimes, for lines of `kept`, with their range over seeds; growth
+    rates, for lines of times; correlations, for scatter plots; and what two
+    causes cost together.
     """
     found = []
     for chart in charts:

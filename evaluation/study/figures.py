@@ -22,7 +22,7 @@ def draw_city(
 ) -> dict[str, PageDrive]:
     """Draws the routes of a city; returns its drives for the page, by name.
 
-    Each stage is a name, and the `SurveyedDrive` and the cloud of its drive.
+    Each stage has a name, and the `SurveyedDrive` and the cloud of its drive.
     """
     names, views, routes, drives = [], [], [], {}
     for done, (name, surveyed, fine) in enumerate(stages):

@@ -279,9 +279,9 @@ class Part:
     path: Path
 
     def write(self, inputs: Mapping, value: object) -> None:
-        """Writes the part; its folder is made if needed.
+        """Writes the value to the part, whose folder is created if needed.
 
-        The inputs are all that the value depends on, ready for JSON.
+        The inputs are everything on which the value depends, ready for JSON.
 
         Raises:
             InputError: if it cannot be kept or written.

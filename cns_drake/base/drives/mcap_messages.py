@@ -158,8 +158,8 @@ def checked_poses(
     """Returns poses (..., 4, 4) of positions and quaternions in a recording.
 
     Args:
-        p: (..., 3) [m].
-        quat_xyzw: (..., 4).
+        p: (..., 3) positions [m].
+        quat_xyzw: (..., 4) quaternions.
 
     Raises:
         InputError: a number is not finite, a position is too far away, or a

@@ -175,7 +175,7 @@ def locate_records(
 ) -> Iterator[tuple[int, int, McapRecord | Fault]]:
     """Yields the records of an MCAP file, each with its place in the file.
 
-    They are those of `read_records`.
+    They are the records that `read_records` yields.
 
     Yields:
         The offset of a chunk in the file and that of a record in the

@@ -98,9 +98,9 @@ _TO_KERB = 0.08
 def furnish_sidewalks(
     draft: Draft, districts: Sequence[District], junctions: BaseGeometry
 ) -> None:
-    """Places street lamps, then trees, then furniture on all sidewalks.
+    """Places street lamps, trees and then furniture on all sidewalks.
 
-    `junctions` is the area of all of them in W [m].
+    `junctions` is the area of all junctions in W [m].
     """
     for task, distance in _FROM_KERB_OF.items():
         keep_off = junctions.buffer(_JUNCTION_CLEARANCE[task])

@@ -162,7 +162,7 @@ def add_described_imu(
     Args:
         config: the description.
         builder: builder of the diagram.
-        body: that carries the IMU.
+        body: body that carries the IMU.
         trajectory: motion of that body.
         motion: the system that moves it.
         scan_rate: scans per second, the rate of an IMU without one.

@@ -392,8 +392,8 @@ class DirectionPattern(BeamPattern):
         """Takes the beams.
 
         Args:
-            directions: (N, 3), expressed in the sensor frame S, of any
-                length but zero.
+            directions: (N, 3) directions in the sensor frame S, of any length
+                except zero.
             min_range: nearest range that is measured [m].
             max_range: farthest range that is measured [m].
             period: duration of one turn [s].

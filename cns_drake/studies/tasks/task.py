@@ -227,7 +227,7 @@ class Task(abc.ABC):
 
         Args:
             found: value of the part.
-            before: that of the baseline condition; None if there is none.
+            before: outcome in the baseline condition; None without a baseline.
         """
 
     def answers(self, found: Any) -> Iterable[Answers]:
