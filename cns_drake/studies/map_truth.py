@@ -194,7 +194,7 @@ def write_truth(
 
     Args:
         output: the folder, new or empty.
-        spacing: length of the way between two scans [m].
+        spacing: distance driven between two scans [m].
         across_maps: whether the drives' maps may have different names, as an
             aged map has.
 

@@ -181,7 +181,7 @@ class RedrawCity(MakeMap):
         return redrawn_inputs(self.map_folder, self.stage, self.seed)
 
     def finish_inputs(self, draft: Path) -> None:
-        """Writes inputs that depend on the city itself."""
+        """Writes the inputs that can only be made once the city is drawn."""
 
     def sources(self) -> dict[str, object]:
         """Returns everything on which the city depends, ready for JSON."""

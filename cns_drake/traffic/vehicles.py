@@ -342,8 +342,8 @@ def find_ahead(
 ) -> tuple[float, float]:
     """Returns the gap [m] to the next vehicle ahead, and its speed [m/s].
 
-    It is on the same piece, ahead of a vehicle of a number, whose front bumper
-    is at s [m].
+    The two vehicles are on the same piece. The one behind has the number `who`,
+    and its front bumper is at s [m].
     """
     gap, speed = np.inf, 0.0
     at = traffic.head[piece]
@@ -701,7 +701,8 @@ def choose_way(traffic: Traffic, i: int) -> None:
 def uniform(seed: int, who: int, draw: int) -> float:
     """Returns the draw-th random number of a road user, from 0 to 1.
 
-    SplitMix64's finalizer (Steele, Lea, Flood, OOPSLA 2014) of the three.
+    It is SplitMix64's finalizer (Steele, Lea, Flood, OOPSLA 2014) of the seed,
+    the user's number and the draw.
     """
     z = np.uint64(seed) * np.uint64(0x9E3779B97F4A7C15)
     z += np.uint64(who) * np.uint64(0xD1B54A32D192ED03)

@@ -378,7 +378,7 @@ def compare(
 
     Args:
         tables: Tables of results, or folders with a results.csv.
-        metric: Metric to rank by, as in the column metric of the tables.
+        metric: Name of the metric to rank by, as in the tables.
         protocol: Protocol whose rows to compare; by default all protocols.
         gate: Compare results with --gate instead of those without.
         rankings: Compare only the rankings, each over its own conditions, such

@@ -53,7 +53,7 @@ def score(
 ) -> dict:
     """Returns all scores, ready for JSON; None where one is undefined.
 
-    Names are those of classes by their numbers.
+    `names` maps the number of a class to its name.
 
     Raises:
         InputError: the truth leaves out every point.

@@ -179,8 +179,8 @@ def write_session(
 
     Args:
         drive: the drive.
-        folder: the session's; it is made.
-        spacing: length of the way between two scans [m].
+        folder: folder to create for the session.
+        spacing: distance driven between two scans [m].
         track: reports progress.
 
     Returns:

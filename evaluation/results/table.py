@@ -216,7 +216,7 @@ class Answers(Key):
 
     @cached_property
     def outcomes(self) -> QueryOutcomes:
-        """The outcome of each query; the size of the database is unknown."""
+        """Outcome of each query; without the number of places."""
         columns = self.columns
         is_right = np.asarray(columns["correct"], dtype=bool)
         ranks = np.full(len(is_right), math.inf)
