@@ -174,7 +174,7 @@ class Piece:
     shape: Shape
 
     def evaluate(self, s: np.ndarray) -> np.ndarray:
-        """Returns x, y [m] and heading [rad] (N, 3) at distances on the road."""
+        """Returns (N, 3) x, y [m] and heading [rad] at distances s on the road."""
         u, v, turn = self.shape.evaluate(s - self.s).T
         c, sine = math.cos(self.heading), math.sin(self.heading)
         return np.stack(
