@@ -290,16 +290,23 @@ def ApplyOdometryConfig(
     the quaternion of R_WB (w first), p_WB [m], then angular and linear velocity
     in the world, expressed in B [rad/s, m/s].
 
+    Args:
+        config: description of the odometry.
+        builder: builder of the diagram.
+        plant: finalized plant; by default the system named `plant`.
+        scene_graph: not used.
+        lcm_buses: the buses of which the config names one.
+        lcm: interface to publish on, instead of a bus. Without buses and
+            interface, one to the default URL is added.
+
+    Raises:
+        RuntimeError: there is no such plant, frame or bus, or the plant is not
+            finalized.
+
     Example:
         from cns_drake import ApplyOdometryConfig, OdometryConfig
 
         ApplyOdometryConfig(OdometryConfig(rate=100), builder)
-
-    Args:
-        config: the odometry.
-        builder: builder of the diagram.
-        plant, lcm_buses, lcm: as of `ApplyLidarConfig`.
-        scene_graph: not used.
     """
     section = _section(config, OdometrySection)
     rate = _checked_rate(config, section.rate)

@@ -174,7 +174,7 @@ class Piece:
     shape: Shape
 
     def evaluate(self, s: np.ndarray) -> np.ndarray:
-        """Returns (N, 3) x, y [m] and heading [rad] at distances s on the road."""
+        """Returns (N, 3) x, y [m] and heading [rad] along the road."""
         u, v, turn = self.shape.evaluate(s - self.s).T
         c, sine = math.cos(self.heading), math.sin(self.heading)
         return np.stack(
