@@ -70,7 +70,9 @@ def age_map(
     progress: Callable[[str], None] = lambda line: None,
     finish: Callable[[Path, AgedMap], None] = lambda folder, aged: None,
 ) -> AgedMap:
-    """Writes the map folder of a city that ages; returns what was made.
+    """Writes the map folder of a city after years of change.
+
+    It returns the aged stages and what happened.
 
     Args:
         source: the folder of the map; its last stage is today.
@@ -158,10 +160,10 @@ def _swept(trajectory: Trajectory) -> BaseGeometry:
 def past(
     world: OldWorld, year: int
 ) -> tuple[dict[str, Structure | None], list[Event]]:
-    """Returns what stood some years ago, and the buildings built since.
+    """Returns the structures of some years ago, and the events since.
 
-    Buildings of later years were not there, and their lots were in another
-    use. Trees were younger. The year is negative.
+    Buildings of later years were not there, and their lots had another use.
+    Trees were younger. The year is negative.
     """
     assert world.today is not None  # The caller has checked it.
     standing: dict[str, Structure | None] = dict.fromkeys(world.visuals)

@@ -23,7 +23,7 @@ _SEEN = 60.0
 
 
 def street_views(aged: AgedMap) -> dict[str, View]:
-    """Returns views along the last drive where most is built."""
+    """Returns views along the last drive, where most has been built."""
     way = aged.trajectory
     times = np.linspace(0.0, way.duration, int(way.length / _SPACING) + 2)[:-1]
     R_WBs, p_WBs = way.poses(times)

@@ -233,7 +233,7 @@ class City:
     def near(
         self, area: BaseGeometry, ignored: Sequence[str] = ()
     ) -> list[str]:
-        """Returns the names of what stands on an area of W, but for ground."""
+        """Returns names of the structures on an area in W, without ground."""
         rows = sorted(self._tree.query(area, predicate="intersects"))
         found = [
             name
@@ -366,7 +366,7 @@ class City:
     # A year.
 
     def live(self) -> None:
-        """Lets a year pass."""
+        """Simulates one year: draws which structures change."""
         self.year += 1
         for name in self._passing:
             self._remove(name, event="scaffold")

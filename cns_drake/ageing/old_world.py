@@ -85,13 +85,13 @@ class OldWorld:
         self.rows = {row["name"]: row for _, row in records}
 
     def of_class(self, *classes: str) -> list[world_structures.Structure]:
-        """Returns the things of some classes, in the order of names."""
+        """Returns the structures of the given classes, sorted by name."""
         return [t for t in self.things.values() if t.semantic_class in classes]
 
     def structure(self, name: str) -> structures.Structure:
-        """Returns a structure as the city generator has it.
+        """Returns a structure in the form that the city generator uses.
 
-        Its footprint is the hull of what is near the ground.
+        Its footprint is the convex hull of its parts near the ground.
 
         Raises:
             InputError: a shape or a mesh is of another kind, or the table lacks

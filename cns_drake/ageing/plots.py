@@ -112,7 +112,7 @@ class Plot:
         return cls(area, xy, yaw, round(z, 3))
 
     def place(self, x: float, y: float) -> tuple[float, float]:
-        """Returns the place in W of a place in S, in millimetres."""
+        """Returns a point given in S as a point in W, in millimetres."""
         c, s = math.cos(self.yaw), math.sin(self.yaw)
         return (
             round(self.xy[0] + c * x - s * y, 3),
@@ -120,12 +120,15 @@ class Plot:
         )
 
     def inside(self, area: BaseGeometry) -> BaseGeometry:
-        """Returns an area of W in S."""
+        """Returns an area given in W, expressed in S."""
         moved = affinity.translate(area, -self.xy[0], -self.xy[1])
         return affinity.rotate(moved, -self.yaw, (0, 0), use_radians=True)
 
     def triangles(self, p_W: np.ndarray) -> np.ndarray:
-        """Returns triangles (M, 3, 3) of W in S, heights above its ground."""
+        """Returns triangles (M, 3, 3) given in W, expressed in S [m].
+
+        Heights are above the plot's ground.
+        """
         c, s = math.cos(self.yaw), math.sin(self.yaw)
         x, y, z = np.moveaxis(p_W - [*self.xy, self.z], -1, 0)
         return np.stack([c * x + s * y, c * y - s * x, z], axis=-1)
@@ -135,7 +138,7 @@ class Plot:
         return largest_rectangle(self.inside(self.area))
 
     def thing(self, name: str, kind: str, model: Model) -> Structure:
-        """Returns a structure whose frame is S."""
+        """Returns a structure that stands on the plot, with the frame S."""
         return Structure(name, kind, model, (*self.xy, self.z), self.yaw)
 
 
@@ -151,11 +154,11 @@ def new_building(
 
     Args:
         plot: where it stands.
-        height: of the building, about [m].
+        height: height of the building, about [m].
         banned: the archetype that it does not have.
         neighbours: footprints of its neighbours in W.
         rng: draws the building.
-        ending: of its name, after the archetype.
+        ending: ending of its name, after the archetype.
     """
     x0, y0, x1, y1 = plot.room().bounds
     names = [name for name in _BUILT_TODAY if name != banned]
@@ -238,7 +241,7 @@ def site(plot: Plot, name: str, rng: np.random.Generator) -> list[Structure]:
 
 
 def frame(building: Structure, seed: int) -> Model:
-    """Returns the unfinished state of a building."""
+    """Returns a building's unfinished frame, as while it is built."""
     model, name = building.model, building.name
     height = max(0.55 * top_of(model), _LEAST_FRAME)
     try:
@@ -309,9 +312,9 @@ def annex_to(
     """Returns an annex of one storey behind a building; None without room.
 
     Args:
-        plot: that of the building.
+        plot: plot of the building.
         triangles: (M, 3, 3) of the building in W [m].
-        name: of the annex.
+        name: name of the annex.
         is_free: whether an area in W may be built on.
         rng: draws its size.
     """
@@ -384,9 +387,9 @@ def balconies_on(
 def renewed(
     building: Structure, moves: bool, rng: np.random.Generator
 ) -> Structure:
-    """Returns a building in another colour.
+    """Returns a building with a new colour.
 
-    If it moves, insulation takes its walls outwards by 15 cm.
+    If `moves`, new insulation also shifts its walls outwards by 15 cm.
     """
     model = building.model
     walls = [p for p in model.parts if "glass" not in p.name and p.rgb]
@@ -418,7 +421,7 @@ def _widened(part: Part, middle: np.ndarray, share: float) -> Part:
 
 
 def section(triangles: np.ndarray, z: float) -> np.ndarray:
-    """Returns the (N, 2, 2) segments in which triangles meet a height."""
+    """Returns the segments (N, 2, 2) in which triangles cut a height z."""
     z += 1e-4  # Not at a vertex, whose heights are in millimetres.
     a, b = triangles, np.roll(triangles, -1, axis=1)
     rise = b[..., 2] - a[..., 2]
@@ -430,7 +433,7 @@ def section(triangles: np.ndarray, z: float) -> np.ndarray:
 
 
 def last(segments: np.ndarray, x: float) -> float:
-    """Returns the greatest y of (N, 2, 2) segments at x; NaN without any."""
+    """Returns the greatest y at x of segments (N, 2, 2); NaN without any."""
     a, b = segments[:, 0], segments[:, 1]
     meets = (a[:, 0] - x) * (b[:, 0] - x) < 0
     a, b = a[meets], b[meets]

@@ -50,7 +50,7 @@ def read_rates(path: Path | None, factor: float = 1.0) -> dict[str, float]:
 
 
 def check_rates(found: object, source: object) -> dict[str, float]:
-    """Returns event -> rate a year, of some events, if they are rates.
+    """Returns rates by event, after checking that they are rates.
 
     Raises:
         InputError: an event is unknown, or a rate is not from 0 to 1.
@@ -73,7 +73,7 @@ def check_rates(found: object, source: object) -> dict[str, float]:
 
 
 def check_years(years: Iterable[int]) -> tuple[int, ...]:
-    """Returns years, if they ascend and are within reach.
+    """Returns years, after checking that they ascend and are in range.
 
     Raises:
         InputError: they do not, or one is beyond 200.
@@ -105,16 +105,16 @@ class Tally:
     number: Counter[str] = field(default_factory=Counter)
 
     def count(self, event: str, share: float, hit: bool, things: int) -> None:
-        """Counts a draw of a probability that hits an event, or does not."""
+        """Counts one random draw, and whether the event happened."""
         self.expected[event] += share
         self.exposure[event] += things
         self.number[event] += hit
 
     def to_csv(self) -> str:
-        """Returns the rates asked and those that came about.
+        """Returns a CSV table of the wanted and the observed rates.
 
-        `p` is the probability of a Poisson number as far from the expected
-        one, or farther.
+        `p` is the probability that a Poisson number is at least as far from its
+        expectation.
         """
         lines = ["event,rate,exposure,expected,events,rate_came_about,p\n"]
         for event, rate in self.rates.items():

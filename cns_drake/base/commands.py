@@ -34,7 +34,7 @@ SessionSpacing = Annotated[
     typer.Option(
         metavar="METRES",
         min=0.01,
-        help="Distance driven between two scans that enter a map [m].",
+        help="Distance driven between two scans of a map [m].",
     ),
 ]
 MethodSettings = Annotated[
@@ -79,7 +79,7 @@ class Command(TyperCommand):
         super().__init__(*args, help=text, params=params, **settings)
 
     def invoke(self, ctx: Any) -> Any:
-        """Runs the command, unless a number within bounds is none."""
+        """Runs the command, after checking that its numbers are finite."""
         # Others are checked where they are used.
         check_finite(
             {

@@ -71,7 +71,7 @@ def _for_all(
 
 @functools.cache
 def start_compiler() -> None:
-    """Has Numba load what it loads with the first function of a process."""
+    """Makes Numba load its modules now instead of on the first call."""
     numba.njit(lambda: None)()
 
 

@@ -41,9 +41,9 @@ def write_csv(
 
 
 def read_rows(path: Path) -> list[tuple[int, list[str]]]:
-    """Returns the rows of a CSV file, each with the number of its line.
+    """Returns the rows of a CSV file, each with its line number.
 
-    Cells are stripped of space around them; rows without any are left out.
+    Cells are stripped of surrounding spaces. Empty rows are left out.
 
     Raises:
         InputError: the file cannot be read, is not CSV in UTF-8 or holds a
@@ -108,7 +108,7 @@ def whole_number(text: str, where: object) -> int:
 
 
 def number_within(text: str, largest: float, where: object) -> float:
-    """Returns the number that a cell holds.
+    """Returns the number in a cell, after checking its size.
 
     Raises:
         InputError: it holds none, or one beyond the largest, of either sign;

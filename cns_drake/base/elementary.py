@@ -21,7 +21,10 @@ power = np.vectorize(math.pow, otypes=[float])
 
 
 def product(A: np.ndarray, B: np.ndarray) -> np.ndarray:
-    """Returns A @ B of matrices (..., M, K) and (..., K, N)."""
+    """Returns the matrix product A @ B for (..., M, K) and (..., K, N).
+
+    It is rounded alike on every processor.
+    """
     result = A[..., :1] * B[..., :1, :]
     for k in range(1, A.shape[-1]):
         result = result + A[..., k : k + 1] * B[..., k : k + 1, :]
@@ -29,9 +32,9 @@ def product(A: np.ndarray, B: np.ndarray) -> np.ndarray:
 
 
 def turns(rotvecs: np.ndarray) -> np.ndarray:
-    """Returns the (N, 3, 3) rotations about (N, 3) vectors, by their lengths.
+    """Returns the rotation matrices (N, 3, 3) of rotation vectors (N, 3).
 
-    By Rodrigues' formula [rad].
+    By Rodrigues' formula; the length of a vector is its angle [rad].
     """
     x, y, z = rotvecs.T
     half = np.sqrt(x * x + y * y + z * z) / 2.0
@@ -49,5 +52,5 @@ def turns(rotvecs: np.ndarray) -> np.ndarray:
 
 
 def rotated(R: np.ndarray, vectors: np.ndarray) -> np.ndarray:
-    """Returns (..., 3) vectors after (..., 3, 3) rotations."""
+    """Returns vectors (..., 3) rotated by matrices (..., 3, 3)."""
     return product(R, vectors[..., None])[..., 0]

@@ -35,10 +35,10 @@ _PACKAGES = {
 
 
 class InputError(Exception):
-    """Input that cannot be used; the message is one line for the user.
+    """An error in the user's input, with a message of one line.
 
-    The message names the file (or argument), the field where there is one,
-    and the fault. The command line prints it and exits with status 2.
+    The message names the file (or argument), the field where there is one, and
+    the fault. The command line prints it and exits with status 2.
 
     Attributes:
         exit_status: exit status of a command that ends with this error.
@@ -70,7 +70,7 @@ class FailedJobsError(InputError):
 
 @contextlib.contextmanager
 def value_errors(place: object) -> Iterator[None]:
-    """Turns a ValueError into one line that begins with its place.
+    """Turns a ValueError into an InputError of one line, with its place.
 
     Raises:
         InputError: if the block raises ValueError.
@@ -93,12 +93,12 @@ def one_line(message: object) -> str:
 
 
 def printable(text: str) -> str:
-    """Returns a text whose lines a terminal only shows, without obeying."""
+    """Returns a text without characters that control a terminal."""
     return "".join(c if c.isprintable() or c == "\n" else " " for c in text)
 
 
 def validated(model: type[_Model], values: object, source: object) -> _Model:
-    """Returns what a file or argument, the source, holds as a model.
+    """Returns the values of a file or argument as a validated model.
 
     Raises:
         InputError: a field is missing, unknown or not usable.
@@ -156,9 +156,9 @@ def _advice(fault: Mapping[str, Any], model: type[BaseModel] | None) -> str:
 def nearest_field(
     model: type[BaseModel], place: Sequence[str | int]
 ) -> str | None:
-    """Returns the field that is written most like an unknown one.
+    """Returns the known field whose spelling is closest to an unknown one.
 
-    The place is the keys and indices that lead to it, and itself.
+    The place is the keys and indices that lead to the field, and its name.
     """
     names = sorted(set(_fields_at(model, place[:-1])))
     close = difflib.get_close_matches(str(place[-1]), names, n=1)
@@ -185,7 +185,7 @@ def _fields_at(kind: Any, place: Sequence[str | int]) -> Iterator[str]:
 
 
 def shows_traceback() -> bool:
-    """Returns whether the command line asks for the tracebacks of errors.
+    """Returns whether `--traceback` was given on the command line.
 
     The processes of jobs have the arguments of their parent.
     """
@@ -198,10 +198,10 @@ def has_utf8() -> bool:
 
 
 def missing_library(error: ImportError) -> str | None:
-    """Returns a line about what the system lacks for an import.
+    """Returns a line about what the system lacks for a failed import.
 
-    It is a shared library, or a locale that has UTF-8; None if the import
-    failed for another reason.
+    It is a shared library, or a locale with UTF-8; None if the import failed
+    for another reason.
     """
     if "initialization failed" in str(error) and not has_utf8():
         name = locale.setlocale(locale.LC_CTYPE)

@@ -35,7 +35,7 @@ def part_path(path: Path) -> Path:
 
 @contextlib.contextmanager
 def user_errors(path: Path | str) -> Iterator[None]:
-    """Turns errors of the file system into one line that names the file.
+    """Turns a file system error into an InputError that names the file.
 
     Raises:
         InputError: if the block raises OSError.
@@ -71,11 +71,11 @@ def completing(path: Path) -> Iterator[Path]:
 
 @contextlib.contextmanager
 def draft_folder(folder: Path, *, replaces: bool = False) -> Iterator[Path]:
-    """Yields a draft of a folder, of the same name; it takes its place at last.
+    """Yields a temporary folder that replaces `folder` at the end.
 
-    The draft lies in a folder of its own, since files may name their folder. On
-    an exception it is removed. The folder may be there, with files, only if the
-    draft `replaces` it.
+    It has the same name, but lies in a folder of its own, since files may name
+    their folder. On an exception it is removed. A folder with files may exist
+    only if the draft `replaces` it.
 
     Raises:
         InputError: if it cannot be written.
@@ -100,7 +100,7 @@ def draft_folder(folder: Path, *, replaces: bool = False) -> Iterator[Path]:
 
 
 def check_new_folder(folder: Path) -> None:
-    """Refuses a folder to write whose name is taken; it may be there, empty.
+    """Raises an error if a folder to write exists and is not empty.
 
     Raises:
         InputError: the folder holds files, or something else has its name.
@@ -113,7 +113,7 @@ def check_new_folder(folder: Path) -> None:
 
 
 def check_regular(path: Path) -> None:
-    """Refuses paths that are not regular files, such as devices and pipes.
+    """Raises an error for paths such as devices and pipes.
 
     Raises:
         InputError: if the path is something else, or does not exist.
@@ -127,7 +127,7 @@ def check_regular(path: Path) -> None:
 
 
 def is_there(path: Path) -> bool:
-    """Returns whether there is a file of a name that may be missing.
+    """Returns whether an optional file exists.
 
     Raises:
         InputError: something else has the name: a folder, a pipe, a dead link.
@@ -139,9 +139,9 @@ def is_there(path: Path) -> bool:
 
 
 def read_bytes(path: Path, limit: int = _WRITTEN_BYTES) -> bytes:
-    """Reads a whole file, unless it is larger than a limit [bytes].
+    """Returns the content of a file, after checking its size.
 
-    The default is ample for files written by hand.
+    The default limit [bytes] is ample for files written by hand.
 
     Raises:
         InputError: if it cannot be read, does not exist or is too large.
@@ -167,9 +167,9 @@ def read_text(path: Path, limit: int = _WRITTEN_BYTES) -> str:
 
 
 def decode_text(data: bytes) -> str:
-    """Returns text in UTF-8, or in UTF-16 with a mark; the mark is left out.
+    """Returns the text in UTF-8 bytes, or in UTF-16 with a byte order mark.
 
-    Editors of Windows begin files with such a byte order mark.
+    Editors of Windows begin files with such a mark; it is removed.
 
     Raises:
         UnicodeDecodeError: if it is neither.
@@ -222,10 +222,10 @@ def _new_part(path: Path) -> Path:
 
 
 def open_plain(path: Path, flags: int) -> int:
-    """Returns a descriptor of a file to write; it is made if need be.
+    """Returns a descriptor of a file to write, which is created if needed.
 
-    No link is followed, which may lead to a file of others, and the reader of a
-    pipe is not waited for.
+    It follows no link, which may lead to another user's file, and does not wait
+    for the reader of a pipe.
     """
     flags |= os.O_CREAT | os.O_NOFOLLOW | os.O_NONBLOCK
     return os.open(path, flags, 0o666)
@@ -300,11 +300,11 @@ def make_folder(path: Path) -> None:
 
 @contextlib.contextmanager
 def exclusive(path: Path, on_wait: Callable[[], None]) -> Iterator[None]:
-    """Keeps other processes that lock the same path out while the block runs.
+    """Keeps other processes that use the same lock out of the block.
 
-    The file `<path>.lock` is locked meanwhile, also for other machines if
-    the file system has locks. It is unlocked however the process ends.
-    Before waiting for another process, `on_wait` is called.
+    The file `<path>.lock` is locked meanwhile, also for other machines if the
+    file system has locks. It is unlocked however the process ends. Before
+    waiting for another process, `on_wait` is called.
 
     Raises:
         InputError: if the lock cannot be written.
@@ -319,7 +319,7 @@ def exclusive(path: Path, on_wait: Callable[[], None]) -> Iterator[None]:
 
 
 def remove_lock(path: Path) -> None:
-    """Removes the lock of a killed process, unless another one holds it."""
+    """Removes the lock file of a killed process, unless it is in use."""
     lock = path.with_name(f"{path.name}.lock")
     if lock.is_file():
         # What cannot be locked is in use, or no lock of ours.

@@ -17,7 +17,7 @@ _Handler = Callable[[int, FrameType | None], object]
 
 
 def interrupt_on_termination(once: bool = False) -> None:
-    """Makes SIGTERM an exception, so that open files are closed.
+    """Turns SIGTERM into an exception, so that open files are closed.
 
     Later signals may interrupt the closing, unless it comes `once`: that is for
     a process that another process can still kill.
@@ -55,7 +55,7 @@ def _handled_by(handle: _Handler) -> Iterator[dict[int, _Handler]]:
 
 @contextlib.contextmanager
 def uninterrupted() -> Iterator[None]:
-    """Makes interrupts wait; for imports.
+    """Delays interrupts until the block ends; for imports.
 
     An extension module that is interrupted while it is initialised fails with
     another error, or crashes the process later. Blocking the signals would not
@@ -72,12 +72,12 @@ def uninterrupted() -> Iterator[None]:
 
 @contextlib.contextmanager
 def interrupts_wait() -> Iterator[Callable[[], None]]:
-    """Makes an interrupt wait for the next call of what is yielded.
+    """Delays interrupts until the next call of the yielded function.
 
-    Raised anywhere, its exception can come up inside the conversion of
-    arguments for a C++ function, which takes it for a type that does not fit
-    and goes on with another error. A second one, before the first has
-    struck, strikes at once; later ones do not disturb the closing.
+    Raised anywhere, an interrupt's exception can come up inside the conversion
+    of arguments for a C++ function, which takes it for a type that does not fit
+    and goes on with another error. A second interrupt takes effect at once;
+    later ones do not disturb the closing.
     """
     waiting: list[int] = []
     struck: list[int] = []
@@ -102,17 +102,16 @@ def interrupts_wait() -> Iterator[Callable[[], None]]:
 
 
 def ignore_interrupts() -> None:
-    """Ignores interrupts from now on; for a process that is done."""
+    """Ignores all further interrupts, at the end of a process."""
     for number in SIGNALS:
         signal.signal(number, signal.SIG_IGN)
 
 
 def end_interrupted() -> NoReturn:
-    """Ends a process that was interrupted, at once.
+    """Ends an interrupted process at once, without Python's shutdown.
 
-    The exception has closed all open files on its way. The rest of an
-    interpreter's shutdown is left out: it can fail after a library was
-    interrupted in a computation.
+    The exception has closed all open files on its way. The shutdown can fail
+    after a library was interrupted in a computation.
     """
     for stream in (sys.stdout, sys.stderr):
         with contextlib.suppress(OSError, ValueError):

@@ -15,12 +15,12 @@ _SUSPECT = re.compile(rb"\\u(?:0000|[dD][89a-fA-F])")
 
 
 def json_number(value: float) -> float | None:
-    """Returns a number as JSON can hold it: None for NaN."""
+    """Returns a number for JSON, which has no NaN: then None."""
     return None if math.isnan(value) else value
 
 
 def parse_json(data: bytes) -> Any:
-    """Returns the value of a text in JSON, in UTF-8.
+    """Returns the value of UTF-8 bytes that hold JSON.
 
     Raises:
         ValueError: if it is not JSON, is nested too deep, has a key twice, or

@@ -49,10 +49,9 @@ class MapFolder:
         self.views = path / "views.yaml"
 
     def files(self) -> list[Path]:
-        """Returns the files beside the folders, in order.
+        """Returns the files directly in the map's folder, sorted.
 
-        Hidden files, such as locks of editors, and dead links are none of the
-        map's.
+        Hidden files, such as locks of editors, and dead links are left out.
 
         Raises:
             InputError: there is a pipe or a device.
@@ -72,7 +71,7 @@ class MapFolder:
         return self.path / stage_name(stage)
 
     def stages(self) -> dict[str, Path]:
-        """Returns stage -> SDF file of the stages that are there, in order."""
+        """Returns the SDF file of each existing stage, sorted."""
         return {
             path.stem.removeprefix("stage_"): path
             for path in sorted(self.path.glob(stage_name("*")))
@@ -87,9 +86,9 @@ class MapFolder:
         return sorted(self.path.glob(self.drive("*").name))
 
     def recordable_drives(self) -> list[Path]:
-        """Returns those whose stage is there as well.
+        """Returns the scenario files of drives whose stage exists.
 
-        A map's roads and drives may be there before its city is.
+        A map's roads and drives may exist before its city does.
         """
         stages = self.stages()
         return [

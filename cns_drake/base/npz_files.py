@@ -17,13 +17,13 @@ _COMPRESSIONS = (zipfile.ZIP_STORED, zipfile.ZIP_DEFLATED)
 def read_npz(
     path: Path, names: Iterable[str], most_bytes: int
 ) -> dict[str, np.ndarray]:
-    """Returns the arrays of an archive by name; absent ones are left out.
+    """Returns the wanted arrays of an .npz file by name, if present.
 
-    A small file cannot fill the memory, nor run code.
+    The size is limited, and no code is run.
 
     Args:
         path: the file.
-        names: of the wanted arrays; no others are read.
+        names: names of the wanted arrays; no others are read.
         most_bytes: greatest size of the file, and of each array.
 
     Raises:

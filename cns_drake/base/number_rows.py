@@ -13,12 +13,12 @@ def parse_rows(
     separator: str | None = None,
     first: int = 0,
 ) -> np.ndarray:
-    """Returns rows of numbers, each a line of text.
+    """Returns numbers from lines of text, one row per line.
 
     Args:
         lines: N rows.
-        dtype: of a row, with fields; or of each number.
-        separator: between numbers; None is white space.
+        dtype: dtype of a row, with fields; or of each number.
+        separator: text between numbers; None for white space.
         first: the number of rows before these, for errors.
 
     Returns:

@@ -14,7 +14,7 @@ _ROOT = os.path.realpath(os.path.join(os.path.dirname(__file__), "../.."))
 
 
 def leave_out_folder(search_path: list[str]) -> None:
-    """Takes the current folder off the search path of a program, `sys.path`.
+    """Removes the current folder from `sys.path`.
 
     `python -m` puts it there. It stays if it holds this package.
     """
@@ -26,7 +26,7 @@ def leave_out_folder(search_path: list[str]) -> None:
 
 
 def check_evaluation() -> None:
-    """Refuses a process in which `import evaluation` gives another package.
+    """Raises an error if `import evaluation` gives another package.
 
     Raises:
         InputError: names the other package, and what to do.

@@ -23,10 +23,10 @@ def xyz(points: np.ndarray, dtype: DTypeLike = np.float64) -> np.ndarray:
 
 
 def check_range(points: np.ndarray, limit: float, first: int = 0) -> None:
-    """Refuses numbers that cannot be coordinates, such as misread bytes.
+    """Raises an error for numbers that cannot be coordinates.
 
-    Values that are not finite pass: many sensors store them for beams without a
-    return.
+    Such are misread bytes. Values that are not finite pass: many sensors store
+    them for beams without a return.
 
     Args:
         points: (N,) structured array.
@@ -48,7 +48,7 @@ def check_range(points: np.ndarray, limit: float, first: int = 0) -> None:
 
 
 def from_xyz(coordinates: np.ndarray) -> np.ndarray:
-    """Returns a cloud of the given coordinates.
+    """Returns points with the given coordinates (N, 3).
 
     Args:
         coordinates: (N, 3) or (N, 4) floating point; a fourth column is
@@ -64,9 +64,9 @@ def from_xyz(coordinates: np.ndarray) -> np.ndarray:
 
 
 def store(points: np.ndarray, name: str, values: np.ndarray) -> None:
-    """Stores numbers that were written as text in a field of points.
+    """Writes values from text, as float64, to a field of points.
 
-    The values are (N,) or (N, K) float64.
+    The values are (N,) or (N, K).
 
     Raises:
         ValueError: if a number does not fit the field's type.

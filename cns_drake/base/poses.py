@@ -17,9 +17,9 @@ def make_pose(R: np.ndarray, p: np.ndarray) -> np.ndarray:
 
 
 def rotation_from_quaternion(quat_xyzw: np.ndarray) -> np.ndarray:
-    """Returns rotation matrices (..., 3, 3) of quaternions (..., 4).
+    """Returns the rotation matrices (..., 3, 3) of quaternions (..., 4).
 
-    They are scaled to unit length.
+    Quaternions are x, y, z, w, and are normalised first.
 
     Raises:
         ValueError: if a quaternion has no direction (its norm is zero or
@@ -48,10 +48,12 @@ def inverse(X: np.ndarray) -> np.ndarray:
 def interpolate(
     X_0: np.ndarray, X_1: np.ndarray, fraction: np.ndarray
 ) -> np.ndarray:
-    """Returns poses between pairs of poses: turns by SLERP, moves linearly.
+    """Returns poses between pairs of poses.
+
+    Rotations are interpolated by SLERP, positions linearly.
 
     Args:
-        X_0, X_1: (N, 4, 4).
+        X_0, X_1: (N, 4, 4) poses at both ends.
         fraction: (N,) share of the way from the one to the other.
 
     Returns:

@@ -16,9 +16,9 @@ def num_cores() -> int:
 
 
 def look_seldom() -> None:
-    """Has Python look for garbage less often, in the rest of this process.
+    """Makes Python collect garbage less often in this process.
 
-    Imports and compilation build up objects that stay. To look after each few
-    hundred of them takes up to a tenth of the time.
+    Imports and compilation build up objects that stay. Looking through them
+    every few hundred objects takes up to a tenth of the time.
     """
     gc.set_threshold(_OBJECTS, *gc.get_threshold()[1:])

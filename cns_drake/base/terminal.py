@@ -32,7 +32,7 @@ _UsageError: Any = typer.BadParameter.__base__
 
 
 def plain_app(**settings: Any) -> typer.Typer:
-    """Returns a command line without commands, whose help is plain text.
+    """Returns a Typer program without commands, whose help is plain text.
 
     Rich would take units such as "[m, rad]" for markup, and its frames and
     columns leave little room for words on a narrow terminal.
@@ -114,20 +114,19 @@ def make_program(
 
 
 def example(*lines: str) -> str:
-    """Returns the end of a command's help: lines to type, left as they are."""
+    """Returns the end of a command's help, with an example to type."""
     # What follows \b is not wrapped.
     return "\n  ".join(("\b\nExample:", *lines))
 
 
 def run(app: typer.Typer, program: str) -> NoReturn:
-    """Runs a command line; bad usage and bad input are one line.
+    """Runs a command line; for bad usage or input it prints one line.
 
-    A traceback is shown only with `--traceback`.
-
-    Exits with 0 on success; with 2 and one line on stderr for bad usage or
-    input, for files that cannot be used, for lack of memory and of libraries
-    of the system; with 1 for jobs that failed; with 130 when interrupted,
-    also by SIGTERM, so that open files are closed.
+    A traceback is shown only with `--traceback`. Exits with 0 on success; with
+    2 and one line on stderr for bad usage or input, for files that cannot be
+    used, for lack of memory and of libraries of the system; with 1 for jobs
+    that failed; with 130 when interrupted, also by SIGTERM, so that open files
+    are closed.
     """
     message: str | None = None
     look_seldom()
@@ -236,7 +235,10 @@ def _forget_results() -> None:
 
 
 def track(items: Iterable[Any], description: str, total: int) -> Iterator[Any]:
-    """Shows progress on stderr: a bar, or lines where that is no terminal."""
+    """Yields items and shows progress on stderr.
+
+    It is a bar on a terminal, and lines elsewhere.
+    """
     # Slow to import, and not needed to print help.
     from cns_drake.base.progress_bars import count_progress, show_progress
 
@@ -250,7 +252,7 @@ def track(items: Iterable[Any], description: str, total: int) -> Iterator[Any]:
 
 
 def check_finite(values: Mapping[str, object]) -> None:
-    """Refuses values of options, by name, that are no finite numbers.
+    """Raises an error if an option's value is not a finite number.
 
     Typer lets NaN pass any bound.
 
@@ -283,7 +285,7 @@ def print_rows(rows: Iterable[tuple[str, str]]) -> None:
 
 
 def number(value: float | None) -> str:
-    """Returns a ratio with four decimals, as the paper prints them."""
+    """Returns a ratio as text with four decimals, as the paper prints them."""
     if value is None or math.isnan(value):
         return "undefined"
     return f"{value:.4f}"

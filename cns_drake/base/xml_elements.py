@@ -39,7 +39,7 @@ class Element(ElementTree.Element):
         return next(self.all(*path), None)
 
     def value(self, name: str, default: str | None = None) -> str:
-        """Returns an attribute.
+        """Returns an attribute as text, or the default.
 
         Raises:
             ValueError: if it is too long, or missing without a default.
@@ -53,7 +53,7 @@ class Element(ElementTree.Element):
         return value
 
     def number(self, name: str, default: float | None = None) -> float:
-        """Returns an attribute that is a number.
+        """Returns an attribute as a number, or the default.
 
         Raises:
             ValueError: if it is not a number, is too large for a road, or is
@@ -81,7 +81,7 @@ _COMMENT = re.compile(
 
 
 def readable_xml(content: bytes) -> bytes:
-    """Returns a file without what XML forbids and many programs write.
+    """Returns XML content with common errors of other programs repaired.
 
     Such are two dashes in comments, and blanks before the declaration. Lines
     keep their numbers.
@@ -100,13 +100,13 @@ def readable_xml(content: bytes) -> bytes:
 def read_elements(
     path: Path, root: str | None = None, encoding: str | None = None
 ) -> Element:
-    """Reads a file.
+    """Returns the top element of an XML file.
 
     Prefixes of names need not be declared.
 
     Args:
         root: tag of its outermost element; any if None.
-        encoding: that of the file; what it says itself if None.
+        encoding: encoding of the file; by default the one that it declares.
 
     Raises:
         InputError: if it cannot be read, is no XML, has another root, holds

@@ -28,11 +28,11 @@ def read_yaml(path: Path) -> Any:
 
 
 def parse_yaml(text: str | bytes, loader: type = yaml.CSafeLoader) -> Any:
-    """Parses a document of YAML.
+    """Returns the content of a YAML document.
 
     Aliases are resolved within bounds: a few lines of them could expand to more
-    than memory holds, or contain themselves. A key that is there twice is
-    refused; YAML's libraries would silently use the last.
+    than memory holds, or contain themselves. A repeated key is an error; YAML's
+    libraries would silently use the last.
 
     Returns:
         Its value; None for an empty document.

@@ -13,10 +13,10 @@ FUNCTIONS: Mapping[str, Any] = {
 
 
 def value_of(given: Any, names: dict[str, Any]) -> Any:
-    """Returns the value of a formula, of each in a list, or a plain value.
+    """Returns the value of a formula, or of each formula in a list.
 
     Formulas are Python expressions as text, which may use the numbers and
-    functions in `names`.
+    functions in `names`. Plain values are returned as they are.
     """
     if isinstance(given, list):
         return [value_of(one, names) for one in given]

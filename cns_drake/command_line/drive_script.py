@@ -33,26 +33,32 @@ def run_drive(
     graphviz: Path | str | None = None,
     overwrite: bool = False,
 ) -> Run:
-    """Runs a drive on all cores with progress on stderr; see `simulate`.
+    """Simulates and records a drive, with a progress bar on stderr.
+
+    It uses all cores. `simulate` does the same with a loaded scenario and no
+    progress bar.
 
     Args:
-        name_or_file: a shipped drive or a scenario file.
-        output: the folder of recordings.
-        frames: record only so many frames.
-        lidar: preset that replaces the scenario's LiDARs.
-        returns: `ideal` or `calibrated`, in place of the scenario's.
-        weather: in place of the scenario's.
-        traffic: how many vehicles, and how many walkers, in place of the
-            scenario's.
+        name_or_file: name of a shipped drive, or a scenario file.
+        output: folder for the recordings.
+        frames: number of frames to record, from the start; by default all.
+        lidar: preset that replaces the LiDARs of the scenario.
+        returns: `ideal` or `calibrated`; by default as the scenario says.
+        weather: weather; by default that of the scenario.
+        traffic: number of vehicles, and also of walkers; by default as the
+            scenario says.
         transient: switches of the section `transient`, and their values.
-        driver: `real` for one like those of published drives, or `none`, in
-            place of the scenario's.
-        ride: class of the road, A to E, or `none`, in place of the scenario's.
-        imu_rate: samples per second of the IMU, in place of the scenario's.
-        camera: fields of a further camera, `camera`, with depths and labels.
-        recording: where to save a web page of the drive.
-        graphviz: where to save the Diagram as Graphviz text.
-        overwrite: replace an existing recording.
+        driver: `real` for a driver who wanders and changes lanes, or `none`; by
+            default as the scenario says.
+        ride: class of the road, A to E, or `none`; by default as the scenario
+            says.
+        imu_rate: samples of the IMU per second; by default as the scenario
+            says.
+        camera: fields of an additional camera, named `camera`, which also
+            records depths and labels.
+        recording: file for a web page of the drive, if any.
+        graphviz: file for the Diagram as Graphviz text, if any.
+        overwrite: whether to replace an existing recording.
 
     Raises:
         InputError: an argument cannot be used.
@@ -115,10 +121,10 @@ def run_drive(
 
 
 def run_script(name: str, description: str) -> None:
-    """The command line of a diagram script.
+    """Runs a diagram script's command line, which records one drive.
 
     Args:
-        name: the drive.
+        name: name of the drive.
         description: the script's docstring, shown by `--help`.
 
     Example:

@@ -39,7 +39,7 @@ def train(
     jobs: Jobs = None,
     scheduler: Scheduler = None,
 ) -> None:
-    """Train the method learned.
+    """Train the place-recognition method `learned`.
 
     The training drives run along the streets of Riverside, Suburbia and
     Downtown, through cities that are drawn at random, at different stages and

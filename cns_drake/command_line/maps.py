@@ -192,8 +192,8 @@ def import_city(
             ones are left out to save memory. By default no limit.
         drive_on: Side of the street on which cars drive; by default as the file
             says, or else right.
-        grow: Share of the buildings, drawn at random, that an additional first
-            stage lacks or has lower. By default 0.3 without --years.
+        grow: Share of the buildings, drawn at random, that are missing or lower
+            in an additional first stage. By default 0.3 without --years.
         plain: Use only what the file contains; draw nothing at random.
     """
     # The years that follow the first of --years come as arguments.
@@ -306,8 +306,8 @@ def city(
     """Build the stages of a city from its roads and plan.
 
     Args:
-        folder: Folder with roads.yaml, city.yaml and stages.yaml. The lengths
-            and times in its drive files are updated too.
+        folder: Folder with roads.yaml, city.yaml and stages.yaml. The table of
+            its drives is updated too.
         start: First write the files that are missing, except roads.yaml: a plan
             with a district for each block, two stages, and a drive for each.
         seed: Seed of the plan that --start draws.

@@ -144,8 +144,7 @@ def simulate(
         driver: Driver of the car: real wanders and changes lanes as drivers of
             published data sets do; none keeps to the middle of the lane.
         ride: Class of the road surface after ISO 8608, from A (new) to E (very
-            poor), on which the car moves on its springs; none keeps the car
-            steady.
+            poor). The car then moves on its springs; with none it is steady.
         imu_rate: Rate of the IMU [Hz]; by default the scenario's.
         camera: Size and rate of a camera that looks ahead, in pixels and images
             a second, such as 640x480@2. It also records depths and classes.

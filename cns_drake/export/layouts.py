@@ -63,7 +63,7 @@ class Layout:
 
 
 def checked_name(drive: McapDrive, text: str) -> str:
-    """Returns a name from a recording as a part of a path.
+    """Returns a name from a recording, made safe for a path.
 
     Raises:
         InputError: if the name could lead elsewhere.
@@ -132,7 +132,7 @@ def seconds(stamp_ns: int) -> str:
 def stamped_rows(
     stamps: Iterable[object], columns: Sequence[np.ndarray], separator: str
 ) -> str:
-    """Returns N stamps and (N, K) numbers as text; all digits are kept."""
+    """Returns N times and (N, K) numbers as text with all digits."""
     rows = zip(stamps, np.hstack(columns).tolist(), strict=True)
     return "".join(
         f"{separator.join([str(stamp), *map(repr, row)])}\n"
@@ -261,7 +261,10 @@ def _kitti_rows(X: np.ndarray) -> str:
 
 
 def kitti_layout(number: str | None = None) -> Layout:
-    """Returns KITTI's layout; the drive has its own number, or a given one."""
+    """Returns KITTI's file layout for a drive.
+
+    The number of the sequence is the drive's own unless it is given.
+    """
 
     def of(drive: McapDrive) -> str:
         return number or _kitti_number(drive)

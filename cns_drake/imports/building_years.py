@@ -43,7 +43,7 @@ _DUTCH = ("oorspronkelijkbouwjaar", "bouwjaar")
 
 
 def year_of_date(text: str) -> int | None:
-    """Returns the year of a date, None if it has none.
+    """Returns the year of a date in text, None if it has none.
 
     A period gives its middle, or an earlier or later year with "early" and
     "late". A range (`1914..1918`) gives its end; `before 1910` and `~1855` give
@@ -74,10 +74,10 @@ def construction_year(
     name: str = "",
     faults: ImportFaults | None = None,
 ) -> int | None:
-    """Returns the year in which an object was built, if the file has it.
+    """Returns the year in which an object was built, if known.
 
     The attribute holds the year; if None, the usual ones do. Values that are
-    not years, and years to come, are counted for the name.
+    not years, and years in the future, are counted as faults of the name.
     """
     faults = faults or ImportFaults()
     if attribute is not None:
@@ -108,5 +108,5 @@ def _year(value: object) -> int | None:
 
 
 def stands_today(until: int | None) -> bool:
-    """Returns whether an object stands, by the year of its demolition."""
+    """Returns whether an object still stands, by its year of demolition."""
     return until is None or until > datetime.date.today().year

@@ -61,12 +61,12 @@ class ReferenceSystem:
 
     @property
     def is_plain(self) -> bool:
-        """Whether the coordinates are metres, east, north, up already."""
+        """Whether the coordinates already are metres east, north and up."""
         return self.axes == _PLAIN
 
     @property
     def is_north_first(self) -> bool:
-        """Whether the first coordinate leads north or south."""
+        """Whether the first coordinate points north or south."""
         return self.axes[0].startswith(("north", "south"))
 
     def to_metres(self, points: np.ndarray) -> np.ndarray:
@@ -84,9 +84,9 @@ class ReferenceSystem:
         return replace(self, axes=axes, matrix=self.matrix[:, [1, 0, 2]])
 
     def has_place(self, first: float, second: float) -> bool:
-        """Returns whether coordinates, as defined, are in the area of use.
+        """Returns whether coordinates are in the system's area of use.
 
-        A system that names none has none.
+        A system that names no area has none.
         """
         system = pyproj.CRS.from_user_input(self.name)
         if system.area_of_use is None:
@@ -251,7 +251,7 @@ class CityFile:
 
 
 def read_cityjson(path: Path) -> CityFile:
-    """Reads a file.
+    """Returns the objects of a CityJSON file.
 
     Raises:
         InputError: if it cannot be read, is no CityJSON, or its coordinates
@@ -660,9 +660,9 @@ def import_structures(
 ) -> list[Imported]:
     """Returns a structure for each object that has a surface.
 
-    A building with its parts is one. The world has an origin (3,) in the file's
-    coordinates [m]. If the level of detail is None, each object has its highest
-    one.
+    A building with its parts is one structure. The world has its origin at (3,)
+    in the file's coordinates [m]. If the level of detail is None, each object
+    has its highest one.
     """
     groups = _families(city)
     names = _unique_names(groups)

@@ -26,17 +26,18 @@ _CORNERS_OF_FOUR = np.array([(3, 0, 1), (0, 1, 2), (1, 2, 3), (0, 2, 3)])
 
 
 def joined(some: Iterable[np.ndarray]) -> np.ndarray:
-    """Returns all triangles (M, 3, 3) of any number of arrays."""
+    """Returns the triangles (M, 3, 3) of several arrays as one array."""
     return np.concatenate([np.zeros((0, 3, 3)), *some])
 
 
 def face_triangles(
     rings: Sequence[np.ndarray], name: str, faults: ImportFaults
 ) -> np.ndarray:
-    """Returns a face as (M, 3, 3) triangles [m], turned as its outer ring.
+    """Returns a face as (M, 3, 3) triangles [m].
 
-    Rings (N, 3) are the outer one, then holes [m], without repeated corners.
-    Faces that are repaired or left out are counted.
+    Triangles have the orientation of the outer ring. Rings (N, 3) are the outer
+    one, then holes [m], without repeated corners. Faces that are repaired or
+    left out are counted.
     """
     rings = [_cleaned(ring, name, faults) for ring in rings]
     if len(rings[0]) < 3:
@@ -151,7 +152,7 @@ def extruded(
     Args:
         polygon: the footprint.
         low, high: heights of the lowest and the highest point [m].
-        name: of the object, for faults.
+        name: name of the object, for faults.
         faults: counts what was made otherwise.
         roof: `flat`; `pyramidal`, on any footprint; `gabled` or `hipped`, on
             one of four corners.

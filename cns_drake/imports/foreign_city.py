@@ -29,12 +29,12 @@ LAWN: Rgb = (0.42, 0.55, 0.30)
 
 
 def random_share(seed: int, purpose: str, name: str) -> float:
-    """Returns a number from 0 to 1 that depends on the arguments only."""
+    """Returns a random number from 0 to 1, fixed by the arguments."""
     return _number(seed, purpose, name) / 2.0**64
 
 
 def random_generator(seed: int, purpose: str, name: str) -> np.random.Generator:
-    """Returns a generator whose draws depend on the arguments only."""
+    """Returns a random generator that is fixed by the arguments."""
     return np.random.default_rng(_number(seed, purpose, name))
 
 
@@ -68,12 +68,12 @@ class Imported:
 
     @property
     def draw_name(self) -> str:
-        """The name that seeds the random draws."""
+        """Name that seeds the random draws of the object."""
         return self.original or self.structure.name
 
     @property
     def is_ground(self) -> bool:
-        """Whether a car can drive over it, if it is flat."""
+        """Whether a car can drive over the object, if it is flat."""
         return self.structure.semantic_class in _GROUND_CLASSES
 
 
@@ -112,7 +112,10 @@ class Street:
 
 
 def ends_at_nodes(streets: Iterable[Street]) -> Counter[int]:
-    """Returns node -> number of ends of streets there, two where one passes."""
+    """Returns node -> number of street ends there.
+
+    A street that passes the node counts as two.
+    """
     ends: Counter[int] = Counter()
     for street in streets:
         last = len(street.nodes) - 1
@@ -188,18 +191,18 @@ def make_imported(
     tags: Mapping[str, str] | None = None,
     lod: float = 0.0,
 ) -> Imported:
-    """Returns a structure of triangles in the world.
+    """Returns a structure made of triangles in the world.
 
     Args:
         name: unique in the city.
         semantic_class: a key of `scene.semantics.CLASS_IDS`.
-        kind: of object, as the file calls it.
+        kind: kind of object, as the file calls it.
         surfaces: part of its surface -> triangles (M, 3, 3) [m]; empty parts
             are left out, and not all are empty.
         colours: part -> its colour; without one it has that of the class.
-        year: in which it was built; None if unknown.
+        year: year in which it was built; None if unknown.
         until: year until which it stands; None if unknown.
-        tags: of the object in its file.
+        tags: tags of the object in its file.
         lod: its level of detail.
     """
     filled = {part: some for part, some in surfaces.items() if len(some)}

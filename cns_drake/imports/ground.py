@@ -44,7 +44,10 @@ class Ground:
         self.cell = float(xs[1] - xs[0])
 
     def height(self, xy: np.ndarray) -> np.ndarray:
-        """Returns the height at places (N, 2), between those of the grid."""
+        """Returns the height of the ground at places (N, 2) [m].
+
+        Between the points of the grid it is interpolated.
+        """
         column = np.clip(
             (xy[:, 0] - self.xs[0]) / self.cell, 0, len(self.xs) - 1.001
         )
@@ -62,7 +65,10 @@ class Ground:
         )
 
     def below(self, places: Iterable[np.ndarray]) -> Ground:
-        """Returns a ground nowhere above places, some (N, 3) at a time [m]."""
+        """Returns the ground lowered so that it is below all given places [m].
+
+        Places (N, 3) are given some at a time.
+        """
         z = self.z.copy()
         for points in places:
             c = ((points[:, 0] - self.xs[0]) // self.cell).astype(int)
@@ -84,7 +90,7 @@ class Ground:
 
 
 def guess_ground(feet: np.ndarray, corners: np.ndarray) -> Ground:
-    """Returns a smooth ground through feet (N, 3), one or more [m].
+    """Returns a smooth ground through the feet (N, 3) of structures [m].
 
     It reaches beyond the corners (M, 3) of all structures [m].
     """
@@ -146,7 +152,7 @@ def ground_of(
 def bottom_of(
     structures: Sequence[Imported], ground: Ground
 ) -> list[Structure]:
-    """Returns the guessed ground, where the file has no terrain."""
+    """Returns the guessed ground if the file has no terrain."""
     if any(one.kind == "TINRelief" for one in structures):
         return []
     taken = {one.structure.name for one in structures}

@@ -44,7 +44,7 @@ def import_city(
     progress: Progress = lambda line: None,
     finish: Finish = lambda folder, sizes: None,
 ) -> ImportReport:
-    """Writes a map folder of a file.
+    """Writes a map folder from a file of a real city.
 
     Args:
         source: CityJSON (.json, .jsonl), OpenStreetMap (.osm, .pbf) or
@@ -198,7 +198,7 @@ def _read(source: Path, options: ImportOptions) -> ForeignCity:
 
 
 def drive_along(path: Path) -> WaypointDrive:
-    """Returns a drive along waypoints of a file, without their heights.
+    """Returns the drive along a file's waypoints, without their heights.
 
     Raises:
         InputError: if the file cannot be used, or a bend is too tight.

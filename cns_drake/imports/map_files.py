@@ -50,7 +50,7 @@ def write_world(
     bottom: Sequence[Structure],
     dressing: Dressing | None = None,
 ) -> dict[str, tuple[int, int]]:
-    """Writes the stages, their meshes and the table of structures.
+    """Writes the stages of a map, their meshes and the structure table.
 
     Args:
         draft: folder of the map.
@@ -105,7 +105,7 @@ def triangles_in(obj: str) -> int:
 def stage_size(sdf: str, triangles: Mapping[str, int]) -> tuple[int, int]:
     """Returns the numbers of structures with a surface, and of triangles.
 
-    A mesh has its number of triangles by its path in the map's folder.
+    Each mesh's number of triangles is given by its path in the map's folder.
     """
     structures = set(re.findall('visual name="([^"/]+)', sdf))
     meshes = re.findall("<uri>([^<]+)</uri>", sdf)
@@ -124,9 +124,9 @@ def city_facts(
 
     Args:
         city: the city as the file has it.
-        options: of the import.
+        options: options of the import.
         stages: names of the stages.
-        changes: of the first stage, if it was drawn at random.
+        changes: changes of the first stage, if it was drawn at random.
         dressing: what was added to buildings and streets.
     """
     facts: dict[str, object] = {
@@ -155,7 +155,7 @@ def write_facts(
     comment: str = "# Where this map comes from. A place of the map plus the"
     " origin is one of the\n# source [m].\n",
 ) -> None:
-    """Writes what is remembered of an import.
+    """Writes the facts of an import to the map's folder.
 
     Args:
         draft: folder of the map.
@@ -179,7 +179,7 @@ def write_facts(
 
 
 def write_report(draft: Path, report: ImportReport) -> None:
-    """Writes all counts of an import, of which the command prints a few."""
+    """Writes all counts of an import, of which the command prints some."""
     lines = [f"{kind}: {number}" for kind, number in report.kinds.items()]
     lines += [
         f"{kind}: {number}, such as {example}"
@@ -201,10 +201,11 @@ def write_drives(
     routes: Sequence[np.ndarray],
     cruise: Sequence[float] = (_CRUISE, _CRUISE),
 ) -> None:
-    """Writes routes, and scenarios of each through every stage.
+    """Writes the routes of a map, and a scenario of each per stage.
 
-    A stage has words for its time, the end of a title. At most two routes have
-    waypoints (N, 3) [m], and a speed each [m/s].
+    `stages` maps the name of a stage to words for its time, which end the title
+    of a drive. Each of at most two routes has waypoints (N, 3) [m], and a speed
+    [m/s].
     """
     for letter, waypoints in zip("ab", routes, strict=False):
         rows = [f"{x:.3f},{y:.3f},{z:.3f}" for x, y, z in waypoints]

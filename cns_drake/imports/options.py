@@ -31,7 +31,7 @@ class ImportFaults:
         self._examples.setdefault(kind, _printable(example))
 
     def take_back(self, kind: str) -> None:
-        """Counts one fault less of a kind that has some."""
+        """Counts one fault of a kind less."""
         kind = _printable(kind)
         self._counts[kind] -= 1
         if not self._counts[kind]:

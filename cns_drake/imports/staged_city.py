@@ -80,11 +80,11 @@ def _cropped(one: Imported, ways: BaseGeometry, distance: float) -> Imported:
 def with_gone(
     gone: Sequence[Imported], others: Iterable[Imported]
 ) -> list[Imported]:
-    """Returns what stood together, of what is gone and what stands today.
+    """Returns a city's former structures and those that stood with them.
 
-    Where both have the same place, a building of today that has a year was
-    there already, and what it replaced was not; one without a year came
-    later.
+    Where a former and a present building have the same place, a present one
+    with a year was there already, and what it replaced was not; one without a
+    year came later.
     """
     others = list(others)
     later = [one for one in others if one.kind.startswith("Building")]
@@ -163,7 +163,7 @@ class StagedCity:
     def replaced(
         self, changed: Mapping[Imported, Imported | None]
     ) -> StagedCity:
-        """Returns the city with others, or none, in place of structures."""
+        """Returns the city with some structures replaced or removed."""
 
         def new(some: Iterable[Imported]) -> list[Imported]:
             others = (changed.get(one, one) for one in some)
@@ -320,15 +320,14 @@ def _has_years(one: Imported) -> bool:
 def grow(
     city: StagedCity, part: float, seed: int
 ) -> tuple[StagedCity, dict[str, Any]]:
-    """Returns a city with a stage before its only one, and the changes.
+    """Returns a city with an additional first stage, and the changes.
 
     The draws depend on the names of buildings, so that the rest of a file does
     not change them. What is gone by the only stage stands at the first, and
-    what has its place today does not.
-
-    At first, a `part` of its buildings is missing or lower. The changes are the
-    names of buildings that are `missing`, the `part_of_height` of lower ones,
-    and, if any stood there, those of the file that are `gone_since`.
+    what has its place today does not. At first, a `part` of its buildings is
+    missing or lower. The changes are the names of buildings that are `missing`,
+    the `part_of_height` of lower ones, and, if any stood there, those of the
+    file that are `gone_since`.
     """
     (last,) = city.standing.values()
     buildings = [one for one in last if one.kind.startswith("Building")]

@@ -177,7 +177,7 @@ class SmoothPath:
         )
 
     def tightest_bend(self) -> tuple[float, np.ndarray]:
-        """Returns the least radius [m] and the (3,) place that has it."""
+        """Returns the least radius [m] of the path, and its place (3,)."""
         jet = self.evaluate(self._places())
         curvature = np.abs(jet.turn) / jet.speed
         at = int(curvature.argmax())

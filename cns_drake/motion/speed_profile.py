@@ -76,7 +76,7 @@ def find_speed_profile(
 
 
 def drive_positions(profile: SpeedProfile) -> np.ndarray:
-    """Returns the places of the fastest drive at each `KNOT_PERIOD` [m]."""
+    """Returns the distances of the fastest drive at each `KNOT_PERIOD` [m]."""
     u, speed, _ = profile
     times = np.concatenate(
         [[0.0], np.cumsum(2 * np.diff(u) / (speed[1:] + speed[:-1]))]

@@ -178,7 +178,7 @@ class Suspension:
         self._loads[NUM_COORDINATES:, count + 2] = -masses.wheels
 
     def at_rest(self, inputs: np.ndarray) -> np.ndarray:
-        """Returns the coordinates under (W + 3,) constant inputs."""
+        """Returns the body's coordinates at rest under (W + 3,) inputs."""
         return rotated(inv(self._stiffness), rotated(self._loads, inputs))
 
     def respond(

@@ -36,7 +36,10 @@ class FrameMotion(NamedTuple):
         return self.a + cross(self.alpha, r) + cross(self.w, cross(self.w, r))
 
     def of_frame(self, motion: FrameMotion) -> FrameMotion:
-        """Returns the motion in E of a frame B that moves in F."""
+        """Returns the motion in E of a frame B, given its motion in F.
+
+        This motion is that of F in E.
+        """
         p, w, v, alpha, a = (rotated(self.R, vector) for vector in motion[1:])
         rotating = cross(self.alpha, p) + cross(self.w, cross(self.w, p))
         return FrameMotion(
@@ -126,14 +129,17 @@ class BodyRide:
         self._splines = [spline, spline.derivative(), spline.derivative(2)]
 
     def at(self, t: ArrayLike) -> RideMoments:
-        """Returns heave, roll and pitch at (N,) times; at the ends it rests."""
+        """Returns heave, roll and pitch of the body at (N,) times.
+
+        At the ends it rests.
+        """
         times = np.clip(np.atleast_1d(t), 0.0, self._end)
         q, dq, ddq = (spline(times) for spline in self._splines)
         return RideMoments(q, dq, ddq, self._pivot)
 
 
 def ride_motion(moments: RideMoments) -> FrameMotion:
-    """Returns how B moves in F.
+    """Returns the motion of the body frame B in the path frame F.
 
     With R = R_y(pitch) R_x(roll), the roll axis turns with the pitch.
     """
@@ -209,7 +215,10 @@ class Trajectory:
         self._ride: BodyRide | None = None
 
     def with_positions(self, positions: np.ndarray) -> Trajectory:
-        """Returns a drive along the same path; see `make_time_scaling`."""
+        """Returns a drive along the same path with other timing.
+
+        See `make_time_scaling` for the positions.
+        """
         drive = copy.copy(self)
         drive._time_scaling = path_geometry.SplineDerivatives(
             speed_profile.make_time_scaling(positions), 2
@@ -238,7 +247,7 @@ class Trajectory:
         return [value[:, 0] for value in values]
 
     def at(self, t: ArrayLike) -> Moments:
-        """Returns the path at (N,) times."""
+        """Returns the quantities of the path at (N,) times."""
         u, rate, acceleration = self.path_parameter(t)
         ride = None if self._ride is None else self._ride.at(t)
         return Moments(u, rate, acceleration, self.path.evaluate(u), ride)

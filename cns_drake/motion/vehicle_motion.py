@@ -69,7 +69,7 @@ class WheelMotion:
         return jet.speed - jet.turn * self._y, jet.turn * self._x
 
     def steering(self, moments: Moments) -> JointMotion:
-        """Returns the steering at (N,) times, positive to the left."""
+        """Returns steering angles of wheels at (N,) times, left positive."""
         rate, acceleration, jet = moments[1:4]
         a, b, da, db, dda, ddb = self._ground_motion(jet)
         squared = a**2 + b**2
@@ -83,9 +83,9 @@ class WheelMotion:
         )
 
     def rolling(self, moments: Moments) -> JointMotion:
-        """Returns the rolling at (N,) times.
+        """Returns rolling angles of the wheels at (N,) times.
 
-        It is positive forwards and zero at the start.
+        They are positive forwards and zero at the start.
         """
         u, rate, acceleration, jet = moments[:4]
         a, b, da, db, _, _ = self._ground_motion(jet)
@@ -98,7 +98,7 @@ class WheelMotion:
         )
 
     def travel(self, moments: Moments) -> JointMotion:
-        """Returns the travel upwards in the body at (N,) times [m]."""
+        """Returns how far wheels move up in the body at (N,) times [m]."""
         ride = moments.ride
         if ride is None:
             still = np.zeros_like(moments.u)
@@ -134,7 +134,7 @@ class _State(NamedTuple):
 
 
 class VehicleMotion(LeafSystem):
-    """Prescribes the motion of a vehicle, wheels included.
+    """A system that moves a vehicle along a trajectory, wheels included.
 
     It has the kinematic output ports of a MultibodyPlant, and can feed sensors
     and a SceneGraph in its place: a plant has no port for prescribed motion.
@@ -152,8 +152,8 @@ class VehicleMotion(LeafSystem):
         - body_spatial_velocities
         - body_spatial_accelerations
 
-    `position` is the plant's q; the others are lists over its bodies of
-    X_WB, V_WB and A_WB, expressed in the world. They depend on time only.
+    `position` is the plant's q; the others are lists over its bodies of X_WB,
+    V_WB and A_WB, expressed in the world. They depend on time only.
 
     Example:
         from cns_drake import VehicleMotion

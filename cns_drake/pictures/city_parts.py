@@ -52,7 +52,7 @@ class StageDifference:
 
 
 def read_parts(world: World) -> dict[str, list[Part]]:
-    """Returns structure -> its parts, of all that never moves."""
+    """Returns structure -> parts, for everything that never moves."""
     plant = world.plant
     context = plant.CreateDefaultContext()
     geometries = read_perception_geometry(
@@ -84,7 +84,7 @@ def read_parts(world: World) -> dict[str, list[Part]]:
 def compare_parts(
     own: Mapping[str, Sequence[Part]], other: Mapping[str, Sequence[Part]]
 ) -> StageDifference:
-    """Compares a stage with another one, structure by structure.
+    """Returns how a stage differs from another one, by structure.
 
     A structure that was moved, or has another shape of the same height, is
     common to both.

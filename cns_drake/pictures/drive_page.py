@@ -167,7 +167,10 @@ def make_drive_page(
 def make_panel(
     title: str, drive: DriveRecord, changes: Set[str], shown: ShownStages
 ) -> str:
-    """Returns the HTML of title, legend (of `CHANGE_RGB`), plots, buttons."""
+    """Returns the HTML of the page's title, legend, plots and buttons.
+
+    The legend is that of `CHANGE_RGB`.
+    """
     # Only pages need templates, whose import takes a moment.
     from jinja2 import Environment, StrictUndefined
     from markupsafe import Markup
@@ -248,7 +251,10 @@ class Plot:
 
 
 def motion_plots(drive: DriveRecord) -> list[Plot]:
-    """Returns the plots of speed and IMU; none of less than two frames."""
+    """Returns the plots of speed and IMU.
+
+    A drive of less than two frames has none.
+    """
     if len(drive.speeds) < 2:
         return []
     forces = np.array(drive.specific_forces_I)
@@ -466,9 +472,10 @@ class MeshcatRecorder(LeafSystem):
         self.DeclareForcedPublishEvent(self._publish)
 
     def show_too(self, name: str, frames: Sequence[FrameId]) -> None:
-        """Adds a moving thing of a unique name; its first frame leads.
+        """Adds a moving object with a unique name.
 
-        Its limbs stay as at the first frame of the drive.
+        The first of its frames leads. Its limbs stay as at the first frame of
+        the drive.
         """
         leading = frames[0]
         self.drive.X_WFs[leading] = []
@@ -476,7 +483,7 @@ class MeshcatRecorder(LeafSystem):
         self.drive.limbs[leading] = dict.fromkeys(frames, RigidTransform())
 
     def save(self, path: Path, *, title: str = "cns-drake") -> None:
-        """Writes the page of the drive up to now.
+        """Writes the page of the drive so far.
 
         Raises:
             InputError: if the file cannot be written.

@@ -52,7 +52,7 @@ def draw_parts(
 ) -> None:
     """Draws parts of a city as one mesh for each class, `<path>/<class>`.
 
-    Without a colour for all of it, each part has its own.
+    Without `rgba`, each part keeps its own colour.
     """
     by_class: dict[str, list[Part]] = {}
     for part in parts:
@@ -71,7 +71,7 @@ def draw_parts(
 def draw_body(
     meshcat: Meshcat, path: str, geometries: Iterable[PerceptionGeometry]
 ) -> None:
-    """Draws the geometry of one frame in that frame, in its own colours."""
+    """Draws the geometry of one frame in its own colours."""
     by_color: dict[tuple, list[PerceptionGeometry]] = {}
     for geometry in geometries:
         rgb = geometry.rgb or _DEFAULT_RGB
@@ -82,7 +82,7 @@ def draw_body(
 
 
 def draw_marker(meshcat: Meshcat, path: str) -> None:
-    """Draws an arrow that points down at the origin, to be seen from afar."""
+    """Draws an arrow that points down at the origin, large enough to see."""
     meshcat.SetObject(
         path,
         MeshcatCone(height=_MARKER_HEIGHT, a=_MARKER_RADIUS, b=_MARKER_RADIUS),
@@ -130,7 +130,10 @@ def height_rgb(z: np.ndarray) -> np.ndarray:
 
 
 def draw_points(meshcat: Meshcat, path: str, p_WRset: np.ndarray) -> None:
-    """Draws points (N, 3) in W [m], coloured by height, alike near and far."""
+    """Draws points (N, 3) in W [m], coloured by height.
+
+    They have the same size near and far.
+    """
     cloud = PointCloud(len(p_WRset), Fields(BaseField.kXYZs | BaseField.kRGBs))
     cloud.mutable_xyzs()[:] = _on_grid(p_WRset).T
     rgb = _linear(height_rgb(p_WRset[:, 2]))
@@ -141,7 +144,7 @@ def draw_points(meshcat: Meshcat, path: str, p_WRset: np.ndarray) -> None:
 
 
 def set_view(meshcat: Meshcat, lower: np.ndarray, upper: np.ndarray) -> None:
-    """Lights a scene by day and looks at it from the air, from the south.
+    """Lights a scene as by day, and views it from the south from the air.
 
     The view reaches from (3,) lower to upper coordinates [m].
     """

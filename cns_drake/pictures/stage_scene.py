@@ -57,13 +57,13 @@ class View(BaseModel):
         return self
 
     def pose(self) -> RigidTransform:
-        """Returns X_WC; x forward, y left, z up."""
+        """Returns the pose X_WC of the camera; x forward, y left, z up."""
         return look_at(self.position, self.target)
 
     def project(
         self, p_WQset: np.ndarray, width: int, height: int
     ) -> tuple[np.ndarray, np.ndarray]:
-        """Returns (M, 2) pixels and the indices (M,) of their points.
+        """Returns pixels (M, 2) of visible points, and their indices (M,).
 
         The (N, 3) points are in the world [m], the size of the picture is in
         pixels.
@@ -103,7 +103,7 @@ class StageScene:
         height: int,
         haze_length: float = HAZE_LENGTH,
     ) -> np.ndarray:
-        """Returns the rendered (height, width, 3) picture."""
+        """Returns a rendered picture (height, width, 3)."""
         return render(
             self.scene,
             self._geometries,

@@ -87,11 +87,11 @@ def make_static_page(
 def save_meshcat_page(
     meshcat: Meshcat, path: Path | str, title: str = "Meshcat"
 ) -> None:
-    """Saves a Meshcat scene as one page that opens without a server.
+    """Saves a Meshcat scene as a web page that opens without a server.
 
     Args:
-        meshcat: holds the scene.
-        path: file of the page.
+        meshcat: the server with the scene.
+        path: HTML file to write.
         title: title of the page, plain text.
 
     Raises:
@@ -106,7 +106,7 @@ def save_meshcat_page(
 
 
 def filter_rows(data: bytes) -> bytes:
-    """Returns bytes in a form that compresses better.
+    """Returns bytes rearranged so that they compress better.
 
     Each byte becomes its difference to the byte one row before. All bytes in
     the first place of their row come first, then all in the second, and so on.

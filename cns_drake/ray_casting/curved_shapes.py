@@ -104,7 +104,10 @@ class NearCurvedShapes:
         )
 
     def contain(self, p_OSset: np.ndarray) -> np.ndarray:
-        """Returns which of (K, 3) places are in a polyhedron, (K,) bool."""
+        """Returns which of K places lie in a polyhedron, (K,) bool.
+
+        The places are (K, 3) [m].
+        """
         result = np.zeros(len(p_OSset), bool)
         _find_near(self._near, p_OSset, result)
         return result
@@ -185,12 +188,12 @@ class CapsuleAxes:
         )
 
     def place(self, placed: Placed) -> None:
-        """Moves groups to their places."""
+        """Moves the capsules' groups to their present places."""
         self._X_OLs[placed.rows] = placed.X_OLs
         self._is_still[placed.rows] = placed.in_sight & ~placed.moves
 
     def cast(self, rays: Rays, hits: Hits) -> None:
-        """Updates `hits` where rays along an axis meet its capsule first.
+        """Corrects `hits` of rays that run along the axis of a capsule.
 
         Capsules that move during the turn are left out.
         """

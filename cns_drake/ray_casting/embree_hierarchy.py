@@ -95,7 +95,10 @@ def merge_first(group: RayGroup) -> Iterator[Primitives]:
 
 
 def merge_second(group: RayGroup) -> Iterator[Primitives]:
-    """Yields the primitives for few rays: curved shapes that cannot move."""
+    """Yields the primitives that only few rays need: fixed curved shapes.
+
+    `merge_first` has polyhedra about them.
+    """
     if group.frame_id is None:
         yield from merge_curved(_numbered(group))
 
@@ -334,7 +337,7 @@ class EmbreeHierarchy:
         )
 
     def place(self, placed: Placed) -> None:
-        """Gives instances in sight their places, and disables the others.
+        """Moves instances in sight to their places, and disables the others.
 
         Fewer instances are faster to build and to cast on.
         """
@@ -383,7 +386,7 @@ class EmbreeHierarchy:
         mask: int = ALL,
         with_normals: bool = False,
     ) -> Hits:
-        """Casts rays."""
+        """Casts rays on the geometry; returns what they hit."""
         num_rays = len(rays.d_Sset)
         hits = Hits.misses(num_rays, with_normals)
         # All threads draw from one iterator, which gives each part once.
@@ -466,12 +469,12 @@ class EmbreeScene:
         self._axes = CapsuleAxes(groups)
 
     def place(self, placed: Placed) -> None:
-        """Moves groups to their places."""
+        """Moves all groups to their present places."""
         self._first.place(placed)
         self._axes.place(placed)
 
     def cast_rays(self, rays: Rays, with_normals: bool) -> Hits:
-        """Casts rays."""
+        """Casts rays on the scene; returns what they hit."""
         hits = self._first.cast(rays, with_normals=with_normals)
         if self._second.rows:
             self._cast_again(rays, hits, with_normals)

@@ -30,7 +30,7 @@ class KnownPoses(NamedTuple):
     def find(
         self, frame: FrameId, calc_X_WF: Callable[[FrameId], RigidTransform]
     ) -> RigidTransform:
-        """Returns the pose of a frame, calculated if it is not stored."""
+        """Returns the pose of a frame, computed only if it is not stored."""
         row = self.rows.get(frame)
         if row is None:
             return calc_X_WF(frame)
@@ -58,7 +58,7 @@ class Placed(NamedTuple):
 
     @classmethod
     def of(cls, groups: Sequence[RayGroup], rows: Sequence[int]) -> Placed:
-        """Returns groups as they are placed now."""
+        """Returns groups with their present places."""
         chosen = [groups[row] for row in rows]
         return cls(
             np.array(rows, int),
@@ -68,7 +68,7 @@ class Placed(NamedTuple):
         )
 
     def below(self, row: int) -> Placed:
-        """Returns those of the first groups, up to a row."""
+        """Returns only the first groups, up to a row."""
         kept = self.rows < row
         return Placed(*(one[kept] for one in self))
 
@@ -115,11 +115,11 @@ class MovingGroups:
         known: KnownPoses = NOTHING_KNOWN,
         seen: Ball = EVERYWHERE,
     ) -> Placed:
-        """Sets `X_OL`, `motion` and `in_sight` of groups.
+        """Updates the poses, motions and visibility of moving groups.
 
-        Groups that are out of sight, beyond the ball `seen`, stay where they
-        are, and so do those whose frames have not moved. Known poses replace
-        calls of `calc_X_WF`.
+        These are `X_OL`, `motion` and `in_sight`. Groups that are out of sight,
+        beyond the ball `seen`, stay where they are, and so do those whose
+        frames have not moved. Known poses replace calls of `calc_X_WF`.
 
         Returns:
             The groups that were placed.

@@ -97,7 +97,7 @@ class RayCastingScene:
             self._group_of[[index for index, *_ in group.members]] = row
 
     def serves(self, p_WS: np.ndarray) -> bool:
-        """Returns whether it is precise for a sensor at p_WS [m]."""
+        """Returns whether ranges are precise for a sensor at p_WS [m]."""
         return serves(self._p_WO, self._groups, p_WS)
 
     def set_frame_poses(
@@ -120,9 +120,9 @@ class RayCastingScene:
             self._normal_matrices = None
 
     def surface_frames(self) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        """Returns frames L that move with surfaces, for geometries G.
+        """Returns the frame L with which the surface of each geometry moves.
 
-        L of what is merged is the world, that of anything else its own frame.
+        For merged geometry L is the world, otherwise the geometry's own frame.
 
         Returns:
             The (G,) row of each geometry's frame, the (R, 3, 3) inverse
@@ -145,9 +145,9 @@ class RayCastingScene:
         times: np.ndarray = _AT_ONCE,
         with_normals: bool = False,
     ) -> RayHits:
-        """Casts N rays, from one pose of a sensor S or from several.
+        """Casts N rays from one or several poses of a sensor S.
 
-        Ray i takes entry i mod length of all arrays but the directions.
+        Ray i uses entry i mod length of all arrays except the directions.
 
         Args:
             p_WSset: (3,) or (K, 3) origins in the world [m].

@@ -43,7 +43,7 @@ class Motion(NamedTuple):
 
     @property
     def num_steps(self) -> int:
-        """Number of poses, at even times, that Embree needs.
+        """Number of evenly spaced poses that Embree needs for the motion.
 
         Raises:
             ValueError: F turns too fast.
@@ -57,7 +57,7 @@ class Motion(NamedTuple):
         return steps
 
     def at(self, times: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Returns the motion of F to (N,) parts of the turn, from 0 to 1.
+        """Returns the motion of F at (N,) fractions of the turn, from 0 to 1.
 
         Returns:
             (N, 3, 3) rotations, and (N, 3) displacements of F's origin.
@@ -99,7 +99,7 @@ class RayGroup:
     def place(
         self, p_WO: np.ndarray, calc_X_WF: Callable[[FrameId], RigidTransform]
     ) -> None:
-        """Sets `X_OL` by the pose of the group's frame."""
+        """Sets `X_OL` from the pose of the group's frame."""
         X_WL = self.X_FL
         if self.frame_id is not None:
             X_WL = calc_X_WF(self.frame_id).GetAsMatrix4() @ X_WL
@@ -107,7 +107,7 @@ class RayGroup:
         self.X_OL[:, 3] -= p_WO
 
     def X_OL_at(self, times: np.ndarray) -> np.ndarray:
-        """Returns `X_OL` at parts of the turn, (N, 3, 4)."""
+        """Returns `X_OL` (N, 3, 4) at fractions of the turn."""
         if self.motion is None:
             return np.broadcast_to(self.X_OL, (len(times), 3, 4))
         R_OL0, way_F = self.motion.at(times)
@@ -121,7 +121,7 @@ class RayGroup:
     def content(self) -> tuple:
         """Returns a key that is equal only for groups of the same shapes.
 
-        It holds as long as there are the surfaces of both groups.
+        It is valid as long as the surfaces of both groups exist.
         """
         shapes = tuple(
             (
@@ -143,12 +143,13 @@ def group_geometries(
     *,
     p_WS: np.ndarray | None = None,
 ) -> tuple[np.ndarray, list[RayGroup]]:
-    """Returns p_WO, and the groups of geometries, given with their indices.
+    """Returns the origin p_WO and the groups of geometries.
 
-    The world's is the first if there is one; half spaces are the last. Large
-    surfaces with many copies get a group for each copy, all with the same
-    surface. Where a sensor at p_WS is far from the middle of the world's
-    geometry, O is in the middle of the cube with the sensor.
+    Geometries are given with their indices. The world's group is the first if
+    there is one; half spaces are the last. Large surfaces with many copies get
+    a group for each copy, all with the same surface. Where a sensor at p_WS is
+    far from the middle of the world's geometry, O is in the middle of the cube
+    with the sensor.
     """
     geometries = list(geometries)
     shared = _find_shared(geometries)

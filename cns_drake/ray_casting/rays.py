@@ -33,7 +33,7 @@ class Rays(NamedTuple):
     times: np.ndarray
 
     def select(self, rows: np.ndarray, max_ranges: np.ndarray) -> Rays:
-        """Returns the rays of some rows, each with a range of its own."""
+        """Returns the rays in the given rows, with new maximum ranges."""
         return Rays(
             self.p_OSset[rows % len(self.p_OSset)],
             self.R_OSset[rows % len(self.R_OSset)],
@@ -43,7 +43,7 @@ class Rays(NamedTuple):
         )
 
     def max_ranges_of(self, rows: np.ndarray) -> np.ndarray:
-        """Returns the ranges of the rays of some rows."""
+        """Returns the maximum ranges of the rays in the given rows."""
         return self.max_ranges[rows % len(self.max_ranges)]
 
     def p_Oset(self) -> np.ndarray:
@@ -58,10 +58,10 @@ class Rays(NamedTuple):
 
 @compiled
 def rotate(R_FSset: np.ndarray, d_Sset: np.ndarray) -> np.ndarray:
-    """Returns the (N, 3) directions in F, by (L, 3, 3) orientations in turn.
+    """Returns directions (N, 3) in F of directions in S.
 
-    Products are added in a fixed order: the result of a matrix library depends
-    on the processor.
+    The (L, 3, 3) orientations apply in turn. Products are added in a fixed
+    order: the result of a matrix library depends on the processor.
     """
     d_Fset, turn = np.empty((len(d_Sset), 3)), -1
     for ray in range(len(d_Sset)):

@@ -61,12 +61,12 @@ class RecordedMessage(NamedTuple):
 
 
 class BagWriter:
-    """A context manager that writes one recording.
+    """A context manager that writes one recording as a rosbag2 folder.
 
     Leaving the context normally completes the recording. Leaving it by an
     exception closes the file as a shorter but valid MCAP file under its `.part`
-    name. The same calls give the same bytes, with or without an interruption
-    before.
+    name. The same calls give the same bytes, whether or not the run was
+    interrupted in between.
 
     Example:
         from cns_drake import BagWriter, recording_topics
@@ -183,7 +183,7 @@ class BagWriter:
             self._close_stream()
 
     def follows_interruption(self) -> bool:
-        """Whether an interrupted run has left messages to take over.
+        """Whether messages of an interrupted run can still be taken over.
 
         It is True until another message is written.
         """
@@ -221,13 +221,13 @@ class BagWriter:
     ) -> None:
         """Appends one message; messages must come in the order of time.
 
-        A latched message that is already there is left out.
+        A latched message is skipped if the recording already has it.
 
         Args:
             topic: name of one of the topics.
-            stamp_ns: the message's time [ns].
+            stamp_ns: time of the message [ns].
             data: the serialised message.
-            sequence: the message's number on its topic.
+            sequence: number of the message on its topic.
 
         Raises:
             InputError: if the file cannot be written, e.g. on a full disk, or
@@ -442,7 +442,7 @@ def take_over_frames(
     schedule: Schedule,
     frame_topic: str,
 ) -> int:
-    """Writes the complete frames of an interrupted run into its successor.
+    """Copies the complete frames of an interrupted run to its successor.
 
     A frame has all messages from one message on `frame_topic` until the next;
     latched topics have one message, at tick 0. Nothing has been written yet to
@@ -512,7 +512,7 @@ class BackgroundWriter:
             self._thread.shutdown(cancel_futures=True)
 
     def write(self, *message: Any) -> None:
-        """Hands a message over; waits while too many are waiting.
+        """Queues a message for writing; waits while too many are queued.
 
         Raises:
             Whatever writing an earlier message raised.

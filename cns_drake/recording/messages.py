@@ -113,8 +113,8 @@ def make_imu(
         angular_velocity: w_WI_I, shape (3,) [rad/s].
         specific_force: expressed in I, shape (3,) [m/s^2]; at rest on level
             ground +9.81 along z.
-        variances: those of each axis of the specific force [m^2/s^4] and the
-            angular velocity [rad^2/s^2].
+        variances: variance of each axis of the specific force [m^2/s^4] and of
+            the angular velocity [rad^2/s^2].
 
     Returns:
         The message. A value without noise has a standard deviation of 1e-6.
@@ -152,8 +152,8 @@ def make_odometry(
 ) -> Any:
     """Returns an Odometry message: pose in the map, twist in the vehicle.
 
-    The velocity V_WB_B is expressed in B [rad/s, m/s]. The values are exact,
-    with standard deviations of 1e-6.
+    The velocity V_WB_B is expressed in B [rad/s, m/s]. The values are exact;
+    their standard deviations are given as 1e-6.
     """
     twist = (V_WB_B.translational(), V_WB_B.rotational())
     return ros_types.make_message(
@@ -184,7 +184,7 @@ def _place(X: RigidTransform) -> tuple[np.ndarray, tuple[float, ...]]:
 
 
 def to_quat_xyzw(R: RotationMatrix) -> tuple[float, float, float, float]:
-    """Returns the unit quaternion of a rotation in ROS order."""
+    """Returns the unit quaternion of a rotation as x, y, z, w."""
     q = R.ToQuaternion()
     return q.x(), q.y(), q.z(), q.w()
 
@@ -203,7 +203,8 @@ def make_image(
     """Returns an Image message.
 
     Args:
-        pixels: (height, width, channels), little-endian; depth in metres.
+        pixels: (height, width, channels) values, little-endian; depths in
+            metres.
         encoding: one of `ENCODINGS`.
         frame_id: the camera's frame, z ahead and y down.
     """

@@ -72,7 +72,7 @@ class BoxMessages:
         self._who: tuple[bytes, tuple[str, ...]] | None = None
 
     def encode(self, objects: RecordedObjects, stamp_ns: int) -> bytes:
-        """Returns the CDR form of the message; all have one stamp [ns]."""
+        """Returns the CDR message of objects, all with one stamp [ns]."""
         who = (objects.instance.tobytes(), objects.semantic_classes)
         if who != self._who:
             self._prepare(objects)
@@ -128,7 +128,7 @@ def _views(data: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
 def marked_detections(
     who: Sequence[tuple[int, str]], numbers: np.ndarray
 ) -> Any:
-    """Returns a Detection3DArray in the map, with a mark as its stamp.
+    """Returns a Detection3DArray in the map, whose stamp is a placeholder.
 
     It takes id and class of N objects, and (N, 10) position, orientation (x, y,
     z, w) and size.
@@ -179,7 +179,7 @@ def _box(numbers: np.ndarray) -> tuple[tuple, np.ndarray]:
 
 
 def motion_table(objects: RecordedObjects) -> np.ndarray:
-    """Returns (N,) records of the places and velocities of objects."""
+    """Returns the positions and velocities of objects as (N,) records."""
     table = np.zeros(len(objects.instance), MOTION_DTYPE)
     for names, values in (("x y z", objects.p_WO), ("vx vy vz", objects.v_WO)):
         for k, name in enumerate(names.split()):

@@ -34,7 +34,7 @@ def recording_topics(
     with_objects: bool = False,
     further: Iterable[Topic] = (),
 ) -> tuple[Topic, ...]:
-    """Returns the topics of a recording.
+    """Returns the topics of a recording with their types and encodings.
 
     Args:
         layouts: LiDAR name -> layout of its points, if not `cns`.
@@ -64,7 +64,7 @@ def recording_topics(
 def make_calibration(
     X_BSs: Mapping[str, RigidTransform], X_BI: RigidTransform | None
 ) -> dict:
-    """Returns the frames of LiDARs S and the IMU I as a JSON value.
+    """Returns the poses of LiDARs S and the IMU I, ready for JSON.
 
     Returns:
         Frame name -> parent frame, `translation` [m] and `quat_xyzw`.

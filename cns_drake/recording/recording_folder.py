@@ -29,10 +29,11 @@ class RecordingFolder:
         return self.metadata.is_file()
 
     def check(self, overwrite: bool) -> None:
-        """Refuses a folder that a recording must not go into.
+        """Raises an error if a recording must not be written to the folder.
 
-        Without `overwrite`, these are a folder with a finished recording, and
-        one with files but without a recording of this name.
+        Without `overwrite`, the folder must not hold a finished recording. It
+        must also not hold other files, unless there is a recording of this
+        name.
 
         Raises:
             InputError: the folder must not be used, or cannot be read.

@@ -32,7 +32,7 @@ class Topic:
 
 
 def channel_metadata(topic: Topic) -> dict[str, str]:
-    """Returns what rosbag2 wants of a channel: QoS, and the type's hash."""
+    """Returns rosbag2's metadata of a channel: QoS and the type's hash."""
     return {
         "offered_qos_profiles": _qos_yaml(topic),
         "topic_type_hash": ros_types.message_hash(topic.message_type),
@@ -49,11 +49,11 @@ def describe_topic(
     """Returns the description of a topic and its messages.
 
     Args:
-        name: of the topic.
-        message_type: such as `sensor_msgs/msg/Imu`.
+        name: name of the topic.
+        message_type: ROS type, such as `sensor_msgs/msg/Imu`.
         count: number of messages.
-        metadata: of its channel in the MCAP.
-        encoding: of the messages.
+        metadata: metadata of its channel in the MCAP.
+        encoding: encoding of the messages.
     """
     return {
         "topic_metadata": {
@@ -78,8 +78,8 @@ def make_bag_information(
     """Returns the description of a recording of one file in its folder.
 
     Args:
-        file_name: of the MCAP.
-        topics: as `describe_topic` returns them.
+        file_name: file name of the MCAP.
+        topics: descriptions of topics, from `describe_topic`.
         start_ns, end_ns: times of the first and the last message.
         custom_data: what `ros2 bag info` shows besides.
     """

@@ -49,7 +49,7 @@ class Schedule:
         return float(self.tick)
 
     def due(self, tick: int) -> list[str]:
-        """Returns the names of the streams that are due at a tick."""
+        """Returns the names of the streams that have a message at a tick."""
         return [
             name
             for name, step in self.steps.items()

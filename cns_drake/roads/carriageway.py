@@ -143,7 +143,7 @@ def _stub(road: Road, arm: Arm) -> LineString:
 def make_areas(
     roads: Mapping[str, Road], junction_areas: Mapping[str, BaseGeometry]
 ) -> Areas:
-    """Returns the areas of a whole network, its roads and junctions by name."""
+    """Returns the areas of a road network by road and by junction."""
     lanes = {name: road_strip(road) for name, road in roads.items()}
     bays = {}
     for name, road in roads.items():

@@ -88,7 +88,7 @@ class Centreline:
 
     @property
     def length(self) -> float:
-        """The length [m]."""
+        """Length of the centreline [m]."""
         return float(self._ends[-1])
 
     def evaluate(self, s: ArrayLike) -> np.ndarray:

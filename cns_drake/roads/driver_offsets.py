@@ -38,7 +38,7 @@ _ITERATIONS = 40
 
 
 def kerbs(network: RoadNetwork) -> STRtree:
-    """Returns the edges of the lanes: kerbs, medians, and bays of parked cars.
+    """Returns the edges of lanes: kerbs, medians and bays of parked cars.
 
     They are pieces of a few metres.
     """
@@ -61,7 +61,7 @@ def depart(
 ) -> LanePath:
     """Returns the path of a driver who wanders and changes lanes.
 
-    Where the line has obstacles nearby, seen from above, the car stays on it.
+    Where obstacles are near the line, seen from above, the car stays on it.
     Elsewhere, it keeps 0.3 m from all of them, mirrors included.
 
     Args:

@@ -21,12 +21,14 @@ Acceleration = Annotated[float, Field(ge=0.05, le=9.81, allow_inf_nan=False)]
 
 
 class Speeds(BaseModel):
-    """Bounds of a drive's speed and acceleration at every instant.
+    """The limits of a drive's speed and acceleration at every instant.
 
     Attributes:
-        cruise: the highest speed; the roads' limits hold besides [m/s].
-        longitudinal_acceleration: bound along the path, both signs [m/s^2].
-        lateral_acceleration: bound of the centripetal acceleration [m/s^2].
+        cruise: highest speed [m/s]; the speed limits of the roads apply as
+            well.
+        longitudinal_acceleration: largest acceleration and braking along the
+            path [m/s^2].
+        lateral_acceleration: largest centripetal acceleration [m/s^2].
     """
 
     model_config = ConfigDict(extra="forbid", frozen=True, strict=True)

@@ -75,7 +75,7 @@ class RoadNetwork:
     def connection(
         self, incoming: LaneRef, outgoing: LaneRef, spacing: float = 1.0
     ) -> Connection:
-        """Returns the way from one lane to another, legal or not.
+        """Returns the path from one lane to another, legal or not.
 
         Its points are about a spacing apart [m].
 
@@ -138,13 +138,13 @@ class RoadNetwork:
                     yield LaneRef(road.name, direction, lane)
 
     def is_legal(self, connection: Connection) -> bool:
-        """Returns whether traffic may take a way through a junction.
+        """Returns whether traffic may take a path through a junction.
 
-        A left turn leads from the innermost lane to the innermost lane, a
-        right turn from the outermost to the outermost; straight on, the lane
-        keeps its number, counted from the middle of the road. Between
-        one-way roads, those of a roundabout for example, the lane keeps its
-        number counted from the kerb on the right, on any turn.
+        A left turn leads from the innermost lane to the innermost lane, a right
+        turn from the outermost to the outermost; straight on, the lane keeps
+        its number, counted from the middle of the road. Between one-way roads,
+        those of a roundabout for example, the lane keeps its number counted
+        from the kerb on the right, on any turn.
         """
         incoming, outgoing = connection.incoming, connection.outgoing
         if all(self._is_one_way(lane) for lane in (incoming, outgoing)):
@@ -163,7 +163,7 @@ class RoadNetwork:
         return self.roads[lane.road].lanes[lane.direction] - lane.lane
 
     def connections(self, junction: str) -> list[Connection]:
-        """Returns every legal way through a junction."""
+        """Returns every legal path through a junction."""
         lanes = list(self.lanes())
         incoming = [a for a in lanes if self.exit_junction(a) == junction]
         outgoing = [b for b in lanes if self.entry_junction(b) == junction]
@@ -176,7 +176,7 @@ class RoadNetwork:
 
     @cached_property
     def junction_areas(self) -> dict[str, BaseGeometry]:
-        """The areas of junctions between the roads' ends and the kerbs."""
+        """Areas of junctions between the ends of roads and the kerbs."""
         return {
             name: carriageway.junction_area(self.roads, junction)
             for name, junction in self.junctions.items()
@@ -205,7 +205,7 @@ def _classify(angle_deg: float, num_arms: int) -> Turn:
 
 
 def load_road_network(path: Path | str) -> RoadNetwork:
-    """Reads a `roads.yaml` and checks that it is a network.
+    """Returns the road network of a `roads.yaml`, after checking it.
 
     Raises:
         InputError: naming the file, the field and the fault; faults of form, a

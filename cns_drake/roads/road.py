@@ -33,14 +33,15 @@ class _Model(BaseModel):
 
 
 class RoadStyle(_Model):
-    """The common style of a town's roads; every road may override it.
+    """The style of roads. Each road can override the common one.
 
     Attributes:
-        lanes: lanes along the centreline and against it, up to 4 each; a zero
-            makes the road one-way.
+        lanes: number of lanes along the centreline and against it, up to 4
+            each; a zero makes the road one-way.
         lane_width: width of a lane [m].
         median: width of the kerbed strip between the directions [m].
-        parking: width of the bays cut into both sidewalks, 0 for none [m].
+        parking: width of the parking bays cut into both sidewalks [m]; 0 for
+            none.
         sidewalk: width of the sidewalk on each side [m].
         kerb_height: height of sidewalks and medians above the lanes [m].
         speed_limit: speed limit [m/s].
@@ -60,14 +61,15 @@ class RoadEntry(RoadStyle):
 
     Attributes:
         start: name of the junction where the centreline begins.
-        end: name of the junction where it ends.
-        via: corners on the way, each `[x, y, radius of its bend]` [m].
-        heights: points between the junctions, each `[distance along the
-            centreline, height]` [m]; in between the height follows a monotone
-            cubic, and it is level where the road meets a junction.
-        start_setback: how far from the junction's position the road begins [m];
-            by default it follows from the kerb radius.
-        end_setback: likewise at its end [m].
+        end: name of the junction where the centreline ends.
+        via: corners on the way, each as `[x, y, radius of the bend]` [m].
+        heights: heights between the junctions, each as `[distance along the
+            centreline, height]` [m]. A monotone cubic interpolates them, and is
+            level where the road meets a junction.
+        start_setback: distance from the position of the first junction to the
+            begin of the road [m]; by default it follows from the kerb radius.
+        end_setback: distance from the end of the road to the position of the
+            last junction [m]; likewise.
     """
 
     start: str
@@ -79,14 +81,15 @@ class RoadEntry(RoadStyle):
 
 
 class JunctionEntry(_Model):
-    """A junction of roads; also the joint of two different roads.
+    """A junction of roads, or the joint between two different roads.
 
     Attributes:
         position: `[x, y]` where the centrelines meet [m].
-        height: the junction's area is level at this z [m].
-        kerb_radius: radius of the kerb round each corner; of a dead end, radius
-            of the disc in which its road ends [m].
-        dead_end: only one road comes here, and traffic cannot go on.
+        height: height z of the whole area of the junction, which is level [m].
+        kerb_radius: radius of the kerb round each corner [m]. At a dead end,
+            radius of the disc in which the road ends.
+        dead_end: whether the only road that comes here ends, so that traffic
+            cannot go on.
     """
 
     position: tuple[Finite, Finite] = Field(strict=False)
@@ -96,12 +99,12 @@ class JunctionEntry(_Model):
 
 
 class RoadsFile(_Model):
-    """The whole file: styles, junctions by name and roads by name.
+    """The file `roads.yaml`: common styles, junctions and roads.
 
     Attributes:
-        defaults: style of roads without their own.
-        junctions: name -> junction, at least one.
-        roads: name -> road, at least one.
+        defaults: style of all roads, where they have none of their own.
+        junctions: name -> junction. At least one.
+        roads: name -> road. At least one.
     """
 
     defaults: RoadStyle = RoadStyle()
@@ -171,11 +174,11 @@ class Road:
         """Makes a road between two junctions.
 
         Args:
-            name: of the road.
+            name: name of the road.
             entry: what the plan says of it.
             curve: its whole centreline.
             setbacks: distances of its two ends from their junctions [m].
-            heights: of the two junctions [m].
+            heights: heights of the two junctions [m].
 
         Raises:
             ValueError: the setbacks leave nothing of the road, or its heights
@@ -221,7 +224,7 @@ class Road:
 
     @property
     def full_length(self) -> float:
-        """Length of the whole centreline, junction to junction [m]."""
+        """Length of the whole centreline, from junction to junction [m]."""
         return self._curve.length
 
     @property

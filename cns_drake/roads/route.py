@@ -40,12 +40,12 @@ class RouteLeg(BaseModel):
     Attributes:
         road: name of the road.
         direction: `forward` along its centreline, or `backward`.
-        lane: 1 is next to the middle of the road; two numbers change from the
-            first to the second.
-        start: only in the first leg: the start of the drive, from the entry of
-            the road [m].
-        end: in the last leg: the end of the drive, measured likewise; in a leg
-            before one that leads back: the place where the car turns round [m].
+        lane: number of the lane, 1 next to the middle of the road. Two numbers
+            change from the first lane to the second.
+        start: start of the drive, as a distance from where the leg enters the
+            road [m]. Only in the first leg.
+        end: end of the drive, likewise [m]. In the last leg, or in a leg that
+            the next one leads back along: there the car turns round.
     """
 
     model_config = ConfigDict(extra="forbid", frozen=True, strict=True)
@@ -83,17 +83,15 @@ def make_lane_path(
     *,
     aside: float = 0.0,
 ) -> LanePath:
-    """Joins the lanes of a route and the ways between them.
+    """Returns the path along the lanes of a route, joined at junctions.
 
     Consecutive legs must meet in a junction, and the way through it must be
     legal: a left turn from the innermost lane to the innermost, a right turn
     from the outermost lane to the outermost, straight on without a change of
     lane (`RoadNetwork.is_legal`). Lanes change only along a leg. Within a
-    junction the lower one of the two roads' speed limits holds.
-
-    If the next leg leads back on the same road, the car turns round in a loop
-    to the left: at the leg's end, or as near to the junction as the room
-    allows.
+    junction the lower one of the two roads' speed limits holds. If the next leg
+    leads back on the same road, the car turns round in a loop to the left: at
+    the leg's end, or as near to the junction as the room allows.
 
     Args:
         spacing: the distance of the points, rounded so that it divides the
@@ -357,9 +355,9 @@ _WEIGHT_OF_NEW = 6.0
 def draw_route(
     network: RoadNetwork, length: float, rng: np.random.Generator
 ) -> Route:
-    """Draws a legal route that prefers roads that it has not seen yet.
+    """Returns a random legal route that prefers new roads.
 
-    Its roads have a least length [m].
+    Its roads have a least length in total [m].
 
     Raises:
         InputError: the network has no route of any length.

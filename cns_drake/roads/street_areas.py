@@ -18,7 +18,7 @@ class SurfaceHeights(Protocol):
 
     @property
     def is_level(self) -> bool:
-        """Whether they lie at z = 0 throughout."""
+        """Whether the surface is at z = 0 everywhere."""
 
     def heights(self, xy: ArrayLike) -> np.ndarray:
         """Returns the (N,) heights at (N, 2) places [m]."""
@@ -53,7 +53,7 @@ class RoadSurface:
 
     @property
     def is_level(self) -> bool:
-        """Whether all roads lie at z = 0 throughout."""
+        """Whether all roads are at z = 0 everywhere."""
         return not self._places[:, 2].any()
 
     def heights(self, xy: ArrayLike) -> np.ndarray:

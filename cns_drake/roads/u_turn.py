@@ -41,16 +41,17 @@ def loop_corners(
     aside_in: float,
     aside_out: float,
 ) -> np.ndarray:
-    """Returns the corners of a left loop; rounded by its radius it is smooth.
+    """Returns the corners of a loop to the left, in which a car turns round.
 
-    A car comes along a line, leaves it to the right, goes round the centre to
-    the left, and joins the line on which it leaves, again from the right. It
-    turns by more than 90 degrees. The bends at its ends have the loop's radius.
+    Rounded by the loop's radius, the corners make a smooth path. A car comes
+    along a line, leaves it to the right, goes round the centre to the left, and
+    joins the line on which it leaves, again from the right. It turns by more
+    than 90 degrees. The bends at its ends have the loop's radius.
 
     Args:
-        centre: of the loop [m].
+        centre: centre of the loop [m].
         heading_in, heading_out: directions of the two lines [rad].
-        radius: of the loop [m].
+        radius: radius of the loop [m].
         aside_in, aside_out: distance of the centre to the left of each line, at
             most the radius [m].
     """

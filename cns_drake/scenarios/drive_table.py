@@ -26,7 +26,7 @@ class DriveRow:
 
     Attributes:
         checksum: that of the files that the figures depend on.
-        length: of the path [m].
+        length: length of the path [m].
         duration: [s].
         structures, triangles: in the stage.
     """
@@ -93,9 +93,10 @@ def write_table(
     progress: Callable[[str], None] = lambda line: None,
     sizes: Mapping[str, tuple[int, int]] | None = None,
 ) -> None:
-    """Brings the table of a folder up to date.
+    """Updates the table of drives in a map's folder.
 
-    A folder without drives gets no table. Arguments as of `drive_rows`.
+    A folder without drives gets no table. The arguments are those of
+    `drive_rows`.
 
     Raises:
         InputError: as `drive_rows`, or if the table cannot be written.

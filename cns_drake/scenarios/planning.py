@@ -43,11 +43,14 @@ _STEEP = 0.7
 def plan_drive(
     scenario: Scenario, positions: np.ndarray | None = None
 ) -> Trajectory:
-    """Plans the drive of a scenario, along its route or its waypoints.
+    """Returns the trajectory of a scenario's vehicle along its route.
+
+    The route is a list of lanes or of waypoints.
 
     Args:
-        positions: places on the path at even times, of a car that follows
-            others; see `TrafficPlan`. By default it is as fast as it may be.
+        positions: (N,) distances along the path at even times [m], of a car
+            that follows others; see `TrafficPlan`. By default the car is as
+            fast as the limits allow.
 
     Raises:
         InputError: the roads, the waypoints or the vehicle's springs cannot
@@ -165,10 +168,11 @@ def count_frames(scenario: Scenario, trajectory: Trajectory) -> int:
 
 
 def shown_beside(scenario: Scenario) -> tuple[Scenario | None, str]:
-    """Returns the stage that a drive's page compares with its own, and a name.
+    """Returns the stage with which a drive's page compares its own stage.
 
-    It is the last stage, or the first one if the drive is in the last. For a
-    drive without some structures it is the same stage with them.
+    Its name comes second. It is the last stage, or the first one if the drive
+    is in the last. For a drive without some structures it is the same stage
+    with them.
     """
     if scenario.without:
         return scenario.replaced(without=()), "the whole city"

@@ -45,7 +45,7 @@ def digest_inputs(
     files they name.
 
     Args:
-        watch: also notes each file, before it is read.
+        watch: notes the status of each file before it is read.
 
     Returns:
         `world`, `vehicle`, and `structures`, `suspension`, `roads`, `lanes`,
@@ -85,12 +85,12 @@ def digest_inputs(
 
 
 def combined_digest(inputs: dict[str, str]) -> str:
-    """Returns one digest for all that `digest_inputs` returns."""
+    """Returns one digest for the digests from `digest_inputs`."""
     return hashlib.sha256(json.dumps(inputs).encode()).hexdigest()
 
 
 def recording_fingerprint(scenario: Scenario, inputs: dict[str, str]) -> str:
-    """Returns the fingerprint of a scenario's recording.
+    """Returns a hash of everything that determines a scenario's recording.
 
     The folder of its files does not count, nor do settings of the drive's page.
     """
@@ -116,7 +116,7 @@ def recording_fingerprint(scenario: Scenario, inputs: dict[str, str]) -> str:
 
 
 def recording_code() -> str:
-    """Returns a digest of the code that has a say in a recording."""
+    """Returns a digest of all code that affects a recording."""
     return code_digest(
         "cns_drake.simulation.simulation", without=("cns_drake.pictures",)
     )
@@ -126,7 +126,7 @@ def digest_file(path: Path, watch: FileWatch | None = None) -> str:
     """Returns the SHA-256 digest of a model and of the files that it names.
 
     Args:
-        watch: also notes each file, before it is read.
+        watch: notes the status of each file before it is read.
 
     Raises:
         InputError: a file cannot be read.

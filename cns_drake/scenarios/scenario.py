@@ -86,14 +86,14 @@ _REPLACED: dict[str, tuple[str, ...]] = {
 
 
 class RideConfig(Section):
-    """The motion of the vehicle's body against its path.
+    """How the vehicle's body moves on its springs along its path.
 
     Attributes:
-        roughness: class of the road after ISO 8608, from `A` (new) to `E` (very
-            poor).
-        seed: seed of the road's profile.
-        crossfall: how far the road falls to the car's right, in m per m; 0.025
-            is usual where cars keep right. It needs a class of the road.
+        roughness: class of the road surface after ISO 8608, from `A` (new) to
+            `E` (very poor); `none` keeps the vehicle steady.
+        seed: seed of the unevenness of the road.
+        crossfall: slope of the road down to the car's right [m/m], such as
+            0.025 where cars keep right. Needs a `roughness` other than `none`.
     """
 
     roughness: Literal["none", RoughnessClass] = "none"
@@ -117,14 +117,15 @@ class DriverConfig(Section):
     """How the driver departs from the middle of the lanes.
 
     Attributes:
-        wander: standard deviation of the car's offset from its line, where the
-            road has room for it; the offsets of two drives differ by the square
-            root of two of it [m].
+        wander: standard deviation of the car's offset from the middle of its
+            lane, where the road has room for it [m]. The offsets between two
+            such drives are larger by a factor of 1.4.
         wander_length: distance after which the correlation of the offset has
             fallen to 1/e [m].
-        lane_changes: rate at which the car goes to a lane beside its own, and
-            back after 15 to 270 m, where there is one [1/km].
-        follows: whether the car is a vehicle among those of `traffic`.
+        lane_changes: rate of changes to a neighbouring lane, where there is one
+            [1/km]. The car returns after 15 to 270 m.
+        follows: whether the car moves among the vehicles of `traffic` and keeps
+            its distance to them.
         seed: seed of all draws, a number or a name; by default the name of the
             drive.
     """
@@ -145,11 +146,14 @@ class DriverConfig(Section):
 
     @property
     def departs(self) -> bool:
-        """Whether the car leaves its line."""
+        """Whether the driver ever leaves the middle of the lane."""
         return self.wander > 0 or self.lane_changes > 0
 
     def rng(self, name: str) -> np.random.Generator:
-        """Returns what decides; without a seed, by the drive's name."""
+        """Returns the random generator of the driver's decisions.
+
+        Without a seed, the name of the drive is the seed.
+        """
         seed = name if self.seed is None else self.seed
         return np.random.default_rng(
             [*seed.encode()] if isinstance(seed, str) else [seed]
@@ -171,11 +175,12 @@ class TrafficConfig(Section):
         vehicles: number of cars, vans, trucks, buses, motorcycles and bicycles
             that drive along the map's roads.
         walkers: number of people that walk on its sidewalks and crossings.
-        seed: seed of their kinds, starts and ways.
-        fcd: a trace of SUMO (floating-car data) to play instead; then nothing
-            else moves.
-        queues: whether vehicles stand in queues in all lanes instead, as in a
-            rush hour. None is there while the car is; nothing else moves.
+        seed: seed of their kinds, starting places and routes.
+        fcd: file of a SUMO trace (floating-car data) to play; no other traffic
+            is then possible.
+        queues: whether vehicles stand in queues in all lanes, as in a rush
+            hour, except where the car itself drives; no other traffic is then
+            possible.
     """
 
     vehicles: int = Field(default=0, ge=0, le=_MOST_TRAFFIC)
@@ -209,29 +214,30 @@ class TrafficConfig(Section):
 
 
 class TransientConfig(Section):
-    """Changes of a city that no building plan lists.
+    """Temporary changes of a city, on which its stages say nothing.
 
     The effect of each switch depends on the seed and on the names of
-    structures, not on the other switches but for `roadsides`.
+    structures, but not on the other switches, except for `roadsides`.
 
     Attributes:
-        seed: seed of the draws.
-        parked_cars: part of the parked cars that have left (three in ten of
-            them), stand elsewhere in their bay (two), or have another in their
-            place.
-        leaves: part of the leaves that is left on crowns, needles included;
-            wood stays; a shrub without wood keeps a tenth, as twigs.
-        snow: depth of the snow on surfaces that face the sky within 120 m of
-            the drive; roads are cleared, with banks along their kerbs [m].
-        scaffolds: part of the fronts within 30 m of the drive that stand behind
-            a scaffold, four in ten of them with a net.
-        works: part of the stretches of kerb within 30 m of the drive with
-            fences, skips or diggers beside the road, and a new kerb stone 0.3 m
-            into it.
-        furniture: part of poles, lamps and signs that were replaced within 2 m.
-        roadsides: part of the hedges, garden walls, bushes, young trees,
-            garages and parked cars that stand beside kerbs within 30 m of the
-            drive where there is room; the seed draws the cars alone.
+        seed: seed of all draws.
+        parked_cars: share of the parked cars that changed. Of these, three in
+            ten have left, two in ten stand elsewhere in their bay, and another
+            car has replaced the rest.
+        leaves: share of the leaves and needles that are left on plants. Wood
+            stays; a shrub without wood keeps a tenth, as twigs.
+        snow: depth of the snow on surfaces that face the sky, within 120 m of
+            the drive [m]. Roads are cleared, with banks along their kerbs.
+        scaffolds: share of the fronts within 30 m of the drive that stand
+            behind a scaffold; four in ten of the scaffolds have a net.
+        works: share of the stretches of kerb within 30 m of the drive that have
+            road works: fences, skips or diggers beside the road, and a new kerb
+            stone 0.3 m into it.
+        furniture: share of the poles, lamps and signs that were replaced by
+            others within 2 m.
+        roadsides: share of the places beside kerbs, within 30 m of the drive,
+            that get hedges, garden walls, bushes, young trees, garages or
+            parked cars. Only the cars depend on the seed.
     """
 
     seed: int = Field(default=1, ge=0)
@@ -245,7 +251,7 @@ class TransientConfig(Section):
 
     @property
     def is_off(self) -> bool:
-        """Whether nothing changes."""
+        """Whether there are no temporary changes."""
         return self == TransientConfig(seed=self.seed)
 
 
@@ -256,37 +262,37 @@ class Scenario(Section):
     follows either lanes of the map's roads or waypoints.
 
     Attributes:
-        name: name of the drive and its files; letters, digits and
+        name: name of the drive and its files, from letters, digits and
             underscores.
-        base: another drive, by its name or its file, which has all fields that
-            this one leaves out.
-        map: a shipped map, or a folder laid out like one.
+        base: name or file of another drive, which provides all fields that this
+            one leaves out.
+        map: name of a shipped map, or a folder laid out like one.
         stage: stage of the map.
-        world: any SDF file, in place of `map` and `stage`.
-        without: names of structures to leave out, as in `structures.csv`.
-        title: what the drive shows, in words.
-        route: the lanes to follow, leg by leg; give this or `waypoints`.
-        waypoints: a CSV file of places to pass; needed with a world, which has
-            no roads.
-        u_turns: whether the car turns round where waypoints double back.
-        aside: offset of the car to the right of its lanes' middle between
-            junctions, within the room of the road; to the left if negative, at
-            most 3 [m].
-        speeds: speed and acceleration.
+        world: SDF file of a world, instead of `map` and `stage`.
+        without: names of structures to leave out, from `structures.csv`.
+        title: what the drive shows, for readers.
+        route: lanes to follow, leg by leg; give this or `waypoints`.
+        waypoints: CSV file of places to pass. A `world` needs it, because it
+            has no roads.
+        u_turns: whether the car turns round where the waypoints double back.
+        aside: distance of the car to the right of the middle of its lanes [m];
+            negative to the left. It applies between junctions, as far as the
+            road has room.
+        speeds: limits of speed and acceleration.
         driver: how the driver departs from the middle of the lanes.
-        ride: motion of the car by springs and the road.
+        ride: how the car moves on its springs.
         traffic: moving vehicles and walkers.
-        transient: passing changes since the stage was built.
-        lidars: name -> LiDAR; frame and topic have this name; by default one
-            named `lidar`.
-        cameras: name -> camera; its optical frame (x right, y down, z ahead)
+        transient: temporary changes, such as parked cars or snow.
+        lidars: name -> LiDAR. Its frame and its topic have this name. By
+            default one LiDAR named `lidar`.
+        cameras: name -> camera. Its optical frame (x right, y down, z ahead)
             and its topics have this name.
-        imu: the IMU.
+        imu: the inertial measurement unit.
         weather: fog, rain and snowfall for calibrated returns.
-        odometry: the odometry.
-        frames: number of frames to record, the scans of the first LiDAR; by
-            default the whole drive.
-        seed: seed of the noise of LiDARs and the IMU.
+        odometry: the recorded motion of the vehicle.
+        frames: number of frames to record, which are the scans of the first
+            LiDAR; by default the whole drive.
+        seed: seed of the noise of all LiDARs and the IMU.
 
     Example:
         from cns_drake import load_scenario
@@ -422,12 +428,12 @@ class Scenario(Section):
 
     @property
     def source(self) -> str:
-        """The beginning of errors: the scenario's file, or else its name."""
+        """The scenario's file, or else its name, for error messages."""
         return str(self._files[0] if self._files else self.name)
 
     @property
     def files(self) -> tuple[Path, ...]:
-        """The files that it was read from: its own and those of its bases."""
+        """Files from which the scenario was read, its bases included."""
         return self._files
 
     @property
@@ -437,12 +443,12 @@ class Scenario(Section):
 
     @property
     def frame_period(self) -> float:
-        """Time between frames, the scans of the first LiDAR [s]."""
+        """Time between two frames, the scans of the first LiDAR [s]."""
         return 1.0 / next(iter(self.lidars.values())).rate
 
     @property
     def further_sensors(self) -> dict[str, SensorConfig]:
-        """Sensors besides LiDARs, IMU and odometry, by the field's name."""
+        """Field's name -> sensor, for all but LiDARs, IMU and odometry."""
         return {n: one for n, one in self if isinstance(one, SensorConfig)}
 
     def with_returns(
@@ -450,12 +456,12 @@ class Scenario(Section):
         returns: Literal["ideal", "calibrated"],
         weather: WeatherConfig | None = None,
     ) -> Scenario:
-        """Returns the scenario with other returns of every LiDAR.
+        """Returns the scenario with another model of every LiDAR's returns.
 
         Args:
-            returns: see `LidarSection`. Calibrated returns drop the noise and
-                losses of ideal ones; ideal returns drop the weather.
-            weather: in place of the scenario's.
+            returns: `ideal` or `calibrated`. Calibrated returns drop the noise
+                and losses of ideal ones; ideal returns drop the weather.
+            weather: the weather; by default that of the scenario.
         """
         if returns == "ideal":
             update: dict = {"returns": returns, "echoes": Echoes.STRONGEST}
@@ -475,9 +481,9 @@ class Scenario(Section):
         list is replaced as a whole. None stands for the default.
 
         Args:
-            changes: field -> its new value, or that of some fields in it. A
-                world replaces a map and its route, a route waypoints, and the
-                other way round.
+            changes: field -> its new value, or a mapping of the fields in it.
+                Setting a world removes the map and its route, setting a route
+                removes the waypoints, and vice versa.
             source: the file or argument that errors name.
 
         Raises:
@@ -490,7 +496,7 @@ class Scenario(Section):
         return scenario
 
     def with_traffic(self, number: int) -> Scenario:
-        """Returns the scenario with so many vehicles, and walkers."""
+        """Returns the scenario with this many vehicles, and as many walkers."""
         seed = self.traffic.seed
         return self.replaced(
             traffic=TrafficConfig(vehicles=number, walkers=number, seed=seed)
@@ -505,11 +511,12 @@ class Scenario(Section):
         return self.with_fields({"transient": changes}, self.source)
 
     def with_driver(self, driver: Literal["real", "none"]) -> Scenario:
-        """Returns the scenario with another driver, of the same seed.
+        """Returns the scenario with another driver, who has the same seed.
 
         Args:
-            driver: `real` for the values of published drives; along waypoints,
-                which have no lanes, without changes of lane.
+            driver: `real` for a driver who wanders and changes lanes as in
+                published drives; along waypoints, which have no lanes, he only
+                wanders. `none` for the middle of the lane.
         """
         if driver == "none":
             return self.replaced(driver=DriverConfig())
@@ -519,9 +526,9 @@ class Scenario(Section):
         return self.replaced(driver=chosen)
 
     def with_lidar_preset(self, preset: str) -> Scenario:
-        """Returns the scenario with the unit of every LiDAR replaced.
+        """Returns the scenario with every LiDAR replaced by a unit of a preset.
 
-        Their places and settings of measurement stay as they are.
+        Their poses and the settings of their measurements stay.
 
         Raises:
             InputError: there is no such preset.

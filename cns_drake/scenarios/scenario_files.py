@@ -14,7 +14,7 @@ from cns_drake.sensors.imu.config import KALIBR_FILE
 
 
 def make_scenario(values: dict, source: object) -> Scenario:
-    """Validates a scenario's fields; errors name their source.
+    """Returns a scenario made from its fields, after checking them.
 
     Raises:
         InputError: a field is missing, unknown or not usable.
@@ -29,7 +29,7 @@ def make_scenario(values: dict, source: object) -> Scenario:
 
 
 def load_scenario(name_or_file: str | Path) -> Scenario:
-    """Loads a shipped drive by name, or a scenario file.
+    """Returns a shipped drive's scenario by its name, or one from a file.
 
     Raises:
         InputError: there is no such drive or file, or the file is not a
@@ -120,7 +120,7 @@ def _find_base(
 
 
 def find_files(values: dict, path: Path) -> None:
-    """Makes the paths in fields of a scenario or a family absolute.
+    """Returns a scenario's or a family's fields with absolute paths.
 
     Args:
         path: the file of these fields; paths are relative to it.

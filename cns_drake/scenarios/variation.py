@@ -67,11 +67,11 @@ class _Steps(Section):
 
 
 class DrawnRoutes(Section):
-    """Random routes.
+    """Routes that are drawn at random.
 
     Attributes:
         count: number of routes.
-        length: least length of each [m].
+        length: least length of each route [m].
         seed: seed of the draws.
     """
 
@@ -81,26 +81,27 @@ class DrawnRoutes(Section):
 
 
 class Family(Section):
-    """The base of a family of scenarios, and its variations.
+    """A family of drives: a base drive and what varies among its members.
 
     Attributes:
-        base: drive or scenario file that gives map, route, speeds and
+        base: name or file of the drive that provides map, route, speeds and
             sensors.
-        stage: stage from which structures are missing; by default the map's
+        stage: stage from which structures are removed; by default the map's
             last one.
-        towards: another stage; only structures that it lacks can be missing,
-            and lower ones stay high.
-        missing: missing parts, each from 0 to 1; or `{from: 0, to: 0.6, count:
-            20}` for evenly spread ones.
-        scattered: class of structures, such as `pole` -> part of them that is
-            missing at random as well.
-        seeds: each gives another place from which the city decays, and other
-            random draws.
-        city_seeds: each draws another city along the same streets.
-        routes: random routes, in place of the base's.
-        lidars: presets in place of the base's LiDARs, such as `[cns, os1-64]`.
-        ride: the ride of all members, in place of the base's.
-        imu: the IMU of all members, in place of the base's.
+        towards: another stage. Only structures that it lacks are removed, and
+            structures that are lower in it keep their height.
+        missing: shares of the structures that are removed, each from 0 to 1, or
+            `{from: 0, to: 0.6, count: 20}` for evenly spaced ones.
+        scattered: class of structures, such as `pole` -> share of it that is
+            also removed at random.
+        seeds: seeds of the random draws. Each begins to remove structures at
+            another place.
+        city_seeds: seeds of other cities, drawn along the same streets.
+        routes: random routes, instead of the base's.
+        lidars: presets that replace the LiDARs of the base, such as `[cns,
+            os1-64]`.
+        ride: ride of all members, instead of the base's.
+        imu: IMU of all members, instead of the base's.
     """
 
     base: str

@@ -19,10 +19,10 @@ PARSER_ERRORS = (
 
 @contextlib.contextmanager
 def collected_errors() -> Iterator[list[str]]:
-    """Collects errors that Drake logs, which would otherwise be printed.
+    """Collects errors that Drake would otherwise print to its log.
 
-    Warnings are passed on at the end, unless an exception was raised: beside an
-    error they would be a second line.
+    Warnings are passed on at the end, unless an exception was raised: next to
+    an error they would be a second line.
     """
     errors: list[str] = []
     records: list[logging.LogRecord] = []

@@ -9,9 +9,9 @@ from pydrake.systems.lcm import LcmBuses
 def find_bus(
     builder: DiagramBuilder, lcm_buses: LcmBuses, caller: str, bus: str
 ) -> Any:
-    """Returns the interface of a bus, as `LcmBuses.Find` does.
+    """Returns the interface of an LCM bus, as `LcmBuses.Find` does.
 
-    The bindings of 1.58 give a system there that is none: whatever uses it ends
+    The bindings of 1.58 return an unusable system there: whatever uses it ends
     the process. The builder has the system itself.
 
     Raises:

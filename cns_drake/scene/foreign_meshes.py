@@ -32,7 +32,7 @@ class ForeignMeshes:
         self._end()
 
     def read(self, path: Path) -> tuple[np.ndarray, np.ndarray]:
-        """Reads a mesh.
+        """Returns a mesh from a file in another format.
 
         Returns:
             (N, 3) float64 vertices [m]; (M, 3) int32 triangles, none if the

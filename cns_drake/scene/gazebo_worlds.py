@@ -74,7 +74,7 @@ class ModelFinder:
 
 
 def model_file(path: Path) -> Path:
-    """Returns a model's SDF file: the path, or the file named by its folder.
+    """Returns the SDF file of a model, given the file or its folder.
 
     Raises:
         InputError: the folder has none.
@@ -99,7 +99,7 @@ def model_file(path: Path) -> Path:
 
 
 def read_xml(path: Path) -> Element:
-    """Reads a file.
+    """Returns the tree of an XML file.
 
     Raises:
         InputError: it cannot be read, or is not the XML of a model.

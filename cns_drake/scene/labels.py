@@ -28,9 +28,9 @@ class Labels(NamedTuple):
 
 
 def number_structures(names: Sequence[str]) -> Labels:
-    """Returns labels by the names of structures, without classes.
+    """Returns labels of structures without classes, by their names.
 
-    Instances follow the alphabet, from 1 on.
+    Instance ids follow the alphabet, from 1 on.
 
     Raises:
         InputError: there are more structures than instance ids.

@@ -58,7 +58,7 @@ _JSON = 0x4E4F534A
 
 
 def unread_parts(path: Path) -> tuple[str, ...]:
-    """Returns one line for each kind of thing in a mesh that is not read.
+    """Returns a line for each kind of content in a mesh that is ignored.
 
     Raises:
         ValueError: its shapes would be misread.
@@ -163,7 +163,7 @@ _NO_INDICES = re.compile(rb"[^-\d\s]|\d-|\d{10}")
 
 
 def check_obj(path: Path) -> None:
-    """Refuses an OBJ file with a face that names missing vertices.
+    """Raises an error if a face of an OBJ file has missing vertices.
 
     Raises:
         ValueError: if so; it names the line.
@@ -203,7 +203,7 @@ _FACES = np.array([(0, 2, 1), (0, 1, 3), (1, 2, 3), (2, 0, 3)])
 
 
 def read_vtk(path: Path) -> tuple[np.ndarray, np.ndarray]:
-    """Reads the boundary of a volume mesh.
+    """Returns the boundary surface of a volume mesh in a VTK file.
 
     Returns:
         (N, 3) float64 vertices [m], also those inside; (M, 3) int32
@@ -252,7 +252,7 @@ class MeshFiles:
         self._surfaces: dict[tuple, TriangleSurface] = {}
 
     def read(self, name: str, shape: Mesh | Convex) -> TriangleSurface:
-        """Returns the surface of a shape in G.
+        """Returns the surface of a mesh shape, in the geometry's frame G.
 
         Raises:
             InputError: the mesh is missing, cannot be read, or is too large;

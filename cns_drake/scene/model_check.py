@@ -41,7 +41,7 @@ _OTHER_NUMBERS = {
 
 
 def lacks_size(shape: ElementTree.Element) -> bool:
-    """Returns whether a shape of SDF has a size only by SDF's defaults."""
+    """Returns whether an SDF shape gives no size of its own."""
     if shape.tag == "plane" or shape.tag.startswith("drake:"):
         return False
     return any(shape.find(name) is None for name in SIZES.get(shape.tag, ()))

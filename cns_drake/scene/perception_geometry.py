@@ -103,7 +103,7 @@ def read_perception_geometry(
     inspector: SceneGraphInspector,
     keep_frame: Callable[[FrameId], bool] = lambda frame_id: True,
 ) -> tuple[PerceptionGeometry, ...]:
-    """Reads every geometry of `Role.kPerception` on the frames to keep.
+    """Returns every geometry of `Role.kPerception` on the given frames.
 
     Raises:
         InputError: see `GeometryReader.read`.
@@ -150,7 +150,7 @@ class GeometryReader:
         inspector: SceneGraphInspector,
         hidden: Collection[GeometryId] = frozenset(),
     ) -> tuple[PerceptionGeometry, ...]:
-        """Reads every geometry of the role that is not hidden.
+        """Returns every visible geometry of the role.
 
         The order is that of `GetAllGeometryIds`, which Drake documents as
         stable; the result depends only on the SceneGraph. Geometry that has not

@@ -32,7 +32,7 @@ class FileWatch:
         self._states: dict[str, tuple[int, ...]] = {}
 
     def take_down(self, path: str) -> os.stat_result | None:
-        """Returns the present status of a file; None if there is none.
+        """Returns the present status of a file; None if it does not exist.
 
         Only the first status of each file counts.
         """
@@ -41,7 +41,10 @@ class FileWatch:
         return status
 
     def changed(self) -> str | None:
-        """Returns the first file that has changed since, if one has."""
+        """Returns the first file that has changed since its status was noted.
+
+        None if none has.
+        """
         for path, state in self._states.items():
             if _state(_status(path)) != state:
                 return path

@@ -57,7 +57,7 @@ class StructureTable:
 
     @property
     def last_instance(self) -> int:
-        """The highest id in use, 0 for none."""
+        """Highest instance id in use, 0 for none."""
         return max((entry.instance for entry in self), default=0)
 
     def joined(self, other: StructureTable) -> StructureTable:
@@ -79,7 +79,7 @@ class StructureTable:
         return StructureTable(entries)
 
     def labels(self, names: Sequence[str]) -> Labels:
-        """Returns those of geometries, by the names of their structures."""
+        """Returns labels of geometries, by the names of their structures."""
         table = self.completed(names)
         entries = [table[name] for name in names]
         columns = (

@@ -78,9 +78,10 @@ _PLANE_TRIANGLES = np.array([(0, 1, 2), (0, 2, 3)], np.int32)
 def merge_triangles(
     members: Sequence[tuple[int, RigidTransform, TriangleSurface]],
 ) -> tuple[TriangleSurface, np.ndarray]:
-    """Returns triangles in one frame T, and their owners.
+    """Returns the triangles of many geometries in one frame T.
 
-    Members have an index, a pose X_TG and a surface each.
+    It also returns the owner of each triangle. Members have an index, a pose
+    X_TG and a surface each.
 
     Returns:
         The surface in T, and the (M,) int32 index of each of its triangles.

@@ -161,15 +161,17 @@ def _mesh_notes(scene_graph: SceneGraph) -> tuple[str, ...]:
 
 @dataclass(frozen=True)
 class World:
-    """Parsed models, ready to be wired.
+    """The parsed models of a world and its vehicle, ready for a diagram.
 
     Attributes:
-        scene_graph: holds the geometry; add it to a DiagramBuilder.
-        plant: owns bodies and frames; finalized, not meant for a Diagram.
-        vehicle: the vehicle's model instance; None without a vehicle.
+        scene_graph: the SceneGraph with their geometry; add it to a
+            DiagramBuilder.
+        plant: the plant with their bodies and frames; finalized, not meant for
+            a Diagram.
+        vehicle: model instance of the vehicle; None without one.
         structures: class and instance id of every structure in the world,
-            listed in a table or not.
-        notes: for the user.
+            whether or not a table lists it.
+        notes: messages for the user.
 
     Example:
         from cns_drake import load_world
@@ -197,14 +199,14 @@ def load_world(
     without: Collection[str] = (),
     model_paths: Collection[Path | str] = (),
 ) -> World:
-    """Parses a world and, in it, a vehicle.
+    """Returns the parsed models of an SDF world and, if given, of a vehicle.
 
-    A world for Gazebo keeps its visuals, at their places at the start; the
-    notes list the omitted parts.
+    A world made for Gazebo keeps its visuals, at their initial places; the
+    notes list the parts that are left out.
 
     Args:
-        sdf: the world or model file.
-        vehicle: the vehicle's model file.
+        sdf: SDF file of the world or model.
+        vehicle: file of the vehicle's model; None for no vehicle.
         structures: table of structures; by default `structures.csv` beside
             the world, if there is one.
         without: names of structures to leave out.

@@ -18,7 +18,7 @@ def sensor_pose(mount: Mount) -> RigidTransform:
 def body_and_pose(
     place: RigidBody | Frame, X_PS: RigidTransform
 ) -> tuple[RigidBody, RigidTransform]:
-    """Returns the body B of a place P, and X_BS.
+    """Returns the body B of a frame P, and the pose X_BS of a sensor.
 
     P is a body or a frame fixed on one, of a finalized plant.
 
@@ -48,10 +48,10 @@ def connect_motion(
     body: RigidBody,
     inputs: dict[str, InputPort],
 ) -> None:
-    """Connects inputs, by output ports' names, to the source of bodies' motion.
+    """Connects inputs of a system to the motion of a plant's bodies.
 
-    It has the kinematic output ports of a MultibodyPlant; by default it is the
-    body's plant itself.
+    Inputs are given by the names of output ports. The source has the kinematic
+    output ports of a MultibodyPlant; by default it is the body's plant itself.
     """
     source = body.GetParentPlant() if motion is None else motion
     for name, port in inputs.items():

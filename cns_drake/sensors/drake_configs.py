@@ -51,31 +51,33 @@ _RATE = 20
 class LidarConfig:
     """A LiDAR, as YAML describes it to Drake.
 
-    Its fields are those of a LiDAR in a scenario, but for place and layout, and
-    some of its own. Like that of `add_lidar`, a preset is not rounded, and
-    turns at the rate of its data sheet.
+    Its fields are those of a LiDAR in a scenario, except its place and layout,
+    and some of its own. Unlike in a scenario, coordinates are not rounded by
+    default, and the LiDAR turns at the rate of its data sheet.
 
     Attributes:
-        name: names the system and the channel.
-        X_PB: pose of the sensor; its `base_frame` names P, a frame of the
-            plant, by default the world's.
+        name: name of the system, and end of the channel's name.
+        X_PB: pose of the sensor in the frame P, which `base_frame` names: a
+            frame of the plant, by default the world's.
         preset: name of the unit, from the table of presets.
         rate: turns per second, at most 1000; by default that of the data sheet.
-        columns: columns in a turn, in place of the preset's.
-        min_range: nearest range, in place of the preset's [m].
-        max_range: farthest range, in place of the preset's [m].
+        columns: columns in a turn; by default those of the preset.
+        min_range: nearest range [m]; by default that of the preset.
+        max_range: farthest range [m]; by default that of the preset.
         resolution: step of the coordinates; 0 for exact values [m].
         range_noise: standard deviation of a Gaussian error of ranges [m].
         dropout: probability that a return is lost.
-        faint_dropout: on top, a return of intensity I is lost with this
-            probability times (1 - I).
+        faint_dropout: factor of a further loss: a return of intensity I is also
+            lost with this probability times (1 - I).
         motion_distortion: whether beams are cast at their own firing times.
-        causal: whether a scan is the turn that ends at its time, for feedback.
+        causal: whether a scan covers the turn that ends at its time, so that a
+            controller can use it at once.
         returns: `ideal` or `calibrated`.
-        echoes: echoes of calibrated returns.
-        unit_seed: seed of this very unit's errors, in calibrated returns.
-        seed: seed of its noise.
-        lcm_bus: name of the bus that it publishes on.
+        echoes: which echoes of a beam calibrated returns report.
+        unit_seed: seed of the errors that this individual unit has, in
+            calibrated returns.
+        seed: seed of the noise.
+        lcm_bus: name of the bus on which the scans are published.
 
     Example:
         from pydrake.common.yaml import yaml_load_typed
@@ -108,10 +110,11 @@ class LidarConfig:
 
 @dataclass
 class ImuConfig:
-    """An IMU, as YAML describes it to Drake; see `LidarConfig`.
+    """An IMU, as YAML describes it to Drake.
 
-    The other fields are those of the IMU in a scenario. Without a rate, of its
-    own or in Kalibr's file, it publishes 20 messages a second.
+    Its fields are those of the IMU in a scenario, and `name`, `X_PB`, `seed`
+    and `lcm_bus` as in `LidarConfig`. It publishes 20 messages a second unless
+    it, or its file for Kalibr, gives a rate.
 
     Example:
         from cns_drake import ImuConfig
@@ -133,9 +136,10 @@ class ImuConfig:
 
 @dataclass
 class OdometryConfig:
-    """Odometry, as YAML describes it to Drake; see `LidarConfig`.
+    """Exact odometry of a frame, as YAML describes it to Drake.
 
-    Without a rate it publishes 20 messages a second.
+    Its `name`, `X_PB` and `lcm_bus` are as in `LidarConfig`. Without a rate it
+    publishes 20 messages a second.
 
     Example:
         from cns_drake import OdometryConfig
@@ -161,20 +165,22 @@ def ApplyLidarConfig(
     lcm_buses: LcmBuses | None = None,
     lcm: Interface | None = None,
 ) -> Lidar:
-    """Adds a LiDAR to a diagram, and publishes its scans on LCM.
+    """Adds a LiDAR to a diagram and publishes its scans on LCM.
 
-    The scans, in the world, are `lcmt_point_cloud` on the channel
-    `DRAKE_POINT_CLOUD_<name>`, one a turn; Meldis shows them. Their `rgb` are
-    greys, the intensities as in the port `point_cloud_W` of a `Lidar`.
+    The messages are `lcmt_point_cloud` on the channel
+    `DRAKE_POINT_CLOUD_<name>`, one per turn, with points expressed in the
+    world. Meldis shows them. Their `rgb` are greys: the intensities, as in the
+    port `point_cloud_W` of a `Lidar`.
 
     Args:
-        config: describes the LiDAR.
-        builder: holds plant and SceneGraph.
-        plant: finalized; by default the system named `plant`.
-        scene_graph: by default the system named `scene_graph`.
+        config: description of the LiDAR.
+        builder: builder of the diagram, with plant and SceneGraph.
+        plant: finalized plant; by default the system named `plant`.
+        scene_graph: SceneGraph to scan; by default the system named
+            `scene_graph`.
         lcm_buses: the buses of which the config names one.
-        lcm: the interface to publish on, in place of a bus. Without buses and
-            interface, an interface to the default URL is added.
+        lcm: interface to publish on, instead of a bus. Without buses and
+            interface, one to the default URL is added.
 
     Returns:
         The system, as `add_lidar` does.
@@ -227,16 +233,20 @@ def ApplyImuConfig(
     lcm_buses: LcmBuses | None = None,
     lcm: Interface | None = None,
 ) -> Imu:
-    """Adds an IMU to a diagram, and publishes its samples on LCM.
+    """Adds an IMU to a diagram and publishes its samples on LCM.
 
-    They are `lcmt_drake_signal` on the channel `DRAKE_IMU_<name>`: specific
-    force [m/s^2] and angular velocity [rad/s] in its frame.
+    The messages are `lcmt_drake_signal` on the channel `DRAKE_IMU_<name>`:
+    specific force [m/s^2] and angular velocity [rad/s], expressed in the IMU's
+    frame.
 
     Args:
-        config: the IMU.
-        builder: of the diagram.
-        plant, lcm_buses, lcm: as of `ApplyLidarConfig`.
+        config: description of the IMU.
+        builder: builder of the diagram.
+        plant: finalized plant; by default the system named `plant`.
         scene_graph: not used.
+        lcm_buses: the buses of which the config names one.
+        lcm: interface to publish on, instead of a bus. Without buses and
+            interface, one to the default URL is added.
 
     Raises:
         InputError: Kalibr's file cannot be used.
@@ -274,25 +284,29 @@ def ApplyOdometryConfig(
     lcm_buses: LcmBuses | None = None,
     lcm: Interface | None = None,
 ) -> odometry.OdometrySensor:
-    """Adds exact odometry of a frame B to a diagram; publishes it on LCM.
+    """Adds exact odometry of a frame B to a diagram, published on LCM.
 
-    It is `lcmt_drake_signal` on the channel `DRAKE_ODOMETRY_<name>`: the
-    quaternion of R_WB (w first), p_WB [m], then angular and linear velocity in
-    the world, expressed in B [rad/s, m/s].
+    The messages are `lcmt_drake_signal` on the channel `DRAKE_ODOMETRY_<name>`:
+    the quaternion of R_WB (w first), p_WB [m], then angular and linear velocity
+    in the world, expressed in B [rad/s, m/s].
 
-    The config is an `OdometryConfig`. Other arguments and errors are those of
-    `ApplyLidarConfig`; the `scene_graph` is not used.
+    Args:
+        config: description of the odometry.
+        builder: builder of the diagram.
+        plant: finalized plant; by default the system named `plant`.
+        scene_graph: not used.
+        lcm_buses: the buses of which the config names one.
+        lcm: interface to publish on, instead of a bus. Without buses and
+            interface, one to the default URL is added.
+
+    Raises:
+        RuntimeError: there is no such plant, frame or bus, or the plant is not
+            finalized.
 
     Example:
         from cns_drake import ApplyOdometryConfig, OdometryConfig
 
         ApplyOdometryConfig(OdometryConfig(rate=100), builder)
-
-    Args:
-        config: the odometry.
-        builder: of the diagram.
-        plant, lcm_buses, lcm: as of `ApplyLidarConfig`.
-        scene_graph: not used.
     """
     section = _section(config, OdometrySection)
     rate = _checked_rate(config, section.rate)

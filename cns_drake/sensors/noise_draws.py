@@ -6,10 +6,11 @@ import numpy as np
 def noise_generator(
     seed: int, sensor_name: str, purpose: int, index: int
 ) -> np.random.Generator:
-    """Returns the generator for one frame, block or other piece of noise.
+    """Returns the random generator for one piece of a sensor's noise.
 
-    The same arguments always give the same numbers. Several sensors differ by
-    their names; the number of a purpose is at least 0.
+    A piece is a frame or a block, for example. The same arguments always give
+    the same numbers. Several sensors differ by their names; the number of a
+    purpose is at least 0.
     """
     # Keys are never negative: pieces before time zero have other streams.
     stream = purpose if index >= 0 else 2**32 - 1 - purpose

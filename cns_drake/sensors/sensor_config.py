@@ -35,7 +35,7 @@ class Section(BaseModel):
     model_config = ConfigDict(extra="forbid", frozen=True, allow_inf_nan=False)
 
     def replaced(self, **fields: Any) -> Self:
-        """Returns a copy with other values of some fields, unchecked."""
+        """Returns a copy with some fields replaced, without checks."""
         return self.model_copy(update=fields)
 
 
@@ -100,9 +100,9 @@ class SensorConfig(Mount, abc.ABC):
         """Adds the sensor to a Diagram; returns the port to record.
 
         Args:
-            scene_graph: has the geometry that the sensor may see.
+            scene_graph: SceneGraph with the geometry that the sensor may see.
             body: the vehicle B, of a finalized plant.
-            motion: has the kinematic output ports of that plant.
+            motion: system with the kinematic output ports of that plant.
         """
 
     @abc.abstractmethod

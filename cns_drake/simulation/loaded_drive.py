@@ -110,9 +110,9 @@ def load_drive(scenario: Scenario) -> LoadedDrive:
 def load_stage_and_traffic(
     scenario: Scenario, trajectory: Trajectory
 ) -> tuple[World, traffic_plan.TrafficPlan | None, Trajectory]:
-    """Loads the stage of a scenario, and plans the traffic in it, if any.
+    """Returns the stage of a scenario, its traffic, and the trajectory.
 
-    The trajectory is another one if the vehicle follows others.
+    The trajectory differs from the given one if the vehicle follows others.
 
     Raises:
         InputError: the scenario cannot be run.
@@ -183,12 +183,13 @@ def _driven(scenario: Scenario, drive: shapely.LineString) -> BaseGeometry:
 def plan_scenario_traffic(
     scenario: Scenario, trajectory: Trajectory, world: World | None = None
 ) -> traffic_plan.TrafficPlan:
-    """Plans the traffic of a scenario.
+    """Returns the motion of all vehicles and walkers of a scenario.
 
     Args:
-        scenario: with traffic.
-        trajectory: motion of its vehicle.
-        world: its stage, if already loaded; not yet a part of a diagram.
+        scenario: scenario with traffic.
+        trajectory: motion of the scenario's vehicle.
+        world: stage of the scenario, if already loaded; not yet a part of a
+            diagram.
 
     Raises:
         InputError: the map has no roads or sidewalks, or no room for that many;
@@ -279,7 +280,7 @@ def _things(world: World) -> list[BaseGeometry]:
 
 
 def load_ways(folder: MapFolder) -> LaneFile:
-    """Returns what vehicles and walkers follow on a map.
+    """Returns the lanes and walkways that traffic follows on a map.
 
     Raises:
         InputError: the map has neither roads nor lanes.
@@ -325,7 +326,7 @@ def _check_room(
 
 
 def with_traffic(world: World, plan: traffic_plan.TrafficPlan) -> World:
-    """Returns a world with the traffic in its table and notes.
+    """Returns a world whose structure table and notes include the traffic.
 
     Raises:
         InputError: there are more structures than ids.

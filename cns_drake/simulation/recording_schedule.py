@@ -52,17 +52,17 @@ def _camera_rates(scenario: Scenario) -> dict[Topic, int]:
 
 
 def first_points_topic(scenario: Scenario) -> str:
-    """Returns the topic whose scans are the frames."""
+    """Returns the topic of the first LiDAR, whose scans are the frames."""
     return scenario_topics(scenario)[0].name
 
 
 def drive_schedule(scenario: Scenario) -> Schedule:
     """Returns the schedule of a scenario's topics.
 
-    If the scenario has a number of frames, LiDARs end with the last one. An IMU
-    or odometry with its own rate continues until that scan is complete, so that
-    its samples enclose every scan; and so does `/tf` with motion distortion,
-    which can be put right by it.
+    If the scenario has a number of frames, LiDARs end with the last one. Topics
+    with a rate of their own, such as an IMU's, continue until that scan is
+    complete, so that their samples enclose every scan. So does `/tf` with
+    motion distortion, by which scans can be corrected.
 
     Raises:
         InputError: Kalibr's file cannot be used.

@@ -35,7 +35,7 @@ def add_mcap_recorder(
     overwrite: bool = False,
     name: str = "mcap_recorder",
 ) -> BagWriter:
-    """Adds a recorder of sensors to a diagram.
+    """Adds a system to a diagram that records its sensors as a rosbag2 folder.
 
     Every LiDAR has a topic `/<name of the system>/points`; every camera
     `/<name>/color`, `depth`, `label` and `camera_info`; an IMU `/imu/data`,
@@ -46,17 +46,17 @@ def add_mcap_recorder(
     Without a period, each LiDAR is recorded once for each of its turns.
 
     Args:
-        builder: holds the sensors.
+        builder: builder of a diagram with the sensors.
         folder: the rosbag2 folder to write.
         period: time between frames of all other sensors [s]; by default a
             turn of the first LiDAR.
         rates: name of a LiDAR or a camera, `imu` or `odometry` -> messages
             per second.
-        lidars: to record; each needs a different name.
-        cameras: name -> camera.
-        imu: to record, if any.
-        odometry: to record, if any.
-        start_ns: the stamp of time zero [ns].
+        lidars: LiDARs to record; each needs a different name.
+        cameras: name -> camera to record.
+        imu: IMU to record, if any.
+        odometry: odometry to record, if any.
+        start_ns: time stamp of the simulation's time zero [ns].
         overwrite: whether an existing recording may be replaced.
         name: name of the system.
 

@@ -121,12 +121,12 @@ class DriveInProgress(PlannedDrive):
         self._fault: BaseException | None = None
 
     def raise_fault(self) -> None:
-        """Raises the simulation's exception, even if the reader caught it."""
+        """Raises the simulation's exception again, if there was one."""
         if self._fault is not None:
             raise self._fault
 
     def scan(self, index: int) -> np.ndarray:
-        """Advances to a frame and returns its scan.
+        """Simulates up to a frame and returns its scan.
 
         Raises:
             ValueError: the simulation is beyond the frame, or the vehicle is
@@ -157,7 +157,7 @@ class DriveSimulation:
         return SimulatedDrive(self.scenario)
 
     def identity(self) -> dict:
-        """Returns the scenario, and digests of its files and of the code."""
+        """Returns the scenario, with digests of its files and of the code."""
         return {
             "simulated": self.scenario.model_dump(mode="json"),
             "inputs": digest_inputs(self.scenario),
@@ -215,9 +215,10 @@ class SimulatedDrive(PlannedDrive):
         return self._lidar.GetOutputPort("scan").Eval(self._at(index))
 
     def look(self, index: int) -> tuple[RayCastingScene, RigidTransform]:
-        """Returns what a scan's sensor sees, and its pose X_WS at the stamp.
+        """Returns the scene around a scan's LiDAR, and its pose X_WS.
 
-        The scene casts any rays, until the next scan or look moves it.
+        The pose is that at the stamp. You can cast any rays in the scene, until
+        the next scan or look changes it.
         """
         scene = self._lidar.EvalScene(self._at(index))
         return scene, self.X_WBs[index] @ self.X_BS

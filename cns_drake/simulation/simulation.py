@@ -43,13 +43,13 @@ NoteCallback = Callable[[str], None]
 
 @dataclass(frozen=True)
 class Run:
-    """The result of a simulation.
+    """The files, counts and times of a finished simulation.
 
     Attributes:
         name: name of the drive.
-        folder: the recording.
-        num_frames: frames in the recording.
-        resumed_frames: number of them that an interrupted run had recorded.
+        folder: folder of the recording.
+        num_frames: number of frames in the recording.
+        resumed_frames: number of frames taken over from an interrupted run.
         simulated_s: simulated time from the first frame simulated to the
             last [s].
         wall_s: wall time of the simulation, without loading [s].
@@ -72,7 +72,7 @@ class Run:
 
     @property
     def real_time_factor(self) -> float:
-        """Simulated seconds per second."""
+        """Simulated seconds per second of computing."""
         return self.simulated_s / self.wall_s if self.wall_s > 0 else math.inf
 
 
@@ -88,28 +88,27 @@ def simulate(
     on_frame: ProgressCallback = lambda done, total: None,
     on_note: NoteCallback = lambda text: None,
 ) -> Run:
-    """Simulates a scenario and records it as `<output>/<name>/`.
+    """Simulates a scenario and records it in the folder `<output>/<name>`.
 
     If an interrupted run of the same scenario, world and version has left
-    frames there, they are kept and the simulation starts with the next one;
-    the result is the same. For a page of the drive all frames are simulated.
+    frames there, they are kept and the simulation starts with the next one; the
+    result is the same. For a web page of the drive, all frames are simulated.
 
     Args:
         scenario: the scenario to run.
-        output: the folder of recordings.
-        page_file: where to save a web page of the drive, if anywhere.
-        graphviz_file: where to save the Diagram as Graphviz text, if
-            anywhere.
-        overwrite: replace an existing recording of that name.
+        output: folder for recordings.
+        page_file: file for a web page of the drive, if any.
+        graphviz_file: file for the Diagram as Graphviz text, if any.
+        overwrite: whether to replace an existing recording of that name.
         num_threads: number of threads that cast the rays of a LiDAR; the
             recording does not depend on it.
         reader: reads the drive while it is recorded, each scan of the first
             LiDAR once and in order, and must not raise. Scans that it does not
             read are simulated all the same. It is called only for a recording
             that begins with the first frame.
-        on_frame: receives the progress.
-        on_note: receives notes on an interrupted run, and on the world's table
-            of structures.
+        on_frame: called with the progress.
+        on_note: called with notes for the user, on an interrupted run or on the
+            world's table of structures.
 
     Raises:
         InputError: the scenario cannot be run, or its output cannot be written.

@@ -74,8 +74,8 @@ def make_station(
         trajectory: the drive, if already planned.
         traffic: the scenario's traffic, if already planned; the structures of
             the world then include it (see `with_traffic`).
-        bag: an open recording of the scenario's topics.
-        page: a recorder of the same world for a web page.
+        bag: open recording with the scenario's topics, if any.
+        page: recorder of a web page of the same world, if any.
         num_threads: number of threads that cast the rays of a LiDAR.
 
     Raises:

@@ -78,7 +78,7 @@ class Compared:
     asked: Changes = field(default_factory=dict)
 
     def fingerprint(self) -> str:
-        """Returns a fingerprint of what is compared, names included."""
+        """Returns a hash of both drives, names included."""
         return fingerprint(
             {
                 "database": self.database.model_dump(mode="json"),
@@ -463,10 +463,10 @@ class PairOfDrives:
 
 
 def control_drive(drive: Scenario, stage: str) -> Scenario:
-    """Returns the control of a drive: its route, through another stage.
+    """Returns a drive on the same route through another stage.
 
-    The driver is the same. All change between the control and that stage's own
-    drive is due to the routes, and not to the city.
+    It is a control: all change between it and that stage's own drive is due to
+    the routes, and not to the city. The driver is the same.
     """
     driver = drive.driver
     if driver.departs and driver.seed is None:
@@ -496,7 +496,7 @@ def _ending(side: str, condition: Condition, seed: int) -> str:
 
 
 def beside(drive: Scenario) -> Scenario:
-    """Returns a drive whose LiDARs are where a database has them by default."""
+    """Returns a drive whose LiDARs have a database's default poses."""
     return moved(drive, _AHEAD, *VIEWPOINTS["near"])
 
 

@@ -29,18 +29,18 @@ def distracting_drives(
     cluster: Cluster,
     on_note: Callable[[str], None] = lambda text: None,
 ) -> list[Scenario]:
-    """Returns drives through other cities with about so many places.
+    """Returns drives through other cities that distract a method.
 
-    These are the shipped drives of other maps, each through its own stage;
-    then those of this map, along the same streets between other buildings, if
-    it is shipped; then the drives of other maps through the other stages; then
-    through those cities drawn anew.
+    They have about the wanted number of places. These are the shipped drives of
+    other maps, each through its own stage; then those of this map, along the
+    same streets between other buildings, if it is shipped; then the drives of
+    other maps through the other stages; then through those cities drawn anew.
 
     Args:
         query: the drive whose LiDARs measure all of them, and whose city is
             left out.
-        number: of places, about.
-        spacing: between two places [m].
+        number: number of places, about.
+        spacing: distance between two places [m].
         output: folder for cities that are drawn anew.
         cluster: runs the jobs.
         on_note: takes what a user should know.

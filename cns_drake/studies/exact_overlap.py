@@ -43,11 +43,14 @@ class VisibleSurfaces:
 
     @property
     def reach(self) -> float:
-        """Distance of the farthest surface [m]."""
+        """Distance of the farthest visible surface [m]."""
         return min(self.pattern.max_range, math.sqrt(3.0) * self.max_range)
 
     def share_of(self, points: np.ndarray) -> float:
-        """Returns the visible part of points (N, 3), in the sensor's frame."""
+        """Returns which share of points (N, 3) is visible.
+
+        Points are in the sensor's frame [m].
+        """
         if len(points) == 0:
             return math.nan
         kept = points[within_range(points, self.max_range)]

@@ -107,15 +107,15 @@ _LONG_FORMS = {"tasks": _by_name, "methods": _by_name, "protocol": _base}
 
 
 class MadeMap(Section):
-    """A map that an experiment makes: a city that ages, or an imported one.
+    """A map that an experiment makes: an aged city or an imported one.
 
     Attributes:
         name: name of the map.
-        age: a map that ages by `years`.
-        years: years that pass.
-        import_file: file of a real city, to import; relative to `files` of the
-            experiment.
-        sha256: digest of that file.
+        age: name of the map that is aged by `years`.
+        years: number of years by which the map is aged.
+        import_file: file of the real city to import, in the folder `files` of
+            the experiment.
+        sha256: SHA-256 digest of that file.
         grow: share of the imported buildings that the first stage lacks.
         plain: whether an imported city stays without the windows, roofs and
             kerbs that its file lacks; else they are drawn, as by
@@ -152,40 +152,42 @@ def _map(value: Any) -> str | MadeMap:
 
 
 class Experiment(Section):
-    """A question about two drives: fields, factors, tasks and methods.
+    """A question about two drives: what varies, and what is measured.
 
     Attributes:
         name: name of the experiment, in all its tables.
         about: the question in words.
-        maps: names or folders of maps, folders of recordings, or maps to be
-            made; by default the shipped maps.
-        files: folder of the files that `maps` import.
-        drives: `same-route`: the last drive of a map queries a database of its
-            own route; `stages`: it queries each earlier drive; `both-ways`:
-            likewise, and two drives of a map query each other;
-            `first-and-last`: the last drive, through the last stage, queries
-            the first one.
-        both: fields of both drives; lists are factors.
+        maps: names or folders of maps, folders of recordings, or maps to make;
+            by default the shipped maps.
+        files: folder with the files that `maps` import.
+        drives: which drives of a map are compared. `same-route`: the last drive
+            queries a database recorded on its own route. `stages`: the last
+            drive queries each earlier drive. `both-ways`: likewise, and if a
+            map has two drives, each queries the other. `first-and-last`: the
+            last drive, through the last stage, queries the first drive.
+        both: fields of both drives. A list makes the field a factor.
         database: fields of the drive that makes the database.
-        query: fields of the drive that asks.
-        cases: name of a cause -> fields of a side, or names of other cases that
-            come together. Lists are the levels of the case, the weakest first.
-            Each case is measured by itself, beside the case `none`.
-        levels: levels of the cases to measure; all by default.
-        design: `product`: each value of a factor with each of all others;
-            `one-at-a-time`: each with the baseline's values of the others.
+        query: fields of the drive that makes the queries.
+        cases: name of a case -> fields of one or both drives, or names of other
+            cases to combine. Lists are the levels of the case, the weakest
+            first. Each case is measured by itself and compared with the case
+            `none`.
+        levels: levels of the cases to measure; by default all.
+        design: `product`: each value of a factor with every value of the
+            others. `one-at-a-time`: each value with the baseline's values of
+            the others.
         tasks: names of tasks, or name -> settings.
-        methods: names of methods or Python files, or name -> settings; lists of
-            settings are factors. By default all methods that ship.
-        seeds: seeds of everything that is random in a condition.
-        protocol: `fair` (the default), `paper` or `recorded`, or fields of a
-            protocol; `base` is the protocol whose fields are replaced.
-        baseline: values of factors in the condition that others are compared
-            with; by default the first value of each factor.
-        frozen: table of the shipped worlds with the fingerprints that the
-            drives of each level must have.
-        charts: the charts of the experiment's page.
-        quick: fields that replace those above with `--quick`.
+        methods: names of methods or Python files, or name -> settings. Lists of
+            settings are factors. By default all shipped methods.
+        seeds: seeds of all random draws in a condition; each is measured.
+        protocol: `fair`, `paper` or `recorded`, or fields of a protocol; `base`
+            then names the protocol that provides the other fields.
+        baseline: values of the factors in the condition with which all others
+            are compared; by default the first value of each factor.
+        frozen: table of the fingerprints that the drives of each level must
+            have, so that shipped worlds stay the same.
+        charts: charts on the page of the experiment.
+        quick: fields that replace those above if `--quick` is given.
     """
 
     name: Annotated[str, Field(pattern=r"^[A-Za-z0-9][\w.-]*$")]
@@ -231,13 +233,13 @@ class Experiment(Section):
 
     @property
     def fresh(self) -> list[int]:
-        """The fresh versions of maps, of which each has its own baseline."""
+        """Freshly drawn versions of maps, each with its own baseline."""
         found = self.both.get("fresh", [])
         return found if isinstance(found, list) else [found]
 
     @property
     def text(self) -> str:
-        """The experiment as YAML, without what is default."""
+        """The experiment as YAML, without fields that have their defaults."""
         import yaml
 
         values = self.model_dump(
@@ -325,7 +327,10 @@ def _override(text: str) -> dict[str, Any]:
 
 
 def merged(values: Any, changes: Any) -> Any:
-    """Returns a tree with changes: mappings field by field, others whole."""
+    """Returns a tree of values with changes applied.
+
+    Mappings are changed field by field, other values as a whole.
+    """
     if not (isinstance(values, Mapping) and isinstance(changes, Mapping)):
         return changes
     return {

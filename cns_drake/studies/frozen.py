@@ -11,7 +11,7 @@ _COLUMNS = ("map", "level", "drives")
 
 
 def frozen_drives(table: str) -> dict[tuple[str, int], str]:
-    """Returns (map, level) -> fingerprint of the drives, as they were frozen.
+    """Returns (map, level) -> fingerprint of the drives when frozen.
 
     Args:
         table: a file of the shipped worlds.
@@ -26,7 +26,7 @@ def frozen_drives(table: str) -> dict[tuple[str, int], str]:
 def check_frozen(
     table: str, compared: Mapping[tuple[str, int], Sequence[str]]
 ) -> None:
-    """Checks that the drives of frozen conditions are those of the table.
+    """Checks that drives of frozen conditions still have their fingerprints.
 
     Maps that the table lacks are not checked.
 

@@ -106,7 +106,7 @@ class MadeMaps:
     def want_age(
         self, drive: Scenario, years: Any, rates: Any, seed: int
     ) -> tuple[str, str]:
-        """Notes that a drive's city is needed after some years.
+        """Notes that a drive's city must be aged by some years.
 
         Returns:
             The drive's own map and stage, as long as there is no other.
@@ -121,7 +121,7 @@ class MadeMaps:
         return str(drive.map), str(drive.stage)
 
     def want_redrawn(self, drive: Scenario, seed: Any) -> tuple[str, str]:
-        """Notes that a drive's city is needed drawn anew; see `want_age`.
+        """Notes that a drive's city must be drawn anew with a seed.
 
         Raises:
             InputError: the seed is out of range.
@@ -137,18 +137,18 @@ class MadeMaps:
     def aged(
         self, drive: Scenario, years: int, rates: Any, seed: int
     ) -> tuple[str, str]:
-        """Returns the folder of a drive's city, and its stage after years."""
+        """Returns the map folder of a drive's aged city, and its stage."""
         key = self._key(drive, rates, seed)
         number = sorted(self._ages[key]).index(years)
         return str(self._aged_folder(*key)), f"{number + 2:02d}"
 
     def redrawn(self, drive: Scenario, seed: int) -> tuple[str, str]:
-        """Returns the folder of a drive's city drawn anew, and its stage."""
+        """Returns the map folder of a drive's redrawn city, and its stage."""
         source = map_folder(drive).path.resolve()
         return str(self.folder / f"{source.name}_c{seed}"), _STAGE
 
     def make(self, cluster: Cluster) -> None:
-        """Makes the maps that are not there.
+        """Makes all maps that were noted and do not exist yet.
 
         Raises:
             InputError: one could not be made; all are named.

@@ -123,7 +123,7 @@ class Survey:
     scenario: Scenario
 
     def still(self) -> RayCastingScene:
-        """Returns its world without the vehicle and moving objects."""
+        """Returns the drive's world without the vehicle and moving objects."""
         if self.scenario.traffic.is_off:
             # The LiDAR does not see its own vehicle.
             return self.simulated.look(0)[0]
@@ -194,8 +194,9 @@ def write_truth(
 
     Args:
         output: the folder, new or empty.
-        spacing: length of the way between two scans [m].
-        across_maps: their maps may have different names, as an aged one has.
+        spacing: distance driven between two scans [m].
+        across_maps: whether the drives' maps may have different names, as an
+            aged map has.
 
     Returns:
         Side -> label -> number of points; what became of the structures.
@@ -248,7 +249,7 @@ def label_points(
 ) -> np.ndarray:
     """Returns a label for each point of a map, (N,) uint8.
 
-    The other drive looks from its frames (K,).
+    Labels say what the other drive sees there from its frames (K,).
     """
     unobserved, kept, changed = SIDES[session.side]
     labels = np.full(len(session.points), unobserved, np.uint8)
@@ -368,7 +369,10 @@ def _spiral() -> np.ndarray:
 
 
 def is_there(points: np.ndarray, scene: RayCastingScene) -> np.ndarray:
-    """Returns (N,) bool: points (N, 3) in W [m] within `NEAR` of a surface."""
+    """Returns which points (N, 3) in W [m] lie on a surface, (N,) bool.
+
+    They are within `NEAR` of it.
+    """
     result = np.zeros(len(points), bool)
     left = np.arange(len(points))
     for axis in _AXES / np.linalg.norm(_AXES, axis=1, keepdims=True):
@@ -456,11 +460,11 @@ def write_page(
     """Writes the page: both maps from above, and the changed structures.
 
     Args:
-        path: of the page.
+        path: path of the page.
         pair: both maps.
         truth: labels of the points of each map.
         table: the changed structures.
-        names: of the two drives.
+        names: names of the two drives.
     """
     low, step, shape = _frame(pair)
     maps = []

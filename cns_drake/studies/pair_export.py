@@ -64,7 +64,7 @@ class ExportOptions:
 
     Attributes:
         format: the trainer's.
-        spacing: between two clouds, along the path [m].
+        spacing: distance between two clouds, along the path [m].
         scans: consecutive scans that are merged into a cloud.
         max_range: points with a greater x, y or z are left out [m].
     """
@@ -112,14 +112,15 @@ def export_pairs(
     cluster: Cluster,
     on_note: Callable[[str], None] = lambda note: None,
 ) -> list[Path]:
-    """Writes a set for a trainer; returns the files that name the pairs.
+    """Writes training data for other programs; returns the index files.
 
-    Finished drives are not simulated again.
+    The index files name the pairs of scans. Finished drives are not simulated
+    again.
 
     Args:
         scenarios: the drives to learn from.
-        held_out: those for the evaluation alone; without any, that is of the
-            others.
+        held_out: drives for evaluation only; without any, all drives are
+            evaluated.
         output: the folder of the set.
         options: what is exported.
         cluster: runs the work.

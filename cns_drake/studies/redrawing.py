@@ -58,12 +58,13 @@ def redraw_cities(
     output: Path,
     cluster: Cluster,
 ) -> dict[int, Path]:
-    """Draws the city of a map anew, with progress on stderr.
+    """Draws the city of a map anew with several seeds.
 
-    An existing city of the same inputs and program is kept.
+    Shows progress on stderr. An existing city of the same inputs and program is
+    kept.
 
     Args:
-        map_folder: has `roads.yaml` and `city.yaml`.
+        map_folder: folder of the map, with `roads.yaml` and `city.yaml`.
         stage: the stage that is drawn.
         seeds: one for each city.
         output: folder for the cities.
@@ -113,7 +114,7 @@ class MakeMap(Step):
             )
 
     def check(self) -> bool:
-        """Returns whether an older one is there.
+        """Returns whether an older version of the map exists.
 
         Raises:
             InputError: anything else has its name.
@@ -129,11 +130,11 @@ class MakeMap(Step):
 
     @abc.abstractmethod
     def make(self, finish: Callable[[Path], None], reporter: Reporter) -> None:
-        """Makes the folder; `finish` completes it before it gets its name."""
+        """Makes the map's folder; `finish` completes it before it is named."""
 
     @abc.abstractmethod
     def sources(self) -> dict[str, object]:
-        """Returns all that the map depends on, ready for JSON."""
+        """Returns everything on which the map depends, ready for JSON."""
 
 
 def make_maps(steps: Sequence[MakeMap], output: Path, cluster: Cluster) -> None:
@@ -180,10 +181,10 @@ class RedrawCity(MakeMap):
         return redrawn_inputs(self.map_folder, self.stage, self.seed)
 
     def finish_inputs(self, draft: Path) -> None:
-        """Writes inputs that depend on the city itself."""
+        """Writes the inputs that can only be made once the city is drawn."""
 
     def sources(self) -> dict[str, object]:
-        """Returns all that the city depends on, ready for JSON."""
+        """Returns everything on which the city depends, ready for JSON."""
         return {
             **{
                 name: content.decode()
@@ -241,7 +242,7 @@ class Version:
 
 
 def fresh_versions() -> list[Version]:
-    """Returns the versions as they were frozen."""
+    """Returns the frozen list of freshly drawn versions."""
     rows = read_records(worlds_folder() / "fresh.csv", _COLUMNS)
     return [
         Version(
@@ -366,7 +367,7 @@ def _turned_bounds(bounds: Sequence[float], turn_deg: float) -> list[float]:
 
 
 def kept_names(stages: Any, names: Sequence[str]) -> Any:
-    """Returns the content of `stages.yaml` without structures a city lacks.
+    """Returns a `stages.yaml` without the structures that a city lacks.
 
     A draw has another number of houses in a row. Groups without any structure
     are left out.

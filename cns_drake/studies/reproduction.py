@@ -55,7 +55,7 @@ def reproduce_maps(
         cluster: runs the jobs.
         with_pages: whether drives get web pages.
         quick: whether only the report is made.
-        protocol: of place recognition.
+        protocol: protocol of place recognition.
         own_methods: Python files of further methods.
         settings: `METHOD.NAME=VALUE` each.
         with_costs: whether times are measured.

@@ -199,7 +199,7 @@ class Study:
         self._made = MadeMaps(self.output / "cities")
 
     def run(self, maps: Sequence[str] = ()) -> Path:
-        """Does the work; returns the path of the page."""
+        """Runs the study; returns the path of its page."""
         for name in _FORMER:
             if (self.output / name).exists():
                 raise InputError(

@@ -129,7 +129,7 @@ class Sampler:
             raise InputError("training: no city has two drives that meet")
 
     def batch(self, step: int) -> Batch:
-        """Returns the batch of a step."""
+        """Returns the scans and targets of one training step."""
         rng = np.random.default_rng([self._seed, step])
         queries: list[int] = []
         places: list[int] = []
@@ -229,7 +229,7 @@ def start_parameters(seed: int) -> Parameters:
 
 
 def features(parameters: Parameters, images: Any) -> Any:
-    """Returns maps of unit length (N, TURNS, FEATURES), in JAX."""
+    """Returns feature maps (N, TURNS, FEATURES) of unit length, in JAX."""
     import jax
     from jax import lax
     import jax.numpy as jnp
@@ -256,7 +256,10 @@ def features(parameters: Parameters, images: Any) -> Any:
 
 
 def scores(queries: Any, places: Any) -> Any:
-    """Returns the method's scores (Q, P) of maps, in JAX."""
+    """Returns how alike queries and places are, (Q, P), in JAX.
+
+    Both are feature maps.
+    """
     import jax.numpy as jnp
 
     own, others = (
@@ -284,9 +287,9 @@ def train(
     Args:
         scans: images of scans and which of them are of one place.
         steps: number of batches.
-        seed: of all draws.
+        seed: seed of all draws.
         state: file from which an interrupted training goes on.
-        digest: of the scans; a state of others is refused.
+        digest: digest of the scans; a state of others is refused.
         track: reports progress.
         on_step: takes the number of a step and the weights.
 
@@ -435,7 +438,7 @@ class TrainingPlan:
 
     @classmethod
     def of_minutes(cls, minutes: float, **fields: Any) -> "TrainingPlan":
-        """Returns a plan of about so many minutes of one core."""
+        """Returns a plan that takes about so many minutes on one core."""
         cities = max(2, round(_CITIES_A_MINUTE * minutes))
         steps = max(10, round(_STEPS_A_MINUTE * minutes))
         return cls(**{"cities": cities, "steps": steps, **fields})

@@ -84,7 +84,7 @@ class FcdTrace:
 
     @property
     def duration(self) -> float:
-        """From the first to the last time [s]."""
+        """Time from the first to the last entry [s]."""
         return self.dt * (self.num_steps - 1)
 
 
@@ -220,13 +220,13 @@ def play_trace(
 
     Args:
         trace: what SUMO wrote.
-        path: its file, named in errors.
+        path: file of the trace, for errors.
         graph, walkways: of the map; they give heights.
-        seed: of the kinds of cars.
+        seed: seed of the kinds of cars.
         duration: time of the last frame [s].
         end: time at which the ego car arrives [s].
         ego: motion of the ego car.
-        ego_box: its size.
+        ego_box: size of the ego car.
 
     Raises:
         InputError: the trace is shorter than the drive, or is of another map.
@@ -316,7 +316,7 @@ class Heights:
     def along(
         self, xy: np.ndarray, z: np.ndarray, yaw: np.ndarray | None
     ) -> np.ndarray:
-        """Returns the heights (M,) under one that moves over places (M, 2) [m].
+        """Returns the heights (M,) of a road user along places (M, 2) [m].
 
         Where roads cross at two heights, it is on that of its height in the
         trace; if it has none (NaN), on that on which it came, or of a lane in

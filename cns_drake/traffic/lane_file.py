@@ -80,7 +80,7 @@ def lane_text(
     walkways: Sequence[Walkway],
     in_the_way: Sequence[str] = (),
 ) -> str:
-    """Returns the text of a file of lanes, see `LaneFile`."""
+    """Returns the text of a lane file, see `LaneFile`."""
     content: dict[str, Any] = {
         "lanes": [
             {
@@ -127,7 +127,7 @@ def _known(one: Piece | Walkway, *names: str) -> dict[str, int]:
 
 
 def read_lanes(path: Path) -> LaneFile:
-    """Reads a text of `lane_text`.
+    """Returns the lanes of a file that `lane_text` made.
 
     Raises:
         InputError: the file cannot be read or is not a file of lanes.

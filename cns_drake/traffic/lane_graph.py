@@ -113,7 +113,7 @@ class Walkway:
 
     @property
     def limits(self) -> np.ndarray:
-        """The (N, 2) least and greatest offset to the right [m]."""
+        """(N, 2) least and greatest offset of walkers to the right [m]."""
         if self.free is not None:
             return self.free
         sides = self.half_width * np.array([-1, 1])
@@ -121,7 +121,7 @@ class Walkway:
 
     @property
     def is_narrow(self) -> np.ndarray:
-        """The (N,) bool whether walkers have to face along it."""
+        """(N,) bool, where walkers only have room if they face along it."""
         if self.narrow is not None:
             return self.narrow
         return np.zeros(len(self.points), bool)
@@ -130,9 +130,9 @@ class Walkway:
 def kept_clear(
     walkways: Sequence[Walkway], things: Sequence[BaseGeometry]
 ) -> list[Walkway]:
-    """Returns walkways that pass things, and end where these bar the way.
+    """Returns walkways that lead around objects, or end at them.
 
-    The things are seen from above [m]. No crossing stays without a walkway at
+    The objects are seen from above [m]. No crossing stays without a walkway at
     both ends.
     """
     tree, found = shapely.STRtree(things), []

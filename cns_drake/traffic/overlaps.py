@@ -9,10 +9,10 @@ from cns_drake.base.compiled import compiled
 
 @compiled
 def boxes_overlap(a: Any, b: Any, half_a: Any, half_b: Any) -> bool:
-    """Returns whether two rectangles overlap: along all their axes.
+    """Returns whether two rectangles overlap.
 
-    They have (3,) x, y of the middle [m] and heading [rad], and (2,) half the
-    length and the width [m].
+    They overlap if they do along all their axes. Each has (3,) x, y of the
+    middle [m] and heading [rad], and (2,) half the length and the width [m].
     """
     dx, dy = b[0] - a[0], b[1] - a[1]
     square = (half_a[0] + half_b[0]) ** 2 + (half_a[1] + half_b[1]) ** 2
@@ -39,7 +39,7 @@ def boxes_overlap(a: Any, b: Any, half_a: Any, half_b: Any) -> bool:
 def find_overlaps(
     poses: np.ndarray, half: np.ndarray, found: np.ndarray
 ) -> None:
-    """Finds the pairs of bodies that ever overlap; `found` is (N, N) bool.
+    """Marks in `found` (N, N) bool which pairs of bodies ever overlap.
 
     Poses are (K, N, 3) x, y [m], heading [rad], NaN while a body is absent;
     half lengths and half widths (N, 2) [m].

@@ -72,7 +72,10 @@ _WALKERS_GAP = 6.0
 
 @compiled
 def grant_ways(traffic: Traffic, k: int) -> None:
-    """Gives ways and crossings in the order of arrival, at the k-th time."""
+    """Grants vehicles their ways through junctions, first come first served.
+
+    Crossings are granted as well. It is the k-th time step.
+    """
     streets, cars, crossings = traffic.streets, traffic.cars, traffic.crossings
     t, pieces, num_cars = k * STEP, streets.pieces, len(cars)
     first = np.full(len(pieces), -1)

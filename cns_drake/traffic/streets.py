@@ -50,7 +50,7 @@ class Signals(NamedTuple):
 
 
 def make_signals(graph: LaneGraph, begin: np.ndarray) -> Signals:
-    """Returns the program of all signals.
+    """Returns the program of all traffic lights.
 
     Where ways begin to meet crossings is (P + C, P + C), see `find_conflicts`.
     """
@@ -100,7 +100,7 @@ def make_signals(graph: LaneGraph, begin: np.ndarray) -> Signals:
 
 
 def way_shares(graph: LaneGraph, lane: int) -> np.ndarray:
-    """Returns the shares of drivers that take each way behind a lane."""
+    """Returns the shares of drivers that take each way after a lane."""
     after = graph.pieces[lane].after
     likes = []
     for way in after:
@@ -262,13 +262,19 @@ class EgoBox(NamedTuple):
         return (self.front - self.rear) / 2, self.half_width
 
     def middles(self, xy: np.ndarray, yaw: np.ndarray) -> np.ndarray:
-        """Returns (N, 3) x, y [m], yaw of its middle at (N, 2), (N,) poses."""
+        """Returns x, y [m] and yaw (N, 3) of the box's middle.
+
+        The car's frame is at places (N, 2) with headings (N,).
+        """
         ahead = np.column_stack([cos(yaw), sin(yaw)])
         middle = (self.rear + self.front) / 2
         return np.column_stack([xy + middle * ahead, yaw])
 
     def corners(self, xy: np.ndarray, yaw: np.ndarray) -> np.ndarray:
-        """Returns (N, 4, 2) corners at (N, 2) places and (N,) headings."""
+        """Returns the box's corners (N, 4, 2) as the car moves.
+
+        The car's frame is at places (N, 2) with headings (N,).
+        """
         ahead = np.column_stack([cos(yaw), sin(yaw)])
         return outlines(xy, ahead, -self.rear, self.front, self.half_width)
 
@@ -521,10 +527,10 @@ def speed_on(streets: Streets, piece: int, s: float) -> float:
 def is_ego_far(
     streets: Streets, k: int, lane: int, s: float, wait: float = WAIT
 ) -> bool:
-    """Returns whether a vehicle can leave a lane before the ego car is there.
+    """Returns whether a vehicle can leave a lane before the ego car comes.
 
     Args:
-        streets: all lanes, with the times of the ego car.
+        streets: arrays of all lanes, with the times of the ego car.
         k: number of the time.
         lane: number of the lane.
         s: distance of the vehicle along the lane [m].

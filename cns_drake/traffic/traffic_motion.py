@@ -107,7 +107,10 @@ class LimbTable:
         self._swing = np.array([limb.swing for limb in limbs])
 
     def poses(self, states: BodyStates) -> np.ndarray:
-        """Returns X_WL (M, 4, 4) of all limbs: they turn about y, then z."""
+        """Returns the poses X_WL (M, 4, 4) of all limbs.
+
+        They turn about y, then z.
+        """
         body, p = self.body, self._joint.T
         # A forward swing turns about -y.
         pitch = states.pitch[body] - self._swing * states.swing[body]
@@ -293,10 +296,10 @@ def make_traffic(
     Args:
         scene_graph: takes the geometry, on frames of a source of its own.
         seed: seed of colours and sizes.
-        structures: has an instance id for each body; by default
+        structures: table with an instance id for each body; by default
             `traffic_structures` of the plan.
         turn: duration of a LiDAR's turn with motion distortion [s].
-        name: that of the source.
+        name: name of the source of geometry.
     """
     if structures is None:
         structures = traffic_structures(plan)
@@ -326,10 +329,11 @@ def add_traffic(
     name: str = "traffic",
     **options: Any,
 ) -> TrafficMotion:
-    """Adds vehicles and walkers to a diagram.
+    """Adds moving vehicles and walkers to a diagram; returns their system.
 
     Options are further arguments of `make_traffic`. The system has the name of
-    the source of geometry, and its port `geometry_pose` is connected.
+    the source of geometry, and its port `geometry_pose` is connected to the
+    SceneGraph.
 
     Example:
         from cns_drake import add_traffic
@@ -351,7 +355,7 @@ def connect_traffic(
     lidar: System,
     goes_on: bool = False,
 ) -> None:
-    """Connects traffic with a LiDAR, which labels moving bodies as moving.
+    """Connects a LiDAR to traffic, so that it labels moving bodies as such.
 
     Its port `frame_poses` may be connected already. If traffic goes on during
     its turn, the LiDAR has the `moving_frames` of `traffic` as `moving_bodies`.

@@ -65,9 +65,9 @@ class _Run(NamedTuple):
 
 
 def find_runs(graph: LaneGraph, points: np.ndarray) -> list[_Run]:
-    """Returns the pieces along a way, those that fit best as a whole.
+    """Returns the pieces of lanes that best fit a car's path.
 
-    The way is through (N, 2) points, `_STEP` apart [m].
+    The path is through (N, 2) points, `_STEP` apart [m].
     """
     lines = [shapely.LineString(piece.points[:, :2]) for piece in graph.pieces]
     tree = shapely.STRtree(lines)
@@ -174,7 +174,7 @@ class Follower:
         self.arrived = False
 
     def record(self, streets: Streets) -> np.ndarray:
-        """Returns the (1,) record `VEHICLE` of the car at its first place."""
+        """Returns the record `VEHICLE` (1,) of the car at its start."""
         car = np.zeros(1, motion.VEHICLE)
         bound = _PART_OF_BOUND * self._profile.acceleration
         for name, value in (
@@ -194,7 +194,10 @@ class Follower:
         return car
 
     def step(self, traffic: Traffic, k: int) -> None:
-        """Moves the car on, the last of the vehicles, at the k-th step."""
+        """Moves the car by one step.
+
+        It is the last of the vehicles; the step is the k-th.
+        """
         car, u = traffic.cars[-1], self.u[-1]
         if k < self._leaves or self.arrived:
             self.u.append(u)
@@ -480,10 +483,11 @@ def plan_traffic(
         graph: lanes and crossings.
         walkways: sidewalks, where walkers walk, and crossings.
         vehicles, walkers: wanted numbers.
-        seed: of kinds, places and ways.
-        duration: of the drive [s]; the longest if the ego car follows others.
+        seed: seed of kinds, places and ways.
+        duration: duration of the drive [s]; the longest if the ego car follows
+            others.
         ego: motion of the ego car; at its first place if it follows others.
-        ego_box: its size.
+        ego_box: size of the ego car.
         drive: its path and speeds if it follows others, else None.
     """
     # Traffic goes on after the drive, for a LiDAR that is turning then.
@@ -575,7 +579,7 @@ class Trial:
         self._overlaps = np.zeros((len(self._half_sizes),) * 2, bool)
 
     def run(self, steps: range) -> None:
-        """Moves all bodies by the next steps; notes which of them overlap."""
+        """Moves all bodies for the next steps; notes which of them overlap."""
         traffic, crowd = self._traffic, self._crowd
         cars = traffic.cars
         past_cars = np.empty((len(steps), len(self._kinds)), cars.dtype)
@@ -630,7 +634,7 @@ class Trial:
         return vehicles[: self._task.vehicles], walkers[: self._task.walkers]
 
     def left_out(self) -> int:
-        """Returns how many of the wanted bodies the plan has to leave out."""
+        """Returns how many of the wanted bodies do not fit into the plan."""
         vehicles, walkers = self._kept()
         wanted = self._task.vehicles + self._task.walkers
         return wanted - len(vehicles) - len(walkers)
@@ -710,10 +714,10 @@ def plan_queues(
 
     Args:
         graph: lanes and crossings.
-        seed: of kinds and gaps.
-        duration: of the drive [s].
+        seed: seed of kinds and gaps.
+        duration: duration of the drive [s].
         ego: motion of the ego car.
-        ego_box: its size.
+        ego_box: size of the ego car.
     """
     rng = np.random.default_rng(seed)
     kinds, rows = [], []

@@ -144,7 +144,7 @@ class Traffic(NamedTuple):
 def begin_traffic(
     streets: Streets, cars: np.ndarray, crossings: np.ndarray, seed: int
 ) -> Traffic:
-    """Returns traffic with room for the entries of all vehicles."""
+    """Returns the traffic at the start, with room for all vehicles' entries."""
     num_pieces = len(streets.pieces)
     entries = np.zeros(_MOST_ENTRIES * len(cars) + num_pieces, _ENTRY)
     head = np.full(num_pieces, -1)
@@ -284,7 +284,7 @@ def _places(
 
 @compiled
 def find_occupants(traffic: Traffic, k: int) -> None:
-    """Notes the places of all vehicles at the k-th time."""
+    """Finds which vehicle is where, at the k-th time step."""
     streets, cars = traffic.streets, traffic.cars
     pieces = streets.pieces
     traffic.head[:] = -1
@@ -340,9 +340,10 @@ def _enter(
 def find_ahead(
     traffic: Traffic, piece: int, s: float, who: int
 ) -> tuple[float, float]:
-    """Returns the gap to the next one ahead on a piece [m], and its speed.
+    """Returns the gap [m] to the next vehicle ahead, and its speed [m/s].
 
-    It is ahead of a vehicle of a number, whose front bumper is at s [m].
+    The two vehicles are on the same piece. The one behind has the number `who`,
+    and its front bumper is at s [m].
     """
     gap, speed = np.inf, 0.0
     at = traffic.head[piece]
@@ -368,9 +369,9 @@ def free_acceleration(car: Any, v0: float) -> float:
 
 @compiled
 def interaction(car: Any, gap: float, approach: float) -> float:
-    """Returns the loss of acceleration behind a vehicle [m/s^2].
+    """Returns how much a vehicle ahead reduces acceleration [m/s^2].
 
-    That is a (s* / gap)^2 with s* = s0 + max(0, v T + v dv / (2 sqrt(a b))),
+    It is a (s* / gap)^2 with s* = s0 + max(0, v T + v dv / (2 sqrt(a b))),
     where the gap is that from bumper to bumper [m], and dv is the speed minus
     that of the vehicle ahead [m/s].
     """
@@ -396,7 +397,9 @@ def is_walked(traffic: Traffic, c: int, way: int, is_large: bool) -> bool:
 
 @compiled
 def lane_over(streets: Streets, car: Any, c: int) -> tuple[int, float, float]:
-    """Returns where a vehicle comes to the c-th crossing, one without marks.
+    """Returns the place where a vehicle's lane meets the c-th crossing.
+
+    The crossing has no marks.
 
     Returns:
         The lane that leads over it, -1 for none on the vehicle's path; the
@@ -489,7 +492,7 @@ def rear_on_way(streets: Streets, car: Any) -> float:
 
 @compiled
 def accelerations(traffic: Traffic) -> np.ndarray:
-    """Returns the (N,) accelerations [m/s^2]."""
+    """Returns the accelerations of all vehicles, (N,) [m/s^2]."""
     streets, cars = traffic.streets, traffic.cars
     pieces = streets.pieces
     result = np.zeros(len(cars))
@@ -542,7 +545,7 @@ def accelerations(traffic: Traffic) -> np.ndarray:
 
 @compiled
 def change_lanes(traffic: Traffic, k: int) -> None:
-    """Begins the change of lane of one vehicle at most, at the k-th time."""
+    """Lets at most one vehicle begin to change lanes, at the k-th time step."""
     cars, pieces = traffic.cars, traffic.streets.pieces
     for i in range(len(cars)):
         car = cars[i]
@@ -626,7 +629,10 @@ def _is_better(traffic: Traffic, k: int, i: int, target: int) -> bool:
 
 @compiled
 def advance(traffic: Traffic, accelerations: np.ndarray) -> None:
-    """Moves all vehicles on, at (N,) accelerations [m/s^2]."""
+    """Moves all vehicles by one time step.
+
+    Their accelerations are (N,) [m/s^2].
+    """
     cars, pieces = traffic.cars, traffic.streets.pieces
     for i in range(len(cars)):
         car = cars[i]
@@ -695,7 +701,8 @@ def choose_way(traffic: Traffic, i: int) -> None:
 def uniform(seed: int, who: int, draw: int) -> float:
     """Returns the draw-th random number of a road user, from 0 to 1.
 
-    SplitMix64's finalizer (Steele, Lea, Flood, OOPSLA 2014) of the three.
+    It is SplitMix64's finalizer (Steele, Lea, Flood, OOPSLA 2014) of the seed,
+    the user's number and the draw.
     """
     z = np.uint64(seed) * np.uint64(0x9E3779B97F4A7C15)
     z += np.uint64(who) * np.uint64(0xD1B54A32D192ED03)

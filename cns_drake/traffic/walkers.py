@@ -113,10 +113,10 @@ def room_for_walkers(walkways: Sequence[Walkway]) -> int:
 
 
 def gait_rate(speed: np.ndarray) -> np.ndarray:
-    """Returns the rates of a gait's phase at some speeds [rad/s].
+    """Returns how fast the phase of walkers' steps changes [rad/s].
 
-    A stride, of two steps, is as long as 0.7 s of a walk at that speed and
-    0.4 m more.
+    A stride, of two steps, is as long as 0.7 s of a walk at that speed and 0.4
+    m more.
     """
     return 2.0 * np.pi * speed / (0.7 * speed + 0.4)
 
@@ -146,7 +146,10 @@ class Crowd:
         self.walkers = _place_walkers(count, walkways, rng)
 
     def step(self, t: float, seed: int) -> None:
-        """Moves all walkers on from a time [s]; draws their ways by a seed."""
+        """Moves all walkers by one step from a time [s].
+
+        A seed draws their ways.
+        """
         crossings, walkers = self._crossings, self.walkers
         opened = crossings["opened"]
         begun = (opened >= 0.0) & (opened + WALK_GROUP <= t)

@@ -85,7 +85,7 @@ class Bay:
         self.reach = np.repeat([lengths.max() / 2, lengths.min() / 2], 2)
 
     def box(self, beyond: np.ndarray | float = 0.0) -> Polygon:
-        """Returns the bay, extended, seen from above [m].
+        """Returns the enlarged bay as a rectangle seen from above [m].
 
         `beyond` has lengths at front, back, left and right [m].
         """
@@ -99,7 +99,7 @@ class Bay:
         )
 
     def grow(self, car: Structure, cars: Obstacles, others: Obstacles) -> None:
-        """Grows towards other things, and half the way towards other cars."""
+        """Enlarges the bay up to other objects, and halfway to other cars."""
         own = (car.name,)
         box = self.box()
         growth = np.zeros(4)
@@ -257,10 +257,10 @@ _WAVES = (9.0, 3.7)
 
 
 def lay_snow(around: Surroundings, ground: GroundSurface, depth: float) -> None:
-    """Lays snow of a depth [m], except on roads, plants and thin things.
+    """Lays snow of a depth [m], except on roads, plants and thin objects.
 
-    Ground, which is that before earlier changes, is raised. Roads are cleared,
-    with banks along their kerbs.
+    The snow raises `ground`, the surface before all earlier changes. Roads are
+    cleared, with banks along their kerbs.
     """
     editing = around.editing
     for thing in around.things.values():

@@ -213,7 +213,7 @@ class _Stretch:
 
         Args:
             around: the ground and what stands on it.
-            suffix: of its name.
+            suffix: suffix of its name.
             semantic_class: its class.
             model: its shape.
             x, y: its place [m].

@@ -77,12 +77,12 @@ class SceneEditing:
         self._notes.append(f"transient: {text}")
 
     def blame(self, structure: str, cause: str) -> None:
-        """Keeps the cause of a change of a structure."""
+        """Notes what caused a change of a structure."""
         if cause not in self._causes[structure]:
             self._causes[structure].append(cause)
 
     def remove(self, thing: Structure, cause: str) -> None:
-        """Removes a structure."""
+        """Removes a structure, and notes the cause."""
         for part in thing.parts:
             self._remove_part(part)
         self.blame(thing.name, cause)
@@ -90,7 +90,7 @@ class SceneEditing:
     def move(
         self, thing: Structure, X_new: RigidTransform, name: str, cause: str
     ) -> None:
-        """Transforms a structure's points in the world; gives it a new name."""
+        """Moves a structure's points by X_new in the world, and renames it."""
         for part in thing.parts:
             self._register(
                 f"{name}/{part.name}",
@@ -143,7 +143,7 @@ class SceneEditing:
         self.blame(name, cause)
 
     def keep_triangles(self, part: StructurePart, kept: np.ndarray) -> None:
-        """Removes all triangles of a part but those of some indices."""
+        """Removes all triangles of a part except those with given indices."""
         surface = part.geometry.surface
         assert isinstance(surface, TriangleSurface)
         triangles = surface.triangles[kept]
@@ -177,7 +177,7 @@ class SceneEditing:
 
         Args:
             part: the other part.
-            name: of the new part.
+            name: name of the new part.
             p_WVs: (N, 3) vertices [m].
             triangles: (M, 3) indices of vertices.
             look: its colour and material.
@@ -315,9 +315,9 @@ class Surroundings:
         ignored: Collection[str] | None = None,
         classes: Collection[str] = (),
     ) -> Obstacles:
-        """Returns the area that stays free, and footprints of structures.
+        """Returns the footprints of structures, and the area to keep free.
 
-        Those of some classes are no obstacles, or those of others alone are.
+        Some classes are no obstacles, or only the given ones are.
         """
         feet = (
             (thing.name, thing.footprint)
@@ -333,7 +333,7 @@ class Surroundings:
     def chosen(
         self, cause: str, things: Iterable[Named], share: float
     ) -> Iterator[tuple[Named, np.random.Generator]]:
-        """Yields a share of some things, each with its random numbers."""
+        """Yields a random share of objects, with random numbers for each."""
         for thing in things:
             rng = draws(self.seed, cause, thing.name)
             if rng.uniform() < share:

@@ -258,16 +258,16 @@ class GroundSurface:
     def lowest(self, area: BaseGeometry, default: float) -> float:
         """Returns the least height at the corners of an area [m].
 
-        It is the default without ground there.
+        Without ground there, it is `default`.
         """
         z = self.heights(shapely.get_coordinates(area))
         z = z[np.isfinite(z)]
         return float(z.min()) if len(z) else default
 
     def rise(self, old: np.ndarray, new: np.ndarray) -> float:
-        """Returns how far the ground rises from a place to another (2,) [m].
+        """Returns how much higher the ground is at a new place (2,) [m].
 
-        It is 0 where either has no ground.
+        It is 0 where either place has no ground.
         """
         z = self.heights(np.array([old, new]))
         return float(z[1] - z[0]) if np.isfinite(z).all() else 0.0

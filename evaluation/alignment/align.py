@@ -109,11 +109,11 @@ class AlignmentReport:
     ground: float
 
     def to_json(self) -> dict:
-        """Returns all numbers."""
+        """Returns all numbers of the alignment, ready for JSON."""
         return asdict(self)
 
     def to_text(self) -> str:
-        """Returns one line for the user."""
+        """Returns a line for the user that summarises the alignment."""
         return (
             f"{self.moved} (poses in {self.frames[1]!r}) aligned to"
             f" {self.held} (in {self.frames[0]!r}): {self.inliers} of"
@@ -148,7 +148,7 @@ def in_one_world(
     hold_first: bool = False,
     across_maps: bool = False,
 ) -> Alignment | None:
-    """Aligns two drives, see `align`, or returns None if they stay as they are.
+    """Moves two drives into one world if needed; else returns None.
 
     "auto" aligns drives whose world frames differ by name. With `across_maps`
     they may be of maps of different names.
@@ -158,7 +158,8 @@ def in_one_world(
         when: `auto` aligns drives whose world frames differ by name; `always`,
             `never`.
         track: reports progress.
-        hold_first: as of `align`.
+        hold_first: whether the first drive must stay where it is, as of
+            `align`.
         across_maps: whether the drives may be of maps of different names.
 
     Raises:
@@ -373,7 +374,9 @@ def _motion(X_WS: np.ndarray, X_TS: np.ndarray) -> dict:
 
 
 def make_consistent(drive: Drive, track: Track) -> tuple[Submaps, float]:
-    """Makes a drive agree with itself, if it passes a place again.
+    """Returns a drive's submaps with poses that agree where it passes again.
+
+    They agree at places that the drive passes more than once.
 
     Returns:
         The drive, with new poses if it had drifted; its disagreement with

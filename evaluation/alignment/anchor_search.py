@@ -73,7 +73,7 @@ class Ties:
     is_doubtful: bool
 
     def errors(self, V: np.ndarray) -> np.ndarray:
-        """Returns the errors (M, 6) of the ties: turn and move."""
+        """Returns the rotation and translation errors (M, 6) of the ties."""
         E = poses.inverse(V[self.i]) @ V[self.j] @ poses.inverse(self.Z)
         turn = Rotation.from_matrix(E[:, :3, :3]).as_rotvec()
         return np.concatenate([turn, E[:, :3, 3]], axis=1)
@@ -191,7 +191,7 @@ class Guess:
 def find_candidates(
     source: Submaps, target: Submaps, track: Track
 ) -> Candidates:
-    """Finds keyframes of two drives that look alike."""
+    """Returns pairs of keyframes of two drives that look alike."""
     method = ScanContext()
     places = [
         method.describe_place(gather(target.drive, frame, 1, _MAX_RANGE))
@@ -337,7 +337,7 @@ def fit_anchor(
     """Returns the pose X_TS (4, 4) with the most agreeing loops.
 
     Args:
-        loops: M >= 1 from a source to a target.
+        loops: one or more loops (M) from a source to a target.
         X_TL: poses (L, 4, 4) of the target's keyframes in its world T.
         X_SK: poses (K, 4, 4) of the source's keyframes in its world S.
     """
@@ -367,10 +367,10 @@ def fit_anchor(
 def fit_bent(
     loops: list[Loop], X_TL: np.ndarray, source: Submaps, X_TS: np.ndarray
 ) -> np.ndarray:
-    """Returns poses X_TK (K, 4, 4) of a source that has drifted.
+    """Returns poses X_TK (K, 4, 4) of a drifting source, fitted to loops.
 
     Args:
-        loops: M >= 1 from the source to a target.
+        loops: one or more loops (M) from the source to a target.
         X_TL: poses of the target's keyframes in its world.
         source: the drive.
         X_TS: (4, 4) anchor to start from.
@@ -383,7 +383,7 @@ def fit_bent(
 
 
 def straighten(loops: list[Loop], drive: Submaps) -> np.ndarray:
-    """Returns poses X_WK (K, 4, 4) of a drive under loops to itself.
+    """Returns poses X_WK (K, 4, 4) of a drive that agree with its loops.
 
     Its last keyframe stays, and then all are moved so that the first does.
     """
@@ -395,7 +395,7 @@ def straighten(loops: list[Loop], drive: Submaps) -> np.ndarray:
 def agreeing(
     loops: list[Loop], X_TL: np.ndarray, X_TK: np.ndarray
 ) -> np.ndarray:
-    """Returns (M,) bool, which loops poses agree with."""
+    """Returns which loops agree with the poses, (M,) bool."""
     distances, angles = loop_errors(loops, X_TL, X_TK)
     return (distances < AGREEMENT[0]) & (angles < AGREEMENT[1])
 

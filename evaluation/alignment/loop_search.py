@@ -77,7 +77,7 @@ def close(
 def loop_errors(
     loops: list[Loop], X_WL: np.ndarray, X_WK: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Returns the disagreement of poses with loops.
+    """Returns how much poses disagree with loops.
 
     Args:
         loops: M of them.
@@ -94,7 +94,7 @@ def loop_errors(
 
 
 def implied_poses(loops: list[Loop], X_WL: np.ndarray) -> np.ndarray:
-    """Returns the poses (M, 4, 4) that loops give to their keyframes."""
+    """Returns the poses (M, 4, 4) of keyframes that loops imply."""
     X_LK = np.array([loop.X_LK for loop in loops]).reshape(-1, 4, 4)
     return X_WL[[loop.target for loop in loops]] @ X_LK
 
@@ -118,11 +118,14 @@ class LoopSearch:
     num_attempts: int = 0
 
     def near(self, X_TK: np.ndarray) -> np.ndarray:
-        """Returns keyframes (M,) with a neighbour under guesses (K, 4, 4)."""
+        """Returns keyframes (M,) that have a neighbour in the other drive.
+
+        Their guessed poses are (K, 4, 4).
+        """
         return np.flatnonzero([self._place(X) is not None for X in X_TK])
 
     def attempt(self, k: int, X_TK: np.ndarray) -> bool:
-        """Registers keyframe k, guessed to be at X_TK (4, 4).
+        """Registers keyframe k to the other drive, from a guess X_TK (4, 4).
 
         Returns:
             Whether a loop was found.
@@ -166,7 +169,7 @@ class LoopSearch:
                 learn(k)
 
     def retry(self, keyframes: np.ndarray, X_TK: np.ndarray) -> int:
-        """Tries keyframes again, if there is something new to try.
+        """Registers keyframes again if their guesses have changed.
 
         Args:
             keyframes: which.
@@ -201,9 +204,9 @@ class LoopSearch:
 
 
 def find_self_loops(drive: Submaps, most: int, track: Track) -> list[Loop]:
-    """Registers keyframes of a drive to earlier ones at the same place.
+    """Registers a drive's keyframes to its earlier ones at the same place.
 
-    At most that many are tried, evenly along the drive.
+    At most a number of them are tried, evenly along the drive.
     """
     pairs = []
     for k in range(len(drive)):
@@ -223,7 +226,7 @@ def find_self_loops(drive: Submaps, most: int, track: Track) -> list[Loop]:
 
 
 def evenly(number: int, most: int) -> np.ndarray:
-    """Returns at most `most` of `number` indices, evenly spread."""
+    """Returns up to `most` evenly spread indices below `number`."""
     if number <= most:
         return np.arange(number)
     return np.linspace(0, number - 1, most).astype(np.int64)

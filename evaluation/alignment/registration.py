@@ -52,7 +52,7 @@ class Surface:
     tree: small_gicp.KdTree
 
     def sample(self, number: int = _NUM_SAMPLES) -> np.ndarray:
-        """Returns a number of the points, (M,) increasing indices."""
+        """Returns the increasing indices (M,) of a sample of the points."""
         count = len(self.points)
         if count <= number:
             return np.arange(count)
@@ -61,7 +61,7 @@ class Surface:
 
     @cached_property
     def covariances(self) -> np.ndarray:
-        """(N, 3, 3) of the neighbours of each point, flattened as for GICP."""
+        """(N, 3, 3) covariances of points' neighbours, flattened for GICP."""
         return covariances(self.cloud)
 
     @cached_property
@@ -98,11 +98,14 @@ def covariances(cloud: small_gicp.PointCloud) -> np.ndarray:
 def make_surface(
     points: np.ndarray, num_neighbours: int = NUM_NEIGHBOURS
 ) -> Surface:
-    """Returns a cloud with normals and covariances, of nearest neighbours.
+    """Returns a cloud with normals and covariances of its points.
+
+    They are computed from the nearest neighbours of each point.
 
     Args:
-        points: (N, 3) [m], N >= num_neighbours.
-        num_neighbours: that they are fitted to, the point among them.
+        points: (N, 3) points [m], N >= num_neighbours.
+        num_neighbours: number of points to which each normal is fitted,
+            including the point itself.
     """
     cloud = small_gicp.PointCloud(points)
     tree = small_gicp.KdTree(cloud)
@@ -114,7 +117,7 @@ def make_surface(
 def register(
     source: Surface, target: Surface, guess: np.ndarray
 ) -> Registration:
-    """Moves a cloud onto another.
+    """Returns the motion that registers a cloud to another, and its quality.
 
     Args:
         source: S.

@@ -77,10 +77,10 @@ class Submaps:
         return self.travelled[self.frames]
 
     def bend(self, X_VK: np.ndarray) -> np.ndarray:
-        """Returns poses of all frames for new ones of the keyframes.
+        """Returns the poses of all frames after the keyframes have moved.
 
         Args:
-            X_VK: (K, 4, 4).
+            X_VK: (K, 4, 4) new poses of the keyframes.
 
         Returns:
             (N, 4, 4); between keyframes, the moves of both are blended along

@@ -50,8 +50,8 @@ class TrajectoryErrors:
         drift: (K,) errors of position over 100 m [m]; empty if the path is
             shorter.
         drift_deg: (K,) errors of orientation over 100 m [deg].
-        length: of the true path along the poses [m].
-        drive_length: of the path of the whole drive [m].
+        length: length of the true path along the poses [m].
+        drive_length: length of the path of the whole drive [m].
         num_outside: number of estimated poses that are left out, before or
             after the drive.
     """
@@ -128,13 +128,13 @@ def trajectory_errors(
     frame: Frame = "lidar",
     time_offset: float = 0.0,
 ) -> TrajectoryErrors:
-    """Compares an estimated trajectory with a drive.
+    """Returns the errors of an estimated trajectory of a drive.
 
-    The drive's poses are interpolated at the estimate's times. Its world does
-    not matter.
+    The drive's poses are interpolated at the estimate's times. The world frame
+    of the estimate does not matter.
 
     Args:
-        drive: has the true poses.
+        drive: drive with the true poses.
         estimate: poses of the frame in any world.
         frame: the frame whose poses are estimated: that of the LiDAR, or the
             vehicle's.
@@ -170,7 +170,7 @@ def trajectory_errors(
 
 
 def aligned_offsets(p: np.ndarray, q: np.ndarray) -> np.ndarray:
-    """Returns distances (N,) of points p from points q, aligned with them.
+    """Returns the distances (N,) of points from others, after alignment.
 
     Args:
         p: (N, 3) true positions [m].
@@ -188,7 +188,7 @@ def aligned_offsets(p: np.ndarray, q: np.ndarray) -> np.ndarray:
 def segment_errors(
     X: np.ndarray, Y: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Returns the errors of the motion over the next 100 m.
+    """Returns the errors of the motion over 100 m, from each pose on.
 
     Args:
         X: (N, 4, 4) true poses.

@@ -92,7 +92,7 @@ class ChangeReport:
     alignment: AlignmentReport | None = None
 
     def to_json(self) -> dict:
-        """Returns all numbers; NaN becomes None, with a reason."""
+        """Returns all numbers for JSON; NaN becomes None, with a reason."""
         change = self.change
         sides = {
             "source": change.source_to_target,
@@ -133,7 +133,7 @@ class ChangeReport:
 
 
 def survey(path: Path, track: Track = silent) -> Surveyed:
-    """Maps a drive, or reads a map file.
+    """Returns the map of a drive, or of a map file.
 
     Raises:
         InputError: if it can be read as neither.
@@ -148,7 +148,7 @@ def survey_in_one_world(
     lidar: str | None = None,
     columns: int | None = None,
 ) -> tuple[list[Surveyed], list[AlignmentReport]]:
-    """Maps drives, or reads map files, all in one world.
+    """Returns the maps of drives or map files, all in one world.
 
     Args:
         paths: paths of drives or map files; map files must be in that world.
@@ -204,7 +204,7 @@ def compare(
     control: Surveyed | None = None,
     alignment: AlignmentReport | None = None,
 ) -> ChangeReport:
-    """Measures the change between two maps.
+    """Returns the change between two maps.
 
     Args:
         source: A.
@@ -259,7 +259,7 @@ def _change(
 def open_source(
     path: Path, lidar: str | None = None, columns: int | None = None
 ) -> Drive | Path:
-    """Opens a drive; returns the path of a cloud.
+    """Returns an opened drive, or the path of a point cloud.
 
     Raises:
         InputError: if it cannot be read.

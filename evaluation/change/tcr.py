@@ -149,7 +149,7 @@ class DirectedChange:
 
     @property
     def ratio(self) -> float:
-        """1 - |O| / |H|, the TCR of the NSS benchmark; NaN if H is empty."""
+        """TCR of the NSS benchmark, 1 - |O| / |H|; NaN if H is empty."""
         return _ratio(self.num_unchanged, self.num_in_hull)
 
     def restricted(self, kept: np.ndarray) -> DirectedChange:
@@ -161,11 +161,13 @@ class DirectedChange:
 
 @dataclass(frozen=True)
 class TemporalChange:
-    """The change between two maps, seen from either.
+    """The change between two maps: TCR_sym and the labels of all points.
 
     Attributes:
-        source_to_target: labels of the source's points.
-        target_to_source: labels of the target's points.
+        source_to_target: labels of the source's points, changed or not in the
+            target.
+        target_to_source: labels of the target's points, changed or not in the
+            source.
 
     Example:
         from evaluation import temporal_change
@@ -178,7 +180,7 @@ class TemporalChange:
 
     @property
     def num_in_hull(self) -> int:
-        """|H(S, T) u H(T, S)|."""
+        """Number of points inside the other map's hull: |H(S, T) u H(T, S)|."""
         return (
             self.source_to_target.num_in_hull
             + self.target_to_source.num_in_hull
@@ -186,7 +188,7 @@ class TemporalChange:
 
     @property
     def num_unchanged(self) -> int:
-        """|O(S, T) u O(T, S)|."""
+        """Number of unchanged points: |O(S, T) u O(T, S)|."""
         return (
             self.source_to_target.num_unchanged
             + self.target_to_source.num_unchanged
@@ -194,12 +196,12 @@ class TemporalChange:
 
     @property
     def symmetric(self) -> float:
-        """TCR_sym, equation 1; NaN if the hulls contain no points."""
+        """TCR_sym, equation 1 of the paper; NaN if no point is in a hull."""
         return _ratio(self.num_unchanged, self.num_in_hull)
 
     @property
     def undefined_because(self) -> str | None:
-        """Why TCR_sym is NaN; None if it is a number."""
+        """Reason why TCR_sym is NaN; None if it is a number."""
         if self.num_in_hull:
             return None
         sides = (self.source_to_target, self.target_to_source)
@@ -212,12 +214,11 @@ class TemporalChange:
     ) -> TemporalChange:
         """Returns the change with only some of the points counted.
 
-        Hulls and nearest neighbours stay those of the whole maps: a mask
-        selects the points to judge.
+        Hulls and nearest neighbours remain those of the whole maps.
 
         Args:
-            source_kept: (N,) bool.
-            target_kept: (M,) bool.
+            source_kept: (N,) bool, points of the source to count.
+            target_kept: (M,) bool, points of the target to count.
         """
         return TemporalChange(
             self.source_to_target.restricted(source_kept),
@@ -233,7 +234,7 @@ def temporal_change(
     margin: float = HULL_MARGIN,
     restrict_to_hull: bool = True,
 ) -> TemporalChange:
-    """Compares two maps.
+    """Returns the temporal change ratios between two maps.
 
     Args:
         source: (N, 3) float64 voxel centroids, in the frame of both [m].
@@ -268,16 +269,17 @@ def covered(
     trajectories: tuple[np.ndarray, ...],
     radius: float = COVERAGE_RADIUS,
 ) -> np.ndarray:
-    """Returns which points lie near every one of some trajectories.
+    """Returns which points lie near each of several trajectories.
 
-    Two routes see different parts of a city even without a change. Near both
-    routes, most of that difference is gone.
+    Even without a change, two routes see different parts of a city. Points near
+    both routes are free of most of that difference.
 
     Args:
-        points: (N, 3) [m].
-        trajectories: positions (K, 3) of the sensor on each drive [m].
-        radius: horizontal distance to the nearest position [m]. Height is
-            left out, as a tall facade is seen from its foot.
+        points: (N, 3) points in the world [m].
+        trajectories: (K, 3) positions of the LiDAR in the world [m], one array
+            for each drive.
+        radius: greatest horizontal distance to the nearest position [m]. Height
+            does not count, as a tall facade is seen from its foot.
 
     Returns:
         (N,) bool.

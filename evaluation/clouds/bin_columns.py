@@ -65,7 +65,7 @@ def find_layout(files: Sequence[Path], columns: int | None = None) -> BinLayout:
     """Returns the layout of `.bin` files that one program wrote.
 
     Args:
-        files: at least one; the first, the middle and the last are read.
+        files: one or more files; the first, the middle and the last are read.
         columns: number of columns, if the user gives it.
 
     Raises:

@@ -447,17 +447,17 @@ def _read_ply_header(path: Path) -> tuple[str, list[_Element], int]:
 
 
 def no_note(note: str) -> None:
-    """Takes a note that is not wanted."""
+    """Ignores a note for the user."""
 
 
 def read_cloud(
     path: Path, columns: int | None = None, on_note: OnNote = no_note
 ) -> np.ndarray:
-    """Reads one point cloud, in the format of its name's ending, into memory.
+    """Returns the points of a point cloud file.
 
-    `.pcd` and `.ply` in all their encodings; `.npy` holds N x 3 or N x 4
-    numbers or a structured array; `.bin` is KITTI's sequence of float32
-    x y z intensity, or one of other columns.
+    The ending of its name gives the format: `.pcd` and `.ply` in all their
+    encodings; `.npy` holds N x 3 or N x 4 numbers or a structured array; `.bin`
+    is KITTI's sequence of float32 x y z intensity, or one of other columns.
 
     Args:
         path: an existing file, of a scan rather than a map.
@@ -535,7 +535,7 @@ def _coarse_step(points: np.ndarray) -> float:
 
 
 def is_cloud(path: Path) -> bool:
-    """Returns whether a file of this name is read by `read_cloud`."""
+    """Returns whether `read_cloud` reads a file of this name."""
     return path.suffix.lower() in _READERS
 
 
@@ -597,7 +597,7 @@ def _read_npy_header(
 
 
 def read_npy(path: Path) -> np.ndarray:
-    """Returns the array of a file, whose values follow each other in C order.
+    """Returns the array of a .npy file, in C order.
 
     Raises:
         InputError: it cannot be read, or holds no array of the size it names.

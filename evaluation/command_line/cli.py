@@ -378,9 +378,9 @@ def compare(
 
     Args:
         tables: Tables of results, or folders with a results.csv.
-        metric: Metric to rank by, as in the column metric of the tables.
+        metric: Name of the metric to rank by, as in the tables.
         protocol: Protocol whose rows to compare; by default all protocols.
-        gate: Compare the rows with the gate instead of those without.
+        gate: Compare results with --gate instead of those without.
         rankings: Compare only the rankings, each over its own conditions, such
             as those of simulated and of real drives.
     """

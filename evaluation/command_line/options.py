@@ -21,7 +21,7 @@ When = Literal["auto", "always", "never"]
 Align = Annotated[
     When,
     typer.Option(
-        help="Which drives to align to one world: auto aligns those whose "
+        help="Whether to align drives to one world: auto aligns those whose "
         "world frames differ."
     ),
 ]
@@ -41,8 +41,8 @@ Parameters = Annotated[
     typer.Option(
         "--set",
         metavar="NAME=VALUE",
-        help="Setting of the method, such as candidates=20; may be repeated. "
-        "Separate several numbers by commas.",
+        help="Setting of the method; may be repeated. Separate several numbers "
+        "by commas.",
     ),
 ]
 SensorHeight = Annotated[

@@ -24,16 +24,16 @@ __all__ = [
 def open_drive(
     path: Path, lidar: str | None = None, columns: int | None = None
 ) -> Drive:
-    """Opens the recorded drive at `path` with the reader it needs.
+    """Opens a recorded drive with the reader for its format.
 
     Args:
-        path: an .mcap file or a folder with one (as cns-drake and rosbag2
-            write it), or a folder of a drive as MulRan, HeLiPR, NCLT, Boreas,
-            KITTI odometry or CNS publish it. `LiDAR/<name>` in one of HeLiPR
+        path: an .mcap file, a folder with one (as cns-drake and rosbag2 write
+            it), or a folder of a drive as MulRan, HeLiPR, NCLT, Boreas, KITTI
+            odometry or CNS publish it. `LiDAR/<name>` in a folder of HeLiPR
             chooses the LiDAR.
-        lidar: which LiDAR's scans to read, of a recording with several.
-        columns: number of float32 of a point of KITTI's and MulRan's `.bin`;
-            by default as their values show.
+        lidar: name of the LiDAR to read, if the recording has several.
+        columns: number of float32 values per point in `.bin` files of KITTI and
+            MulRan; by default it is guessed from the values.
 
     Raises:
         InputError: if nothing there can be read as a drive, or it has no

@@ -149,11 +149,11 @@ class _Way:
 
 
 def compare_drives(first: Drive, second: Drive) -> DriveComparison:
-    """Compares the ways of two drives.
+    """Measures how the paths of two drives differ.
 
     Args:
-        first: A, in whose direction offsets are measured.
-        second: B, in the same world, with its sensor mounted as that of A.
+        first: drive A, in whose direction offsets are measured.
+        second: drive B, in the same world, with its LiDAR mounted as on A.
 
     Raises:
         InputError: if the two are not of one world, or one of them never

@@ -52,7 +52,7 @@ class MovedDrive(DriveView):
 
         Args:
             drive: drive of N scans.
-            X_WS: (N, 4, 4).
+            X_WS: (N, 4, 4) new poses of the LiDAR in the world.
             world_frame: name of W.
             datum: see `Drive.datum`.
         """

@@ -48,14 +48,14 @@ class QuerySensor:
         tilt_deg: float,
         hidden_deg: float,
     ) -> QuerySensor:
-        """Draws the sensor of a query.
+        """Draws how a query is turned, tilted and hidden.
 
         All drives have the same draw at a frame, so that a query of a drive and
         the same query of its control are turned alike. Each effect has the same
         draw with the others as without.
 
         Args:
-            seed: of the drawing.
+            seed: seed of the drawing.
             frame: frame of the query.
             turns: whether it has any yaw.
             tilt_deg: greatest roll, and greatest pitch [deg].
@@ -82,7 +82,7 @@ class QuerySensor:
 
 
 def travelled(positions: np.ndarray) -> np.ndarray:
-    """Returns the length (N,) of the path up to each position (N, 3) [m]."""
+    """Returns the path length (N,) up to each position (N, 3) [m]."""
     steps = np.linalg.norm(np.diff(positions, axis=0), axis=1)
     return np.concatenate([[0.0], np.cumsum(steps)])
 
@@ -91,8 +91,8 @@ def sample_frames(positions: np.ndarray, spacing: float) -> np.ndarray:
     """Returns frames at equal distances along a trajectory.
 
     Args:
-        positions: (N, 3) [m], N >= 1.
-        spacing: between two frames, along the path [m].
+        positions: (N, 3) positions of the sensor [m], at least one.
+        spacing: distance between two frames, along the path [m].
 
     Returns:
         (K,) increasing frame numbers; the first is 0.
@@ -106,7 +106,7 @@ def within_range(points: np.ndarray, max_range: float) -> np.ndarray:
     """Returns which points (N, 3) are finite and within a range, (N,) bool.
 
     Args:
-        points: in the frame of the sensor [m].
+        points: (N, 3) points in the frame of the sensor [m].
         max_range: greatest absolute value of each coordinate [m].
     """
     kept = np.ones(len(points), dtype=bool)
@@ -183,7 +183,8 @@ def cropped(
     Args:
         scan: structured array (N,) in the frame S of a sensor.
         max_range: see `within_range`, in the frame F of the cloud.
-        X_FS: (4, 4); identity if left out.
+        X_FS: (4, 4) pose of the sensor in the frame F of the result; by default
+            F is S.
         fields: fields of the points, beside their coordinates.
         source: name of the drive, for messages.
 

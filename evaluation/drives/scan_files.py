@@ -25,7 +25,7 @@ _LIMITS = ((100_000.0, 900_000.0), (0.0, 10_000_000.0))
 
 
 def is_local(X_WB: np.ndarray) -> bool:
-    """Returns whether poses (N, 4, 4) are all too near to be in UTM metres."""
+    """Returns whether poses (N, 4, 4) are too near the origin to be in UTM."""
     return bool((np.abs(X_WB[:, :2, 3]) < _LIMITS[0][0]).all())
 
 
@@ -78,7 +78,7 @@ class FileDrive(Drive):
             world_frame: name of W.
             files: N scans.
             stamps_ns: (N,) int64 [ns], strictly increasing.
-            X_WS: (N, 4, 4).
+            X_WS: (N, 4, 4) poses of the LiDAR in the world.
             notes: see `Drive.notes`.
             datum: see `Drive.datum`.
             scenario: see `Drive.scenario`.
@@ -169,11 +169,11 @@ def list_stamped(
     suffix: str,
     parse: Callable[[np.ndarray], np.ndarray] = parse_stamps_ns,
 ) -> tuple[list[Path], np.ndarray]:
-    """Finds files whose names are their times.
+    """Returns the files in a folder whose names are times.
 
     Args:
-        folder: of the files.
-        suffix: of their names.
+        folder: folder of the files.
+        suffix: suffix of their names.
         parse: returns times [ns] of texts.
 
     Returns:
@@ -200,7 +200,7 @@ def list_stamped(
 def keep_spanned(
     files: list[Path], spanned: np.ndarray, poses_path: Path
 ) -> tuple[list[Path], tuple[str, ...]]:
-    """Leaves out the scans before the first and after the last pose.
+    """Returns scan files without those before the first or after the last pose.
 
     Returns:
         The other files; a note if scans were left out.
@@ -216,7 +216,7 @@ def keep_spanned(
 
 
 def read_packed(path: Path, dtype: np.dtype) -> np.ndarray:
-    """Reads a file that consists of records only.
+    """Returns the records of a file that contains nothing else.
 
     Raises:
         ValueError: if the last record is incomplete.
@@ -232,9 +232,9 @@ def read_packed(path: Path, dtype: np.dtype) -> np.ndarray:
 
 
 def check_below(points: np.ndarray, name: str, limit: int) -> None:
-    """Refuses points with a number that their sensor does not have.
+    """Raises an error for points whose field exceeds a sensor's limit.
 
-    The numbers differ between files of two sensors.
+    It tells files of two sensors apart.
 
     Raises:
         ValueError: if `points[name]` reaches `limit`.

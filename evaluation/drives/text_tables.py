@@ -34,7 +34,7 @@ def read_stamped_rows(
     Args:
         path: the file.
         width: number of values after the time.
-        separator: between columns; None is white space.
+        separator: text between columns; None for white space.
         parse: reads times; `parse_stamps_ns` by default.
 
     Returns:
@@ -64,7 +64,7 @@ def read_numbers(
     Args:
         path: the file.
         columns: NumPy type of a row, or of every number.
-        separator: between columns; None is white space.
+        separator: text between columns; None for white space.
 
     Returns:
         (N,) records, or (N, width) numbers; N >= 1.
@@ -136,7 +136,7 @@ def parse_microseconds(texts: np.ndarray) -> np.ndarray:
 
 
 def check_increasing(path: Path, stamps_ns: np.ndarray, what: str) -> None:
-    """Refuses times that do not increase.
+    """Raises an error for times that do not increase.
 
     Raises:
         InputError: that names the first such row.
@@ -151,7 +151,7 @@ def check_increasing(path: Path, stamps_ns: np.ndarray, what: str) -> None:
 
 
 def check_finite(path: Path, values: np.ndarray) -> None:
-    """Refuses a table (N, width) with a number that is not finite.
+    """Raises an error for a table (N, width) with NaN or infinity.
 
     Raises:
         InputError: that names the first such row.
@@ -201,7 +201,7 @@ class Trajectory:
     def interpolate(
         self, stamps_ns: np.ndarray, longest_gap_ns: int
     ) -> tuple[np.ndarray, np.ndarray]:
-        """Returns poses between those of the table (SLERP and linear).
+        """Returns interpolated poses at given times (SLERP and linear).
 
         Args:
             stamps_ns: (M,) int64 times of the wanted poses [ns].
@@ -242,7 +242,7 @@ class Trajectory:
         )
 
     def at(self, stamps_ns: np.ndarray, tolerance_ns: int) -> np.ndarray:
-        """Returns the poses with these times, without interpolation.
+        """Returns the stored poses at given times, without interpolation.
 
         Args:
             stamps_ns: (M,) int64 [ns].
@@ -272,7 +272,9 @@ class Trajectory:
 
 
 def read_matrices(path: Path, separator: str | None) -> Trajectory:
-    """Reads rows of a time and the upper 3 x 4 of a pose, row by row.
+    """Returns a trajectory of rows with a time and a 3 x 4 matrix.
+
+    The matrix is the upper part of a pose, row by row.
 
     Raises:
         InputError: if the table does not have that form, a matrix is no
@@ -296,7 +298,7 @@ def read_quaternions(
     separator: str | None,
     parse: Callable[[np.ndarray], np.ndarray] | None = None,
 ) -> Trajectory:
-    """Reads rows of a time, a position and a quat_xyzw.
+    """Returns a trajectory of rows with a time, a position and a quat_xyzw.
 
     Args:
         path: the file.
@@ -321,7 +323,9 @@ def read_quaternions(
 
 
 def read_angles(path: Path, width: int) -> tuple[Trajectory, tuple[str, ...]]:
-    """Reads rows of microseconds, a position, and roll, pitch and yaw [rad].
+    """Returns a trajectory of rows with a time, position and angles.
+
+    Times are in microseconds, roll, pitch and yaw in radians.
 
     Args:
         path: a table with commas.
@@ -360,7 +364,7 @@ def read_angles(path: Path, width: int) -> tuple[Trajectory, tuple[str, ...]]:
 
 
 def read_poses(path: Path) -> np.ndarray:
-    """Reads rows of the upper 3 x 4 of a pose, row by row, as (N, 4, 4).
+    """Returns poses (N, 4, 4) from rows with a 3 x 4 matrix, row by row.
 
     Raises:
         InputError: like `read_numbers`, or a matrix is no rotation.
@@ -374,11 +378,11 @@ def read_poses(path: Path) -> np.ndarray:
 
 
 def pose_matrices(path: Path, values: np.ndarray) -> np.ndarray:
-    """Returns poses from rows of twelve numbers: the upper 3 x 4, row by row.
+    """Returns poses from rows of twelve numbers, a 3 x 4 matrix each.
 
     Args:
         path: file of the numbers, for messages.
-        values: (N, 12).
+        values: (N, 12) numbers.
 
     Returns:
         (N, 4, 4) with the rotations as they are in the text, rounded.

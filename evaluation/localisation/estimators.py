@@ -83,7 +83,7 @@ class Settings:
     iterations: int = 50
 
     def with_values(self, values: Iterable[tuple[str, Any]]) -> "Settings":
-        """Returns settings with other values, numbers or their text.
+        """Returns the settings with other values, as numbers or text.
 
         Raises:
             InputError: if a setting is unknown, or a value does not fit.
@@ -118,7 +118,7 @@ class LocalisationMap:
     """A map to be localised in.
 
     Attributes:
-        name: of its drive or file.
+        name: name of its drive or file.
         surface: the thinned points in W, with normals and covariances.
     """
 
@@ -130,7 +130,10 @@ class LocalisationMap:
         return {}
 
     def voxels(self, resolution: float) -> small_gicp.GaussianVoxelMap:
-        """Returns a Gaussian for each voxel of a side [m], in W shifted."""
+        """Returns a Gaussian for each voxel of the map.
+
+        The side of a voxel is `resolution` [m], the frame W shifted.
+        """
         if resolution not in self._voxels:
             voxels = small_gicp.GaussianVoxelMap(resolution)
             voxels.insert(self.surface.cloud, _voxel_shift(resolution))
@@ -164,7 +167,9 @@ def make_map(
     columns: int | None = None,
     on_note: OnNote = no_note,
 ) -> LocalisationMap:
-    """Maps a drive at its true poses, or reads a cloud in W.
+    """Returns the localisation map of a drive or of a cloud in W.
+
+    A drive's scans are placed at their true poses.
 
     Args:
         source: the drive, or the cloud's file.
@@ -240,7 +245,7 @@ class Fit:
     """The fit of a scan at a pose.
 
     Attributes:
-        share: of its points that lie on a surface of the map.
+        share: share of its points that lie on a surface of the map.
         residual: root mean square of the distances of pairs off their planes
             [m]; NaN without a pair.
         covariance: (6, 6) of a small motion about the LiDAR, in axes of W:
@@ -255,7 +260,7 @@ class Fit:
 
 
 def judge(surface: Surface, scan: np.ndarray, X_WS: np.ndarray) -> Fit:
-    """Returns how a scan (N, 3) in S fits a map at a pose."""
+    """Returns how well a scan (N, 3) in S fits a map at a pose."""
     p_W = poses.transform(X_WS, scan)
     found, squares = surface.tree.batch_nearest_neighbor_search(p_W)
     is_pair = np.asarray(squares) < _PAIR**2
@@ -449,7 +454,8 @@ def make_estimator(method: str, settings: Settings) -> Estimator:
 
     Args:
         method: one of `METHODS`, or the name of a Python file.
-        settings: of a shipped method; an own one has those of its file.
+        settings: settings of a shipped method; an own one has those of its
+            file.
 
     Raises:
         InputError: if there is no such method, its package is not installed,
@@ -493,7 +499,7 @@ def make_estimator(method: str, settings: Settings) -> Estimator:
 
 
 def thinned(measured: np.ndarray, settings: Settings, where: str) -> np.ndarray:
-    """Returns a scan (N, 3) with one point for each voxel.
+    """Returns a scan (N, 3) with at most one point per voxel.
 
     Raises:
         InputError: if hardly a point is left.

@@ -92,7 +92,7 @@ class Starts:
     Attributes:
         radius: distance to the true position [m].
         turn_deg: angle to the true orientation [deg].
-        seed: of all directions.
+        seed: seed of all directions.
 
     Raises:
         InputError: if a value is out of range.
@@ -116,7 +116,7 @@ class Starts:
             raise InputError(f"--seed: {self.seed} is below 0")
 
     def draw(self, frame: int) -> tuple[np.ndarray, np.ndarray]:
-        """Returns the start of a frame, the same for all methods.
+        """Returns the random start of a frame, the same for all methods.
 
         Returns:
             (3,) its offset in W [m], on a sphere; (3,) its turn about a random
@@ -167,7 +167,7 @@ def as_query(source: Drive | Path, columns: int | None = None) -> Drive:
 def mapped_frames(
     place: Drive | Path, surroundings: LocalisationMap, query: Drive
 ) -> np.ndarray:
-    """Returns for each frame of the queries whether the map holds it, (N,).
+    """Returns which query frames lie within the map, (N,) bool.
 
     Raises:
         InputError: if it holds none.
@@ -190,7 +190,9 @@ def mapped_frames(
 
 
 def way_axes(p_WS: np.ndarray, X_WS: np.ndarray) -> np.ndarray:
-    """Returns R_WT (N, 3, 3): columns along the way, to its left, and up.
+    """Returns rotations R_WT (N, 3, 3) along the path.
+
+    Columns point along the path, to its left, and up.
 
     Args:
         p_WS: (N, 3) positions of a drive [m].
@@ -235,11 +237,11 @@ class Localiser:
         turn: np.ndarray,
         X_WS0: np.ndarray | None = None,
     ) -> tuple[np.ndarray, np.ndarray | None]:
-        """Localises one scan and compares with the truth.
+        """Localises one scan and compares the result with the truth.
 
         Args:
-            frame: its number.
-            stamp_ns: its time.
+            frame: number of the scan.
+            stamp_ns: time of the scan [ns].
             scan: structured array, in S.
             X_WS: the truth.
             R_WT: see `way_axes`.
@@ -303,12 +305,12 @@ def localise(
     jobs: int = 1,
     track: Track = silent,
 ) -> np.ndarray:
-    """Localises scans of a drive, each on its own.
+    """Localises scans of a drive, each independently of the others.
 
     Args:
         localiser: the map and the estimator.
         query: the drive.
-        frames: of the scans, in any order.
+        frames: frames of the scans, in any order.
         starts: the draw of starts.
         jobs: number of processes, where the system can fork.
         track: reports progress.
@@ -357,7 +359,7 @@ def is_right(
     translation: float = RIGHT_TRANSLATION,
     rotation_deg: float = RIGHT_ROTATION_DEG,
 ) -> np.ndarray:
-    """Returns which ends of queries (K,) have at most these errors."""
+    """Returns which results (K,) have at most these errors."""
     return (rows["translation_error"] <= translation) & (
         rows["rotation_error_deg"] <= rotation_deg
     )
@@ -375,7 +377,7 @@ class Localisation:
 
     @property
     def believed_from(self) -> float:
-        """The score that 95 % of the right ends reach; NaN without any."""
+        """Score that 95 % of the right results reach; NaN without any."""
         scores = self.rows["own_score"][is_right(self.rows)]
         if len(scores) == 0:
             return math.nan
@@ -434,7 +436,7 @@ class Localisation:
         return found
 
     def numbers(self) -> dict[str, float]:
-        """Returns those of the summary that a table of results has."""
+        """Returns the numbers of the summary that go into tables of results."""
         found = self.to_json()
         known = {name: found[name] for name in _SHOWN}
         return {k: float(v) for k, v in known.items() if v is not None}

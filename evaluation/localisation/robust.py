@@ -37,7 +37,7 @@ def align_robustly(
     still: tuple[float, float],
     covariances: np.ndarray | None = None,
 ) -> tuple[np.ndarray, int]:
-    """Moves a scan onto a map.
+    """Returns the pose of a scan on a map, registered with a robust kernel.
 
     Args:
         surface: the map.

@@ -35,7 +35,7 @@ TRACKED = np.dtype(
 
 
 def check_drift(drift: float) -> None:
-    """Refuses a drift that is no share."""
+    """Raises an error if a drift is not from 0 to 1."""
     if not 0.0 <= drift <= 1.0:
         raise InputError(f"--odometry-drift: {drift:g} is not from 0 to 1")
 
@@ -53,7 +53,7 @@ def drifting_steps(
         X_WS: (N, 4, 4) true poses.
         way: (N,) length of the way up to each [m].
         drift: share of the way; 0 for none.
-        seed: of the draw.
+        seed: seed of the draw.
 
     Returns:
         (N - 1, 4, 4) poses of each LiDAR in the one before.
@@ -82,10 +82,10 @@ def track_drive(
     drift: float,
     track: Track = silent,
 ) -> np.ndarray:
-    """Follows a drive through the stretches of its way that the map holds.
+    """Tracks a drive along the parts of its path that the map covers.
 
-    On each stretch the first start is drawn, and each later one is the last end
-    moved by the odometry.
+    On each part the first start is drawn, and each later one is the last
+    estimate moved by the odometry.
 
     Args:
         localiser: the map and the estimator.
@@ -167,7 +167,7 @@ class TrackSummary:
     rows: np.ndarray
 
     def losses(self) -> list[tuple[float, bool]]:
-        """Returns the way until each loss ended [m], and whether it did."""
+        """Returns the path length to each loss [m], and whether it occurred."""
         found = []
         for stretch in np.unique(self.rows["stretch"]):
             rows = self.rows[self.rows["stretch"] == stretch]
@@ -181,7 +181,7 @@ class TrackSummary:
         return found
 
     def to_json(self) -> dict[str, float | int | None]:
-        """Returns the summary; the way counts, not the number of scans."""
+        """Returns the summary, weighted by path length instead of scans."""
         way = float(self.rows["step"].sum())
         within = self.rows["translation_error"] <= RIGHT_TRANSLATION
         losses = self.losses()

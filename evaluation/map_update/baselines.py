@@ -58,7 +58,7 @@ _BLOCK, _PART, _AT = 1.0, 0.2, 0.12
 
 
 def run_baseline(name: str, pair: Pair, track: Track = silent) -> Labels:
-    """Returns the labels of a baseline.
+    """Returns the labels that a change detector gives both maps.
 
     Raises:
         InputError: the sessions lack what it needs, or its package is not
@@ -76,7 +76,7 @@ def run_baseline(name: str, pair: Pair, track: Track = silent) -> Labels:
 def by_distance(
     mine: Session, theirs: Session, track: Track = silent
 ) -> np.ndarray:
-    """Returns labels (N,) of a map by the distance of the other one's."""
+    """Returns labels (N,) of a map by its distance from the other map."""
     del track
     _, kept, changed = SIDES[mine.side]
     far = np.isinf(nearest(mine.points, theirs.points, _APART))
@@ -86,7 +86,7 @@ def by_distance(
 def by_free_space(
     mine: Session, theirs: Session, track: Track = silent
 ) -> np.ndarray:
-    """Returns labels (N,) of a map by what the other's scans see."""
+    """Returns labels (N,) of a map by what the other drive's scans see."""
     unobserved, kept, changed = SIDES[mine.side]
     _check_scans(theirs)
     labels = np.full(len(mine.points), kept, np.uint8)
@@ -171,7 +171,7 @@ def _slopes(p_S: np.ndarray) -> np.ndarray:
 def by_m3c2(
     mine: Session, theirs: Session, track: Track = silent
 ) -> np.ndarray:
-    """Returns labels (N,) of a map by M3C2 of py4dgeo."""
+    """Returns labels (N,) of a map by the method M3C2, from py4dgeo."""
     py4dgeo = _py4dgeo()
     unobserved, kept, changed = SIDES[mine.side]
     epochs = [py4dgeo.Epoch(one.points) for one in (mine, theirs)]

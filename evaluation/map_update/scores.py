@@ -53,7 +53,7 @@ def score(
 ) -> dict:
     """Returns all scores, ready for JSON; None where one is undefined.
 
-    Names are those of classes by their numbers.
+    `names` maps the number of a class to its name.
 
     Raises:
         InputError: the truth leaves out every point.
@@ -152,11 +152,13 @@ def _share_near(
 def nearest(
     points: np.ndarray, others: np.ndarray, most: float = math.inf
 ) -> np.ndarray:
-    """Returns the distance (N,) to the nearest of others; inf beyond `most`.
+    """Returns the distance (N,) to the nearest other point.
+
+    It is infinite beyond `most`.
 
     Args:
-        points: (N, 3).
-        others: (M, 3).
+        points: (N, 3) points [m].
+        others: (M, 3) other points [m].
         most: greatest distance [m].
     """
     if len(others) == 0:

@@ -80,7 +80,7 @@ class Session:
     """One of both drives.
 
     Attributes:
-        folder: of its files.
+        folder: folder of its files.
         points: (N, 3) its map in the world [m].
         classes: (N,) uint16, SemanticKITTI's ids; 0 if unknown.
         instances: (N,) uint16, number of a structure; 0 for none.
@@ -99,7 +99,7 @@ class Session:
 
     @property
     def moves(self) -> np.ndarray:
-        """(N,) bool, points of moving and of parked vehicles and people."""
+        """(N,) bool, points on vehicles and people, also on parked ones."""
         return np.isin(self.classes, MOVES)
 
     def scan(self, index: int) -> np.ndarray:
@@ -126,7 +126,10 @@ class MapBuilder:
         self._points: list[np.ndarray] = []
 
     def add(self, scan: np.ndarray, X_WS: np.ndarray) -> None:
-        """Adds a scan: structured (N,), from a LiDAR at the pose (4, 4)."""
+        """Adds a scan, a structured array (N,), to the map.
+
+        The LiDAR is at the pose X_WS (4, 4).
+        """
         points = np.zeros(len(scan), _MAP_DTYPE)
         p_W = poses.transform(X_WS, xyz(scan))
         for column, name in enumerate("xyz"):
@@ -159,7 +162,10 @@ class MapBuilder:
             self._parts[-1] = np.union1d(self._parts[-1], last)
 
     def points(self) -> np.ndarray:
-        """Returns the map: structured (N,) x, y, z [m], label, instance."""
+        """Returns the map as a structured array (N,).
+
+        Its fields are x, y, z [m], label and instance.
+        """
         return np.concatenate([np.zeros(0, _MAP_DTYPE), *self._points])
 
 
@@ -173,8 +179,8 @@ def write_session(
 
     Args:
         drive: the drive.
-        folder: the session's; it is made.
-        spacing: length of the way between two scans [m].
+        folder: folder to create for the session.
+        spacing: distance driven between two scans [m].
         track: reports progress.
 
     Returns:

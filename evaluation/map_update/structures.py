@@ -42,14 +42,14 @@ class StructureChange:
 
     @property
     def moves(self) -> bool:
-        """Whether it is a vehicle or a person."""
+        """Whether the structure is a vehicle or a person."""
         return self.label in MOVES
 
 
 def verdicts(
     instances: np.ndarray, labels: np.ndarray, side: str
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Returns what became of the structures of a map.
+    """Returns whether each structure of a map is kept, gone or new.
 
     Args:
         instances: (N,) number of the structure of each point; 0 for none.
@@ -88,7 +88,7 @@ def write_structures(
     A structure that only one world has is there without a point, too.
 
     Args:
-        path: of the CSV file.
+        path: path of the CSV file.
         pair: both sessions.
         truth: labels of each.
         tables: instance -> name and class, of each.

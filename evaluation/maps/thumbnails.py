@@ -19,9 +19,10 @@ def thumbnail(
     """Returns the highest point in each cell around the sensor.
 
     Args:
-        points: (N, 3) in the frame of the sensor [m].
-        sensor_height: above the ground [m].
-        seed: of the order, and so of the choice if there are too many.
+        points: (N, 3) points in the frame of the sensor [m].
+        sensor_height: height of the sensor above the ground [m].
+        seed: seed of the random order, which decides which points stay if there
+            are too many.
 
     Returns:
         (M, 3) uint8, M <= 2000: cells along x and along y, of which 128 is

@@ -78,7 +78,7 @@ def move(
     larger: np.ndarray,
     larger_sampled: np.ndarray,
 ) -> None:
-    """Enters all voxels of one table into another, empty one."""
+    """Moves all voxels of a table into a larger, empty one."""
     for i in range(len(table)):
         if table[i].count != 0:
             slot = _find(larger, table[i].ix, table[i].iy, table[i].iz)
@@ -109,7 +109,7 @@ def enter(
     samples: np.ndarray,
     num_samples: int,
 ) -> tuple[int, int, int]:
-    """Enters points into a table of voxels.
+    """Adds points to the voxels of a table.
 
     Args:
         points: (3, N) in the frame of a sensor [m].
@@ -173,12 +173,13 @@ def enter(
 
 @dataclass(frozen=True)
 class VoxelMap:
-    """The occupied voxels of a cloud, sorted by index.
+    """A map as its occupied voxels, sorted by index.
 
     Attributes:
-        indices: (V, 3) int32 voxel number along x, y, z.
-        centroids_W: (V, 3) float64 mean of each voxel's points [m].
-        counts: (V,) int64 points in each voxel.
+        indices: (V, 3) int32 number of each voxel along x, y, z.
+        centroids_W: (V, 3) float64 mean of each voxel's points in the world
+            [m].
+        counts: (V,) int64 number of points in each voxel.
         voxel_size: length of a voxel's side [m].
         num_ignored: number of points left out as not finite.
         origin_W: a corner of voxel (0, 0, 0) [m].
@@ -243,7 +244,9 @@ class VoxelMap:
         )
 
     def find(self, points_W: np.ndarray) -> np.ndarray:
-        """Returns the voxels of points (N, 3) [m].
+        """Returns the voxel in which each of N points lies.
+
+        The points (N, 3) are in the world [m].
 
         Returns:
             (N,) index into the map, -1 where its voxel is not occupied.
@@ -295,7 +298,7 @@ class VoxelAccumulator:
         self._columns = np.zeros((3, _BATCH))
 
     def add(self, points: np.ndarray, X_WS: np.ndarray | None = None) -> int:
-        """Adds a cloud.
+        """Adds a cloud to the map.
 
         Args:
             points: structured array of shape (N,) with x, y, z [m].
@@ -351,7 +354,7 @@ class VoxelAccumulator:
         )
 
     def samples(self) -> np.ndarray:
-        """Returns the first point in each part of a voxel.
+        """Returns the first point in each subdivision of a voxel.
 
         Returns:
             (K, 3), in the order in which they came [m].
@@ -380,7 +383,7 @@ class VoxelAccumulator:
 def voxelise(
     points: np.ndarray, voxel_size: float = VOXEL_SIZE
 ) -> tuple[VoxelMap, int]:
-    """Returns the voxel map of one cloud in the world frame.
+    """Returns the voxel map of a cloud (N, 3) in the world frame [m].
 
     Returns:
         The map, and how many points were left out as not finite.
@@ -400,10 +403,10 @@ def map_drive(
     voxel_size: float = VOXEL_SIZE,
     track: Track = silent,
 ) -> VoxelMap:
-    """Returns the world-frame map of all scans of a drive.
+    """Returns the voxel map of all scans of a drive, in the world frame.
 
-    One pass over the scans, one in memory at a time. The default grid is
-    the one on which structural change is defined.
+    Scans are read once, one at a time. The default voxel size is the one for
+    which structural change is defined.
 
     Raises:
         InputError: if a scan or a pose cannot be read.
@@ -430,10 +433,12 @@ def _corners(
 
 
 def thin(points: np.ndarray, voxel_size: float) -> np.ndarray:
-    """Returns the voxel centroids of a cloud in the frame of a sensor.
+    """Returns a cloud with one point per voxel, the centroid.
+
+    Points are in the frame of a sensor.
 
     Args:
-        points: (N, 3) [m]; points that are not finite are left out.
+        points: (N, 3) points [m]; those that are not finite are left out.
         voxel_size: length of a voxel's side [m].
 
     Returns:

@@ -68,48 +68,55 @@ def _increasing(limits: tuple[float, float]) -> tuple[float, float]:
 
 
 class BtcConfig(MethodConfig):
-    """Parameters of BTC.
+    """Settings of BTC.
 
-    Sources: [O] the outdoor settings of the public program, [P] fixed in
-    its text. The height of the sensor is not used: the ground is found in
-    the cloud.
+    Sources of the values: [O] the outdoor settings of the public program, [P]
+    constants in its code. The height of the sensor is not used: the method
+    finds the ground in the cloud.
 
     Attributes:
-        voxel_size: side of the voxels of the planes [m]; [O] 2.
-        max_sparse_points: a voxel with more points may be a plane; [O] 10.
-        flatness: variance along the normal below which it is one [m^2];
+        voxel_size: side of the voxels in which planes are sought [m]; [O] 2.
+        max_sparse_points: number of points above which a voxel can be a plane;
+            [O] 10.
+        flatness: largest variance of a plane's points along its normal [m^2];
             [O] 0.01.
-        merge_normal_limit: difference of two normals below which two planes
-            may be one; [O] 0.1.
-        merge_distance_limit: likewise, distance of each centre from the other
-            plane [m]; [O] 0.3.
-        image_axes: whether keypoints are placed as by the public program,
-            whose second axis leaves the plane by a wrong term (see
-            `btc_triangles.image_axes`), or by orthogonal axes. [P] public.
-        resolution: length of a cell of the image [m]; [O] 0.5.
-        height_range: heights above the ground of the points in it [m];
-            [O] -1, 4.
-        height_step: height of the layers that bits stand for [m]; [O] 0.1.
+        merge_normal_limit: largest difference of the normals of two planes that
+            are merged; [O] 0.1.
+        merge_distance_limit: largest distance of the centre of one plane from
+            the other, for merging [m]; [O] 0.3.
+        image_axes: axes in which keypoints are placed. `public` copies the
+            public program, whose second axis leaves the plane by a wrong term
+            (see `btc_triangles.image_axes`); `orthogonal` corrects it. [P]
+            public.
+        resolution: side of a cell of the image [m]; [O] 0.5.
+        height_range: lowest and highest height above the ground of the points
+            in the image [m]; [O] -1, 4.
+        height_step: height of each layer of the image [m]; [O] 0.1.
         num_layers: number of layers; [P] 49. The public program divides the
-            range by the step in single precision, which gives one less than
-            meant, and writes higher points beyond the end of its array; here
-            these have no bit.
-        min_heights: heights that a keypoint needs; [O] 10.
-        suppression_radius: distance within which only the keypoint with most
-            heights stays [m]; [O] 2.
-        max_keypoints: most keypoints of a place; [O] 500.
-        num_neighbours: keypoints that triangles are made with, the keypoint
-            itself included; [O] 10.
-        side_range: lengths of the triangles' sides [m]; [O] 2, 50.
-        side_resolution: step of the table of triangles [m]; [O] 0.2.
-        side_tolerance: relative difference of the sides of triangles that
-            match; [O] 0.01.
-        min_similarity: least similarity of their descriptors; [O] 0.7.
-        min_votes: matches that a candidate needs; [P] 5.
-        candidates: places with most votes that are verified; [O] 50.
-        normal_limit: difference of the normals of planes that fit; [O] 0.2.
-        distance_limit: likewise, distance of the centre from the plane [m];
-            [O] 0.5.
+            range by the step in single precision, which gives one layer less
+            than meant, and writes higher points beyond the end of its array;
+            here these points are ignored.
+        min_heights: number of layers that a keypoint needs; [O] 10.
+        suppression_radius: distance within which only the keypoint with the
+            most layers is kept [m]; [O] 2.
+        max_keypoints: largest number of keypoints of a place; [O] 500.
+        num_neighbours: number of neighbouring keypoints with which triangles
+            are made, including the keypoint itself; [O] 10.
+        side_range: least and greatest length of the triangles' sides [m]; [O]
+            2, 50.
+        side_resolution: step by which side lengths are rounded in the table of
+            triangles [m]; [O] 0.2.
+        side_tolerance: largest relative difference between the sides of
+            matching triangles; [O] 0.01.
+        min_similarity: least similarity of the descriptors of matching
+            triangles; [O] 0.7.
+        min_votes: number of matches that a candidate needs; [P] 5.
+        candidates: number of places with the most votes that are verified; [O]
+            50.
+        normal_limit: largest difference between the normals of matching planes;
+            [O] 0.2.
+        distance_limit: largest distance of the centre of one plane from a
+            matching one [m]; [O] 0.5.
     """
 
     voxel_size: PositiveFloat = 2.0
@@ -253,7 +260,7 @@ class Btc(Method[BtcDescription, BtcDatabase]):
         database: BtcDatabase,
         places: Sequence[int],
     ) -> list[np.ndarray | None]:
-        """Returns the common motions of the triangles.
+        """Returns the poses on which most matching triangles agree.
 
         None if too few match or agree.
         """
@@ -296,9 +303,9 @@ class Btc(Method[BtcDescription, BtcDatabase]):
 
 
 def align(query: np.ndarray, place: np.ndarray) -> np.ndarray:
-    """Returns the motion that brings triangles closest to their partners.
+    """Returns the motion that best aligns triangles with their partners.
 
-    Kabsch's solution, without reflections.
+    It is Kabsch's solution, without reflections.
 
     Args:
         query: (..., 3, 3) vertices, one a row [m].
@@ -322,7 +329,7 @@ def align(query: np.ndarray, place: np.ndarray) -> np.ndarray:
 
 
 def find_motion(query: np.ndarray, place: np.ndarray) -> np.ndarray | None:
-    """Returns the motion with the most agreeing pairs of triangles.
+    """Returns the motion on which most pairs of triangles agree.
 
     Every pair, or every n-th of many, proposes the motion that aligns it.
 
@@ -353,7 +360,7 @@ def plane_overlap(
     normal_limit: float,
     distance_limit: float,
 ) -> float:
-    """Returns the part of a query's patches that lie on one of a place.
+    """Returns the share of a query's patches that match one of a place.
 
     Each patch is compared with the one whose center is nearest to its own.
 

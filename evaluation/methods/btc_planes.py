@@ -63,11 +63,11 @@ def voxel_planes(
 ) -> Planes:
     """Returns the voxels whose points lie on a plane.
 
-    They come in the order of the public program, which depends on the order of
-    the points.
+    They have the order of the public program, which depends on the order of the
+    points.
 
     Args:
-        points: (N, 3) [m].
+        points: (N, 3) points [m].
         voxel_size: side of a voxel [m].
         max_points: only voxels with more points are used.
         flatness: upper limit of the variance along the normal [m^2].
@@ -113,7 +113,7 @@ def merge(
     distance_limit: float,
     keep_single: bool,
 ) -> Planes:
-    """Returns the planes that alike patches form together.
+    """Returns the planes that similar patches form together.
 
     Args:
         planes: some of them alike. The groups depend on their order.
@@ -150,14 +150,14 @@ def group_alike(
     normal_limit: float,
     distance_limit: float,
 ) -> np.ndarray:
-    """Returns the group (P,) of each patch; -1 for one that is like no other.
+    """Returns the group (P,) of each patch; -1 for one without a like.
 
     From the last patch to the first, each is compared with all before it, in
-    their order. If two are alike, one without a group joins that of the
-    other, or both found a new one; two groups never become one.
+    their order. If two are alike, one without a group joins that of the other,
+    or both found a new one; two groups never become one.
 
     Args:
-        centers: (P, 3) [m].
+        centers: (P, 3) centres of the patches [m].
         normals: (P, 3) unit.
         normal_limit: see `base_plane`.
         distance_limit: see `base_plane`.
@@ -276,7 +276,7 @@ def _fit(
 
 
 def voxel_order(index: np.ndarray) -> np.ndarray:
-    """Returns (V,) in which order the public program visits voxels.
+    """Returns the order (V,) in which the public program visits voxels.
 
     Args:
         index: (V, 3) int64 of distinct voxels along x, y and z, in the order
@@ -290,12 +290,12 @@ def voxel_order(index: np.ndarray) -> np.ndarray:
 
 
 def hash_table_order(codes: np.ndarray) -> np.ndarray:
-    """Returns (N,) in which order a std::unordered_map is iterated.
+    """Returns the order (N,) in which a std::unordered_map is iterated.
 
-    The elements are one list, on which those of a bucket follow each other.
-    A new element goes to the front of its bucket, a new bucket to the front
-    of the list. When the number of buckets grows, all elements are put in
-    anew, in the order of the list.
+    The elements are one list, on which those of a bucket follow each other. A
+    new element goes to the front of its bucket, a new bucket to the front of
+    the list. When the number of buckets grows, all elements are put in anew, in
+    the order of the list.
 
     Args:
         codes: (N,) uint64 hashes of the elements, in the order in which they

@@ -113,12 +113,13 @@ def height_image(
     height_step: float,
     num_layers: int,
 ) -> HeightImage:
-    """Draws points into the cells of a grid that starts at the first.
+    """Returns an image of the heights at which each cell has points.
 
-    Its memory grows with the area that the points cover.
+    The cells are those of a grid that starts at the first. Its memory grows
+    with the area that the points cover.
 
     Args:
-        points: (N, 3) [m].
+        points: (N, 3) points [m].
         center: (3,) a point of the plane [m].
         axes: (3, 3) directions of the image, one a row.
         resolution: length of a cell [m].
@@ -177,16 +178,16 @@ def height_image(
 def peaks(
     num_heights: np.ndarray, min_heights: int
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Finds the cells that stand out, away from lines.
+    """Returns the cells of an image that stand out and are not on a line.
 
-    One a segment: the cell with most heights, the first of equal ones. It is
-    part of a line if in some direction one neighbour is nearly as high and
-    the opposite one at least half as high.
+    There is one per segment: the cell with most heights, the first of equal
+    ones. It is part of a line if in some direction one neighbour is nearly as
+    high and the opposite one at least half as high.
 
     Args:
         num_heights: (rows, columns) bits set in each cell; multiples of the
             segment.
-        min_heights: that a peak needs.
+        min_heights: number of heights that a peak needs.
 
     Returns:
         Rows (C,) and columns (C,), by segment along rows, then columns.
@@ -220,13 +221,13 @@ def peaks(
 def find_keypoints(
     image: HeightImage, center: np.ndarray, axes: np.ndarray, min_heights: int
 ) -> Keypoints:
-    """Returns the peaks of an image, as places on its plane.
+    """Returns the peaks of an image as points on its plane.
 
     Args:
         image: cloud seen along the normal.
         center: (3,) with which the image was drawn [m].
         axes: (3, 3) likewise.
-        min_heights: that a keypoint needs.
+        min_heights: number of heights that a keypoint needs.
     """
     cells = peaks(count_bits(image.heights), min_heights)
     return Keypoints(
@@ -236,14 +237,15 @@ def find_keypoints(
 
 
 def suppress(keypoints: Keypoints, radius: float, max_number: int) -> Keypoints:
-    """Returns keypoints with more heights than any other nearby.
+    """Returns the keypoints with more heights than any other nearby.
 
     If two are equal, neither stays.
 
     Args:
-        keypoints: all.
-        radius: distance that is nearby [m].
-        max_number: greatest number of kept ones, those with most heights.
+        keypoints: all keypoints.
+        radius: distance within which keypoints are compared [m].
+        max_number: largest number of keypoints to keep, those with the most
+            heights.
     """
     tree = cKDTree(keypoints.positions)
     pairs = tree.query_pairs(radius, output_type="ndarray")
@@ -381,10 +383,12 @@ def make_triangles(
 
 
 def make_table(clouds: Sequence[Triangles], resolution: float) -> TriangleTable:
-    """Returns the triangles of clouds, sorted by cell; ties in their order.
+    """Returns the triangles of several clouds, sorted by cell.
+
+    Triangles of one cell keep their order.
 
     Args:
-        clouds: at least one.
+        clouds: triangles of each cloud; at least one.
         resolution: length that is one unit of the sides [m].
     """
     triangles = Triangles(
@@ -411,17 +415,17 @@ def match(
     side_tolerance: float,
     min_similarity: float,
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Finds the triangles that are similar to those of a query.
+    """Returns the triangles that are similar to those of a query.
 
-    Similar are triangles whose sides differ by little, relative to their
-    length (Euclidean norms of the three), and whose vertices have about the
-    same heights: Dice similarity, mean of the three. Only cells near those of
-    the query are searched, so that large triangles must be more alike than the
+    Similar are triangles whose sides differ by little, relative to their length
+    (Euclidean norms of the three), and whose vertices have about the same
+    heights: Dice similarity, mean of the three. Only cells near those of the
+    query are searched, so that large triangles must be more alike than the
     tolerance requires.
 
     Args:
-        query: from one cloud.
-        table: to search for its triangles.
+        query: triangles of one cloud.
+        table: table in which similar triangles are sought.
         side_tolerance: upper limit of the sides' relative difference.
         min_similarity: lower limit of the similarity.
 

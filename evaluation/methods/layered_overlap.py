@@ -61,20 +61,22 @@ _TO_LAST = np.array([1, 2, 8, 8])
 
 
 class LayeredOverlapConfig(MethodConfig):
-    """Parameters of layered overlap.
+    """Settings of layered overlap.
 
-    Source of all: trials on development worlds, which are not the worlds of
-    the reported results.
+    All values come from trials on development worlds, which are not the worlds
+    of the reported results.
 
     Attributes:
-        cell: length of a cell of the finest maps, of 256 x 256 [m].
-        min_points: points that fill a cell.
-        poses: pairs of a place and a heading that the second search compares.
-        refined: those of them that the third search compares.
-        candidates: places that are compared cell by cell.
-        weights: weights of common cells: low, middle, high, poles, kerbs.
-        least_cells: weighted cells added to those of either scan, so that two
-            nearly empty scans are not alike.
+        cell: side of a cell of the finest maps, which have 256 x 256 cells [m].
+        min_points: number of points that make a cell occupied.
+        poses: number of pairs of a place and a heading that the second search
+            compares.
+        refined: number of these pairs that the third search compares.
+        candidates: number of places that are compared cell by cell.
+        weights: weights of common cells with low, middle and high points, poles
+            and kerbs.
+        least_cells: number of weighted cells that is added to both scans, so
+            that two nearly empty scans do not look alike.
     """
 
     cell: PositiveFloat = 0.5
@@ -196,9 +198,9 @@ class LayeredOverlap(Method[LayeredScan, LayeredDatabase]):
         database: LayeredDatabase,
         places: Sequence[int],
     ) -> list[np.ndarray | None]:
-        """Returns turns and horizontal translations of the query.
+        """Returns the query's headings and horizontal translations.
 
-        None if one of the two shows nothing.
+        None if one of the two scans shows nothing.
         """
         scans = [database.places[place] for place in places]
         poses: list[np.ndarray | None] = [None] * len(scans)

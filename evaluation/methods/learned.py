@@ -103,10 +103,11 @@ def polar_image(points: np.ndarray, sensor_height: float) -> np.ndarray:
 
 
 class LearnedConfig(MethodConfig):
-    """Parameters of the learned descriptor.
+    """Settings of the learned descriptor.
 
     Attributes:
-        weights: file by `cns-drake train`; None for the shipped weights.
+        weights: file of weights from `cns-drake train`; by default the shipped
+            weights.
     """
 
     weights: Path | None = None
@@ -114,7 +115,7 @@ class LearnedConfig(MethodConfig):
     @computed_field  # type: ignore[prop-decorator]
     @property
     def digest(self) -> str:
-        """The weights: two files of one name are not the same method."""
+        """Digest of the weights, since two files can have the same name."""
         path = self.weights or SHIPPED
         load_weights(path)
         return hashlib.sha256(path.read_bytes()).hexdigest()[:16]
@@ -165,7 +166,7 @@ class Learned(Method[LearnedScan, LearnedDatabase]):
         )
 
     def describe_image(self, image: np.ndarray) -> LearnedScan:
-        """Describes a polar image."""
+        """Returns the description of a polar image."""
         if not image.any():
             return LearnedScan(np.zeros((TURNS, FEATURES), np.float32))
         self._check_seen(image)
@@ -198,7 +199,7 @@ class Learned(Method[LearnedScan, LearnedDatabase]):
     def relative_pose(
         self, query: LearnedScan, database: LearnedDatabase, place: int
     ) -> np.ndarray | None:
-        """Returns the turn of the query, in steps of 3.75 deg.
+        """Returns the query's heading at a place, in steps of 3.75 deg.
 
         None if one of the two has no points within reach.
         """
@@ -225,12 +226,12 @@ class Learned(Method[LearnedScan, LearnedDatabase]):
 
 
 def seen_part(image: np.ndarray) -> float:
-    """Returns the part of the sectors of a polar image that have a point."""
+    """Returns the share of a polar image's sectors that have a point."""
     return float(image.any(axis=(0, 2)).mean())
 
 
 def load_weights(path: Path) -> Mapping[str, np.ndarray]:
-    """Reads and checks a file of weights.
+    """Returns the weights in a file, after checking them.
 
     Returns:
         `kernel_0` (9 x channels in, channels out) float32, `bias_0`, and so on;

@@ -31,7 +31,7 @@ _ALL = 1 << 17
 
 
 class MapClosuresConfig(MethodConfig):
-    """Parameters of MapClosures; defaults are those of the package.
+    """Settings of MapClosures; the defaults are those of the package.
 
     The height of the sensor is not used: the package finds the ground.
 

@@ -30,17 +30,17 @@ PlaceScan = Literal["middle", "first"]
 
 
 class MethodConfig(BaseModel):
-    """Parameters of a method; each default has its source.
+    """The parameters that all methods share, and the base of their own.
 
     Attributes:
-        sensor_height: height of the LiDAR above the ground [m]. Default: the
-            mount of the CNS vehicle.
+        sensor_height: height of the LiDAR above the ground [m]; by default as
+            on the CNS vehicle.
         place: which of the merged scans stands for a place, `middle` or
-            `first`; None for the choice of the protocol. Methods of single
-            scans do not use it.
-        sequence: length of the way before a query whose queries vote for its
-            place, too, as in SeqSLAM [m]; 0 for the query alone. See
-            `sequences.along_the_way`.
+            `first`; by default the protocol decides. Methods of single scans do
+            not use it.
+        sequence: length of the path before a query [m] along which earlier
+            queries also vote for its place, as in SeqSLAM; 0 uses only the
+            query. See `sequences.along_the_way`.
 
     Example:
         from evaluation import MethodConfig
@@ -57,26 +57,26 @@ class MethodConfig(BaseModel):
 
 
 class Method(abc.ABC, Generic[Descriptor, Database]):
-    """Describes scans and compares a query with a database of places.
-
-    Attributes:
-        name: as on the command line.
-        Config: type of its parameters.
-        scans_per_place: number of consecutive scans that are merged into the
-            described cloud, in the frame of the scan that stands for it.
-        point_fields: further fields of points that it needs, such as intensity,
-            ring, t or label.
-        batch_size: number of clouds for a call of `describe_batch`.
-        skips_places: whether it scores NaN, even exhaustively, for places that
-            are no candidates; without it such a score is a fault.
-        rerank_best: number of best places that a second stage, `rerank`,
-            compares by their points; 0 without one.
-        config: the parameters in use.
+    """A place-recognition method: describes and compares scans.
 
     A cloud is (N, 3) float64, finite, in the frame of the LiDAR at the place
     [m]. If the method names `point_fields`, it is a structured array (N,)
     instead, of float64 `x`, `y` and `z` and those fields in the types of the
     recording.
+
+    Attributes:
+        name: name of the method on the command line.
+        Config: type of its parameters.
+        scans_per_place: number of consecutive scans that are merged into the
+            described cloud, in the frame of the scan that stands for it.
+        point_fields: additional fields of points that it needs, such as
+            intensity, ring, t or label.
+        batch_size: number of clouds for one call of `describe_batch`.
+        skips_places: whether its score may be NaN, even when `exhaustive`, for
+            places that are no candidates; otherwise NaN is an error.
+        rerank_best: number of best places that `rerank`, a second stage,
+            compares by their points; 0 without one.
+        config: the parameters in use.
 
     Example:
         from evaluation import make_method
@@ -99,26 +99,28 @@ class Method(abc.ABC, Generic[Descriptor, Database]):
 
     @abc.abstractmethod
     def describe(self, points: np.ndarray) -> Descriptor:
-        """Describes the cloud of a query."""
+        """Returns the description of a query's cloud."""
 
     def describe_place(self, points: np.ndarray) -> Descriptor:
-        """Describes a cloud of the database; by default like a query."""
+        """Returns the description of a place; by default as of a query."""
         return self.describe(points)
 
     def describe_batch(
         self, clouds: Sequence[np.ndarray], *, of_places: bool
     ) -> list[Descriptor]:
-        """Describes some clouds, for methods that are faster with several.
+        """Returns the descriptions of several clouds.
+
+        Override it in methods that are faster with several.
 
         Args:
-            clouds: up to `batch_size` of them.
-            of_places: describe them as of the database, not as queries.
+            clouds: up to `batch_size` clouds.
+            of_places: whether the clouds are of places, and not of queries.
         """
         one = self.describe_place if of_places else self.describe
         return [one(cloud) for cloud in clouds]
 
     def for_lidar(self, field: LidarField | None) -> "Method":
-        """Returns the method for scans of a LiDAR; None if it is not known.
+        """Returns the method adapted to a LiDAR; None is an unknown LiDAR.
 
         By default it is the method itself.
         """
@@ -126,30 +128,30 @@ class Method(abc.ABC, Generic[Descriptor, Database]):
         return self
 
     def assumption(self, field: LidarField | None) -> str | None:
-        """Returns what the method takes for granted of a LiDAR, if anything."""
+        """Returns what the method assumes about a LiDAR, in words, or None."""
         del field
         return None
 
     @property
     def describes_alike(self) -> bool:
-        """Whether places and queries are described in the same way."""
+        """Whether places and queries have the same descriptions."""
         return type(self).describe_place is Method.describe_place
 
     @abc.abstractmethod
     def build_database(self, places: Sequence[Descriptor]) -> Database:
-        """Returns the database: all places, indexed."""
+        """Returns a database with all places, indexed for searches."""
 
     @abc.abstractmethod
     def score(
         self, query: Descriptor, database: Database, *, exhaustive: bool = False
     ) -> np.ndarray:
-        """Compares a query with every place of a database.
+        """Returns how similar a query is to every place of a database.
 
         Args:
-            query: made by `describe`.
-            database: D places.
-            exhaustive: compare also with places that a search would skip only
-                to save time.
+            query: description of the query, made by `describe`.
+            database: database of D places, made by `build_database`.
+            exhaustive: whether to compare also with places that a search would
+                skip only to save time.
 
         Returns:
             (D,) float64, higher is more similar; NaN for a place that is no
@@ -163,10 +165,13 @@ class Method(abc.ABC, Generic[Descriptor, Database]):
         *,
         exhaustive: bool = False,
     ) -> np.ndarray:
-        """Compares the last of some queries, for methods that match drives.
+        """Returns how similar a query is to every place, given earlier queries.
+
+        For methods that match drives instead of single scans.
 
         Args:
-            queries: those of a drive, from its first to the present one.
+            queries: descriptions of a drive's queries, from the first to the
+                present one.
             database: see `score`.
             exhaustive: see `score`.
 
@@ -181,14 +186,15 @@ class Method(abc.ABC, Generic[Descriptor, Database]):
         places: Sequence[np.ndarray],
         scores: np.ndarray,
     ) -> np.ndarray:
-        """Scores the best places anew: a second stage, by points.
+        """Returns new scores for the best places, from a second stage.
 
-        All other places are then no candidates.
+        The second stage compares points. All other places are then no
+        candidates.
 
         Args:
             query: cloud of the query.
-            places: clouds of K places, K at most `rerank_best`.
-            scores: (K,) their results of `score`, decreasing.
+            places: clouds of the K best places; K is at most `rerank_best`.
+            scores: (K,) scores of these places by `score`, decreasing.
 
         Returns:
             (K,) float64, higher is more similar; NaN for no candidate.
@@ -199,9 +205,9 @@ class Method(abc.ABC, Generic[Descriptor, Database]):
     def relative_pose(
         self, query: Descriptor, database: Database, place: int
     ) -> np.ndarray | None:
-        """Returns X_PQ (4, 4), the query's sensor in that of a place.
+        """Returns the pose (4, 4) of a query's LiDAR in the frame of a place's.
 
-        None if the method does not estimate it.
+        It is X_PQ; None if the method does not estimate poses.
         """
         if type(self).relative_poses is Method.relative_poses:
             return None
@@ -210,9 +216,9 @@ class Method(abc.ABC, Generic[Descriptor, Database]):
     def relative_poses(
         self, query: Descriptor, database: Database, places: Sequence[int]
     ) -> list[np.ndarray | None]:
-        """Returns the `relative_pose` of each of some places.
+        """Returns the `relative_pose` of a query at each of several places.
 
-        For methods that are faster with several.
+        Override it in methods that are faster with several.
         """
         return [self.relative_pose(query, database, one) for one in places]
 
@@ -247,7 +253,7 @@ _MethodClass = TypeVar("_MethodClass", bound=type[Method])
 
 
 def register(name: str) -> Callable[[_MethodClass], _MethodClass]:
-    """Decorates a Method: registers it under a name.
+    """Returns a decorator that registers a Method under a name.
 
     Raises:
         ValueError: if another method has that name.
@@ -287,7 +293,7 @@ def known_methods() -> tuple[str, ...]:
 
 
 def optional_methods() -> tuple[str, ...]:
-    """Returns the names of the methods that run only if they are named."""
+    """Returns the names of the methods that run only on request."""
     return tuple(sorted(_OPTIONAL))
 
 
@@ -303,7 +309,9 @@ def shipped_methods() -> tuple[str, ...]:
 
 
 def make_method(name: str, parameters: Mapping[str, Any]) -> Method:
-    """Returns a method with these parameters; others have their defaults.
+    """Returns a method with the given parameters.
+
+    All other parameters have their defaults.
 
     Raises:
         InputError: if the method or a parameter is unknown, or a value does not
@@ -333,7 +341,7 @@ def make_method(name: str, parameters: Mapping[str, Any]) -> Method:
 
 
 def load_method(path: Path) -> type[Method]:
-    """Runs a Python file and returns the method that it defines.
+    """Returns the method that a Python file defines.
 
     Exceptions in it, then and later, become one line for its author.
 
@@ -376,7 +384,7 @@ def load_method(path: Path) -> type[Method]:
 
 
 def run_module(path: Path) -> ModuleType:
-    """Runs a Python file of a method's author, and returns its module.
+    """Returns the module of a method author's Python file, after running it.
 
     Raises:
         InputError: if there is no such file, or it fails.
@@ -397,7 +405,7 @@ def run_module(path: Path) -> ModuleType:
 
 
 def with_named_faults(function: Callable, path: Path) -> Callable:
-    """Returns a function whose exceptions become one line."""
+    """Returns a function whose exceptions become one line with the file."""
 
     @functools.wraps(function)
     def call(*arguments: Any, **options: Any) -> Any:

@@ -50,17 +50,17 @@ _BYTES = np.uint64(0x0101010101010101)
 def layer_cells(
     points: np.ndarray, sensor_height: float, cell: float, least_points: int
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Returns the filled cells of each layer: low, middle, high, poles, kerbs.
+    """Returns the occupied cells of each layer of a scan.
 
-    The cell of a point follows from sums, products, quotients and square roots
-    only. IEEE 754 defines these to the last bit, so that cells are the same on
-    every processor.
+    Layers are low, middle, high, poles and kerbs. The cell of a point follows
+    from sums, products, quotients and square roots only. IEEE 754 defines these
+    to the last bit, so that cells are the same on every processor.
 
     Args:
         points: (N, 3) in the frame of the LiDAR [m].
         sensor_height: above the ground [m].
         cell: length of a cell [m].
-        least_points: that fill a cell.
+        least_points: number of points that fill a cell.
 
     Returns:
         (M,) uint16 numbers of cells, layer by layer and increasing in each,
@@ -169,7 +169,7 @@ def coarse_maps(
     halvings: int,
     maps: np.ndarray,
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Returns coarse maps of a scan, a word a row, at some headings.
+    """Returns coarse maps of a scan at several headings, one word per row.
 
     Args:
         cells: (M,) uint16, see `layer_cells`.
@@ -212,7 +212,7 @@ def best_overlaps(
     starts: np.ndarray,
     moves: np.ndarray,
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Returns how much a query and places overlap at most near some poses.
+    """Returns the largest overlap of a query with each place near some poses.
 
     Args:
         queries: (H, R, S) uint64: maps of the query, at headings of equal
@@ -275,11 +275,12 @@ def climb(
     start: np.ndarray,
     steps: np.ndarray,
 ) -> np.ndarray:
-    """Climbs to the pose at which a query overlaps a place most.
+    """Returns the pose at which a query overlaps a place most.
 
-    A cell of the query overlaps the place where it meets one of the same layer
-    or a neighbour of one. The best of a pose and its 26 neighbours becomes the
-    next one, until none is better; then steps get smaller.
+    It climbs from a start. A cell of the query overlaps the place where it
+    meets one of the same layer or a neighbour of one. The best of a pose and
+    its 26 neighbours becomes the next one, until none is better; then steps get
+    smaller.
 
     Args:
         cells: (M,) uint16 of the query, see `layer_cells`.

@@ -39,16 +39,19 @@ _LEAST_BLUR, _LEAST_DENSITY = 0.1, 0.01
 
 
 class ProbeConfig(MethodConfig):
-    """Parameters of PROBE; defaults are those of the paper's Table I.
+    """Settings of PROBE; the defaults are those of the paper's Table I.
 
-    The height of the sensor is not used: heights are those in its frame.
+    The height of the sensor is not used: heights are measured in the LiDAR's
+    frame.
 
     Attributes:
-        voxel_size: cell of the thinning before, whose first point stays [m].
-        rings: cells of equal length up to `max_range`.
-        sectors: cells of equal angle.
-        max_range: farthest range [m].
-        sigma_t: standard deviation of the expected move [m].
+        voxel_size: side of the voxels to which clouds are thinned first [m];
+            the first point of each voxel is kept.
+        rings: number of equal cells up to `max_range`.
+        sectors: number of equal cells of azimuth.
+        max_range: greatest range of a point that counts [m].
+        sigma_t: standard deviation of the expected displacement between query
+            and place [m].
     """
 
     voxel_size: PositiveFloat = 0.5
@@ -74,7 +77,7 @@ class Probe:
     mu: np.ndarray
 
     def evidence(self) -> tuple[np.ndarray, np.ndarray]:
-        """Returns the probabilities drawn to 1/2, and their log-odds."""
+        """Returns occupancy probabilities, moved towards 1/2, and log-odds."""
         mu = self.mu.astype(np.float64)
         sigma = np.sqrt(mu * (1.0 - mu))
         p = mu * (1.0 - sigma) + 0.5 * sigma
@@ -174,7 +177,7 @@ class ProbeMethod(Method[Probe, ProbeDatabase]):
     def relative_pose(
         self, query: Probe, database: ProbeDatabase, place: int
     ) -> np.ndarray | None:
-        """Returns the turn of the query, in steps of one sector.
+        """Returns the query's heading at a place, in steps of one sector.
 
         None if one of the two has no points within range.
         """

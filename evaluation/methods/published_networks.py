@@ -49,10 +49,10 @@ _TINY = 1e-6
 
 
 def prepare(points: np.ndarray) -> np.ndarray:
-    """Returns PointNetVLAD's form of a cloud.
+    """Returns a cloud in the form that PointNetVLAD's networks expect.
 
     Args:
-        points: (N, 3), x ahead, y left, z up [m].
+        points: (N, 3) points, x ahead, y left, z up [m].
 
     Returns:
         (4096, 3) float32, or (0, 3) if nothing stands on the ground.
@@ -332,9 +332,9 @@ def dpa_net(weights: Weights, cloud: np.ndarray) -> np.ndarray:
 
 
 def farthest_points(points: np.ndarray, number: int) -> np.ndarray:
-    """Returns the indices of points, each the farthest from those before.
+    """Returns indices of points, each the farthest from all before it.
 
-    The first is 0.
+    The first index is 0.
     """
     points = points.astype(np.float64)
     norms = (points * points).sum(axis=1)
@@ -387,12 +387,13 @@ def _deformable_attention(
 
 
 class NetworkConfig(MethodConfig):
-    """Parameters of a published network.
+    """Settings of a published neural network.
 
-    The height of the sensor is not used: the ground is found in the cloud.
+    The height of the sensor is not used: the method finds the ground in the
+    cloud.
 
     Attributes:
-        weights: file by its authors.
+        weights: file of the weights that the authors published.
     """
 
     weights: Path
@@ -400,7 +401,7 @@ class NetworkConfig(MethodConfig):
     @computed_field  # type: ignore[prop-decorator]
     @property
     def digest(self) -> str:
-        """The weights: two files of one name are not the same method."""
+        """Digest of the weights, since two files can have the same name."""
         content = read_bytes(self.weights, MOST_BYTES)
         return hashlib.sha256(content).hexdigest()[:16]
 

@@ -40,25 +40,27 @@ _CORRELATION_SCALE = 0.15
 
 
 class RingPlusPlusConfig(MethodConfig):
-    """Parameters of RING++.
+    """Settings of RING++.
 
-    Source of all: the authors' program, with its settings for KITTI.
+    All values are from the authors' program, with its settings for KITTI.
 
     Attributes:
         half_width: half the side of the square map from above [m]; 70. The
             protocol's limit of 100 m is wider.
-        crop: the points that count, all of the `square` map, or those in the
-            `round` part within half a side of its middle. A square shows other
-            points when it is turned.
-        min_height: height above the ground from which points count [m]; 0.73
-            (z > -1.0 m from a LiDAR at 1.73 m).
-        max_height: height up to which they count [m]; 11.73 (z < 10 m).
-        height_unit: divisor of heights in the description of shape; horizontal
-            coordinates are divided by `half_width` [m]; 10.
-        neighbours: points, itself included, that describe the shape at a
-            point; 30.
-        cells: rows and columns of the map from above, and angles and rays of
-            its Radon transform; 120.
+        crop: which points of the map count: `square` uses all of them, `round`
+            those within half a side of its middle. When the LiDAR is turned, a
+            square contains other points.
+        min_height: least height above the ground of a point that counts [m];
+            0.73 (z > -1.0 m from a LiDAR at 1.73 m).
+        max_height: greatest height above the ground of a point that counts [m];
+            11.73 (z < 10 m).
+        height_unit: divisor of heights when the shape around a point is
+            described [m]; 10. Horizontal coordinates are divided by
+            `half_width`.
+        neighbours: number of points that describe the shape around a point,
+            including the point itself; 30.
+        cells: number of rows and columns of the map from above, and of angles
+            and rays of its Radon transform; 120.
     """
 
     half_width: PositiveFloat = 70.0
@@ -94,7 +96,7 @@ class Ring:
     spectrum: np.ndarray
 
     def bev(self, num_cells: int) -> np.ndarray:
-        """Returns the map from above, (6, n, n) float32."""
+        """Returns the feature map from above, (6, n, n) float32."""
         image = np.zeros((_NUM_FEATURES, num_cells * num_cells), np.float32)
         image[:, self.filled] = self.features.T
         return image.reshape(_NUM_FEATURES, num_cells, num_cells)
@@ -182,9 +184,9 @@ class RingPlusPlus(Method[Ring, RingDatabase]):
     def relative_poses(
         self, query: Ring, database: RingDatabase, places: Sequence[int]
     ) -> list[np.ndarray | None]:
-        """Returns turns and horizontal translations of the query.
+        """Returns the query's headings and horizontal translations.
 
-        None if one of the two shows nothing.
+        None if one of the two scans shows nothing.
         """
         if len(query.filled) == 0:
             return [None] * len(places)
@@ -374,7 +376,7 @@ def _signed(shift: int, n: int) -> int:
 
 
 def nearest_neighbours(points: np.ndarray, k: int) -> np.ndarray:
-    """Returns for every point its k nearest, itself among them.
+    """Returns the k nearest neighbours of every point, itself included.
 
     Args:
         points: (N, 3) finite float64.
@@ -391,21 +393,18 @@ def nearest_neighbours(points: np.ndarray, k: int) -> np.ndarray:
 def local_features(points: np.ndarray, neighbours: np.ndarray) -> np.ndarray:
     """Returns six numbers that describe the shape of a cloud at each point.
 
-    A selection of the hand-made features of LPD-Net (Liu et al., ICCV 2019).
-    With the covariance of a point's neighbours, its eigenvalues l1 >= l2 >= l3,
-    their sum s, and the eigenvalues m1 >= m2 of its horizontal part:
+    They are a selection of the hand-made features of LPD-Net (Liu et al., ICCV
+    2019). With the covariance of a point's neighbours, its eigenvalues l1 >= l2
+    >= l3, their sum s, and the eigenvalues m1 >= m2 of its horizontal part:
+    change of curvature l3 / s; omnivariance (l1 l2 l3)^(1/3) / s; entropy of
+    the eigenvalues, -sum (li / s) ln (li / s); horizontal roundness m2 / m1
+    (there called linearity); range and variance of z.
 
-    - change of curvature l3 / s,
-    - omnivariance (l1 l2 l3)^(1/3) / s,
-    - entropy of the eigenvalues, -sum (li / s) ln (li / s),
-    - horizontal roundness m2 / m1 (there called linearity),
-    - range and variance of z.
-
-    Where the neighbours lie in a plane or on a line, the limits of the
-    formulas count (0 ln 0 = 0, and 0 / 0 = 0 for a vertical line).
+    Where the neighbours lie in a plane or on a line, the limits of the formulas
+    count (0 ln 0 = 0, and 0 / 0 = 0 for a vertical line).
 
     Args:
-        points: (N, 3) float64.
+        points: (N, 3) float64 points.
         neighbours: (N, K) indices, K >= 2, of points that are not all in
             one place.
 

@@ -44,31 +44,34 @@ Variant = Literal["polar", "augmented-polar", "cart", "augmented-cart"]
 
 
 class ScanContextConfig(MethodConfig):
-    """Parameters of Scan Context++.
+    """Settings of Scan Context++.
 
-    Sources: [T] the T-RO program, [C] the C++ program, [E] the evaluation
-    program, all by the method's authors.
+    Sources of the values: [T] the T-RO program, [C] the C++ program, [E] the
+    evaluation program, all by the method's authors.
 
     Attributes:
-        variant: which context; augmented forms add copies to the database.
-            Default: what [T] calls A-PC.
-        voxel_size: cell of the thinning before [m]; [T] 0.5.
-        rings: rings of the polar context; [T], [C] 20.
-        sectors: sectors of the polar context; [T], [C] 60.
+        variant: kind of context: polar or Cartesian (cart). The augmented kinds
+            also add shifted copies of each place to the database. The default
+            is what [T] calls A-PC.
+        voxel_size: side of the voxels to which clouds are thinned first [m];
+            [T] 0.5.
+        rings: number of rings of the polar context; [T], [C] 20.
+        sectors: number of sectors of the polar context; [T], [C] 60.
         max_range: farthest range of the polar context [m]; [T], [C] 80.
-        far_points: treatment of points farther away: they count in the last
-            ring, as in [T] (default), or are dropped, as in [C].
-        min_points: points that a cell of the polar context needs; [T] 5,
-            [C] 1.
+        far_points: what happens to points beyond `max_range`: they count in the
+            last ring, as in [T], or are dropped, as in [C].
+        min_points: number of points that a cell of the polar context needs; [T]
+            5, [C] 1.
         cart_cell: length and width of a cell of the cart context [m];
             [T] 5 and 2.
         cart_range: half length and half width of the cart context [m];
             [T] 100 and 40.
-        lateral_shift: offset of the augmenting copies [m]; [T] 2.
-        candidates: places that the KD-tree returns; [E] 50. With
-            augmented places, as many times more contexts.
-        search_ratio: part of all shifts that are tried around the best by
-            the aligning key; [C] 0.1.
+        lateral_shift: distance by which augmenting copies are shifted sideways
+            [m]; [T] 2.
+        candidates: number of places that the search in the KD-tree returns; [E]
+            50. With augmented places it returns as many times more contexts.
+        search_ratio: share of all shifts that are tried, around the one that
+            the aligning key finds best; [C] 0.1.
     """
 
     variant: Variant = "augmented-polar"
@@ -98,12 +101,12 @@ class Contexts:
 
     @property
     def retrieval_keys(self) -> np.ndarray:
-        """(K, rows) means that do not depend on a shift of the columns."""
+        """(K, rows) row means, which a shift of the columns does not change."""
         return self.images.mean(axis=2)
 
     @property
     def aligning_keys(self) -> np.ndarray:
-        """(K, columns) means that shift with the columns."""
+        """(K, columns) column means, which shift with the columns."""
         return self.images.mean(axis=1)
 
 
@@ -193,7 +196,7 @@ class ScanContext(Method[Contexts, ContextDatabase]):
     def relative_pose(
         self, query: Contexts, database: ContextDatabase, place: int
     ) -> np.ndarray | None:
-        """Returns the turn (polar) or the lane offset (cart) of the query.
+        """Returns the query's heading (polar) or lateral offset (cart).
 
         None if the two have no filled column in common.
         """

@@ -24,24 +24,27 @@ _CNS = LidarField(32, -22.5, 22.5)
 
 
 class SolidConfig(MethodConfig):
-    """Parameters of SOLiD.
+    """Settings of SOLiD.
 
-    Sources: [P] the Python program, [C] the C++ program, both by the
-    method's authors; [S] the data sheet of the `cns` LiDAR.
+    Sources of the values: [P] the Python program and [C] the C++ program, both
+    by the method's authors; [S] the data sheet of the `cns` LiDAR.
 
     Attributes:
-        voxel_size: cell of the thinning before [m]; [P] 1.0. ([C] has 0.4,
-            but only [P] lists LiDARs of this field of view.)
-        min_range: points must be farther [m]; [P] 3.
-        max_range: points must be nearer [m]; [P] 80, for a LiDAR of this field
-            of view.
-        ranges: cells of equal length up to `max_range`; [P], [C] 40.
-        azimuths: cells of equal angle; [P], [C] 60.
-        elevations: cells of equal angle over the field of view; [P], [C]
-            the beams of the LiDAR. None for those of the drive's LiDAR; where
-            its unit is not known, [S] 32.
-        lowest_deg: lower limit of the field of view [deg]; likewise, [S] -22.5.
-        highest_deg: upper limit [deg]; likewise, [S] 22.5.
+        voxel_size: side of the voxels to which clouds are thinned first [m];
+            [P] 1.0. ([C] has 0.4, but only [P] lists LiDARs of this field of
+            view.)
+        min_range: least range of a point that counts [m]; [P] 3.
+        max_range: greatest range of a point that counts [m]; [P] 80, for a
+            LiDAR of this field of view.
+        ranges: number of equal cells up to `max_range`; [P], [C] 40.
+        azimuths: number of equal cells of azimuth; [P], [C] 60.
+        elevations: number of equal cells of elevation over the field of view;
+            [P], [C] the beams of the LiDAR. By default those of the drive's
+            LiDAR, or 32 if its unit is unknown [S].
+        lowest_deg: lower limit of the field of view [deg]; by default that of
+            the drive's LiDAR, or -22.5 if its unit is unknown [S].
+        highest_deg: upper limit of the field of view [deg]; by default that of
+            the drive's LiDAR, or 22.5 if its unit is unknown [S].
     """
 
     voxel_size: PositiveFloat = 1.0
@@ -63,7 +66,7 @@ class SolidConfig(MethodConfig):
         return self
 
     def field(self, lidar: LidarField = _CNS) -> LidarField:
-        """Returns the field of view: that given, or else the LiDAR's."""
+        """Returns the given field of view, or else that of the LiDAR."""
         elevations, lowest_deg, highest_deg = lidar
         if self.elevations is not None:
             elevations = self.elevations
@@ -186,7 +189,7 @@ class SolidMethod(Method[Solid, SolidDatabase]):
     def relative_pose(
         self, query: Solid, database: SolidDatabase, place: int
     ) -> np.ndarray | None:
-        """Returns the turn of the query, in steps of one azimuth cell.
+        """Returns the query's heading at a place, in steps of one azimuth cell.
 
         None if one of the two has no points within range.
         """

@@ -23,8 +23,8 @@ def convolve(
 
     Args:
         cells: (N, 3) int64, different ones, each below 2^20.
-        features: (N, channels in).
-        kernel: (offsets, channels in, channels out).
+        features: (N, channels in) features of the cells.
+        kernel: (offsets, channels in, channels out) weights.
         step: distance of neighbouring cells.
         at: (M, 3) cells of the result; None for the same ones.
     """
@@ -45,7 +45,7 @@ def convolve(
 
 
 def coarser(cells: np.ndarray, step: int) -> np.ndarray:
-    """Returns the cells (M, 3) of a grid with a step that have any of these.
+    """Returns the occupied cells (M, 3) of a coarser grid.
 
     They are named by their lower corners, as the finer cells are.
     """

@@ -63,8 +63,8 @@ def read_weights(
     """Returns the tensors of a network, float32.
 
     Args:
-        path: by `torch.save`, of a state or of a dict with one; since PyTorch
-            1.6.
+        path: file that `torch.save` wrote (PyTorch 1.6 or later), with a state
+            or a dict that holds one.
         shapes: name -> shape of the wanted ones.
 
     Raises:

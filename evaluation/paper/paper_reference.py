@@ -57,7 +57,7 @@ _MEAN_DIFFERENCE = 0.15
 
 
 def reference_for(map_names: Iterable[str]) -> Reference:
-    """Returns the paper if one of the maps is from it, else no reference."""
+    """Returns the paper's values if it has one of the maps, else none."""
     return NO_REFERENCE if paper().city_names.isdisjoint(map_names) else paper()
 
 
@@ -152,11 +152,11 @@ class Trend:
 def findings(
     results: Sequence[RecognitionResult], changes: Sequence[ChangeResult]
 ) -> list[Finding]:
-    """Judges the paper's findings; findings without data are left out.
+    """Returns which of the paper's findings hold, if there are data for them.
 
-    Only the paper's maps and methods are judged by them, and only by its
-    protocol. Of a pair's results of a method, the first one is that of the
-    report's own tables.
+    Only the paper's maps and methods are judged, and only by its protocol. Of a
+    pair's results of a method, the first one is that of the report's own
+    tables.
     """
     shown = {
         (*r.pair, r.method): r
@@ -187,7 +187,7 @@ def findings(
 
 
 def trend(change: Sequence[float], auc: Sequence[float]) -> Trend:
-    """Returns the trend of AUC over TCR_sym, of three pairs or more."""
+    """Returns the trend of AUC over TCR_sym, given three pairs or more."""
     x, y = np.asarray(change), np.asarray(auc)
     spread = float(np.ptp(y))
     if np.ptp(x) == 0.0 or spread == 0.0:
@@ -376,7 +376,7 @@ def _part(number: int, total: int) -> str:
 def aims(
     results: Sequence[RecognitionResult], changes: Sequence[ChangeResult]
 ) -> list[Finding]:
-    """Judges each aim, if all pairs of the paper are there.
+    """Returns whether each aim is met, if all pairs of the paper are there.
 
     RING++ is counted on queries with a match, the others on all, as the paper
     seems to have done.

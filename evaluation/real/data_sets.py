@@ -33,7 +33,7 @@ class DataSet(NamedTuple):
         scans: its files there, as a pattern.
         world: what data sets of one place share.
         unit: name of the LiDAR's unit.
-        height: of the LiDAR above the ground [m].
+        height: height of the LiDAR above the ground [m].
         origin: repository, and path in it.
         licence: terms of use.
         digest: SHA-256 of all scans behind each other, by name.
@@ -168,7 +168,7 @@ class _Scans(FileDrive):
 
 
 def open_data_sets(folder: Path, on_note: OnNote) -> list[RealScans]:
-    """Opens the data sets that are in a folder.
+    """Returns the drives of the data sets in a folder.
 
     Notes name those that are missing, those of another digest, and folders that
     are not known.
@@ -238,7 +238,7 @@ def _named_poses(table: Path, files: Sequence[Path]) -> np.ndarray:
 
 
 def simulated_drives(folder: Path, unit: str) -> list[Drive]:
-    """Returns the drives in a folder that are of a unit.
+    """Returns the drives in a folder that were simulated with a LiDAR unit.
 
     Raises:
         InputError: one cannot be opened.

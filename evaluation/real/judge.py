@@ -70,7 +70,7 @@ def scan_table(scan: np.ndarray) -> np.ndarray:
 
 
 def read_places(path: Path) -> list[list[np.ndarray]]:
-    """Returns the scans of each place of a set."""
+    """Returns the scans of each place in a data set."""
     if not path.is_dir():
         raise InputError(f"{path}: no folder of scans")
     files = sorted(path.glob("*.bin"))
@@ -102,7 +102,7 @@ def places_of(drive: Drive) -> list[list[np.ndarray]]:
 
 
 def patches(scan: np.ndarray, rng: np.random.Generator) -> Iterator[np.ndarray]:
-    """Yields patches of a scan."""
+    """Yields small pieces of a scan."""
     ranges = np.linalg.norm(scan[:, :3], axis=1)
     near = np.flatnonzero((ranges > _NEAREST) & (ranges < _FARTHEST))
     found = 0
@@ -296,7 +296,7 @@ class Features:
         )
 
     def part(self, mask: np.ndarray) -> Features:
-        """Returns some of the patches."""
+        """Returns the features of the patches that a mask selects."""
         part = object.__new__(Features)
         part.rows = [
             row for row, kept in zip(self.rows, mask, strict=True) if kept
@@ -306,7 +306,7 @@ class Features:
 
 
 def common_names(sets: list[Features]) -> list[str]:
-    """Returns the features that both sets have in a tenth of the patches."""
+    """Returns the features that a tenth of the patches in both sets have."""
     names = list(dict.fromkeys(n for s in sets for row in s.rows for n in row))
     shares = [np.isfinite(one.of(names)).mean(axis=0) for one in sets]
     kept = np.min(shares, axis=0) >= 0.1
@@ -314,7 +314,10 @@ def common_names(sets: list[Features]) -> list[str]:
 
 
 def tell_apart(real: Features, simulated: Features, names: list[str]) -> float:
-    """Returns the mean AUC over folds of places; NaN if a set has one place."""
+    """Returns how well a classifier tells real from simulated patches.
+
+    It is the mean AUC over folds of places; NaN if a set has one place.
+    """
     sets = [_in_folds(one) for one in (real, simulated)]
     folds = min(_MOST_FOLDS, *(fold.max() + 1 for fold in sets))
     if folds < 2:
@@ -342,7 +345,10 @@ def _in_folds(one: Features) -> np.ndarray:
 
 
 def judge(real: Features, simulated: Features) -> dict:
-    """Returns the AUC by groups of features, and the control."""
+    """Returns the AUC of a classifier by groups of features, and of a control.
+
+    The classifier tells real from simulated scans.
+    """
     names = common_names([real, simulated])
     groups = {"all": names}
     for name in names:
@@ -373,7 +379,7 @@ def judge_draws(
     draws: int,
     track: Track = silent,
 ) -> dict:
-    """Returns what `judge` does, with the mean AUCs of draws of patches."""
+    """Returns the result of `judge`, averaged over draws of patches."""
     results = []
     for seed in track(range(draws), "judging", draws):
         sets = Features(real, seed), Features(simulated, seed)

@@ -113,7 +113,7 @@ class Measuring:
         return [make_method(name, values) for name in self._methods]
 
     def run(self, folder: Path, simulated: Path | None) -> None:
-        """Measures all data sets in a folder.
+        """Runs all measurements on the data sets in a folder.
 
         Args:
             folder: see `open_data_sets`.

@@ -47,15 +47,16 @@ def measure_cost(
     query: DescribedDrive,
     gate_radius: float | None = None,
 ) -> Cost:
-    """Measures a method.
+    """Returns the time and memory that a method needs.
 
     Args:
-        method: to measure.
+        method: method to measure.
         clouds: clouds to describe, two or more; the time of the first is not
             counted, since it includes loading and compiling.
         scans_per_place: number of merged scans.
-        database: with places.
-        query: with queries; as many are used as there are clouds.
+        database: described drive with places.
+        query: described drive with queries; as many are used as there are
+            clouds.
         gate_radius: see `score_places`.
     """
     describing = [cpu_ms(method.describe, cloud) for cloud in clouds]
@@ -83,12 +84,14 @@ def query_ms(
     *,
     with_pose: bool = True,
 ) -> float:
-    """Returns the median time of some queries [ms]; the first does not count.
+    """Returns the median time of several queries [ms].
+
+    The first query does not count.
 
     Args:
-        method: to measure.
-        places: all are candidates.
-        queries: to ask.
+        method: method to measure.
+        places: described places, all of them candidates.
+        queries: described queries.
         number: how many are asked, two or more.
         gate_radius: see `score_places`.
         with_pose: whether the pose of the best place is estimated, too.
@@ -115,7 +118,7 @@ def query_ms(
 
 
 def cpu_ms(function: Callable[[Any], object], argument: object) -> float:
-    """Returns the processor time of a call [ms]."""
+    """Returns the CPU time of a call [ms]."""
     start = process_time_ns()
     function(argument)
     return (process_time_ns() - start) * 1e-6

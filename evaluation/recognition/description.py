@@ -84,7 +84,7 @@ def describe_drive(
 
     Args:
         drive: the drive.
-        methods: to run.
+        methods: methods that describe the scans.
         roles: roles of the drive.
         protocol: for the frames of places and queries, and their clouds.
         track: reports progress.

@@ -60,12 +60,12 @@ class PairEvidence:
 
     @property
     def visible_changes(self) -> np.ndarray:
-        """(Q,) part of each query's scan that the right place does not show."""
+        """(Q,) share of each query's scan that its match does not show."""
         return 1.0 - self.overlaps
 
     @property
     def visible_change(self) -> tuple[float, int]:
-        """The mean of these, and the number of queries that have one."""
+        """Mean visible change, and the number of queries that have one."""
         return mean_visible_change(self.overlaps)
 
 

@@ -61,24 +61,24 @@ class PrCurve:
 
     @property
     def precision(self) -> np.ndarray:
-        """(K,); every threshold accepts at least one query."""
+        """(K,) precision; every threshold accepts at least one query."""
         return self.true_positives / (
             self.true_positives + self.false_positives
         )
 
     @property
     def recall(self) -> np.ndarray:
-        """(K,); 0 if there is nothing to recall."""
+        """(K,) recall; 0 if there is nothing to recall."""
         return recall_of(self.true_positives, self.false_negatives)
 
     @property
     def f1(self) -> np.ndarray:
-        """(K,) 2 TP / (2 TP + FP + FN)."""
+        """(K,) F1 = 2 TP / (2 TP + FP + FN)."""
         return 2.0 * self.true_positives / (self.true_positives + self.counted)
 
     @property
     def counted(self) -> np.ndarray:
-        """(K,) T = TP + FP + FN."""
+        """(K,) number of queries that count: TP + FP + FN."""
         return self.true_positives + self.false_positives + self.false_negatives
 
     @property
@@ -91,7 +91,7 @@ class PrCurve:
         return float(areas_under(self.precision[None], self.recall[None])[0])
 
     def strict_auc(self, num_with_match: int) -> float:
-        """Returns the area over recall = TP / N.
+        """Returns the area under the curve with recall = TP / N.
 
         N, the number of queries with a match, includes those whose accepted
         place is wrong; TP / (TP + FN) reaches 1 whatever they are.
@@ -108,7 +108,7 @@ class PrCurve:
 
 
 def pr_curve(outcomes: QueryOutcomes) -> PrCurve:
-    """Returns the exact curve of queries, all of which count."""
+    """Returns the exact precision-recall curve of all given queries."""
     thresholds, tp, fp, fn = weighted_counts(
         outcomes, np.ones((1, len(outcomes)))
     )
@@ -120,7 +120,7 @@ def pr_curve(outcomes: QueryOutcomes) -> PrCurve:
 def weighted_counts(
     outcomes: QueryOutcomes, weights: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
-    """Counts TP, FP and FN at every distinct score, queries weighted.
+    """Returns TP, FP and FN at every distinct score, for weighted queries.
 
     Args:
         outcomes: outcomes of Q queries.
@@ -149,7 +149,7 @@ def weighted_counts(
 
 
 def areas_under(precision: np.ndarray, recall: np.ndarray) -> np.ndarray:
-    """Returns the areas (B,) under curves (B, K), K possibly 0."""
+    """Returns the areas (B,) under curves (B, K); K can be 0."""
     if precision.shape[1] == 0:
         return np.zeros(len(precision))
     start = precision[:, 0] * recall[:, 0]
@@ -171,7 +171,7 @@ class Interval:
     high: float = math.nan
 
     def to_json(self) -> list[float | None]:
-        """Returns both limits; NaN becomes None."""
+        """Returns the lower and upper limit; NaN becomes None."""
         return [json_number(self.low), json_number(self.high)]
 
 
@@ -200,7 +200,7 @@ def resampled_weights(
 
     Args:
         num_queries: Q, one or more.
-        seed: of the drawing; equal ones draw the same queries.
+        seed: seed of the drawing; equal ones draw the same queries.
         blocks: (Q,) the block of each query; whole blocks are drawn, as many
             as there are. Each query is a block by default, and on a route
             that is shorter than two blocks.
@@ -224,7 +224,7 @@ def resampled_weights(
 def resampled_metrics(
     outcomes: QueryOutcomes, weights: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Returns AUC, R@1 and strict AUC, each (B,), of samples of the queries.
+    """Returns AUC, R@1 and strict AUC of B samples of queries, each (B,).
 
     Args:
         outcomes: outcomes of Q queries, all of which count.
@@ -248,7 +248,7 @@ def resampled_metrics(
 def own_samples(
     outcomes: QueryOutcomes, seed: int = 0
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Returns `resampled_metrics` of one or more queries, in their own blocks.
+    """Returns `resampled_metrics` of queries, resampled in their own blocks.
 
     They are drawn once, whatever they are compared with.
     """
@@ -259,9 +259,10 @@ def own_samples(
 def paired_samples(
     outcomes: QueryOutcomes, other: QueryOutcomes
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Returns `resampled_metrics` in the blocks that `own_samples` draws.
+    """Returns `resampled_metrics` with the blocks of other queries.
 
-    Those are of the other's queries, which are as many.
+    `own_samples` draws the same blocks for the other queries, of which there
+    are as many.
     """
     if np.array_equal(outcomes.own_blocks, other.own_blocks):
         return own_samples(outcomes)
@@ -270,7 +271,7 @@ def paired_samples(
 
 
 def percentile_interval(samples: np.ndarray) -> Interval:
-    """Returns the interval of 95 % of the samples; NaN do not count."""
+    """Returns the interval that holds 95 % of the samples, without NaN."""
     known = samples[~np.isnan(samples)]
     if len(known) == 0:
         return UNKNOWN
@@ -319,7 +320,9 @@ class Difference:
 
 
 def auc_difference(first: QueryOutcomes, second: QueryOutcomes) -> Difference:
-    """Compares two methods on the same queries, see `mean_auc_difference`.
+    """Returns the AUC difference of two methods on the same queries.
+
+    See `mean_auc_difference`.
 
     Args:
         first: outcomes of Q queries.
@@ -331,12 +334,13 @@ def auc_difference(first: QueryOutcomes, second: QueryOutcomes) -> Difference:
 def mean_auc_difference(
     pairs: Sequence[tuple[QueryOutcomes, QueryOutcomes]],
 ) -> Difference:
-    """Compares two methods on several sets of queries (mode all).
+    """Returns the mean AUC difference of two methods, with its p-value.
 
-    The bootstrap draws the same blocks for both. Its deviation, corrected for
-    the number n of blocks, gives a t test of n - 1 degrees of freedom, whose
-    small p-values do not end at the number of samples. Sets of queries are
-    independent: their variances and degrees of freedom add up.
+    It is over several sets of queries (mode all). The bootstrap draws the same
+    blocks for both. Its deviation, corrected for the number n of blocks, gives
+    a t test of n - 1 degrees of freedom, whose small p-values do not end at the
+    number of samples. Sets of queries are independent: their variances and
+    degrees of freedom add up.
 
     Args:
         pairs: outcomes of both methods on each set; there is one or more.
@@ -363,7 +367,7 @@ def mean_auc_difference(
 
 
 def holm(p_values: np.ndarray) -> np.ndarray:
-    """Returns p-values (N,) corrected for their number, by Holm's method.
+    """Returns p-values (N,) corrected for multiple tests, by Holm's method.
 
     NaN stay, and do not count.
     """
@@ -377,23 +381,26 @@ def holm(p_values: np.ndarray) -> np.ndarray:
 
 @dataclass(frozen=True)
 class PlaceRecognitionMetrics:
-    """The numbers of one pair of drives and one method.
+    """The scores of one method on one pair of drives.
 
     Attributes:
-        mode: the queries that the curve counts.
-        curve: the exact precision-recall curve.
-        auc: area under it.
-        auc_strict: area with recall = TP / N at each of its points.
-        f1_max: greatest F1 on it; 0 if nothing is accepted.
-        f1_max_index: its point on the curve; None if that is empty.
+        mode: which queries the precision-recall curve counts.
+        curve: exact precision-recall curve.
+        auc: area under the curve.
+        auc_strict: area under the curve with recall = TP / N at each of its
+            points.
+        f1_max: greatest F1 on the curve; 0 if nothing is accepted.
+        f1_max_index: index of that point on the curve; None if the curve is
+            empty.
         recall_at_n: (25,) R@1 to R@25.
-        recall_at_1_percent: R@N for a hundredth of the database.
-        num_queries: queries asked.
+        recall_at_1_percent: recall R@N with N a hundredth of the places.
+        num_queries: number of queries.
         num_with_match: N, the number of queries with a match.
         num_right: TP with every candidate accepted: the queries whose best
             place is right. R@1 = num_right / N.
-        auc_interval: 95 % interval by bootstrap over blocks of the route.
-        recall_at_1_interval: likewise.
+        auc_interval: 95 % interval of `auc`, by bootstrap over blocks of the
+            route.
+        recall_at_1_interval: 95 % interval of R@1, likewise.
 
     Example:
         from evaluation import evaluate, judge
@@ -417,19 +424,19 @@ class PlaceRecognitionMetrics:
 
     @property
     def recall_at_1(self) -> float:
-        """The part of the queries with a match whose best place is one."""
+        """R@1: share of queries with a match whose best place is a match."""
         return float(self.recall_at_n[0])
 
 
 def evaluate(
     outcomes: QueryOutcomes, mode: Mode = "all", seed: int = 0
 ) -> PlaceRecognitionMetrics:
-    """Computes all numbers of one pair and method.
+    """Returns the scores of one method on one pair of drives.
 
     Args:
-        outcomes: outcomes of the queries.
-        mode: selects the queries of the precision-recall curve.
-        seed: of the bootstrap.
+        outcomes: outcome of each query.
+        mode: which queries the precision-recall curve counts.
+        seed: seed of the bootstrap.
 
     Example:
         from evaluation import evaluate, judge

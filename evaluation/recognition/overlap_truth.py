@@ -41,7 +41,10 @@ class Seen(Protocol):
     def reach(self) -> float: ...
 
     def share_of(self, points: np.ndarray) -> float:
-        """Returns the visible part of points (N, 3), in the sensor's frame."""
+        """Returns which share of points (N, 3) is visible.
+
+        Points are in the sensor's frame [m].
+        """
         ...
 
 
@@ -125,7 +128,7 @@ def best_overlaps(
     X_WQs: np.ndarray,
     matches: np.ndarray,
 ) -> np.ndarray:
-    """Returns the part (Q,) of each query's scan that its best match shows.
+    """Returns how much of each query's scan its best match shows, (Q,).
 
     Args:
         place_scans: D scans (N, 3), each in the frame of its sensor.
@@ -153,7 +156,7 @@ def best_overlaps(
 
 
 def sampled(points: np.ndarray) -> np.ndarray:
-    """Returns points, at most 8192 of N, drawn at random."""
+    """Returns at most 8192 of N points, drawn at random."""
     if len(points) <= _NUM_POINTS:
         return points
     rng = np.random.default_rng(len(points))
@@ -172,10 +175,10 @@ def write_overlaps(
     query without a point.
 
     Args:
-        path: to write.
+        path: CSV file to write.
         query_frames: (Q,) of the queries.
         database_frames: (D,) of the places.
-        overlaps: (Q, D), see `overlap_truth`.
+        overlaps: (Q, D) overlaps, see `overlap_truth`.
 
     Raises:
         InputError: if the file cannot be written.
@@ -191,12 +194,12 @@ def write_overlaps(
 def read_overlaps(
     path: Path, query_frames: np.ndarray, database_frames: np.ndarray
 ) -> np.ndarray:
-    """Returns the overlaps (Q, D) of a table.
+    """Returns the overlaps (Q, D) from a CSV table.
 
     Args:
         path: path of the table.
-        query_frames: (Q,) that it must have.
-        database_frames: (D,) likewise.
+        query_frames: (Q,) frames of the queries, which the table must have.
+        database_frames: (D,) frames of the places, which the table must have.
 
     Raises:
         InputError: the file cannot be read, a number is impossible, or the

@@ -73,17 +73,17 @@ class PlaceOutcome:
         overlaps: np.ndarray,
         radius: float,
     ) -> PlaceOutcome:
-        """Reduces the scores of all pairs to the outcome of each query.
+        """Returns the outcome of each query from the scores of all pairs.
 
         Args:
-            method: that made the scores.
+            method: method that made the scores.
             is_gated: whether they were gated.
             retrieval: retrieval of Q queries and D places.
             query: (Q,) stamps [ns] and (Q, 3) places [m] of the queries.
             drives: D names of the drives of the places; that of the query's
                 own city comes first.
             overlaps: (Q,) of the best match of each query.
-            radius: of a match [m].
+            radius: radius of a match [m].
         """
         best = retrieval.best_places
         rows = np.arange(len(best))
@@ -117,7 +117,7 @@ class PlaceOutcome:
         interval: Interval = UNKNOWN,
         n: int | None = None,
     ) -> Number:
-        """Returns a number of it, by default of all queries."""
+        """Returns one result of the outcome, by default over all queries."""
         count = len(self.outcomes) if n is None else n
         return Number(
             self.method, self.is_gated, metric, value, interval, count
@@ -127,7 +127,7 @@ class PlaceOutcome:
     def num_hidden(self) -> int:
         """Number of wrong answers to queries with little overlap.
 
-        Their best match shows less than half of them.
+        Their best match shows less than half of their scan.
         """
         is_hidden = self.overlaps < _HALF
         return int((is_hidden & ~self.outcomes.is_right).sum())
@@ -202,7 +202,7 @@ class Number(NamedTuple):
 def place_numbers(
     now: PlaceOutcome, before: PlaceOutcome | None
 ) -> Iterator[Number]:
-    """Yields the numbers of a method.
+    """Yields the results of a method, next to those of the baseline.
 
     Intervals are by bootstrap over blocks of the route; a sample has the same
     ones in the baseline.
@@ -256,7 +256,7 @@ def place_numbers(
 def pose_numbers(
     now: PlaceOutcome, before: PlaceOutcome | None
 ) -> Iterator[Number]:
-    """Yields the numbers of a method's poses; none if it estimates no pose.
+    """Yields the results of a method's poses; none without poses.
 
     Args:
         now: its outcome in a condition.
@@ -283,7 +283,7 @@ def pose_numbers(
 def kept_share(
     changed: np.ndarray | float, unchanged: np.ndarray | float
 ) -> np.ndarray:
-    """Returns changed over unchanged; NaN where the latter is 0 or NaN."""
+    """Returns changed / unchanged; NaN if the latter is 0 or NaN."""
     with np.errstate(invalid="ignore", divide="ignore"):
         share = np.divide(changed, unchanged)
     return np.where(np.asarray(unchanged) > 0.0, share, math.nan)

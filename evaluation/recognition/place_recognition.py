@@ -56,11 +56,11 @@ class PlaceRecognition:
     protocol: RetrievalProtocol
 
     def counting(self, mode: Mode) -> PlaceRecognition:
-        """Returns the same outcome with its numbers in a mode."""
+        """Returns the outcome with its scores in another mode."""
         return replace(self, metrics=evaluate(self.outcomes, mode))
 
     def auc_over_radius(self) -> dict[float, float]:
-        """Returns radius of a match [m] -> AUC (mode all) with that radius.
+        """Returns radius [m] -> AUC if matches have that radius (mode all).
 
         NaN where no query has a match.
         """
@@ -128,16 +128,17 @@ def run(
     across_maps: bool = False,
     overlaps: np.ndarray | None = None,
 ) -> PlaceRecognition:
-    """Runs a method on a pair of drives.
+    """Returns the result of a method on a pair of drives.
 
     Args:
         database, query: the drives.
         method: the method.
         mode: which queries count.
-        protocol: as for `retrieve`.
+        protocol: protocol of the comparison.
         track: reports progress.
         across_maps: whether the drives may be of maps of different names.
-        overlaps: as for `retrieve`.
+        overlaps: (Q, D) part of each query's scan that each place's scan shows;
+            by default computed from the scans. Only for matches by overlap.
 
     Raises:
         InputError: as `retrieve` does, or if no query has a match.
@@ -164,13 +165,13 @@ def judge_retrieval(
     protocol: RetrievalProtocol,
     mode: Mode = "all",
 ) -> PlaceRecognition:
-    """Returns the numbers of a method's retrieval.
+    """Returns the scores of a method, given what it retrieved.
 
     Args:
         method: the method.
         database, query: names of the drives.
         retrieval: what the method found.
-        protocol: by which it was asked.
+        protocol: protocol of the retrieval.
         mode: which queries count.
 
     Raises:
@@ -229,7 +230,7 @@ class RecognitionResult:
     def of(
         cls, map_name: str, stages: tuple[str, str], outcome: PlaceRecognition
     ) -> RecognitionResult:
-        """Returns the result of an outcome, counted in both modes."""
+        """Returns the result of an outcome, with scores in both modes."""
         return cls(
             map_name,
             stages,
@@ -243,5 +244,5 @@ class RecognitionResult:
 
     @property
     def pair(self) -> tuple[str, str, str]:
-        """Map, database, query."""
+        """Names of map, database and query."""
         return (self.map_name, *self.stages)

@@ -33,7 +33,7 @@ class PoseErrors:
 
     @classmethod
     def unknown(cls, num_queries: int) -> PoseErrors:
-        """Returns the errors for a method that estimates no pose."""
+        """Returns the errors of a method that estimates no poses: NaN."""
         return cls(np.full(num_queries, np.nan), np.full(num_queries, np.nan))
 
 
@@ -66,7 +66,7 @@ class PoseMetrics:
 def pose_error(
     X_PQ: np.ndarray, X_WP: np.ndarray, X_WQ: np.ndarray
 ) -> tuple[float, float]:
-    """Returns the errors of a pose, in metres and in degrees.
+    """Returns the error of an estimated pose, in metres and in degrees.
 
     Args:
         X_PQ: (4, 4) the query's sensor in that of the place, as estimated.
@@ -82,7 +82,7 @@ def pose_error(
 
 
 def checked_pose(method: Method, X_PQ: object) -> np.ndarray | None:
-    """Checks that a result of `relative_pose` is a pose or None.
+    """Returns the result of `relative_pose` if it is a pose or None.
 
     Raises:
         InputError: if it is not.
@@ -107,7 +107,10 @@ def pose_metrics(
     outcomes: QueryOutcomes,
     metrics: PlaceRecognitionMetrics,
 ) -> PoseMetrics:
-    """Summarises errors; the metrics of the queries are in mode all."""
+    """Returns a summary of pose errors.
+
+    The metrics of the queries are in mode all.
+    """
     accepted = np.zeros(len(outcomes), dtype=bool)
     if metrics.f1_max_index is not None:
         least = metrics.curve.thresholds[metrics.f1_max_index]
@@ -127,7 +130,7 @@ def pose_metrics(
 
 
 def pose_success(errors: PoseErrors, outcomes: QueryOutcomes) -> float:
-    """Returns `PoseMetrics.success`."""
+    """Returns the share of right poses, `PoseMetrics.success`."""
     # A method that finds no place localises no query.
     known = ~np.isnan(errors.translation)
     estimates = known.any() or np.isnan(outcomes.best_scores).all()

@@ -26,37 +26,37 @@ _QUERY_CHANGES = ("turn_queries", "tilt_queries", "hide_sector")
 
 @dataclass(frozen=True)
 class RetrievalProtocol:
-    """The protocol of a comparison of two drives.
+    """How two drives are compared: which scans, which truth, what changes.
 
-    By default queries are asked as they were recorded, and all else is the
-    paper's but for the places of merged scans.
+    By default, queries are as recorded and all other options are those of the
+    paper, except which of several merged scans stands for a place.
 
     Attributes:
-        radius: greatest distance of a match from its query [m].
-        query_spacing: between two queries, along the path [m].
-        place_spacing: likewise between two places of the database [m].
-        max_range: points with a greater x, y or z in the sensor's frame are
-            left out [m].
+        radius: greatest distance between a query and its match [m].
+        query_spacing: distance driven between two queries [m].
+        place_spacing: distance driven between two places of the database [m].
+        max_range: largest x, y or z of a point in the sensor's frame [m];
+            farther points are left out.
         scans_per_place: number of consecutive scans that are merged into the
             described cloud; None for each method's own number.
         place: which of the merged scans stands for a place, unless the
             method's own parameter says so: `middle`, or as in the paper
             `first`. Truth goes by the pose of that scan. It becomes None for
             one scan per place.
-        exclude_recent: for a drive against itself: only places count that it
-            passed at least this long before [s]. None for two drives.
-        overlap: a place is a match at any distance if its scan shows at least
-            this part of the query's scan (see `overlap_truth`), up to 1; None
-            for matches by the radius.
-        gate: whether to reject those of a query's best places that the method's
-            own pose puts farther away than the radius, see `gate`.
-        turn_queries: whether each query's sensor has a random yaw. Places stay
+        exclude_recent: for a drive compared with itself: least time since it
+            passed a place [s]. None for two drives.
+        overlap: least part of a query's scan, up to 1, that a match must show,
+            at any distance (see `overlap_truth`); None for matches by the
+            radius.
+        gate: whether to reject top-ranked places that lie beyond the radius
+            according to the method's own pose estimate.
+        turn_queries: whether each query is turned by a random yaw. Places stay
             as recorded.
-        tilt_queries: greatest random roll, and pitch, of a query's sensor,
-            from 0 to 90 [deg].
-        hide_sector: angle of the random sector that is hidden from a query,
+        tilt_queries: largest random roll and pitch by which each query is
+            tilted, from 0 to 90 [deg].
+        hide_sector: angle of a random sector that is hidden from each query,
             from 0 to below 360 [deg].
-        seed: of these random numbers, see `QuerySensor.draw`.
+        seed: seed of these random numbers, see `QuerySensor.draw`.
 
     Raises:
         InputError: if a value is out of range, with the option that it has on
@@ -103,18 +103,21 @@ class RetrievalProtocol:
             raise InputError(f"--seed: {self.seed} is negative")
 
     def scans(self, method: Method) -> int:
-        """Returns the number of scans of a method's place."""
+        """Returns how many scans a method merges for one place."""
         if self.scans_per_place is not None:
             return self.scans_per_place
         return method.scans_per_place
 
     def scans_before(self, method: Method) -> int:
-        """Returns how many scans of a method's place come before its own."""
+        """Returns how many scans of a place precede the one at its pose."""
         is_middle = self.of(method).place == "middle"
         return self.scans(method) // 2 if is_middle else 0
 
     def query_sensor(self, frame: int) -> QuerySensor | None:
-        """Returns the sensor of a query; None for the recorded one."""
+        """Returns the changed sensor of a query; None if it is as recorded.
+
+        It can be turned, tilted and partly hidden.
+        """
         if not self._changes_queries:
             return None
         from evaluation.drives.sampling import QuerySensor
@@ -128,18 +131,21 @@ class RetrievalProtocol:
         )
 
     def query_scan(self, drive: Drive, frame: int) -> np.ndarray:
-        """Returns the single scan (N, 3) of a query, in its sensor's frame."""
+        """Returns the scan (N, 3) of a query in its sensor's frame [m].
+
+        The sensor is changed as by `query_sensor`.
+        """
         from evaluation.drives.sampling import gather
 
         sensor = self.query_sensor(frame)
         return gather(drive, frame, 1, self.max_range, sensor=sensor)
 
     def query_poses(self, X_WS: np.ndarray, frames: np.ndarray) -> np.ndarray:
-        """Returns the poses (Q, 4, 4) of the queries' sensors.
+        """Returns the poses (Q, 4, 4) of the queries' sensors in the world.
 
         Args:
-            X_WS: (Q, 4, 4) poses of the recorded sensor.
-            frames: (Q,) frames of the queries.
+            X_WS: (Q, 4, 4) poses of the recorded sensor in the world.
+            frames: (Q,) frame number of each query.
         """
         X_WQ = X_WS.copy()
         for row, frame in enumerate(frames.tolist()):
@@ -150,10 +156,11 @@ class RetrievalProtocol:
 
     @property
     def name(self) -> str:
-        """How queries are asked: `fair`, `paper`, `recorded` or `own`.
+        """Name of the protocol: `fair`, `paper`, `recorded` or `own`.
 
-        The paper asks as recorded, and merged scans stand at their first one;
-        `recorded` is with any other place of merged scans.
+        `paper` and `recorded` leave queries as recorded. The first of several
+        merged scans stands for a place in `paper`, the middle one in
+        `recorded`.
         """
         if self._asked == FAIR_PROTOCOL._asked:
             return "fair"
@@ -171,11 +178,11 @@ class RetrievalProtocol:
 
     @property
     def gate_radius(self) -> float | None:
-        """The radius that the gate compares with [m]; None without a gate."""
+        """Greatest distance that the gate accepts [m]; None without a gate."""
         return self.radius if self.gate else None
 
     def of(self, method: Method) -> RetrievalProtocol:
-        """Returns the protocol of a method's run, without open choices."""
+        """Returns the protocol with the choices that it leaves to a method."""
         return replace(
             self,
             scans_per_place=self.scans(method),
@@ -183,14 +190,17 @@ class RetrievalProtocol:
         )
 
     def asked_like(self, other: RetrievalProtocol) -> RetrievalProtocol:
-        """Returns the protocol with another's queries, and places of scans."""
+        """Returns the protocol with the queries of another protocol.
+
+        Its choice of merged scans is then the other's as well.
+        """
         return replace(self, place=other.place, **other._asked)
 
     def described(self, *, queries: bool = True) -> dict[str, object]:
-        """Returns the options that the descriptions of a drive depend on.
+        """Returns the options on which the descriptions of a drive depend.
 
         Args:
-            queries: whether it has queries, and not only places.
+            queries: whether the drive has queries, and not only places.
         """
         values = asdict(self)
         unused = ["radius", "exclude_recent", "overlap", "gate"]
@@ -201,11 +211,11 @@ class RetrievalProtocol:
         return values
 
     def to_json(self) -> dict[str, object]:
-        """Returns all options of the protocol, by their names."""
+        """Returns all options of the protocol by their names."""
         return asdict(self)
 
     def to_text(self) -> str:
-        """Returns a sentence."""
+        """Returns the protocol in a sentence."""
         match = f"a match within {self.radius:g} m"
         if self.overlap is not None:
             match = f"a match shows {self.overlap:.0%} of the query's scan"

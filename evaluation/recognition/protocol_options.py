@@ -70,8 +70,9 @@ _FIELDS: Options = {
             "exclude_recent",
             float | None,
             None,
-            "Least time since a drive passed a place of its own [s], for loop "
-            "closure: each drive is then compared with itself, too.",
+            "Least time between a query and an earlier place of the same drive "
+            "[s]. Turns on loop closure: each drive is also compared with "
+            "itself.",
             "S",
         ),
     )

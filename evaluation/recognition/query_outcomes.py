@@ -10,7 +10,7 @@ import numpy as np
 
 @dataclass(frozen=True, eq=False)
 class QueryOutcomes:
-    """The outcomes of Q queries.
+    """Whether each of Q queries found its place, and how surely.
 
     Attributes:
         best_scores: (Q,) score of the best place; NaN without a candidate.
@@ -39,7 +39,7 @@ class QueryOutcomes:
         return len(self.best_scores)
 
     def subset(self, kept: np.ndarray) -> QueryOutcomes:
-        """Returns the outcomes of some of the queries, (Q,) bool."""
+        """Returns the outcomes of the queries that a mask (Q,) bool selects."""
         return QueryOutcomes(
             self.best_scores[kept],
             self.is_right[kept],
@@ -51,18 +51,18 @@ class QueryOutcomes:
 
     @property
     def own_blocks(self) -> np.ndarray:
-        """(Q,) the blocks; each query by itself without any."""
+        """(Q,) block of the route of each query, without blocks its number."""
         return np.arange(len(self)) if self.blocks is None else self.blocks
 
     @property
     def known_ranks(self) -> list[int | None]:
-        """`first_right_ranks` as whole numbers; None where infinite."""
+        """`first_right_ranks` as integers; None where they are infinite."""
         return [
             int(r) if np.isfinite(r) else None for r in self.first_right_ranks
         ]
 
     def recall_at(self, rank: int) -> float:
-        """Returns R@N; NaN if no query has a match."""
+        """Returns the recall R@N; NaN if no query has a match."""
         return _mean(self.first_right_ranks[self.has_match] <= rank)
 
     @property
@@ -76,18 +76,18 @@ class QueryOutcomes:
 
     @property
     def match_auroc(self) -> float:
-        """The best score's power to separate queries with a match from others.
+        """How well the best score separates queries with a match from others.
 
-        The area under the receiver operating characteristic: the chance that
-        a query with a match has a higher best score than one without; equal
-        scores count half, and no candidate is the lowest score. NaN if all or
-        none of the queries have a match.
+        It is the area under the receiver operating characteristic: the chance
+        that a query with a match has a higher best score than one without.
+        Equal scores count half, and a query without a candidate has the lowest
+        score. NaN if all or none of the queries have a match.
         """
         return auroc(self.best_scores, self.has_match)
 
     @property
     def one_percent_rank(self) -> int:
-        """The N of R@1%: a hundredth of the database, at least 1."""
+        """The N of R@1%: a hundredth of the number of places, at least 1."""
         return max(1, round(0.01 * self.num_places))
 
 
@@ -96,14 +96,15 @@ def judge(
     matches: np.ndarray,
     blocks: np.ndarray | None = None,
 ) -> QueryOutcomes:
-    """Reduces the scores of all pairs to the outcome of each query.
+    """Returns the outcome of each query from the scores of all pairs.
 
-    If two places have equal scores, the first one in the database is better.
+    Of places with equal scores, the first in the database counts as better.
 
     Args:
-        scores: (Q, D), higher is more similar; NaN is no candidate.
-        matches: (Q, D) bool, the truth.
-        blocks: (Q,) see `QueryOutcomes`.
+        scores: (Q, D) scores, higher is more similar; NaN is no candidate.
+        matches: (Q, D) bool, true matches.
+        blocks: (Q,) block of the route in which each query lies; None if each
+            is a block of its own.
 
     Raises:
         ValueError: scores are complex, masked or not numbers, or the two shapes
@@ -156,11 +157,11 @@ def judge(
 def auroc(scores: np.ndarray, is_positive: np.ndarray) -> float:
     """Returns the area under the receiver operating characteristic.
 
-    The chance that a positive one has a higher score than another; equal scores
-    count half. NaN if all or none are positive.
+    It is the chance that a positive has a higher score than a negative; equal
+    scores count half. NaN if all or none are positive.
 
     Args:
-        scores: (N,); NaN is the lowest.
+        scores: (N,) scores; NaN is the lowest.
         is_positive: (N,) bool.
     """
     num_with = int(is_positive.sum())

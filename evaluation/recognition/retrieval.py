@@ -26,20 +26,20 @@ from evaluation.recognition.sequences import along_the_way
 
 @dataclass(frozen=True)
 class Retrieval:
-    """Scores of all queries against all places, with the truth.
+    """The scores of all queries against all places, and the truth.
 
     Attributes:
         query_frames: (Q,) frame of each query in its drive.
         database_frames: (D,) frame of each place.
         scores: (Q, D) float64, higher is more similar, NaN for a place that
             the method does not consider.
-        distances: (Q, D) float64 between the sensor positions [m].
+        distances: (Q, D) float64 distances between query and place [m].
         matches: (Q, D) bool, whether a place is a true match of a query.
-        pose_errors: errors of the pose at each query's best place.
-        is_known: (Q, D) bool, whether the place is a candidate for the query.
-        overlaps: (Q, D) float64, see `overlap_truth`; None if truth is by
-            radius.
-        query_blocks: (Q,) see `QueryOutcomes.blocks`.
+        pose_errors: errors of the estimated pose at each query's best place.
+        is_known: (Q, D) bool, whether a place may be an answer to a query.
+        overlaps: (Q, D) float64 part of a query's scan that a place's scan
+            shows (see `overlap_truth`); None if matches are by the radius.
+        query_blocks: (Q,) block of the route in which each query lies.
 
     Example:
         from evaluation import retrieve
@@ -60,7 +60,7 @@ class Retrieval:
 
     @property
     def best_places(self) -> np.ndarray:
-        """(Q,) best place of each query, the first of equal ones; -1: none."""
+        """(Q,) best place of each query, the first of equals; -1 for none."""
         candidate = ~np.isnan(self.scores)
         best = ranking(self.scores)[:, 0] if self.scores.size else -1
         return np.where(candidate.any(axis=1), best, -1)
@@ -76,16 +76,17 @@ def retrieve(
     across_maps: bool = False,
     overlaps: np.ndarray | None = None,
 ) -> Retrieval:
-    """Scores every query of a drive against all places of the database.
+    """Returns the scores of all queries against all places of a database.
 
     Args:
         database: the drive of the places.
         query: the drive of the queries, in the same world frame.
-        method: describes and compares.
+        method: method that describes and compares the scans.
         protocol: protocol of the comparison.
-        track: reports progress.
-        across_maps: the two may be of maps of different names.
-        overlaps: (Q, D) for matches by overlap; by default those of the scans.
+        track: called with the progress.
+        across_maps: whether the drives may be of maps with different names.
+        overlaps: (Q, D) part of each query's scan that each place's scan shows;
+            by default computed from the scans. Only for matches by overlap.
 
     Raises:
         InputError: if a drive cannot be read, the two are not of the same
@@ -113,15 +114,16 @@ def compare(
     track: Track = silent,
     overlaps: np.ndarray | None = None,
 ) -> Retrieval:
-    """Scores the queries of one drive against the places of another.
+    """Returns the scores of a query drive against the places of another.
 
     Args:
-        method: that described both.
-        database: with its places described.
-        query: with its queries described; in the same world frame.
-        protocol: that both were described by.
+        method: method that described both drives.
+        database: drive with described places.
+        query: drive with described queries, in the same world frame.
+        protocol: protocol by which both drives were described.
         track: reports progress.
-        overlaps: (Q, D), see `overlap_matrix`; needed for matches by overlap.
+        overlaps: (Q, D) overlaps, see `overlap_matrix`; needed for matches by
+            overlap.
 
     Raises:
         InputError: if the method returns an invalid result.
@@ -143,11 +145,11 @@ def compare_with_gates(
     overlaps: np.ndarray | None = None,
     is_known: np.ndarray | None = None,
 ) -> list[Retrieval]:
-    """Scores queries once; returns what is retrieved with each gate.
+    """Returns what is retrieved with each gate, scoring queries only once.
 
     Args:
         method, database, query, track, overlaps: see `compare`.
-        protocol: likewise; whether it has a gate does not matter.
+        protocol: protocol of the comparison; its own gate does not matter.
         gate_radii: radius of each gate [m]; None is no gate.
         is_known: (Q, D) bool, which places each query may find; by default as
             the protocol says.

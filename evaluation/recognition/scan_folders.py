@@ -41,9 +41,9 @@ def write_scores(
     drives take the queries as one drive, in the order of names.
 
     Args:
-        method: describes and compares.
-        database: folder of scans, each a file.
-        query: likewise.
+        method: method that describes and compares the scans.
+        database: folder of the scans of places, one file each.
+        query: folder of the scans of queries, one file each.
         output: the file to write.
         track: reports progress.
         gate_radius: reject places by the gate, see `gate.gated` [m].

@@ -35,11 +35,13 @@ def ranking(scores: np.ndarray) -> np.ndarray:
 def gate_weight(
     distance: np.ndarray | float, radius: float, softness: float = SOFTNESS
 ) -> np.ndarray:
-    """Returns the part of a score that counts at a distance, from 1 to 0.
+    """Returns the factor from 1 to 0 by which the gate scales a score.
+
+    It depends on the distance of the place.
 
     Args:
-        distance: between query and place by the method's own pose [m]; any
-            shape.
+        distance: distances from query to place by the method's own pose [m], an
+            array of any shape.
         radius: radius of a match [m].
         softness: half the width of the ramp, as a part of the radius.
     """
@@ -105,12 +107,13 @@ def score_places(
     exhaustive: bool = False,
     where: str = "",
 ) -> np.ndarray:
-    """Returns a method's scores for the last of some queries, (D,) float64.
+    """Returns a method's scores for the last of several queries, (D,).
 
-    Its second stage, if it has one, and the gate are included.
+    They are float64. Its second stage, if it has one, and the gate are
+    included.
 
     Args:
-        method: that described queries and places.
+        method: method that described queries and places.
         queries: descriptors, from the first of the drive to the current one.
         query_cloud: cloud of the current query, for a second stage.
         database: the result of `build_database` for the places.

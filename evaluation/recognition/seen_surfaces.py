@@ -66,7 +66,10 @@ class SeenSurfaces:
 
     @classmethod
     def of(cls, points: np.ndarray) -> SeenSurfaces:
-        """Returns the surfaces of a scan (N, 3), in its sensor's frame."""
+        """Returns the surfaces that a scan shows.
+
+        The scan is (N, 3) in the sensor's frame [m].
+        """
         x, y, z = points.T.astype(np.float64)
         elevation = np.degrees(np.arctan2(z, np.hypot(x, y))) + 90.0
         azimuth = np.degrees(np.arctan2(y, x)) + 180.0
@@ -91,18 +94,18 @@ class SeenSurfaces:
         return float(np.linalg.norm(self.points, axis=1).max(initial=0.0))
 
     def share_of(self, points: np.ndarray) -> float:
-        """Returns which part of points (N, 3) is shown; NaN without points.
+        """Returns the share of points (N, 3) that is shown; NaN without points.
 
         Args:
-            points: in this sensor's frame.
+            points: (N, 3) points in this sensor's frame [m].
         """
         return self.shares_of(points).shown
 
     def shares_of(self, points: np.ndarray) -> Shares:
-        """Returns which parts of points (N, 3) are shown, and hidden.
+        """Returns the shares of points (N, 3) that are shown, and hidden.
 
         Args:
-            points: in this sensor's frame.
+            points: (N, 3) points in this sensor's frame [m].
         """
         if len(points) == 0:
             return Shares(math.nan, math.nan)
@@ -112,7 +115,7 @@ class SeenSurfaces:
         )
 
     def clearances(self, points: np.ndarray) -> np.ndarray:
-        """Returns how far before the seen surface points (N, 3) lie, (N,) [m].
+        """Returns how far points (N, 3) lie in front of a surface, (N,) [m].
 
         The distance is across the plane of the three nearest returns, or, at
         edges and with fewer returns, along the line of sight to the nearest of
@@ -120,12 +123,12 @@ class SeenSurfaces:
         near, and NaN for a point between two surfaces.
 
         Args:
-            points: in this sensor's frame.
+            points: (N, 3) points in this sensor's frame [m].
         """
         return self._look(points)[1]
 
     def hides(self, points: np.ndarray) -> np.ndarray:
-        """Returns which of points (N, 3) are behind, (N,) bool."""
+        """Returns which points (N, 3) are behind a seen surface, (N,) bool."""
         return self._look(points)[0] == _BEHIND
 
     def _look(self, points: np.ndarray) -> tuple[np.ndarray, np.ndarray]:

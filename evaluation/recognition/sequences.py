@@ -17,7 +17,7 @@ def along_the_way(
     p_WPs: np.ndarray,
     length: float,
 ) -> np.ndarray:
-    """Returns the scores (Q, D) of places by the queries up to each one.
+    """Returns scores (Q, D) that are averaged along the path.
 
     It is the mean of the query's own score and those of the queries before it,
     each for the place that lies as far from the place as that query lies from
@@ -30,7 +30,7 @@ def along_the_way(
         scores: (Q, D) of single queries, NaN for no candidate.
         is_known: (Q, D) bool, places that may be found.
         p_WQs: (Q, 3) positions of the queries, in the order of the drive [m].
-        p_WPs: (D, 3) positions of the places, likewise [m].
+        p_WPs: (D, 3) positions of the places in the world [m].
         length: greatest distance of a voting query, along its way [m].
     """
     of_query, of_place = travelled(p_WQs), travelled(p_WPs)

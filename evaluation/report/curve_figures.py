@@ -34,7 +34,7 @@ _WIDTH = 480
 def draw_pr_curves(
     map_name: str, results: Sequence[RecognitionResult], stem: Path
 ) -> None:
-    """Draws precision over recall, a column a pair and a row a mode."""
+    """Draws precision-recall curves: a column per pair, a row per mode."""
     pairs = list(dict.fromkeys(result.pair for result in results))
     figure = Figure(figsize=(0.4 + 2.7 * len(pairs), 5.4), layout="constrained")
     grid = figure.subplots(
@@ -83,9 +83,9 @@ def _draw_curve(
 
 
 def chart_illustrations(report: Report, folder: Path) -> list[Illustration]:
-    """Draws the charts of all cities; returns those that have data.
+    """Draws the charts over all cities; returns those that have data.
 
-    A reference has its own, beside ours.
+    The charts of a reference stand next to ours.
     """
     name = "AUC against TCR_sym"
     charts: list[tuple[str, str, Section, dict[str, str], Results]] = [
@@ -126,7 +126,10 @@ def chart_illustrations(report: Report, folder: Path) -> list[Illustration]:
 
 
 def draw_track(rows: np.ndarray, stem: Path) -> None:
-    """Draws errors of `TRACKED` rows over the way, and shares without a map."""
+    """Draws errors along the path, and the share without a map.
+
+    The rows are of the type `TRACKED`.
+    """
     figure = Figure(figsize=(9.0, 4.2), layout="constrained")
     top, bottom = figure.subplots(2, 1, sharex=True, height_ratios=(2, 1))
     for stretch in np.unique(rows["stretch"]):

@@ -76,7 +76,7 @@ class View:
     pixels_per_metre: float = 3.0
 
     def axes(self) -> np.ndarray:
-        """Returns rows right, up and towards the camera (3, 3), in W."""
+        """Returns directions (3, 3) right, up and towards the camera, in W."""
         azimuth = math.radians(self.azimuth_deg)
         elevation = math.radians(self.elevation_deg)
         towards = [
@@ -108,7 +108,7 @@ class Picture:
         return left, left + width / scale, bottom, bottom + height / scale
 
     def project(self, points: np.ndarray) -> np.ndarray:
-        """Returns points (N, 3) along right and up (N, 2) [m]."""
+        """Returns points (N, 3) as coordinates right and up (N, 2) [m]."""
         return points @ self.view.axes()[:2].T
 
 
@@ -181,7 +181,7 @@ def draw_change(
     maps: tuple[VoxelMap, VoxelMap],
     stems: tuple[Path, Path],
 ) -> None:
-    """Draws what changed between two stages, and the sets behind the TCR.
+    """Draws what changed between two stages, in two figures.
 
     The metric alone decides on a colour. In the first figure, red is a point
     without a counterpart in the other map. It is pale where the point lies
@@ -374,7 +374,7 @@ def render(
 def shade_by_height(
     rgb: np.ndarray, heights: np.ndarray, darkest: float = 0.75
 ) -> np.ndarray:
-    """Returns colours (N, 3) uint8 that are darker the lower their points are.
+    """Returns colours (N, 3) uint8 that are darker for lower points.
 
     `darkest` is the factor at the lowest of the heights (N,) [m].
     """
@@ -387,7 +387,7 @@ def colour_by_height(
     lowest: tuple[int, int, int],
     highest: tuple[int, int, int],
 ) -> np.ndarray:
-    """Returns colours (N, 3) uint8 between two by height."""
+    """Returns colours (N, 3) uint8 that go from one to another by height."""
     part = _height_parts(heights)[:, None]
     return ((1.0 - part) * lowest + part * highest).astype(np.uint8)
 

@@ -105,7 +105,7 @@ class Report:
 
     @functools.cached_property
     def survivals(self) -> list[survival.Survival]:
-        """What is left on each pair."""
+        """How much each method keeps of its AUC on each pair."""
         stages = {
             name: stage
             for one, _ in self.pairs
@@ -119,7 +119,7 @@ class Report:
 
     @property
     def compared(self) -> list[RecognitionResult]:
-        """The results beside which the reference has numbers."""
+        """Results for which the reference has published numbers."""
         known = filter(self.reference.covers, self.recognitions)
         return [*known, *self.repeated]
 

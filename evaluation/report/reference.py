@@ -71,11 +71,14 @@ class Reference:
 
     @property
     def city_names(self) -> set[str]:
-        """The maps with published place recognition."""
+        """Names of the maps with published place recognition."""
         return {key[0] for key in self.recognitions}
 
     def compares_back(self, map_name: str, earlier: str, last: str) -> bool:
-        """Returns whether the earlier stage also asks the last one."""
+        """Returns whether the reference also queries the last stage's map.
+
+        The earlier stage is then the query.
+        """
         pair = (map_name, last, earlier)
         return any(key[:3] == pair for key in self.recognitions)
 
@@ -87,7 +90,10 @@ class Reference:
     def further_changes(
         self, map_names: Iterable[str]
     ) -> Sequence[tuple[str, str, float]]:
-        """Returns `further`, for a report on one of the source's maps."""
+        """Returns the published changes without place recognition.
+
+        Only a report on a map of the source shows them.
+        """
         return () if self.city_names.isdisjoint(map_names) else self.further
 
     def protocol_of(
@@ -104,7 +110,7 @@ class Reference:
         return result.pair[0] in self.city_names and self._ran(result)
 
     def mode(self, method: str) -> Mode:
-        """Returns the mode in which a method was counted."""
+        """Returns in which mode the reference counts a method."""
         modes = (key[4] for key in self.recognitions if key[3] == method)
         return next(modes, "all")
 

@@ -84,7 +84,7 @@ def change_table(
     reference: Reference = NO_REFERENCE,
     evidence: Evidence = MappingProxyType({}),
 ) -> Table:
-    """Returns Table I: the change of each pair, and its parts."""
+    """Returns Table I: the change between the drives of each pair."""
 
     def visible(one: ChangeResult) -> tuple[float | None, int | None]:
         return _visible_change(evidence, one.report.source, one.report.target)
@@ -260,7 +260,7 @@ def _merging_text(results: Sequence[RecognitionResult]) -> str:
 def audit_table(
     results: Sequence[RecognitionResult], reference: Reference = NO_REFERENCE
 ) -> Table:
-    """Returns all numbers with the counts behind them, a row each."""
+    """Returns a table of all numbers with the counts behind them."""
     return Table.of(
         [_Counted.of(r, mode, reference) for r in results for mode in MODES],
         {
@@ -338,7 +338,7 @@ class MethodDifference(NamedTuple):
 def method_differences(
     results: Sequence[RecognitionResult],
 ) -> list[MethodDifference]:
-    """Compares each two methods on each pair (mode all)."""
+    """Returns the AUC difference of any two methods on each pair (mode all)."""
     both, found = [], []
     for one, other in itertools.combinations(_by_pair_and_method(results), 2):
         if one.pair == other.pair:
@@ -372,7 +372,7 @@ def difference_numbers(differences: Sequence[MethodDifference]) -> Table:
 
 
 def difference_table(differences: Sequence[MethodDifference]) -> Table:
-    """Returns the differences for print."""
+    """Returns the AUC differences between methods, for print."""
     names = "map", "DB → query"
     return Table.of(
         differences,
@@ -418,7 +418,7 @@ def pose_table(results: Sequence[RecognitionResult]) -> Table:
 
 
 def pose_numbers(results: Sequence[RecognitionResult]) -> Table:
-    """Returns the same numbers, as `poses.csv` has them."""
+    """Returns the errors of estimated poses, for `poses.csv`."""
     return Table.of(
         results,
         {
@@ -467,7 +467,7 @@ def fault_table(
 def fault_numbers(
     results: Sequence[RecognitionResult], evidence: Evidence
 ) -> Table:
-    """Returns all counts, as `why.csv` has them."""
+    """Returns the counts of wrong best places by reason, for `why.csv`."""
     return Table.of(
         _count_faults(results, evidence),
         {
@@ -525,7 +525,7 @@ def cost_table(costs: Sequence[Cost]) -> Table:
 
 
 def cost_numbers(costs: Sequence[Cost]) -> Table:
-    """Returns all numbers, as `costs.csv` has them."""
+    """Returns the costs of all methods, for `costs.csv`."""
     return Table.of(costs, {f.name: attrgetter(f.name) for f in fields(Cost)})
 
 
@@ -537,7 +537,7 @@ class DriveTrack:
     X_WS: np.ndarray
 
     def moments(self, frames: np.ndarray) -> list[np.ndarray]:
-        """Returns frame, stamp, position and quaternion of the sensor.
+        """Returns frame number, stamp and pose of the sensor at given frames.
 
         They are 9 arrays (Q,) of objects, one for each name in `_MOMENT`; None
         where a frame (Q,) is missing, which is then below 0.

@@ -29,10 +29,11 @@ def place_rows(
     tracks: Mapping[str, Any],
     evidence: Mapping[tuple[str, str], PairEvidence],
 ) -> Iterator[Row]:
-    """Yields the rows of the experiment `stages`: controls, then pairs.
+    """Yields the results of place recognition: controls, then pairs.
 
-    The control of a pair is the condition in which the database is of the
-    query's stage. All queries' drives have a `DriveTrack`.
+    They are rows of the experiment `stages`. The control of a pair is the
+    condition in which the database is of the query's stage. All queries' drives
+    have a `DriveTrack`.
     """
 
     def outcome(result: RecognitionResult) -> PlaceOutcome:

@@ -34,13 +34,16 @@ class Survival(NamedTuple):
     after: Mapping[str, Row]
 
     def number(self, side: str, metric: str, end: str = "value") -> float:
-        """Returns a number `before` or `after`, or an end of its interval."""
+        """Returns the value before or after the change, or a limit of it.
+
+        The limits are those of its interval.
+        """
         row = getattr(self, side).get(metric)
         return math.nan if row is None else getattr(row, end)
 
 
 def survivals(rows: Iterable[Row], stages: Mapping[str, str]) -> list[Survival]:
-    """Returns what is left by pair, and methods in the order of tables.
+    """Returns what each method keeps on each pair, in the order of tables.
 
     The stages are those of drives.
     """
@@ -67,7 +70,7 @@ def survivals(rows: Iterable[Row], stages: Mapping[str, str]) -> list[Survival]:
 def by_pair(
     survivals: Iterable[Survival],
 ) -> dict[tuple[str, str, str], list[Survival]]:
-    """Returns (map, database, query) -> methods."""
+    """Returns (map, database, query) -> what each method keeps."""
     groups: dict[tuple[str, str, str], list[Survival]] = {}
     for one in survivals:
         groups.setdefault(one.pair, []).append(one)
@@ -75,7 +78,7 @@ def by_pair(
 
 
 def percent(share: float) -> str:
-    """Returns a share as text."""
+    """Returns a share as text in per cent."""
     return tables.MISSING if math.isnan(share) else f"{100.0 * share:.0f} %"
 
 
@@ -87,7 +90,7 @@ def interval_text(kept: Row) -> str:
 
 
 def survival_numbers(survivals: Sequence[Survival]) -> tables.Table:
-    """Returns all numbers, as `survival.csv` has them."""
+    """Returns what methods keep, for `survival.csv`."""
     numbers: dict[str | tuple[str, str], tuple[str, ...]] = {
         "auc_unchanged": ("before", "auc"),
         "auc_changed": ("after", "auc"),
@@ -117,7 +120,7 @@ def survival_numbers(survivals: Sequence[Survival]) -> tables.Table:
 
 
 def survival_table(survivals: Sequence[Survival]) -> tables.Table:
-    """Returns the table for print: a row for each pair and method."""
+    """Returns what methods keep, for print: a row per pair and method."""
     return tables.Table.of(
         survivals,
         {

@@ -141,12 +141,12 @@ def draw(
     *,
     alone: bool = False,
 ) -> Drawn:
-    """Draws a chart of a table.
+    """Draws a chart from a table of results.
 
     Args:
         chart: a mapping as above.
         results: the table.
-        width: of the drawing [px].
+        width: width of the drawing [px].
         alone: whether it has its message and legend with it.
 
     Raises:
@@ -184,7 +184,7 @@ def draw(
 
 
 def check(chart: Mapping[str, Any]) -> dict[str, str]:
-    """Checks the description of a chart, apart from any table.
+    """Checks the description of a chart, without a table.
 
     Returns:
         The keys of its kind.
@@ -216,7 +216,7 @@ def styles(labels: Sequence[str]) -> dict[str, tuple[str, str, str]]:
 
 
 def titled(label: str) -> str:
-    """Returns a method as its authors write it, with its settings."""
+    """Returns a method's name as its authors write it, with its settings."""
     method, comma, settings = label.partition(",")
     return f"{title(method)}{comma}{settings}"
 
@@ -478,8 +478,8 @@ def smooth(
     """Returns the local linear regression of y over x at places (M,).
 
     Not all x are equal. Gaussian weights; Fan and Gijbels, Local Polynomial
-    Modelling (1996), equation 3.1 with p = 1. How often each point counts in B
-    samples may be given, (B, N), for B regressions (B, M).
+    Modelling (1996), equation 3.1 with p = 1. If it is given how often each
+    point counts in B samples, (B, N), there are B regressions (B, M).
     """
     counts = np.ones(len(x)) if counts is None else counts
     width = _BANDWIDTH * max(np.ptp(grid), 1e-12)

@@ -111,8 +111,9 @@ class Comparison:
         ranked: methods, the best first. One that also ships, or is in two
             tables, has the name of its table behind its own. For rankings, the
             methods of each table over its own conditions.
-        differences: of each two methods whose answers are there.
-        agreements: of each two tables with two or more methods of one name.
+        differences: differences of each two methods whose answers are there.
+        agreements: agreements of each two tables with two or more methods of
+            one name.
         notes: what was left out.
     """
 
@@ -125,7 +126,7 @@ class Comparison:
     notes: Sequence[str]
 
     def to_json(self) -> dict[str, Any]:
-        """Returns all of it; NaN becomes None."""
+        """Returns the whole comparison for JSON; NaN becomes None."""
         return {
             "metric": self.metric,
             "task": self.task,
@@ -170,7 +171,7 @@ def compare(
     gate: bool = False,
     rankings: bool = False,
 ) -> Comparison:
-    """Compares tables with each other and with those that ship.
+    """Returns a comparison of tables of results with the shipped ones.
 
     Args:
         paths: tables of results, or folders with a `results.csv`. A

@@ -41,13 +41,13 @@ def method_style(method: str) -> tuple[str, str, str]:
 
 
 def unit(rgb: tuple[int, int, int]) -> tuple[float, float, float]:
-    """Returns a colour as matplotlib takes it."""
+    """Returns a colour from 0 to 1, as matplotlib takes it."""
     red, green, blue = rgb
     return red / 255.0, green / 255.0, blue / 255.0
 
 
 def plain(text: str) -> str:
-    """Returns text of a drawing in which no dollar begins a formula."""
+    """Returns text for a drawing, without dollars that begin formulas."""
     return text.replace("$", r"\$")
 
 

@@ -63,9 +63,9 @@ def write_page(
 
     Args:
         results: the table, beside the page as `results.csv`.
-        queries: that of queries, beside it as `queries.csv`; None without.
-        folder: to write into.
-        title: of the page.
+        queries: table of queries, written as `queries.csv`; None without one.
+        folder: folder in which the page is written.
+        title: title of the page.
         about: the question, in words.
         charts: see `charts`; the headline is what the first one shows. One
             whose rows the table lacks is left out, and a note says so.

@@ -47,9 +47,9 @@ class Mean(NamedTuple):
 
 
 def means(rows: Iterable[Row], *columns: str) -> list[Mean]:
-    """Returns the mean for each combination of values in columns.
+    """Returns a row of means for each combination of values in columns.
 
-    The least and the greatest value, such as those of seeds, stand beside it.
+    Each row also has the least and the greatest value, such as those of seeds.
 
     Example:
         from evaluation import Results, means
@@ -98,7 +98,7 @@ class Excess:
 
 
 def excesses(queries: QueryRows) -> list[Excess]:
-    """Returns what two causes cost together, for all pairs of causes.
+    """Returns what two causes of failure cost together, for all pairs.
 
     A pair is a cause whose name joins two by "+", each of which is also there
     alone (at its strongest level). Seeds are joined.
@@ -157,10 +157,10 @@ def excesses(queries: QueryRows) -> list[Excess]:
 def lifetime(
     times: Sequence[float], kept: Sequence[float], left: float
 ) -> float:
-    """Returns the time until a share is left; infinite if more is left.
+    """Returns the time until only a given share is left.
 
-    The times ascend; the share is 1 at the first one, and changes evenly
-    between two. NaN if a share is unknown.
+    It is infinite if more is left. The times ascend; the share is 1 at the
+    first one, and changes linearly between two. NaN if a share is unknown.
     """
     if any(math.isnan(share) for share in kept):
         return math.nan
@@ -179,7 +179,7 @@ class Lifetime:
     Attributes:
         row: one that has the map, the drives and the method.
         share: that is left.
-        value: of the mean over seeds; infinite if more is left at `last`.
+        value: value of the mean over seeds; infinite if more is left at `last`.
         low, high: the least and the greatest of a seed.
         last: greatest value of the factor that was measured.
     """
@@ -243,7 +243,7 @@ def _curve_of(
 
 
 def paired_values(results: Results, x: str, y: str) -> list[tuple[Row, float]]:
-    """Returns the rows of a metric, each with another number beside it.
+    """Returns the rows of a metric, each with another number next to it.
 
     The number is a factor's, or a metric's of the same condition: of the same
     method and gate, else without the gate, else of no method (as `tcr_sym`).
@@ -284,7 +284,7 @@ class Growth(NamedTuple):
 
 
 def growths(results: Results, over: str, metric: str) -> list[Growth]:
-    """Returns the exponents of a metric over a factor, or another metric.
+    """Returns the growth exponents of a metric over a factor or metric.
 
     Points with the same map, method and gate belong together.
     """
@@ -311,7 +311,7 @@ class Correlation:
 
     Attributes:
         method: with its settings.
-        number: of conditions.
+        number: number of conditions.
         rho: Spearman's rank correlation of 1 less the metric with each number,
             and its 95 % interval by bootstrap over conditions.
         difference: the second correlation less the first; None of one number.
@@ -370,7 +370,7 @@ def _spearman(values: np.ndarray) -> np.ndarray:
 
 
 def check_same_queries(one: Answers, other: Answers) -> None:
-    """Checks that two methods answered the same queries.
+    """Raises an error unless two methods answered the same queries.
 
     Raises:
         InputError: otherwise.
@@ -394,11 +394,11 @@ class Ranked(NamedTuple):
 def ranking(
     rows: Iterable[Row], *, least_first: bool = False
 ) -> tuple[list[Ranked], np.ndarray]:
-    """Ranks methods by their means over the conditions that all have.
+    """Returns methods ranked by their means over the conditions they share.
 
-    The bootstrap draws maps, where there are several, else conditions; a
-    sample has the same ones for each method. A single condition has the
-    interval of its row.
+    The bootstrap draws maps, where there are several, else conditions; a sample
+    has the same ones for each method. A single condition has the interval of
+    its row.
 
     Args:
         rows: rows of one metric.
@@ -463,11 +463,11 @@ def summarised(
     queries: QueryRows | None,
     charts: Iterable[Mapping[str, Any]],
 ) -> list[Summary]:
-    """Returns what stands behind an experiment's charts.
+    """Returns the numbers behind an experiment's charts.
 
-    They are the lifetimes of lines of `kept`, of which the range is that of
-    seeds, the growth of lines of times, the correlations of scatters, and what
-    two causes cost together.
+    They are lifetimes, for lines of `kept`, with their range over seeds; growth
+    rates, for lines of times; correlations, for scatter plots; and what two
+    causes cost together.
     """
     found = []
     for chart in charts:

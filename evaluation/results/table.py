@@ -112,7 +112,7 @@ class Key:
         map: name of the map.
         database: name of the drive that makes the database.
         query: name of the drive that asks.
-        seed: of everything that is random.
+        seed: seed of everything that is random.
         factors: column -> value of those that apply.
         task: `place`, `pose`, `localise`, `map`, `change`, `cost` or another.
         method: method, estimator or baseline; "" for the task `change`.
@@ -139,7 +139,7 @@ class Key:
 
     @property
     def label(self) -> str:
-        """The method, with those of its settings that are factors."""
+        """Name of the method, with those of its settings that are factors."""
         start = f"{SETTINGS}{self.method}."
         settings = (
             f"{name.removeprefix(start)} {value}"
@@ -149,7 +149,7 @@ class Key:
         return ", ".join((self.method, *settings))
 
     def but(self, *names: str) -> tuple[object, ...]:
-        """Returns what identifies it, apart from some columns.
+        """Returns the key without some columns.
 
         The settings of a method, such as `methods.ring++.crop`, are left out
         with `method`.
@@ -191,7 +191,7 @@ class Row(Key):
 
     @classmethod
     def of(cls, number: Number, **key: Any) -> Row:
-        """Returns the row of a task's number; the key is all that it lacks."""
+        """Returns the row of a task's result, with the condition's key."""
         named = {"method": number.method, "gate": number.gate, **key}
         return cls(
             **named,
@@ -216,7 +216,7 @@ class Answers(Key):
 
     @cached_property
     def outcomes(self) -> QueryOutcomes:
-        """The outcome of each query; the size of the database is unknown."""
+        """Outcome of each query; without the number of places."""
         columns = self.columns
         is_right = np.asarray(columns["correct"], dtype=bool)
         ranks = np.full(len(is_right), math.inf)
@@ -236,7 +236,7 @@ class Answers(Key):
 
 @dataclass(frozen=True)
 class Results:
-    """A table of results: the names of its factors, in order, and its rows.
+    """A table of results: the ordered names of its factors, and its rows.
 
     Example:
         from evaluation import Results
@@ -250,15 +250,15 @@ class Results:
 
     @classmethod
     def of(cls, rows: Iterable[Row]) -> Results:
-        """Returns the table of rows, with their factors as they come."""
+        """Returns a table of rows, with factors in order of appearance."""
         rows = tuple(rows)
         return cls(_factor_names(rows), rows)
 
     @classmethod
     def read(cls, path: str | Path) -> Results:
-        """Reads `results.csv`, or that of a folder.
+        """Returns the table in a file `results.csv`, or in a folder with one.
 
-        Columns may have any order; those that are unknown are factors.
+        Columns can have any order; unknown ones are factors.
 
         Raises:
             InputError: the file cannot be read, is a table of an earlier
@@ -279,7 +279,7 @@ class Results:
         return cls(table.factors, tuple(rows))
 
     def write_csv(self, path: Path) -> None:
-        """Writes the table; equal ones give equal bytes.
+        """Writes the table as CSV; equal tables give equal bytes.
 
         Raises:
             InputError: the file cannot be written.
@@ -298,10 +298,10 @@ class Results:
     def where(
         self, columns: Mapping[str, object] | None = None, **named: object
     ) -> Results:
-        """Returns the rows with values in columns.
+        """Returns the rows that have given values in given columns.
 
-        A tuple, list or set stands for any of its values. Names of factors
-        with dots go into `columns`.
+        A tuple, list or set stands for any of its values. Names of factors with
+        dots go into `columns`.
         """
         wanted = {
             name: value if isinstance(value, tuple | list | set) else (value,)
@@ -317,14 +317,14 @@ class Results:
         )
 
     def distinct(self, column: str) -> list[Any]:
-        """Returns the values of a column, in their order, without None."""
+        """Returns the different values of a column in order, without None."""
         found = dict.fromkeys(row[column] for row in self.rows)
         return [value for value in found if value is not None]
 
 
 @dataclass(frozen=True)
 class QueryRows:
-    """A table of queries: the names of its factors, and all answers.
+    """A table of queries: the names of its factors, and all outcomes.
 
     Example:
         from evaluation import QueryRows
@@ -338,15 +338,15 @@ class QueryRows:
 
     @classmethod
     def of(cls, answers: Iterable[Answers]) -> QueryRows:
-        """Returns the table of answers, with their factors as they come."""
+        """Returns a table of rows, with factors in order of appearance."""
         answers = tuple(answers)
         return cls(_factor_names(answers), answers)
 
     @classmethod
     def read(cls, path: str | Path) -> QueryRows:
-        """Reads `queries.csv`, or that of a folder.
+        """Returns the table in a file `queries.csv`, or in a folder with one.
 
-        All columns of a query but `query_frame`, `correct`, `has_match` and
+        All columns of a query except `query_frame`, `correct`, `has_match` and
         `score` may be missing.
 
         Raises:
@@ -368,7 +368,7 @@ class QueryRows:
         )
 
     def write_csv(self, path: Path) -> None:
-        """Writes the table; equal ones give equal bytes.
+        """Writes the table as CSV; equal tables give equal bytes.
 
         Raises:
             InputError: the file cannot be written.

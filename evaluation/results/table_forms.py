@@ -129,7 +129,7 @@ class Table:
         )
 
     def to_csv(self) -> str:
-        """Returns the table with all digits.
+        """Returns the table as CSV with all digits.
 
         A cell becomes two columns; the second holds the paper's number.
         """
@@ -154,7 +154,7 @@ class Table:
         return csv_text(header, cells)
 
     def write_csv(self, path: Path) -> None:
-        """Writes `to_csv`.
+        """Writes the table as CSV, as `to_csv` returns it.
 
         Raises:
             InputError: the file cannot be written.
@@ -162,7 +162,7 @@ class Table:
         write_text(path, self.to_csv())
 
     def to_markdown(self) -> str:
-        """Returns the table with four decimals, as the paper prints them.
+        """Returns the table as Markdown with four decimals, like the paper's.
 
         The paper's values follow in brackets.
         """
@@ -174,7 +174,7 @@ class Table:
         return "".join(f"| {' | '.join(line)} |\n" for line in lines)
 
     def to_html(self) -> str:
-        """Returns a `table` element."""
+        """Returns the table as an HTML element."""
         caption = html.escape(self.caption)
         lines = [
             "".join(
@@ -194,7 +194,7 @@ class Table:
         )
 
     def to_latex(self) -> str:
-        r"""Returns a `table*` for a document with the package booktabs."""
+        r"""Returns the table as LaTeX `table*`, for the package booktabs."""
         lines = [
             "% Needs \\usepackage{booktabs}; \\resizebox is of graphicx.",
             r"\begin{table*}",
@@ -240,7 +240,10 @@ def keyed(
     keys: Mapping[str | tuple[str, str], _Key],
     value: Callable[[_Item, _Key], object],
 ) -> Columns[_Item]:
-    """Returns a column for each key; its value is of an item and the key."""
+    """Returns one table column for each key.
+
+    `value` computes a cell from an item, the table's row, and the key.
+    """
 
     def column(key: _Key) -> Callable[[_Item], object]:
         return lambda item: value(item, key)
@@ -249,7 +252,10 @@ def keyed(
 
 
 def protocol_columns(path: str) -> Columns[Any]:
-    """Returns columns of the protocol at a path of attributes, name last."""
+    """Returns table columns with the protocol of an item, its name last.
+
+    The protocol is found at a path of attributes.
+    """
     columns = keyed(
         {name: name for name in PROTOCOL_COLUMNS},
         lambda item, name: attrgetter(f"{path}.{name}")(item),

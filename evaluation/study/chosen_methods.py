@@ -35,7 +35,7 @@ class MethodChoice:
 
     @property
     def key(self) -> str:
-        """The name, with the settings: no other choice has it."""
+        """Name of the method with its settings, unique to the choice."""
         settings = (f"{name}={value}" for name, value in self.settings)
         return " ".join([self.name, *settings])
 
@@ -53,7 +53,7 @@ class MethodChoice:
         return make_method(self.name, dict(self.settings))
 
     def identity(self) -> dict:
-        """Returns all that its results depend on, ready for JSON.
+        """Returns everything on which its results depend, ready for JSON.
 
         Raises:
             InputError: if its file cannot be used.

@@ -50,7 +50,7 @@ class RecordingInfo:
         return self.made_by or RecordedDrive(self.path.absolute())
 
     def drives_like(self, other: RecordingInfo) -> bool:
-        """Returns whether both drives have a route, and the same one."""
+        """Returns whether both drives have the same route."""
         return self.way is not None and self.way == other.way
 
 
@@ -74,12 +74,12 @@ class Run:
 
     @property
     def repeats(self) -> bool:
-        """Whether it repeats that by the study's own protocol."""
+        """Whether the run repeats that by the study's own protocol."""
         return self.queries != self.method.key
 
     @property
     def shares_places(self) -> bool:
-        """Whether its places are those of the study's own protocol."""
+        """Whether the run has the places of the study's own protocol."""
         return self.places == self.method.key
 
 
@@ -97,7 +97,7 @@ class City:
     reference: Reference = NO_REFERENCE
 
     def change_pairs(self) -> list[Pair]:
-        """Returns every stage with the last one."""
+        """Returns pairs of every earlier stage with the last one."""
         *earlier, last = (self.stages[key] for key in sorted(self.stages))
         return [(recording, last) for recording in earlier]
 
@@ -125,7 +125,7 @@ class City:
         methods: Iterable[MethodChoice],
         protocol: RetrievalProtocol,
     ) -> list[Run]:
-        """Returns the runs of methods on a pair, then those that repeat them.
+        """Returns the runs of methods on a pair, followed by their repetitions.
 
         Places are shared if both protocols describe them alike.
         """
@@ -154,7 +154,7 @@ class City:
     def unchanged_pair(
         self, database: RecordingInfo, query: RecordingInfo
     ) -> Pair | None:
-        """Returns the control of a pair: its routes, in one stage.
+        """Returns the control of a pair: the same routes, in one stage.
 
         One drive of the pair is replaced by a drive on its route in the stage
         of the other. The database is replaced if possible, so that the queries
@@ -207,7 +207,7 @@ def find_recordings(
 
 
 def nothing_to_compare(cities: Iterable[City]) -> list[str]:
-    """Returns a sentence for each city without a pair of stages."""
+    """Returns a sentence for each city that has no pair of stages."""
     return [
         f"{city.name}: nothing to compare: all drives are through stage"
         f" {', '.join(city.stages)}. A report compares drives through two"

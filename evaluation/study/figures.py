@@ -22,7 +22,7 @@ def draw_city(
 ) -> dict[str, PageDrive]:
     """Draws the routes of a city; returns its drives for the page, by name.
 
-    Each stage is a name, and the `SurveyedDrive` and the cloud of its drive.
+    Each stage has a name, and the `SurveyedDrive` and the cloud of its drive.
     """
     names, views, routes, drives = [], [], [], {}
     for done, (name, surveyed, fine) in enumerate(stages):
@@ -79,7 +79,10 @@ def routes_stem(city: City) -> str:
 def change_stems(
     city: City, pair: tuple[RecordingInfo, RecordingInfo]
 ) -> tuple[str, str]:
-    """Returns the names of the figures of a change: points, and sets."""
+    """Returns the names of the two figures of a change, without ending.
+
+    They are the points and the sets.
+    """
     # Underscores join the parts. They are escaped in all but the first, so that
     # two pairs of stages never share a name.
     earlier, later = (

@@ -98,7 +98,7 @@ def encode(value: object) -> bytes:
 
 
 def decode(data: bytes) -> Any:
-    """Returns the value of bytes by `encode`.
+    """Returns the value in bytes that `encode` returned.
 
     Dataclasses are those of this package, or of modules that have been
     imported.
@@ -279,9 +279,9 @@ class Part:
     path: Path
 
     def write(self, inputs: Mapping, value: object) -> None:
-        """Writes the part; its folder is made if needed.
+        """Writes the value to the part, whose folder is created if needed.
 
-        The inputs are all that the value depends on, ready for JSON.
+        The inputs are everything on which the value depends, ready for JSON.
 
         Raises:
             InputError: if it cannot be kept or written.
@@ -310,14 +310,14 @@ class Part:
             stream.write(data)
 
     def is_current(self, inputs: Mapping) -> bool:
-        """Returns whether a complete part exists that has these inputs."""
+        """Returns whether the part is complete and was made of these inputs."""
         try:
             return self.identity() == fingerprint(inputs)
         except InputError:
             return False
 
     def identity(self) -> str:
-        """Returns the digest of the inputs of the part.
+        """Returns the digest of the inputs that the part was made of.
 
         Raises:
             InputError: if there is no such part, or it is cut off.
@@ -338,7 +338,7 @@ class Part:
             return decode(data)
 
     def fits(self, hint: object) -> bool:
-        """Returns whether the value may be of an annotated type.
+        """Returns whether the part's value can be of an annotated type.
 
         Only its beginning is read.
         """
@@ -458,21 +458,27 @@ class SurveyFiles:
 
     @property
     def drive(self) -> Part:
-        """The `SurveyedDrive`."""
+        """The part with the `SurveyedDrive`."""
         return Part(self.folder / "drive.data")
 
     @property
     def fine(self) -> Part:
-        """The cloud for pictures."""
+        """The part with the cloud for pictures."""
         return Part(self.folder / "fine.data")
 
     @property
     def scans(self) -> Part:
-        """The scans of places and queries: a `KeptDrive`, or a list."""
+        """The part with the scans of places and queries.
+
+        It is a `KeptDrive`, or a list.
+        """
         return Part(self.folder / "scans.data")
 
     def described(self, key: str) -> Part:
-        """Returns the part with (`PlacedDrive`, `DescribedDrive`)."""
+        """Returns the part with the descriptions by a method.
+
+        It holds a `PlacedDrive` and a `DescribedDrive`.
+        """
         return Part(self.folder / f"described_{file_name(key)}.data")
 
 
@@ -493,6 +499,6 @@ class StudyFiles:
         return SurveyFiles(folder / file_name(recording))
 
     def part(self, kind: str, *names: str) -> Part:
-        """Returns the part of a kind, such as `changes`, of drives."""
+        """Returns the part of a kind, such as `changes`, for some drives."""
         name = ",".join(map(file_name, names))
         return Part(self.output / "parts" / kind / f"{name}.data")

@@ -154,7 +154,7 @@ def _describe(
 def joined_places(
     drives: Sequence[description.DescribedScans], num_others: int
 ) -> description.DescribedScans:
-    """Returns the places of a drive together with places of others.
+    """Returns the places of a drive together with those of other drives.
 
     The first drive is that of the query's world. The others are moved so far
     away that none of their places is a match. They add `num_others` places at

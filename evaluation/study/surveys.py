@@ -58,7 +58,7 @@ class MappedDrive(RecentScans):
         return super().scan(index)
 
     def finish(self, track: Track = silent) -> tuple[VoxelMap, np.ndarray]:
-        """Reads the scans that have not been read yet.
+        """Reads the remaining scans, so that the map is complete.
 
         Returns:
             The map of all scans in cells of the TCR, as `map_drive` makes
@@ -168,7 +168,7 @@ class SurveyedDrive:
 
     @property
     def positions(self) -> np.ndarray:
-        """(N, 3) of the sensor [m]."""
+        """(N, 3) positions of the sensor in the world [m]."""
         return self.X_WS[:, :3, 3]
 
 
@@ -189,7 +189,7 @@ class KeptDrive:
     scans: dict[int, np.ndarray] = field(default_factory=dict)
 
     def keep(self, frame: int, scan: np.ndarray, max_range: float) -> None:
-        """Keeps a scan; see `Drive.scan` and `within_range`."""
+        """Keeps a scan, without the points beyond a range."""
         names = [one for one in scan.dtype.names or () if one in _KEPT_FIELDS]
         kept = within_range(xyz(scan), max_range)
         # A view would hold all fields.
@@ -355,9 +355,10 @@ class Survey(Step):
         reporter: Reporter,
         missing: Collection[Part] | None = None,
     ) -> RecordingSurvey:
-        """Returns the survey of the source's drive, maybe while that is made.
+        """Returns the survey of the source's drive.
 
-        The `missing` parts are needed; all by default.
+        It may read the drive while that is made. The `missing` parts are
+        needed; all by default.
 
         Raises:
             InputError: see `survey_recording`.

@@ -99,11 +99,11 @@ def read_scenario(folder: Path) -> Mapping | None:
 
 
 class Drive(abc.ABC):
-    """The scans of one LiDAR on one drive, and where they were taken.
+    """The scans of one LiDAR on one drive, with their poses and times.
 
     Frames: world W (shared by all drives of a place), LiDAR S.
 
-    A scan is read on each access and not kept, so a drive may be larger than
+    A scan is read on each access and not kept, so a drive can be larger than
     memory.
 
     Attributes:
@@ -136,10 +136,10 @@ class Drive(abc.ABC):
 
     @abc.abstractmethod
     def scan(self, index: int) -> np.ndarray:
-        """Returns one scan.
+        """Returns one scan as an array of points.
 
         Args:
-            index: 0 <= index < N.
+            index: number of the scan, 0 <= index < N.
 
         Returns:
             Structured array, one record per return, with at least `x`, `y`
@@ -161,21 +161,21 @@ class Drive(abc.ABC):
 
     @property
     def imu(self) -> np.ndarray | None:
-        """Measurements of the IMU, (M,) of `IMU_DTYPE`, if recorded."""
+        """Samples of the IMU, (M,) of `IMU_DTYPE`, if recorded."""
         return None
 
     @property
     def datum(self) -> str | None:
-        """Name of the survey grid (datum) of W, if any.
+        """Name of the survey grid (datum) in which W lies, if any.
 
-        Two drives with one datum but different world frames differ by the
-        error of their positioning, at most some ten metres.
+        World frames of two drives with one datum differ at most by the error of
+        their positioning, some ten metres.
         """
         return None
 
     @property
     def notes(self) -> tuple[str, ...]:
-        """A note for the user on how the recording was read."""
+        """Notes for the user on how the recording was read."""
         return ()
 
     @property
@@ -188,10 +188,10 @@ class Drive(abc.ABC):
 
     @property
     def lidar_section(self) -> Mapping:
-        """What the scenario says of the LiDAR; empty if it says nothing.
+        """Section of the scenario on this LiDAR; empty if it says nothing.
 
-        A drive whose name ends with that of a LiDAR is that LiDAR's, others
-        are of the first.
+        If the drive's name ends with the name of a LiDAR, it is that one, and
+        otherwise the first.
         """
         lidars = (self.scenario or {}).get("lidars")
         if not isinstance(lidars, dict) or not lidars:
@@ -204,7 +204,7 @@ class Drive(abc.ABC):
 
     @property
     def lidar_field(self) -> LidarField | None:
-        """Rings and field of view of the LiDAR, if its unit is known."""
+        """Rings and field of view of the LiDAR, if the unit is known."""
         unit = self.lidar_section.get("preset")
         if self.scenario and "lidars" not in self.scenario:
             unit = _DEFAULT_UNIT
@@ -212,15 +212,15 @@ class Drive(abc.ABC):
 
     @property
     def instances(self) -> Mapping[int, Mapping] | None:
-        """Instance id -> structure `name`, `class` and `label`, if recorded.
+        """Instance id -> structure (`name`, `class`, `label`), if recorded.
 
-        The id and the label are those of the scans' points.
+        Ids and labels are those of the scans' points.
         """
         return None
 
 
 def index_instances(table: Any, source: str) -> dict[int, Mapping]:
-    """Returns a table of structures, a list in JSON, by instance id.
+    """Returns a structure table from JSON as instance id -> structure.
 
     Raises:
         InputError: if it is no such table.
@@ -243,7 +243,7 @@ class PlacedDrive:
 
     @classmethod
     def of(cls, drive: Drive) -> PlacedDrive:
-        """Returns the world frame and the map of a drive."""
+        """Returns the name of a drive's world frame and of its map."""
         scenario = drive.scenario
         if scenario is not None:
             scenario = {k: v for k, v in scenario.items() if k == "map"}
@@ -257,9 +257,9 @@ Placed = Drive | PlacedDrive
 def check_same_world(
     first: Placed, second: Placed, *, across_maps: bool = False
 ) -> None:
-    """Refuses two drives whose poses cannot be compared.
+    """Raises an error if the poses of two drives cannot be compared.
 
-    Their maps may differ only `across_maps`.
+    Their maps must have the same name unless `across_maps`.
 
     Raises:
         InputError: if their world frames or their maps differ by name.
@@ -281,7 +281,7 @@ def check_same_world(
 
 
 def check_same_map(first: Placed, second: Placed) -> None:
-    """Refuses two drives whose maps have different names.
+    """Raises an error if two drives are of maps of different names.
 
     Raises:
         InputError: if their maps differ by name.

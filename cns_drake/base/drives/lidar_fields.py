@@ -37,5 +37,5 @@ _FIELDS = {
 
 
 def lidar_field(unit: object) -> LidarField | None:
-    """Returns the field of a unit, if its name is known."""
+    """Returns rings and field of view of a LiDAR unit, if it is known."""
     return _FIELDS.get(unit) if isinstance(unit, str) else None

@@ -136,9 +136,9 @@ class McapDrive(Drive):
 
     @property
     def distortion_note(self) -> str | None:
-        """The note on a simulated LiDAR with motion distortion, if it is one.
+        """Note that the scans have motion distortion, if they are known to.
 
-        Whether scans of other recorders are distorted is not known.
+        This is known only of simulated drives.
         """
         if not self.lidar_section.get("motion_distortion"):
             return None
@@ -158,7 +158,7 @@ class McapDrive(Drive):
 
     @property
     def inputs(self) -> Any:
-        """Digests of the files that it was simulated from, if it says so."""
+        """Digests of the files behind a simulated drive, if recorded."""
         found = self._json("provenance.json")
         return found.get("inputs_sha256") if isinstance(found, dict) else None
 
@@ -201,7 +201,7 @@ class McapDrive(Drive):
 
     @property
     def kalibr(self) -> str | None:
-        """Kalibr's file of the IMU's noise, if the IMU has noise.
+        """Text of the IMU's noise file in Kalibr's format, if it has noise.
 
         Raises:
             InputError: if it is no text.

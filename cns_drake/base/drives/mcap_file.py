@@ -200,7 +200,7 @@ class McapFile:
         }
 
     def locate(self, topic: str) -> np.ndarray:
-        """Returns where a topic's messages lie, in the order of time.
+        """Returns the places of a topic's messages in the file, sorted by time.
 
         Returns:
             (N,) of `LOCATION`.
@@ -213,7 +213,7 @@ class McapFile:
         return self._locations[topic]
 
     def step_back_ns(self, topic: str) -> int:
-        """Returns the largest step back of a topic's log time in the file [ns].
+        """Returns the largest step backwards of a topic's log times [ns].
 
         Raises:
             InputError: if the index cannot be read.
@@ -232,7 +232,7 @@ class McapFile:
         return self._message(self._chunk(int(location["chunk"])), location)
 
     def visit(self, locations: np.ndarray) -> Iterator[tuple[int, memoryview]]:
-        """Yields many messages in the file's order, unpacking each chunk once.
+        """Yields many messages in file order, unpacking each chunk once.
 
         Args:
             locations: (N,) of `LOCATION`.

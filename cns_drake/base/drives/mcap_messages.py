@@ -24,7 +24,7 @@ _ENCAPSULATION_BYTES = 4
 
 
 def decode(data: bytes | memoryview, message_type: str) -> Any:
-    """Returns the message of serialised bytes.
+    """Returns the message that serialised bytes hold.
 
     Raises:
         ValueError: if the bytes are no such message, or more than one can have.
@@ -45,7 +45,7 @@ def decode(data: bytes | memoryview, message_type: str) -> Any:
 
 
 def read_cloud_header(data: bytes | memoryview) -> tuple[int, str]:
-    """Reads stamp [ns] and frame of a PointCloud2, and nothing else.
+    """Returns the stamp [ns] and frame of a PointCloud2, and nothing else.
 
     Raises:
         ValueError: if it is cut off, or claims more than makes sense.
@@ -96,12 +96,12 @@ def imu_row(message: Any) -> tuple:
 
 
 def xyz(v: Any) -> tuple[float, float, float]:
-    """Returns the numbers of a vector."""
+    """Returns the components of a vector message."""
     return v.x, v.y, v.z
 
 
 def xyzw(q: Any) -> tuple[float, float, float, float]:
-    """Returns the numbers of a quaternion."""
+    """Returns the components of a quaternion message."""
     return q.x, q.y, q.z, q.w
 
 
@@ -133,7 +133,7 @@ class StaticTransforms:
                     )
 
     def pose(self, base: str, frame: str) -> np.ndarray:
-        """Returns the pose (4, 4) of a frame in another one, its ancestor.
+        """Returns the pose (4, 4) of a frame in one of its ancestors.
 
         Raises:
             InputError: no transforms lead from one to the other, or one of
@@ -158,8 +158,8 @@ def checked_poses(
     """Returns poses (..., 4, 4) of positions and quaternions in a recording.
 
     Args:
-        p: (..., 3) [m].
-        quat_xyzw: (..., 4).
+        p: (..., 3) positions [m].
+        quat_xyzw: (..., 4) quaternions.
 
     Raises:
         InputError: a number is not finite, a position is too far away, or a

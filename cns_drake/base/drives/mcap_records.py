@@ -98,7 +98,9 @@ class RecordContent(ReadDataStream):
 
 
 def uncompress(chunk: Chunk) -> bytes:
-    """Returns a chunk's records; a small file cannot fill the memory.
+    """Returns the uncompressed records of a chunk.
+
+    Their size is limited, so that a small file cannot fill the memory.
 
     Raises:
         ValueError: if it is damaged, too large or of unknown compression.
@@ -171,7 +173,9 @@ def read_records(stream: BinaryIO) -> Iterator[McapRecord | Fault]:
 def locate_records(
     stream: BinaryIO,
 ) -> Iterator[tuple[int, int, McapRecord | Fault]]:
-    """Yields records like `read_records`, each with its place.
+    """Yields the records of an MCAP file, each with its place in the file.
+
+    They are the records that `read_records` yields.
 
     Yields:
         The offset of a chunk in the file and that of a record in the

@@ -44,7 +44,7 @@ def point_field_datatype(dtype: np.dtype) -> int:
 
 
 def to_points(message: Any) -> np.ndarray:
-    """Returns the records of a cloud as they are, without copying them.
+    """Returns a PointCloud2's points as an array, without copying them.
 
     Args:
         message: a deserialised PointCloud2, with any fields and padding.
@@ -66,7 +66,7 @@ def to_points(message: Any) -> np.ndarray:
 
 
 def to_records(message: Any) -> np.ndarray:
-    """Returns the records of a cloud that may have no coordinates.
+    """Returns a PointCloud2's records, which may lack coordinates.
 
     Returns:
         (height * width,) under the message's field names.
@@ -180,15 +180,15 @@ _LAYOUTS = {
 def to_layout(
     points: np.ndarray, layout: str, num_rings: int | None = None
 ) -> np.ndarray:
-    """Returns points in a layout.
+    """Returns points with the fields of another layout, such as Ouster's.
 
     Args:
         points: (N,) with the fields x y z intensity ring t; intensities from
             0 to 1, or, if one is larger, calibrated ones up to 255.
         layout: one of `LAYOUT_NAMES`; `cns` is the layout that the points
             have.
-        num_rings: of the unit. In `velodyne`, whose driver counts rings from
-            below, they are then turned round.
+        num_rings: number of rings of the unit. In `velodyne`, whose driver
+            counts rings from below, they are then turned round.
 
     Returns:
         (N,). Ranges are in millimetres for `ouster`; `t` and `time_stamp` in
@@ -227,7 +227,7 @@ def to_layout(
 
 
 def to_labels(points: np.ndarray) -> np.ndarray:
-    """Returns the labels and instances of points alone, (N,)."""
+    """Returns only the labels and instances of points, (N,)."""
     return repack_fields(points[["label", "instance"]])
 
 
@@ -236,7 +236,7 @@ def from_layout(
     labels: np.ndarray | None = None,
     is_calibrated: Callable[[], bool] = lambda: False,
 ) -> np.ndarray:
-    """Returns points with the fields of this project beside their own.
+    """Returns points of another layout with this project's fields added.
 
     Args:
         points: (N,) in any layout.

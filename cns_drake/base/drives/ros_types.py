@@ -84,12 +84,12 @@ def message_hash(message_type: str) -> str:
 
 
 def serialize(message: Any) -> bytes:
-    """Returns the CDR form of a message."""
+    """Returns a message serialised as CDR."""
     return bytes(_TYPESTORE.serialize_cdr(message, message.__msgtype__))
 
 
 def deserialize(data: bytes | memoryview, message_type: str) -> Any:
-    """Returns the message of a CDR form.
+    """Returns the message in serialised CDR bytes.
 
     Raises:
         Exception: any type of error, if the data are no such message.

@@ -55,15 +55,15 @@ class Cluster:
 
     @property
     def slots(self) -> int | None:
-        """How many jobs run at a time; None if that is not fixed beforehand.
+        """Number of jobs that run at once; None if it is not fixed.
 
-        A foreign scheduler gets all jobs at once, since others may use
-        it, and it may start workers for them.
+        A foreign scheduler gets all jobs at once, since others may use it, and
+        it may start workers for them.
         """
         return self.num_workers if self.scheduler is None else None
 
     def connect(self, listener: Listener) -> AbstractContextManager[Workers]:
-        """Returns workers, which live as long as the context.
+        """Returns the workers of the cluster, until the context ends.
 
         Raises:
             InputError: if the scheduler does not answer.
@@ -74,7 +74,7 @@ class Cluster:
 
 
 def choose_cluster(num_jobs: int | None, scheduler: str | None) -> Cluster:
-    """Returns the cluster of a command's options.
+    """Returns the cluster that the options --jobs and --scheduler name.
 
     Args:
         num_jobs: `--jobs`: work on this machine, so many jobs at a time.
@@ -120,9 +120,9 @@ class LocalWorkers:
         self._threads.shutdown()
 
     def submit(self, name: str, job: bytes, priority: float) -> None:
-        """Lets a job run, when there is room; one with a high priority first.
+        """Queues a job; those with a higher priority run first.
 
-        Here there is a thread for each.
+        Each job has a thread.
         """
         del priority
         self._threads.submit(self._run, name, job)
@@ -262,7 +262,7 @@ def _check_answer(address: str) -> None:
 
 
 def work(name: str, job: bytes, topic: str) -> None:
-    """Runs a job; what a worker of Dask does.
+    """Runs a job on a worker of Dask.
 
     Raises:
         JobError: see `run_process`.

@@ -31,14 +31,14 @@ _LIBRARIES = (
 
 
 def fingerprint(inputs: Mapping[str, object]) -> str:
-    """Returns a short text for inputs, which must be JSON values."""
+    """Returns a short hash of inputs, which must be JSON values."""
     text = json.dumps(inputs, sort_keys=True, separators=(",", ":"))
     return hashlib.sha256(text.encode()).hexdigest()[:32]
 
 
 @functools.cache
 def code_digest(*modules: str, without: tuple[str, ...] = ()) -> str:
-    """Returns a digest of modules and of all modules of ours they import.
+    """Returns a digest of modules and of all project modules they import.
 
     A data file counts if a module of its folder names it, or names the folder
     beside it that holds the file. Versions of libraries count.
@@ -55,10 +55,10 @@ def code_digest(*modules: str, without: tuple[str, ...] = ()) -> str:
 
 
 def script_digest(path: Path) -> str:
-    """Returns a digest of a Python file and of all that it imports.
+    """Returns a digest of a Python file and of everything it imports.
 
-    These are files beside it, modules of ours and the versions of libraries;
-    see `code_digest`.
+    These are files beside it, modules of this project and the versions of
+    libraries; see `code_digest`.
 
     Raises:
         InputError: if a file cannot be read.

@@ -56,13 +56,13 @@ class TimeLeft:
         self._most_running = 1
 
     def start(self, name: str, now: float) -> None:
-        """A job starts, or starts again."""
+        """Notes that a job starts, perhaps not for the first time."""
         self._works[name] = _Work(self._works[name].cost, since=now)
         running = sum(w.since is not None for w in self._works.values())
         self._most_running = max(self._most_running, running)
 
     def progress(self, name: str, share: float, now: float) -> None:
-        """A share of a job is done; its loading time does not count."""
+        """Notes the share of a job that is done, without its loading time."""
         work = self._works[name]
         work.done = share
         if work.since is None or work.first is None:
@@ -70,7 +70,7 @@ class TimeLeft:
         work.taken, work.measured = now - work.since, share - work.first
 
     def end(self, name: str, now: float) -> None:
-        """A job ends."""
+        """Notes that a job has ended."""
         work = self._works[name]
         since = now if work.since is None else work.since
         work.done, work.since = 1.0, None
@@ -79,13 +79,13 @@ class TimeLeft:
             work.taken = work.measured = 0.0
 
     def share(self) -> float:
-        """Returns how much of all work is done, 0 to 1."""
+        """Returns the share of all work that is done, 0 to 1."""
         total = sum(work.cost for work in self._works.values())
         done = sum(work.cost * work.done for work in self._works.values())
         return done / max(total, 1e-9)
 
     def seconds(self) -> float:
-        """Returns the time that is left [s]."""
+        """Returns an estimate of the remaining time [s]."""
         works = self._works.values()
         taken = sum(work.taken for work in works)
         expected = sum(work.cost * work.measured for work in works)
@@ -141,14 +141,14 @@ class JobProgress:
         return self._bars.get_renderable()
 
     def start(self, name: str) -> None:
-        """A job starts, or starts again."""
+        """Shows that a job starts, perhaps not for the first time."""
         self._left.start(name, time.monotonic())
         self._remove(name)
         self._tasks[name] = self._bars.add_task(name, total=None, note="")
         self.refresh()
 
     def progress(self, name: str, done: int, total: int) -> None:
-        """Reports which part of a job is done."""
+        """Shows how much of a job is done."""
         if name not in self._tasks:
             return
         share = done / max(total, 1)
@@ -165,7 +165,7 @@ class JobProgress:
         self.refresh()
 
     def end(self, name: str, fault: bool = False) -> None:
-        """A job ends."""
+        """Shows that a job has ended, or its error."""
         self._left.end(name, time.monotonic())
         self._num_ended += 1
         self._remove(name)
@@ -174,7 +174,7 @@ class JobProgress:
         self.refresh()
 
     def note(self, text: str) -> None:
-        """Prints lines above the display."""
+        """Prints lines of text above the progress display."""
         print_note(self._bars, text)
 
     def refresh(self) -> None:

@@ -242,7 +242,7 @@ def _run(job: bytes, reporter: Reporter) -> tuple[str, str]:
 
 
 def nothing_left(step: Step) -> bool:
-    """Returns whether a step has nothing to do; False if that is unclear."""
+    """Returns whether a step is known to be done; False if unclear."""
     try:
         return step.is_done()
     except InputError:
@@ -250,7 +250,7 @@ def nothing_left(step: Step) -> bool:
 
 
 def end_with_parent() -> None:
-    """Ends this process when its parent has ended, even if killed."""
+    """Makes this process end when its parent ends, even if that is killed."""
     parent = multiprocessing.parent_process()
     assert parent is not None
     parent.join()

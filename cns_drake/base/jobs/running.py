@@ -45,10 +45,10 @@ class Job:
 
 
 def run_jobs(jobs: Iterable[Job], cluster: Cluster) -> None:
-    """Runs jobs; those with the longest chain of work behind them first.
+    """Runs jobs on a cluster, the longest chains of dependent jobs first.
 
     Shows progress on stderr. A job whose process or worker dies is started
-    again. A job that cannot be done stops only the jobs that need it.
+    again. A job that fails stops only the jobs that need it.
 
     Raises:
         FailedJobsError: if some could not be done; all are named.

@@ -26,7 +26,7 @@ class Reporter:
         self._reported: float | None = None
 
     def progress(self, done: int, total: int) -> None:
-        """Reports how much of how much is done, in any unit."""
+        """Reports how much of a total is done, in any unit."""
         now = time.monotonic()
         if (
             done >= total
@@ -43,7 +43,7 @@ class Reporter:
     def track(
         self, items: Iterable, description: str, total: int
     ) -> Iterator[Any]:
-        """Reports the progress of a loop; a `cns_drake.base.progress.Track`."""
+        """Yields the items of a loop, reporting its progress."""
         del description
         for done, item in enumerate(items):
             self.progress(done, total)
@@ -60,7 +60,7 @@ class Step(abc.ABC):
     @property
     @abc.abstractmethod
     def output(self) -> Path | None:
-        """The file or folder that only one step at a time may write, if any.
+        """File or folder that only one step at a time may write, if any.
 
         A lost connection can leave two copies of a step running. They never
         work on it at the same time; see `cns_drake.base.files.exclusive`.
@@ -68,7 +68,7 @@ class Step(abc.ABC):
 
     @abc.abstractmethod
     def is_done(self) -> bool:
-        """Returns whether all its files are there and up to date.
+        """Returns whether all files of the step exist and are up to date.
 
         Raises:
             InputError: that cannot be found out.
@@ -76,14 +76,16 @@ class Step(abc.ABC):
 
     @abc.abstractmethod
     def run(self, reporter: Reporter) -> None:
-        """Does the work; leaves no file under a final name half written.
+        """Does the work of the step.
+
+        It never leaves an incomplete file under a final name.
 
         Raises:
             InputError: it cannot be done.
         """
 
     def made_of(self, inputs: Mapping[str, object]) -> dict[str, object]:
-        """Returns inputs with the digest of the code of this step."""
+        """Returns the step's inputs together with the digest of its code."""
         return {**inputs, "code": code_digest(type(self).__module__)}
 
 

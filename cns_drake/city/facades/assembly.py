@@ -98,7 +98,10 @@ class Site:
         return [k for k, e in flanks.items() if not e & self.blind_edges]
 
     def blind_in(self, number: int, count: int) -> frozenset[int]:
-        """The blind sides of one of `count` units in a row, left to right."""
+        """Returns the blind sides of one of `count` units in a row.
+
+        Units are numbered from left to right.
+        """
         outer = {3: number == 0, 1: number + 1 == count}
         return frozenset(
             edge
@@ -200,13 +203,16 @@ class Assembly:
         return pick(self.rng, choices)
 
     def some_of(self, words: str, low: int, high: int) -> list[str]:
-        """Returns the first `low` to below `high` words of a text."""
+        """Returns the first words of a text, a random number of them.
+
+        The number is from `low` to below `high`.
+        """
         return words.split()[: self.whole(low, high)]
 
     def add(
         self, part: str, *meshes: Mesh, z: float = 0.0, rgb: Rgb | None = None
     ) -> None:
-        """Merges meshes into one of this building's own, at a height.
+        """Merges meshes into one mesh of this building, at a height.
 
         Meshes without any faces (pilasters on walls too short for them) are
         left out.
@@ -222,25 +228,25 @@ class Assembly:
         self._pieces = {material: [] for material in colours}
 
     def add_to(self, material: str, *meshes: Mesh) -> None:
-        """Adds meshes to those of a material."""
+        """Adds meshes to the parts with a material."""
         if material not in self._pieces:
             raise ValueError(f"unknown material {material}")
         self._pieces[material] += meshes
 
     def turn(self, translation: ArrayLike, yaw: float) -> None:
-        """Rotates all materials about z by `yaw`, then translates them."""
+        """Rotates the whole building about z by `yaw`, then translates it."""
         for material, pieces in self._pieces.items():
             mesh = merge_meshes(*pieces).moved(translation, yaw)
             self._pieces[material] = [mesh]
 
     def finish(self, footprint: BaseGeometry) -> Model:
-        """Adds a part for each material in use; returns the building."""
+        """Returns the building, with a part for each material in use."""
         for material, pieces in self._pieces.items():
             self.add(material, *pieces, rgb=self._colours[material])
         return Model(tuple(self.parts), self.meshes, footprint)
 
     def define(self, key: str, mesh: Mesh) -> str:
-        """Adds a mesh of this building's own; returns its full name."""
+        """Adds a mesh to this building; returns the mesh's full name."""
         name = f"{self.site.name}_{key}"
         if name in self.meshes:
             raise ValueError(f"mesh {name} is defined twice")
@@ -274,7 +280,7 @@ class Assembly:
     def shared(
         self, mesh: str, scale: tuple[float, float, float] = (1.0, 1.0, 1.0)
     ) -> MeshShape:
-        """Returns the shape of one of the `object_meshes`."""
+        """Returns one of the shared `object_meshes` as a shape."""
         self.meshes[mesh] = object_mesh(mesh)
         return MeshShape(mesh, scale)
 
@@ -346,4 +352,4 @@ class Building(Assembly, abc.ABC):
 
     @abc.abstractmethod
     def build(self) -> None:
-        """Adds all parts."""
+        """Adds all parts of the building to its assembly."""

@@ -40,10 +40,10 @@ def window(
     hood: float = 0.0,
     pier: float = 0.35,
 ) -> Bay:
-    """A recessed window.
+    """Returns a bay with a recessed window.
 
     Args:
-        width: at most this, less where the bay is narrow [m].
+        width: width of the window, less where the bay is narrow [m].
         sill: bottom of the glass above the floor [m].
         head: top of the glass [m].
         depth: depth of the glass behind the wall [m].
@@ -75,7 +75,7 @@ def window(
 
 
 def ribbon(sill: float, head: float, depth: float, post: float) -> Bay:
-    """A band of glass with a post between one bay and the next."""
+    """Returns a bay of a ribbon window, with a post beside the next bay."""
     return window(1e3, sill, head, depth, pier=post / 2)
 
 
@@ -153,7 +153,7 @@ def shop_front(
 def entrance(
     width: float, height: float, depth: float = 0.9, *, surround: float = 0.2
 ) -> Bay:
-    """A doorway deep in the wall inside a frame that stands out."""
+    """Returns a bay with a deep doorway in a frame that stands out."""
 
     def bay(x0: float, x1: float) -> list[Relief]:
         a, b = _centred(x0, x1, min(width, x1 - x0 - 1.0))
@@ -169,7 +169,10 @@ def entrance(
 
 
 def house_door(width: float, z0: float, z1: float, depth: float) -> Bay:
-    """A doorway above steps: two leaves, a fanlight, a flat surround."""
+    """Returns a bay with a doorway above steps.
+
+    It has two leaves, a fanlight and a flat surround.
+    """
 
     def bay(x0: float, x1: float) -> list[Relief]:
         a, b = _centred(x0, x1, min(width, x1 - x0 - 0.6))
@@ -185,7 +188,7 @@ def house_door(width: float, z0: float, z1: float, depth: float) -> Bay:
 
 
 def bar(width: float, z0: float, z1: float, depth: float) -> Bay:
-    """An upright bar in the middle of the bay, at its own depth."""
+    """Returns a bay with an upright bar in its middle, at its own depth."""
 
     def bay(x0: float, x1: float) -> list[Relief]:
         a, b = _centred(x0, x1, width)
@@ -195,7 +198,7 @@ def bar(width: float, z0: float, z1: float, depth: float) -> Bay:
 
 
 def gate(width: float, height: float, depth: float = 0.3) -> Bay:
-    """A roller shutter with its ribs."""
+    """Returns a bay with a ribbed roller shutter."""
 
     def bay(x0: float, x1: float) -> list[Relief]:
         a, b = _centred(x0, x1, min(width, x1 - x0 - 0.6))
@@ -217,7 +220,7 @@ def loggia(
         width: width of the balcony, less if the bay is too narrow [m].
         depth: how far its back lies behind the wall [m].
         rail: top of the rail above the wall's foot [m].
-        head: top of the opening, likewise [m].
+        head: top of the opening above the wall's foot [m].
         pier: least width of wall on each side [m].
     """
 
@@ -233,9 +236,10 @@ def loggia(
 
 
 def stretches(length: float, pitch: float, margin: float) -> list[Span]:
-    """Divides a wall into equal bays of about `pitch`, clear of its ends.
+    """Returns equal bays of about `pitch` that divide a wall.
 
-    A wall too short for that gets one narrower bay, or none.
+    They keep clear of its ends. A wall too short for that gets one narrower
+    bay, or none.
     """
     room = length - 2 * margin
     count = max(int(room / pitch + 0.4), int(room > 0.6 * pitch))
@@ -246,17 +250,17 @@ def stretches(length: float, pitch: float, margin: float) -> list[Span]:
 
 
 def bounds(cells: Sequence[Span]) -> list[float]:
-    """Returns where cells that touch one another begin and end."""
+    """Returns start and end of a row of adjoining cells."""
     return [cells[0][0], *(end for _, end in cells)]
 
 
 def plain(edge: int, length: float) -> list[Relief]:
-    """The layout of a wall without openings."""
+    """Returns no reliefs: the layout of a wall without openings."""
     return []
 
 
 def rhythm(pitch: float, bays: Sequence[Bay], margin: float = 0.5) -> Layout:
-    """Repeats the bays from both ends towards the middle of every wall."""
+    """Returns a layout that repeats bays from both ends of a wall."""
 
     def layout(edge: int, length: float) -> list[Relief]:
         cells = stretches(length, pitch, margin)
@@ -270,7 +274,10 @@ def rhythm(pitch: float, bays: Sequence[Bay], margin: float = 0.5) -> Layout:
 
 
 def with_middle(layout: Layout, bay: Bay, width: float) -> Layout:
-    """Puts a bay in the middle of a wall, in place of the bays it meets."""
+    """Returns a layout with a bay in the middle of the wall.
+
+    It replaces the bays that it touches.
+    """
 
     def combined(edge: int, length: float) -> list[Relief]:
         x0, x1 = (length - width) / 2, (length + width) / 2
@@ -287,12 +294,12 @@ def with_middle(layout: Layout, bay: Bay, width: float) -> Layout:
 
 
 def alone(bay: Bay, width: float) -> Layout:
-    """Puts a bay in the middle of plain walls."""
+    """Returns a layout with one bay in the middle of a plain wall."""
     return with_middle(plain, bay, width)
 
 
 def by_edge(layouts: dict[int, Layout], otherwise: Layout) -> Layout:
-    """Gives single walls a layout of their own."""
+    """Returns a layout that differs between walls."""
 
     def layout(edge: int, length: float) -> Sequence[Relief]:
         return layouts.get(edge, otherwise)(edge, length)
@@ -301,5 +308,8 @@ def by_edge(layouts: dict[int, Layout], otherwise: Layout) -> Layout:
 
 
 def with_door(layout: Layout, door: Bay, width: float) -> Layout:
-    """Puts a door in the middle of the front, in place of bays it meets."""
+    """Returns a layout with a door in the middle of the front.
+
+    It replaces the bays that it touches.
+    """
     return by_edge({0: with_middle(layout, door, width)}, layout)

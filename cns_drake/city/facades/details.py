@@ -31,10 +31,10 @@ class WallFrame:
         self._outward = np.array([self._along[1], -self._along[0]])
 
     def place(self, mesh: Mesh, z: float = 0.0) -> Mesh:
-        """Returns a mesh given in wall coordinates, in building's ones.
+        """Returns a mesh given in wall coordinates in the building's frame.
 
         Wall coordinates (x along, y outwards, z up) are left-handed, so the
-        faces are turned round.
+        faces are reversed.
         """
         x, y, height = mesh.vertices.T
         xy = self._start + np.outer(x, self._along) + np.outer(y, self._outward)
@@ -55,12 +55,12 @@ class WallFrame:
         return math.atan2(self._along[1], self._along[0])
 
     def point(self, x: float, y: float) -> np.ndarray:
-        """Returns a point given in wall coordinates."""
+        """Returns a point given in wall coordinates in the building's frame."""
         return self._start + x * self._along + y * self._outward
 
 
 def canopy(x0: float, x1: float, reach: float, z: float) -> Mesh:
-    """A flat canopy with a fascia, hung on two slanted rods."""
+    """Returns a flat canopy with a fascia, hung on two slanted rods."""
     rods = [
         beam((x, 0.05, z + 1.2), (x, reach - 0.3, z + 0.3), 0.08)
         for x in (x0 + 0.4, x1 - 0.4)
@@ -72,7 +72,7 @@ def canopy(x0: float, x1: float, reach: float, z: float) -> Mesh:
 def front_canopy(
     outline: ArrayLike, half: float, reach: float, z: float
 ) -> Mesh:
-    """A canopy above the door in the middle of the front."""
+    """Returns a canopy above the door in the middle of the front."""
     front = WallFrame(outline, 0)
     middle = front.length / 2
     return front.place(canopy(middle - half, middle + half, reach, z))
@@ -223,7 +223,7 @@ def pilasters(
         outline: (N, 2) corners of the walls in the building's frame,
             anticlockwise [m].
         pitch: width of a bay, as of `bays.rhythm` [m].
-        margin: distance of the bays from corners, likewise [m].
+        margin: distance of the bays from corners, as of `bays.rhythm` [m].
         every: number of bays from one pilaster to the next.
         width: width of a pilaster [m].
         reach: how far it reaches out of the wall [m].
@@ -345,7 +345,7 @@ def column(x: float, y: float, z0: float, z1: float, radius: float) -> Mesh:
 
 
 def beam(start: ArrayLike, end: ArrayLike, width: float) -> Mesh:
-    """A square bar between two points that are not above one another."""
+    """Returns a square bar between two points that are not vertical."""
     start, end = np.asarray(start, float), np.asarray(end, float)
     length = float(np.linalg.norm(end - start))
     along = (end - start) / length
@@ -473,7 +473,7 @@ def add_railing(
         part: name of the visual.
         wall: the wall.
         start: first point, along and out of the wall [m].
-        end: last point, likewise [m].
+        end: last point, along and out of the wall [m].
         z: height of the floor [m].
         rgb: colour.
     """

@@ -23,7 +23,7 @@ FOUNDATION_M = 0.5
 
 
 def rectangle(x0: float, y0: float, x1: float, y1: float) -> np.ndarray:
-    """Returns the four corners; the first edge lies at y0."""
+    """Returns the four corners of a rectangle; the first edge is at y0."""
     return np.array([(x0, y0), (x1, y0), (x1, y1), (x0, y1)], dtype=float)
 
 
@@ -46,7 +46,7 @@ def square(x: float, y: float, half: float) -> np.ndarray:
 
 
 def inset(points: ArrayLike, distance: ArrayLike) -> np.ndarray:
-    """Moves each edge of an outline inwards and intersects them again.
+    """Returns an outline with each edge moved inwards.
 
     One distance is for all edges, or there is one per edge [m]; negative ones
     move outwards. Corners keep their order. The caller keeps the distances
@@ -68,7 +68,7 @@ def inset(points: ArrayLike, distance: ArrayLike) -> np.ndarray:
 
 
 def inset_limit(points: ArrayLike) -> float:
-    """Returns how far `inset` may go until an edge has lost 70 %."""
+    """Returns how far `inset` can go until an edge loses 70 % of its length."""
     points = np.asarray(points, dtype=float)
     probe = 1e-3
     length = np.linalg.norm(np.roll(points, -1, axis=0) - points, axis=1)
@@ -81,10 +81,11 @@ def inset_limit(points: ArrayLike) -> float:
 def rounded(
     points: ArrayLike, corners: dict[int, float], step: float
 ) -> np.ndarray:
-    """Rounds convex corners of an outline by chords of at most `step` [m].
+    """Returns an outline whose convex corners are rounded by chords.
 
-    `corners` gives their radii by number [m]. The first edge is what the arcs
-    leave of the first edge given.
+    Chords are at most `step` long [m]. `corners` gives the radius of each
+    corner by number [m]. The first edge is what the arcs leave of the first
+    edge given.
     """
 
     def arc(
@@ -357,12 +358,18 @@ def foundation(points: ArrayLike) -> Mesh:
 
 
 def chamfered(points: np.ndarray, cut: float) -> np.ndarray:
-    """Cuts every convex corner of an outline, `cut` metres along each edge."""
+    """Returns an outline with convex corners cut off.
+
+    Each cut takes `cut` metres of both edges.
+    """
     return _replaced(points, lambda k, p, a, b: [p - a * cut, p + b * cut])
 
 
 def notched(points: np.ndarray, depth: float) -> np.ndarray:
-    """Takes a square of side `depth` out of every convex corner."""
+    """Returns an outline without a square at each convex corner.
+
+    The side of a square is `depth` [m].
+    """
     d = depth
     return _replaced(
         points, lambda k, p, a, b: [p - a * d, p - a * d + b * d, p + b * d]
@@ -457,7 +464,7 @@ def l_shape(
 
 
 def mirrored(points: np.ndarray) -> np.ndarray:
-    """Mirrors an outline left to right about the middle of its extent."""
+    """Returns an outline mirrored left to right about its middle."""
     points = np.asarray(points, dtype=float)
     middle = (points[:, 0].min() + points[:, 0].max()) / 2
     flipped = np.column_stack([2 * middle - points[:, 0], points[:, 1]])

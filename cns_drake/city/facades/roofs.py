@@ -79,7 +79,7 @@ def barrel_line(
 
 
 def with_eaves(line: Line, low: float, high: float) -> list[bays.Span]:
-    """Extends the first and the last slope of a line by these runs [m]."""
+    """Returns a roof line whose end slopes are longer by these runs [m]."""
     (a, za), (b, zb) = line[0], line[1]
     (c, zc), (d, zd) = line[-2], line[-1]
     first = (a - low, za - low * (zb - za) / (b - a))

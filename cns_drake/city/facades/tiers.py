@@ -19,7 +19,7 @@ _PANE_OVERLAP = 0.004
 
 
 def add_awnings(p: Building, pieces: Sequence[Mesh]) -> None:
-    """Adds the awnings of a building in a colour of their own."""
+    """Adds awnings to a building, in a colour of their own."""
     if pieces:
         rgb = pick(p.rng, p.kind.choices["awnings"])
         p.add("awnings", *pieces, rgb=rgb)
@@ -28,9 +28,9 @@ def add_awnings(p: Building, pieces: Sequence[Mesh]) -> None:
 def divided(
     height: float, storey: float, most: int = 10
 ) -> tuple[int, int, float]:
-    """Divides a height into storeys, and these into at most so many groups.
+    """Returns groups and storeys per group that fill a height.
 
-    A group becomes one visual.
+    There are at most `most` groups; each becomes one visual.
 
     Returns:
         Number of groups, storeys in a group, height of a storey in whole

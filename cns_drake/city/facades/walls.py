@@ -141,7 +141,7 @@ Quads = Iterator[list[Corner]]
 
 
 def wall_quads(grid: WallCells, glass: tuple[float, ...]) -> Quads:
-    """Yields quads of `Corner`, counter-clockwise seen from outside."""
+    """Yields the quads of a wall, counter-clockwise seen from outside."""
     for arch in grid.arches:
         yield from _arch_reveals(arch)
         if arch.depth not in glass:
@@ -152,7 +152,7 @@ def wall_quads(grid: WallCells, glass: tuple[float, ...]) -> Quads:
 
 
 def glass_quads(grid: WallCells, glass: tuple[float, ...]) -> Quads:
-    """Yields the fronts at the depths of glass, which the wall leaves out."""
+    """Yields the quads of the panes, which `wall_quads` leaves out."""
     for arch in grid.arches:
         if arch.depth in glass:
             yield from _arch_back(arch)
@@ -161,7 +161,7 @@ def glass_quads(grid: WallCells, glass: tuple[float, ...]) -> Quads:
 
 
 def breaks(end: float, values: Sequence[float]) -> list[float]:
-    """Returns 0, the distinct values between it and `end`, and `end` [m]."""
+    """Returns 0, `end` and the distinct values between them, sorted [m]."""
     inner = {round(float(v), 3) for v in values}
     return [0.0, *sorted(v for v in inner if 1e-4 < v < end - 1e-4), end]
 
@@ -327,7 +327,7 @@ class Facade:
     plain: frozenset[int] = frozenset()
 
     def stacked(self, count: int) -> Facade:
-        """Returns `count` copies of these storeys on top of one another."""
+        """Returns the facade of `count` copies of the storeys, stacked."""
         bands = tuple(lifted(b, k * self.height) for k in range(count)
                       for b in self.bands)  # fmt: skip
 
@@ -343,7 +343,7 @@ class Facade:
 
 
 def lifted(item: _Strip, dz: float) -> _Strip:
-    """Returns a band or a relief higher up by `dz` [m]."""
+    """Returns a band or a relief raised by `dz` [m]."""
     moved = {
         name: getattr(item, name) + dz
         for name in item._fields
@@ -376,11 +376,11 @@ def single_wall(
     reliefs: Sequence[Relief],
     fronts: Sequence[Iterable[float]],
 ) -> list[Mesh]:
-    """Returns a wall that meets no other, in the coordinates of a wall.
+    """Returns a wall that touches no other, in wall coordinates.
 
     Reliefs are painted in order and stay clear of both ends [m]. The wall
-    without its glass comes first, then a mesh for each of `fronts`, the depths
-    of panes.
+    without its glass comes first, then one mesh of panes for each depth in
+    `fronts`.
 
     Raises:
         ValueError: a relief leaves the wall.

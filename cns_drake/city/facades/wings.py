@@ -103,17 +103,17 @@ class Wing:
 
     @property
     def width(self) -> float:
-        """Along x [m]."""
+        """Width along x [m]."""
         return self.x1 - self.x0
 
     @property
     def depth(self) -> float:
-        """Along y [m]."""
+        """Depth along y [m]."""
         return self.y1 - self.y0
 
     @property
     def center(self) -> massing.Point:
-        """Its middle [m]."""
+        """Middle of the wing in the building's frame [m]."""
         return (self.x0 + self.x1) / 2, (self.y0 + self.y1) / 2
 
     @property
@@ -137,7 +137,10 @@ class Wing:
 
     @property
     def line(self) -> list[tuple[float, float]]:
-        """The upper surface of the roof between the walls, without eaves."""
+        """Upper surface of the roof between the walls, without eaves.
+
+        It is a line of (across, height) [m].
+        """
         roof = self.roof
         a, b = (self.x0, self.x1) if roof.along_y else (self.y0, self.y1)
         z = self.wall_top + roof.thickness - _SEAT
@@ -158,7 +161,7 @@ class Wing:
         return (0, 2) if self.roof.along_y else (3, 1)
 
     def covers(self, x: float, y: float) -> bool:
-        """Whether a point lies within the walls."""
+        """Returns whether a point lies within the walls."""
         return self.x0 < x < self.x1 and self.y0 < y < self.y1
 
 
@@ -448,7 +451,7 @@ class Openings:
                 ]
 
     def put(self, edge: int, x: float, width: float, bay: bays.Bay) -> None:
-        """Puts a bay around x, in place of the bays it meets there."""
+        """Puts a bay around x, replacing the bays that it touches there."""
         x0, x1 = x - width / 2, x + width / 2
         new = bay(x0, x1)
         if not new:
@@ -484,7 +487,7 @@ class Openings:
         ]
 
     def layout(self, edge: int, length: float) -> list[walls.Relief]:
-        """Returns all reliefs, for a facade.
+        """Returns all reliefs of a wall, for a facade.
 
         Bands end at arches, which need flat wall around them.
         """

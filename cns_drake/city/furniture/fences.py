@@ -43,9 +43,10 @@ def run(
     length: float = 10.0,
     height: float | None = None,
 ) -> structures.Model:
-    """Returns a run of panels of one of `RUN_KINDS`, in a drawn colour.
+    """Returns a fence of several panels in a random colour.
 
-    The height is the nominal one if not given [m].
+    The kind is one of `RUN_KINDS`. The height is the nominal one if not given
+    [m].
 
     Raises:
         ValueError: the length or the height is not positive.

@@ -77,7 +77,7 @@ class Streets(NamedTuple):
 
 
 def meshes_of(structures: Iterable[Structure]) -> dict[str, Mesh]:
-    """Returns all meshes of structures by name.
+    """Returns name -> mesh of all meshes of structures.
 
     Raises:
         ValueError: if two different meshes have the same name, or one has no
@@ -95,7 +95,7 @@ def meshes_of(structures: Iterable[Structure]) -> dict[str, Mesh]:
 
 
 def make_city(world: Path) -> City:
-    """Makes the city of a world folder from `roads.yaml` and `city.yaml`.
+    """Returns the city of a folder with `roads.yaml` and `city.yaml`.
 
     Raises:
         InputError: if one of the files cannot be used.
@@ -117,7 +117,7 @@ def make_city(world: Path) -> City:
 
 
 def lay_out(network: RoadNetwork, plan: CityPlan, source: str) -> City:
-    """Makes a city from a road network.
+    """Returns a city that is made from a road network and a plan.
 
     Raises:
         InputError: if the plan names something unknown or impossible.
@@ -137,7 +137,7 @@ def lay_out(network: RoadNetwork, plan: CityPlan, source: str) -> City:
 
 
 def build_along(streets: Streets, plan: CityPlan, source: str) -> City:
-    """Makes a city along streets.
+    """Returns a city that is made along streets.
 
     Things that need most room, or have the least choice of place, come first.
 

@@ -65,9 +65,10 @@ class _Row(NamedTuple):
 def find_renaming(
     stages: Path, table: Path, structures: Sequence[Structure]
 ) -> Renaming:
-    """Finds new names in a `stages.yaml` for structures of the city of today.
+    """Returns the new names of structures that a `stages.yaml` names.
 
-    The table is the `structures.csv` of the city for which it was written.
+    The table is the `structures.csv` of the city for which it was written. A
+    structure at the same place is the same.
 
     Raises:
         InputError: a file cannot be read.
@@ -97,7 +98,7 @@ def find_renaming(
 
 
 def renamed_text(stages: Path, renamed: Mapping[str, str]) -> str:
-    """Returns the text of a file of stages with other names in it.
+    """Returns the text of a file of stages with structures renamed.
 
     Comments and order stay as they are.
 
@@ -521,7 +522,7 @@ def differing_files(
     *,
     repair_stages: bool = False,
 ) -> list[Path]:
-    """Returns the files that generating the city anew would change."""
+    """Returns the files that would change if the city were generated anew."""
     world = Path(world)
     files = _rendered(world, progress, repair_stages)
     stale = _generated(world) - {world / name for name in files}

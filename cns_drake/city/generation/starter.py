@@ -149,7 +149,7 @@ def starter_plan(areas: Areas, seed: int) -> dict:
 
 
 def starter_stages(city: City) -> dict:
-    """Returns two stages for `Stages`; the first lacks what is in the east."""
+    """Returns two stages; the first lacks the structures in the east."""
     kinds = "building", "vegetation"
     standing = [s for s in city.structures if s.semantic_class in kinds]
     buildings = [s for s in standing if s.semantic_class == "building"]

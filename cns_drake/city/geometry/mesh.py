@@ -56,7 +56,7 @@ class Mesh:
         return corners[begin + np.minimum(np.arange(4), last)]
 
     def with_vertices(self, vertices: np.ndarray) -> Mesh:
-        """Returns the same faces between other vertices (N, 3) [m]."""
+        """Returns the mesh with its vertices moved to (N, 3) [m]."""
         mesh = Mesh(vertices, self.faces)
         mesh.__dict__["_corners"] = self._corners
         return mesh
@@ -70,7 +70,7 @@ class Mesh:
         return self.with_vertices(self.vertices @ R.T + np.asarray(translation))
 
     def turned(self) -> Mesh:
-        """Returns the mesh with faces that look to the other side."""
+        """Returns the mesh with reversed faces."""
         return Mesh(self.vertices, tuple(face[::-1] for face in self.faces))
 
     def to_obj(self) -> str:
@@ -105,7 +105,7 @@ def merge_meshes(*meshes: Mesh) -> Mesh:
 
 
 def box_mesh(size: ArrayLike, center: ArrayLike = (0.0, 0.0, 0.0)) -> Mesh:
-    """Returns an axis-aligned box of the given size [m]."""
+    """Returns an axis-aligned box of the given size about a centre [m]."""
     half = np.asarray(size, dtype=float) / 2
     corners = np.array(
         [(x, y, z) for z in (-1, 1) for y in (-1, 1) for x in (-1, 1)]
@@ -119,7 +119,7 @@ FOLDER = Path(__file__).parents[1] / "object_meshes"
 
 
 def object_mesh(name: str) -> Mesh:
-    """Returns the mesh of this name.
+    """Returns the shared mesh with this name.
 
     Raises:
         FileNotFoundError: there is none.
@@ -129,7 +129,7 @@ def object_mesh(name: str) -> Mesh:
 
 @cache
 def read_mesh(path: Path) -> Mesh:
-    """Returns the mesh of an OBJ file of the city generator's own.
+    """Returns the mesh in an OBJ file that the city generator wrote.
 
     Raises:
         FileNotFoundError: there is none.

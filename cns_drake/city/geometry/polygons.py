@@ -165,9 +165,9 @@ def _is_between(p: _Point, q: _Point, c: _Point) -> bool:
 def cut_ears(
     ring: Sequence[_Point], fans: bool = False
 ) -> list[tuple[int, ...]]:
-    """Returns triangles, as numbers of corners, that fill a ring.
+    """Returns triangles, as indices of corners, that fill a ring.
 
-    It may touch itself. Fans of thin triangles are avoided unless `fans`.
+    The ring may touch itself. Fans of thin triangles are avoided unless `fans`.
 
     Raises:
         ValueError: the ring crosses itself, or runs clockwise.
@@ -296,7 +296,7 @@ def polygons_of(geometry: BaseGeometry) -> list[Polygon]:
 
 
 def tiles(geometry: BaseGeometry, size: float) -> Iterator[MultiPolygon]:
-    """Yields the pieces of polygons in squares of a world-anchored grid."""
+    """Yields the parts of polygons in the squares of a grid in W."""
     _, squares = _squares(geometry, size)
     pieces = shapely.intersection(geometry, squares)
     for piece in shapely.set_precision(pieces, _GRID):
@@ -321,7 +321,7 @@ def _squares(
 def surface_mesh(
     geometry: BaseGeometry, height: HeightMap | float, spacing: float = 0.0
 ) -> Mesh:
-    """Returns the upper side of polygons in W at a height [m].
+    """Returns a horizontal mesh that fills polygons in W at a height [m].
 
     With a positive `spacing` they are first cut into squares of this size [m],
     so that the mesh can follow a height map.
@@ -461,7 +461,7 @@ class Occupancy:
         self._bounds: np.ndarray = np.zeros((64, 4))
 
     def add(self, geometry: BaseGeometry) -> None:
-        """Takes the ground of a polygon."""
+        """Marks the ground of a polygon as taken."""
         count = len(self._geometries)
         if count == len(self._bounds):
             self._bounds = np.concatenate(
@@ -477,7 +477,7 @@ class Occupancy:
         clearance: float = 0.0,
         ignore: BaseGeometry | None = None,
     ) -> bool:
-        """Returns whether a polygon in W keeps a distance from all taken ones.
+        """Returns whether a polygon in W keeps clear of all taken ground.
 
         With a clearance of 0 polygons may touch [m]; a taken polygon to
         `ignore` may be closer, but not overlapped.

@@ -74,7 +74,7 @@ class Model:
 
     @property
     def num_triangles(self) -> int:
-        """Triangles of all parts; any other shape counts as a box."""
+        """Number of triangles of all parts; other shapes count as boxes."""
         return sum(
             self.meshes[part.shape.mesh].num_triangles
             if isinstance(part.shape, MeshShape)
@@ -101,12 +101,12 @@ class Structure:
 
     @property
     def footprint_W(self) -> BaseGeometry:
-        """The ground area of the model, in the world [m]."""
+        """Ground area of the model, seen from above, in the world [m]."""
         return placed(self.model.footprint, self.xyz[:2], self.yaw)
 
     @property
     def p_WFs(self) -> np.ndarray:
-        """The feet: (N, 3) lowest points of the model, in the world [m]."""
+        """Feet of the model: its (N, 3) lowest points, in the world [m]."""
         model = self.model
         meshes = [part_mesh(part, model.meshes) for part in model.parts]
         p_SPs = np.concatenate([mesh.vertices for mesh in meshes])
@@ -230,15 +230,16 @@ def block(
 
 
 def triple(values: Iterable[float]) -> tuple[float, float, float]:
-    """Returns three numbers, from an array for instance, as Python floats."""
+    """Returns three numbers, such as those of an array, as floats."""
     x, y, z = values
     return float(x), float(y), float(z)
 
 
 def assemble(*parts: Part) -> Model:
-    """Returns the model of parts whose meshes are `object_meshes`.
+    """Returns the model that consists of the given parts.
 
-    Its footprint is the convex hull of all geometry below `HEADROOM`.
+    Their meshes are `object_meshes`. The footprint is the convex hull of all
+    geometry below `HEADROOM`.
     """
     shapes = [part.shape for part in parts]
     names = [shape.mesh for shape in shapes if isinstance(shape, MeshShape)]

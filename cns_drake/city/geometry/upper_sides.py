@@ -8,9 +8,10 @@ _UPWARDS = 0.05
 
 
 def long_normals(triangles: np.ndarray) -> np.ndarray:
-    """Returns normals (M, 3) twice as long as the areas of triangles (M, 3, 3).
+    """Returns the cross products (M, 3) of two edges of triangles (M, 3, 3).
 
-    As `np.cross`, which takes far longer for the few triangles of a wall.
+    They are normals, twice as long as the areas. For a few triangles this is
+    faster than `np.cross`.
     """
     u = triangles[:, 1] - triangles[:, 0]
     v = triangles[:, 2] - triangles[:, 0]
@@ -33,18 +34,18 @@ def looks_up(triangles: np.ndarray) -> np.ndarray:
 
 
 def turned_up(triangles: np.ndarray) -> np.ndarray:
-    """Returns triangles (M, 3, 3) with those that look downwards reversed."""
+    """Returns triangles (M, 3, 3), all facing upwards."""
     is_down = unit_normals(triangles)[:, 2] < 0.0
     return np.where(is_down[:, None, None], triangles[:, ::-1], triangles)
 
 
 def from_above(triangles: np.ndarray) -> np.ndarray:
-    """Returns the (M,) polygons of triangles (M, 3, 3) seen from above."""
+    """Returns triangles (M, 3, 3) as (M,) polygons seen from above."""
     return np.asarray(shapely.polygons(triangles[:, :, :2]), object)
 
 
 def quartered(triangles: np.ndarray) -> np.ndarray:
-    """Returns the four triangles of each between the middles of its sides."""
+    """Returns each triangle divided into four at the middles of its sides."""
     a, b, c = np.moveaxis(triangles, 1, 0)
     ab, bc, ca = (a + b) / 2, (b + c) / 2, (c + a) / 2
     parts = ((a, ab, ca), (ab, b, bc), (ca, bc, c), (ab, bc, ca))
@@ -61,7 +62,10 @@ class UpperSides:
         self._tree = shapely.STRtree(from_above(self._triangles))
 
     def heights(self, xy: np.ndarray) -> np.ndarray:
-        """Returns the greatest height (N,) at places (N, 2), or -inf [m]."""
+        """Returns the height (N,) of the highest surface at (N, 2) places [m].
+
+        It is -inf where there is none.
+        """
         highest = np.full(len(xy), -np.inf)
         place, triangle = self._tree.query(shapely.points(xy), "intersects")
         corner = self._triangles[triangle, 0]
@@ -71,5 +75,5 @@ class UpperSides:
         return highest
 
     def hides(self, points: np.ndarray) -> np.ndarray:
-        """Returns which of the points (N, 3) are below an upper side."""
+        """Returns which points (N, 3) lie below a surface."""
         return np.asarray(self.heights(points[:, :2]) > points[:, 2])

@@ -29,7 +29,7 @@ class District(NamedTuple):
 def share_out(
     plan: CityPlan, streets: BaseGeometry, source: str
 ) -> list[District]:
-    """Gives each district its ground, in the order of the plan.
+    """Returns the ground of each district, in the order of the plan.
 
     Carriageways, sidewalks and medians are `streets`, in W [m]; `source` is the
     name of the plan's file, for messages.

@@ -209,7 +209,10 @@ def make_ground(
 
 
 def aprons(buildings: Iterable[Structure], streets: BaseGeometry) -> list[Pad]:
-    """Returns ground around buildings, level with their floors, in W [m]."""
+    """Returns the areas around buildings that are level with their floors.
+
+    They are in W [m].
+    """
     kerbside = streets.buffer(_APRON)
     pads = []
     for building in buildings:
@@ -221,10 +224,10 @@ def aprons(buildings: Iterable[Structure], streets: BaseGeometry) -> list[Pad]:
 
 
 def relaxed(z: np.ndarray) -> np.ndarray:
-    """Fills the gaps (NaN) of a grid of heights by a harmonic field.
+    """Returns a grid of heights with its gaps (NaN) filled smoothly.
 
-    Every gap is at the mean of its two to four neighbours; at least one height
-    is given.
+    Every gap is at the mean of its two to four neighbours, as in a harmonic
+    field; at least one height is given.
     """
     rows, columns = z.shape
     free = np.isnan(z)

@@ -75,10 +75,10 @@ class Covering(NamedTuple):
     def surface(
         self, height: HeightMap | float, spacing: float = 0.0
     ) -> Structure:
-        """Returns its upper side, one part a tile.
+        """Returns the upper side as meshes, one part per tile.
 
-        A mesh that follows a height map has vertices `spacing` apart [m], or
-        with 0 those of the polygons alone.
+        A mesh that follows a height map has vertices `spacing` apart [m]; with
+        0 it has only those of the polygons.
         """
         return self.structure(
             {
@@ -88,9 +88,9 @@ class Covering(NamedTuple):
         )
 
     def structure(self, pieces: dict[str, Mesh]) -> Structure:
-        """Returns the structure of meshes that are given in W already.
+        """Returns the structure of meshes that are given in W.
 
-        Pieces without faces, of slivers alone, are left out.
+        Meshes without faces, which come from slivers, are left out.
         """
         pieces = {part: mesh for part, mesh in pieces.items() if mesh.faces}
         meshes = {f"{self.name}_{part}": mesh for part, mesh in pieces.items()}
@@ -110,7 +110,7 @@ def parking_bays(area: BaseGeometry) -> Covering:
 
 
 def street_structures(network: RoadNetwork) -> list[Structure]:
-    """Returns the ground of all streets, true to the heights of the roads."""
+    """Returns the ground of all streets, at the heights of the roads."""
     bays = unary_union(list(network.areas.parking_bays.values()))
     return street_surfaces(
         network.areas,
@@ -291,7 +291,7 @@ _LEAST_LENGTH = 2 * _STOP_LINE[1] + 4.0
 
 
 def marking_structure(network: RoadNetwork) -> Structure:
-    """Returns the paint of all roads, one part a road."""
+    """Returns the painted markings of all roads, one part per road."""
     pieces = {}
     for name, road in network.roads.items():
         strips = list(_lane_lines(road))

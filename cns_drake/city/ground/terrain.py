@@ -103,7 +103,7 @@ def ground_structures(
 ) -> list[Structure]:
     """Returns the ground of all districts.
 
-    `shape` is the height of everything but water.
+    `shape` gives the height of everything except water.
     """
     structures = []
     # Land within water is a bridge, and water passes below it.
@@ -191,7 +191,7 @@ _WATER_RGB = (0.25, 0.38, 0.45)
 
 
 def water_area(district: District, streets: BaseGeometry) -> BaseGeometry:
-    """Returns all of a water district's water, also that below bridges."""
+    """Returns all water of a district, also below bridges."""
     if district.plan.area is None:
         return district.area
     below = Polygon(district.plan.area).intersection(streets)
@@ -206,9 +206,9 @@ def bridge_structures(
 ) -> list[Structure]:
     """Returns the sides, undersides and piers of all bridges.
 
-    Where a street crosses the area of a district of water, and where such a
-    district has a patch of land, there is a bridge. Its upper side is that
-    of the street or patch. `shape` is the height of everything but water.
+    A bridge is where a street crosses a district of water, and where such a
+    district has a patch of land. Its upper side is that of the street or patch.
+    `shape` gives the height of everything except water.
     """
     structures = []
     for district in districts:

@@ -83,7 +83,7 @@ def lowered(model: Model, height: float, name: str, seed: int) -> Model:
 
 
 def top_of(model: Model) -> float:
-    """Returns the height of a building without equipment on its roof [m]."""
+    """Returns the height of a building without its roof's equipment [m]."""
     return max(
         float(part_mesh(part, model.meshes).vertices[:, 2].max())
         for part in model.parts
@@ -92,10 +92,11 @@ def top_of(model: Model) -> float:
 
 
 def cut_at(mesh: Mesh, height: float) -> tuple[Mesh, np.ndarray]:
-    """Returns the part of a mesh below a height [m], open there, and the cut.
+    """Returns the part of a mesh below a height [m], and the cut.
 
-    The mesh has plane convex faces. The cut is (N, 2, 2), the starts and ends
-    of the edges in which it meets faces, whose backs are on the left [m].
+    The part is open at the cut. The mesh has plane convex faces. The cut is (N,
+    2, 2), the starts and ends of the edges in which it meets faces, whose backs
+    are on the left [m].
     """
     corners: list[_Point] = []
     faces: list[tuple[int, ...]] = []

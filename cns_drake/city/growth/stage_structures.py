@@ -34,9 +34,9 @@ from cns_drake.city.plan.stages import LotUse, Stages
 
 
 def younger(model: Model, height: float) -> Model:
-    """Returns a plant with a top at a height [m], alike in all its proportions.
+    """Returns a plant that is scaled down to a height [m].
 
-    The plant stands on z = 0. If it is lower it is returned itself.
+    The plant stands on z = 0. If it is already lower it is returned itself.
     """
     meshes = (part_mesh(part, model.meshes) for part in model.parts)
     top = max(mesh.vertices[:, 2].max() for mesh in meshes)
@@ -46,7 +46,7 @@ def younger(model: Model, height: float) -> Model:
 
 
 def scaled(model: Model, share: float) -> Model:
-    """Returns a plant of another size, alike in all its proportions."""
+    """Returns a plant scaled to a share of its size."""
 
     def times(values: tuple[float, ...], digits: int) -> list[float]:
         return np.round(np.multiply(values, share), digits).tolist()
@@ -76,10 +76,10 @@ _MOST_SIDES = 12
 
 
 def building_site(model: Model, height: float, name: str, seed: int) -> Model:
-    """Returns the frame of a building that is being built, with its crane.
+    """Returns the unfinished frame of a building, with its crane.
 
-    The frame is `height` high [m]. But for the jib the model stays within the
-    building's footprint.
+    The frame is `height` high [m]. Except for the jib, the model stays within
+    the building's footprint.
 
     Raises:
         ValueError: there is no room for a frame.
@@ -158,7 +158,7 @@ USES: tuple[LotUse, ...] = get_args(LotUse)
 
 
 def use_by_size(structure: Structure) -> LotUse:
-    """Returns the use that suits the size of a building's lot."""
+    """Returns the use of an empty lot that suits the lot's size."""
     area = structure.model.footprint.area
     if area > 900:
         return "car_park"
@@ -173,7 +173,7 @@ def lot_objects(
     cars: Mapping[str, float],
     rng: np.random.Generator,
 ) -> Iterator[Structure]:
-    """Yields the structures on the lot of a building that is not built yet.
+    """Yields the structures on a lot before its building is built.
 
     They are called after the building. `cars` are the weights of parked cars.
     """

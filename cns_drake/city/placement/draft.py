@@ -74,10 +74,10 @@ class Draft:
         self._lanes.add(areas.lane_area)
 
     def rng(self, *words: str | int) -> np.random.Generator:
-        """Returns the random generator of one task, by its name.
+        """Returns the random generator of one task, by the task's name.
 
-        Every task has its own, so that a change in one district leaves the
-        draws of all others alone.
+        Every task has its own, so that a change in one district does not change
+        the draws of others.
         """
         key = "/".join(map(str, words)).encode()
         return np.random.default_rng([self.plan.seed, zlib.crc32(key)])
@@ -88,7 +88,7 @@ class Draft:
         return self.rng(*words)
 
     def open_range(self) -> None:
-        """Starts a new range of numbers in names, for the next task.
+        """Starts a new range of numbers for names in the next task.
 
         House numbers start anew with each street in the same way. One object
         more or less in one task does not rename the objects of later tasks, to
@@ -108,9 +108,9 @@ class Draft:
         clearance: float = 0.0,
         ignore: BaseGeometry | None = None,
     ) -> bool:
-        """Returns whether an area in W is free of lanes and not taken.
+        """Returns whether an area in W is off the lanes and not taken.
 
-        The clearance is to what is taken, not to lanes [m]; a taken area to
+        The clearance is to taken ground, not to lanes [m]; a taken area to
         `ignore` may be closer, but not overlapped.
         """
         return self._lanes.is_free(area) and self._occupancy.is_free(
@@ -118,7 +118,7 @@ class Draft:
         )
 
     def take(self, area: BaseGeometry) -> None:
-        """Keeps an area in W free of later objects."""
+        """Marks an area in W as taken, so that later objects avoid it."""
         self._occupancy.add(area)
 
     def add_building(self, structure: Structure) -> None:
@@ -139,15 +139,15 @@ class Draft:
         crown_part: float = 0.0,
         within: BaseGeometry | None = None,
     ) -> Structure | None:
-        """Places one of `OBJECTS` on the finished ground if there is room.
+        """Places an object on the finished ground, if there is room.
 
-        A model without room uses up a name as well, so that the names of others
-        do not depend on whether it fits.
+        It is one of `OBJECTS`. An object without room uses up a name as well,
+        so that the names of others do not depend on whether it fits.
 
         Args:
             xy, yaw: position and heading in W [m, rad].
             kind: stem of the structure's name; the object's by default.
-            clearance: to all objects placed before [m].
+            clearance: least distance to all objects placed before [m].
             crown_part: how much of the reach of a tree's crown must be
                 clear of buildings, from 0 to 1.
             within: where given, the footprint must lie in this area.

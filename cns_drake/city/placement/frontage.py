@@ -40,13 +40,13 @@ class Lot(NamedTuple):
 
     @property
     def footprint(self) -> Polygon:
-        """The rectangle in S [m]."""
+        """Rectangle of the lot in S [m]."""
         w, d = self.width / 2, self.depth / 2
         return box(-w, -d, w, d)
 
     @property
     def footprint_W(self) -> Polygon:
-        """The rectangle in W [m]."""
+        """Rectangle of the lot in W [m]."""
         return placed(self.footprint, (self.x, self.y), self.yaw)
 
 
@@ -82,7 +82,7 @@ def lines_along(
 
 
 def station_at(line: LineString, s: float) -> Station:
-    """Returns the place at an arc length [m] of a line."""
+    """Returns position and heading at an arc length [m] of a line."""
     before = line.interpolate(max(s - _SHORT, 0.0))
     after = line.interpolate(min(s + _SHORT, line.length))
     at = line.interpolate(s)

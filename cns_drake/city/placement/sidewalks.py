@@ -30,7 +30,7 @@ _SIGNS = ("sign_round", "sign_rectangular", "sign_triangular")
 
 
 def furnish_junctions(draft: Draft, network: RoadNetwork) -> None:
-    """Places lights, stop signs and name signs at all arms, then signs."""
+    """Places traffic lights, then signs, at the arms of all junctions."""
     for junction in network.junctions.values():
         rng = draft.task("junction", junction.name)
         for arm in junction.arms:
@@ -98,9 +98,9 @@ _TO_KERB = 0.08
 def furnish_sidewalks(
     draft: Draft, districts: Sequence[District], junctions: BaseGeometry
 ) -> None:
-    """Places street lamps, then trees, then furniture on all sidewalks.
+    """Places street lamps, trees and then furniture on all sidewalks.
 
-    `junctions` is the area of all of them in W [m].
+    `junctions` is the area of all junctions in W [m].
     """
     for task, distance in _FROM_KERB_OF.items():
         keep_off = junctions.buffer(_JUNCTION_CLEARANCE[task])
@@ -132,7 +132,7 @@ def park_along_streets(draft: Draft, network: RoadNetwork) -> None:
 
 
 def plant_medians(draft: Draft) -> None:
-    """Plants the strips between the directions, and lights them."""
+    """Places plants and lamps on the medians of roads."""
     plan = draft.plan.medians or draft.plan.street
     for index, median in enumerate(draft.areas.medians.geoms):
         rng = draft.task("median", index)

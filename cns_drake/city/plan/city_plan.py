@@ -64,10 +64,10 @@ class BuildingPlan(_Model):
         at: `[x, y]` of the middle of the footprint [m].
         size: `[width along the front, depth]` [m]; give this or
             `outline`.
-        outline: corners of the footprint about `at`, before turning [m].
-        yaw_deg: heading; at 0 the front faces -y [deg].
+        outline: corners of the footprint relative to `at`, before turning [m].
+        yaw_deg: heading of the building [deg]; at 0 its front faces -y.
         height: height of the walls [m].
-        kind: stem of its name; by default the archetype.
+        kind: beginning of its name; by default the archetype.
     """
 
     archetype: str
@@ -89,15 +89,15 @@ class RowPlan(_Model):
     """A row of buildings along the streets of a district.
 
     Attributes:
-        setback: from the inner edge of the sidewalk to the fronts [m].
-        archetypes: archetype -> weight.
-        width: range of the lots [m].
-        depth: range of the lots [m].
-        height: range of the walls [m].
-        gap: range of the distance between neighbours [m].
-        fill: part of the lots that are built on.
-        kind: stem of their names; by default the archetype.
-        within: corners of an area that the row is limited to [m].
+        setback: distance from the inner edge of the sidewalk to the fronts [m].
+        archetypes: archetype -> weight in the random choice.
+        width: least and greatest width of a lot [m].
+        depth: least and greatest depth of a lot [m].
+        height: least and greatest height of the walls [m].
+        gap: least and greatest distance between neighbours [m].
+        fill: share of the lots that are built on.
+        kind: beginning of the buildings' names; by default the archetype.
+        within: corners of the area to which the row is limited [m].
     """
 
     setback: float = Field(default=2.0, ge=0)
@@ -112,15 +112,15 @@ class RowPlan(_Model):
 
 
 class PatchPlan(_Model):
-    """Ground of another kind within a district, e.g. a path in a lawn.
+    """A part of a district with another kind of ground, such as a path.
 
     Attributes:
         ground: kind of ground.
-        area: corners [m]; give this or `line`.
-        line: points of a path's middle line [m].
+        area: corners of the patch [m]; give this or `line`.
+        line: points of the middle line of a path [m].
         width: width of the path [m].
-        level: height at which the patch is held level [m]; by default it
-            follows the ground around it.
+        level: height at which the patch is level [m]; by default it follows the
+            ground around it.
     """
 
     ground: Ground
@@ -137,13 +137,14 @@ class PatchPlan(_Model):
 
 
 class ParkingPlan(_Model):
-    """Rows of bays with parked cars.
+    """A parking lot: a row of bays with parked cars.
 
     Attributes:
-        start: one end of the line along the open side of the bays [m].
-        end: the other; the bays lie on its left, seen from `start` [m].
+        start: `[x, y]` of one end of the open side of the bays [m].
+        end: `[x, y]` of the other end [m]; the bays lie on the left, seen from
+            `start`.
         bay: width and depth of a bay [m].
-        fill: part of the bays that are taken.
+        fill: share of the bays that are taken.
     """
 
     start: Point
@@ -153,16 +154,16 @@ class ParkingPlan(_Model):
 
 
 class ScatterPlan(_Model):
-    """Plants or objects spread over a district's open ground.
+    """Plants or objects scattered over a district's open ground.
 
     Attributes:
-        objects: object -> weight.
-        spacing: least distance between two of them, more than 0.2 [m].
-        fill: part of the places that are used.
-        within: corners of an area that they are limited to [m].
+        objects: object -> weight in the random choice.
+        spacing: least distance between two objects [m].
+        fill: share of the possible places that are used.
+        within: corners of the area to which the objects are limited [m].
         clearance: least distance to buildings and streets [m].
-        ground: kinds of ground that they may stand on.
-        kind: stem of their names; by default the object.
+        ground: kinds of ground on which the objects can stand.
+        kind: beginning of the objects' names; by default the object.
     """
 
     objects: Weights = Field(min_length=1)
@@ -175,15 +176,17 @@ class ScatterPlan(_Model):
 
 
 class LinePlan(_Model):
-    """Objects along a line, e.g. an avenue's trees, a fence, benches.
+    """Objects along a line, such as trees of an avenue, a fence or benches.
 
     Attributes:
-        objects: object -> weight.
-        points: the line [m]; its right is the objects' front.
-        spacing: range of the distance between two objects [m]; by default each
-            piece is as long as the line is straight, as for fences and hedges.
-        yaw_deg: turn of each object against the line [deg].
-        kind: stem of their names; by default the object.
+        objects: object -> weight in the random choice.
+        points: points of the line [m]; the fronts of the objects face its
+            right.
+        spacing: least and greatest distance between two objects [m]. By default
+            each object is as long as a straight part of the line, as for fences
+            and hedges.
+        yaw_deg: heading of each object relative to the line [deg].
+        kind: beginning of the objects' names; by default the object.
         parameters: arguments of the objects' builder.
     """
 
@@ -200,11 +203,11 @@ class ObjectPlan(_Model):
 
     Attributes:
         object: name of an object.
-        at: `[x, y]` [m].
-        yaw_deg: heading [deg].
-        kind: stem of its name; by default the object.
-        parameters: arguments of the object's builder, such as `{height: 1.1}`
-            of a `garden_wall`.
+        at: `[x, y]` of the object [m].
+        yaw_deg: heading of the object [deg].
+        kind: beginning of its name; by default the object.
+        parameters: arguments for the builder of the object, such as `{height:
+            1.1}` for a `garden_wall`.
     """
 
     object: str
@@ -218,13 +221,15 @@ class StreetPlan(_Model):
     """The objects on the sidewalks in front of a district.
 
     Attributes:
-        trees: species -> weight; a street without trees by default.
-        tree_spacing: range of the distance between trees [m].
-        tree_gaps: part of the trees left out.
-        lamp: object used as street lamp.
-        lamp_spacing: distance between lamps, more than 2 [m].
-        furniture: object -> weight.
-        furniture_spacing: range of the distance between objects [m].
+        trees: species -> weight in the random choice; without it there are no
+            trees.
+        tree_spacing: least and greatest distance between trees [m].
+        tree_gaps: share of the trees that are left out.
+        lamp: object that is used as street lamp.
+        lamp_spacing: distance between lamps [m].
+        furniture: object -> weight in the random choice.
+        furniture_spacing: least and greatest distance between pieces of
+            furniture [m].
     """
 
     trees: Weights = Field(default_factory=dict)
@@ -237,26 +242,27 @@ class StreetPlan(_Model):
 
 
 class DistrictPlan(_Model):
-    """One block, or an area of the surroundings.
+    """A district: one block between streets, or another area.
 
     Attributes:
-        name: unique; small letters, digits and underscores; also seeds the
-            district's own draws.
-        block: `[x, y]` of a point in the block that the streets leave [m];
-            give this, `area` or neither.
-        area: corners [m]; without both, the district is all ground that no
-            other one takes.
-        ground: kind of ground.
-        relief: height of the swells of its lawns [m].
-        relief_margin: width of their slope at paths and buildings [m].
-        patches: list of patches.
-        buildings: list of buildings.
-        rows: list of rows of buildings.
-        parking: list of parking lots.
-        objects: list of objects.
-        lines: list of lines of objects.
-        scatter: list of scattered objects.
-        street: the objects on its sidewalks.
+        name: unique name, from lower-case letters, digits and underscores. It
+            is also part of the seed of the district.
+        block: `[x, y]` of a point in the block between streets that the
+            district fills [m]; give this, `area` or neither.
+        area: corners of the district [m]. Without `block` and `area`, the
+            district takes all ground that no other one has.
+        ground: kind of the ground.
+        relief: height of the swells in its lawns [m].
+        relief_margin: distance from paths and buildings over which the relief
+            rises [m].
+        patches: parts with another kind of ground.
+        buildings: single buildings.
+        rows: rows of buildings along the streets.
+        parking: parking lots.
+        objects: single objects.
+        lines: lines of objects.
+        scatter: scattered objects.
+        street: objects on its sidewalks; by default those of the city.
     """
 
     name: str = Field(pattern=r"^[a-z][a-z0-9_]*$")
@@ -282,17 +288,17 @@ class DistrictPlan(_Model):
 
 
 class CityPlan(_Model):
-    """A whole city, from `city.yaml`.
+    """The file `city.yaml`: everything in a city except its roads.
 
     Attributes:
         seed: seed of all random draws.
         bounds: `[x0, y0, x1, y1]` of the generated world [m].
         water_level: height of the water's surface [m].
-        cars: object -> weight, of parked cars.
-        street: the objects on sidewalks, unless the district has its own.
-        medians: plants and lamps between the directions, with the same fields;
+        cars: car -> weight in the random choice of parked cars.
+        street: objects on sidewalks, in districts that have none of their own.
+        medians: plants and lamps on the medians of roads, with the same fields;
             by default as `street`.
-        districts: list of districts, in the order in which they take ground.
+        districts: districts, in the order in which they take ground.
     """
 
     seed: int = Field(ge=0)

@@ -19,14 +19,14 @@ class _Model(BaseModel):
 
 
 class Growth(_Model):
-    """Structures that stand, but have not grown to their full height yet.
+    """Structures that have not grown to their full height yet.
 
     Attributes:
-        height: how high the structures are until then, above their own ground,
-            more than 2 [m].
-        structures: their names in `structures.csv`; `*` and `?` stand for any
-            text and letter.
-        but: names of exceptions.
+        height: height of the structures above their own ground at this stage
+            [m].
+        structures: names in `structures.csv`; `*` stands for any text and `?`
+            for any letter.
+        but: names of structures to which this does not apply.
     """
 
     height: float = Field(gt=2.0, allow_inf_nan=False)
@@ -35,17 +35,17 @@ class Growth(_Model):
 
 
 class Stage(_Model):
-    """One stage: its story, and its differences to the next stage.
+    """One stage: its story, and how it differs from the next stage.
 
     Attributes:
-        story: the differences that a visitor would notice.
-        absent: group, in words -> names of the structures that the next stage
-            adds; none in the last stage.
-        lower: group, in words -> buildings and plants that the next stage
-            raises; none in the last stage.
-        sites: group, in words -> buildings under construction at this stage
-            only: a frame of that height, scaffolds and a crane; the lot needs
-            16 m by 16 m.
+        story: differences to the next stage that a visitor would notice.
+        absent: heading -> names of the structures that this stage lacks and the
+            next has; none in the last stage.
+        lower: heading -> buildings and plants that are lower than in the next
+            stage; none in the last stage.
+        sites: heading -> buildings that are under construction at this stage
+            only, as a frame of the given height with scaffolds and a crane.
+            Their lots need 16 m by 16 m.
     """
 
     story: str
@@ -55,17 +55,18 @@ class Stage(_Model):
 
 
 class Stages(_Model):
-    """The stages of a city, from `stages.yaml`.
+    """The file `stages.yaml`: how the city looked at each stage.
 
-    Each stage lists only what the next one adds and raises; the last stage is
-    the whole city. A stage therefore has all structures of the one before, none
-    of them lower, but for what filled the lots that are built on in between.
+    Each stage lists only what the next stage adds or raises; the last stage is
+    the whole city. A stage therefore has all structures of the stage before,
+    none of them lower, except those that filled lots which are built on in
+    between.
 
     Attributes:
-        stages: stage, two digits in quotes, rising -> stage.
+        stages: number of the stage, two digits in quotes, ascending -> stage.
         lots: use -> buildings whose lots have this use until they are built:
-            `car_park`, `market`, `garden`, `yard` or `empty`; by default a
-            lot's use goes by its size.
+            `car_park`, `market`, `garden`, `yard` or `empty`. By default the
+            use of a lot depends on its size.
     """
 
     stages: dict[StageName, Stage]
@@ -85,7 +86,7 @@ class Stages(_Model):
         }
 
     def heights(self, stage: str) -> dict[str, float]:
-        """Returns the structures that are low at a stage, and how high [m].
+        """Returns the height of each structure that is lower at a stage [m].
 
         Raises:
             KeyError: if there is no such stage.
@@ -99,7 +100,7 @@ class Stages(_Model):
         return heights
 
     def sites(self, stage: str) -> dict[str, float]:
-        """Returns a stage's buildings under construction, with heights [m]."""
+        """Returns the height of each building site at a stage [m]."""
         return {
             name: group.height
             for group in self.stages[stage].sites.values()
@@ -117,7 +118,7 @@ class Stages(_Model):
 def load_stages(
     path: Path, structures: Collection[str], text: str | None = None
 ) -> Stages:
-    """Reads `stages.yaml` and checks it against the names of all structures.
+    """Returns the stages of `stages.yaml`, checked against all structures.
 
     `text` is the coming content of the file; by default the present one.
     Patterns are replaced by the names that they stand for.

@@ -59,7 +59,7 @@ def tree(
     height: float | None = None,
     variant: int | None = None,
 ) -> Model:
-    """Returns one tree; what is not given is drawn.
+    """Returns one tree; whatever is not given is drawn at random.
 
     The `height` of its top is within the species' range, for the promised
     clearance below the crown [m]; `variant` is the number of the mesh variant.

@@ -66,7 +66,7 @@ class Bare:
 def all_laid_bare(
     buildings: Sequence[Imported], ground: Ground, seed: int
 ) -> list[Bare]:
-    """Returns all buildings, lower variants in the style of the original."""
+    """Returns all buildings, with lower variants in the same style."""
     found = []
     styles: dict[str, Style] = {}
     for one in sorted(buildings, key=lambda one: one.original != ""):
@@ -143,7 +143,7 @@ class DriveViews:
             TriangleMesh(self._scene, (solids - self._middle).astype("f4"))
 
     def are_near(self, limits: np.ndarray, distance: float) -> np.ndarray:
-        """Returns which (N,) boxes have a viewing place within a distance [m].
+        """Returns which of N boxes lie within a distance of a drive [m].
 
         Limits (N, 2, 2) are their least and greatest x and y [m]; a circle
         about each box counts.
@@ -153,9 +153,10 @@ class DriveViews:
         return np.asarray(self._tree.query(middles)[0] <= reach + distance)
 
     def distances(self, panels: Sequence[Panel], most: float) -> np.ndarray:
-        """Returns distances (N,) of panels from the nearest viewing place [m].
+        """Returns distances (N,) from panels to the nearest viewing place [m].
 
-        They are infinite if no place within `most` sees the panel.
+        Viewing places lie on the drives. The distance is infinite if no place
+        within `most` sees the panel.
         """
         pairs = [self._looks(panel, most) for panel in panels]
         counts = [len(distance) for _, distance in pairs]
@@ -242,7 +243,7 @@ def dress_buildings(
     always: Collection[Imported] | None = None,
     paving: np.ndarray = _NO_TRIANGLES,
 ) -> DressedBuildings:
-    """Dresses the buildings of a city.
+    """Returns the buildings of a city with windows, doors and shops.
 
     A building looks the same in each stage and each import, since its random
     draws depend on its name. Only the choice of walls with windows depends on
@@ -253,7 +254,7 @@ def dress_buildings(
         drives: the drives, whose distance decides the detail.
         streets: the streets that doors and shops face.
         ground: the ground on which buildings stand.
-        seed: of all random draws.
+        seed: seed of all random draws.
         always: structures that stand in all stages and hide what is behind
             them; all structures if None.
         paving: triangles (M, 3, 3) of terrain, streets and sidewalks, above
@@ -421,16 +422,16 @@ def dress_city(
     ground: Ground,
     seed: int,
 ) -> Dressing:
-    """Dresses buildings and streets.
+    """Returns a city with details on its buildings and along its streets.
 
-    Things that get a place are removed from the faults of the city.
+    Objects that find a place are removed from the faults of the city.
 
     Args:
         staged: the structures of each stage.
         city: the city as the file has it.
         drives: the drives, whose distance decides the detail.
         ground: the ground.
-        seed: of all random draws.
+        seed: seed of all random draws.
 
     Raises:
         InputError: if there are more structures than a map may have.

@@ -94,17 +94,17 @@ class FacadePlan:
 
     @property
     def on_street(self) -> list[Opening]:
-        """The openings on the ground floor."""
+        """Openings on the ground floor."""
         on_ground = self.stands_on_ground
         return [o for o in self.openings if o.row == 0 and on_ground]
 
     def is_in_the_way(self, z: float, reach: float) -> bool:
-        """Returns whether a part at z would hang over a car's path [m]."""
+        """Returns whether a part at height z hangs over a car's path [m]."""
         is_low = z - self.ground < _TALLEST_CAR
         return is_low and self.to_drive < reach + _BESIDE
 
     def probes(self) -> np.ndarray:
-        """Returns places (N + 1, 3) before the openings, and at the top."""
+        """Returns points (N + 1, 3) in front of the openings and at the top."""
         panel = self.panel
         at = [((o.x0 + o.x1) / 2, (o.z0 + o.z1) / 2) for o in self.openings]
         at.append((panel.length / 2, panel.height - _FROM_FOOT))
@@ -112,10 +112,10 @@ class FacadePlan:
         return panel.place(x, z, _BEFORE)
 
     def threshold(self, door: Opening, paving: upper_sides.UpperSides) -> float:
-        """Returns the height of a threshold, a step above the paving [m].
+        """Returns the height of a door's threshold above the paving [m].
 
-        The highest paving before the door and in its recess counts, unless it
-        is far above or below the ground.
+        It is a step. The highest paving before the door and in its recess
+        counts, unless it is far above or below the ground.
         """
         depths = {"shop": _SHOP_DEPTH, "gate": _GATE_DEPTH}
         deep = depths.get(door.kind, self.style.depth + _DOOR_DEEPER)
@@ -130,7 +130,10 @@ class FacadePlan:
         return max((low if is_near else self.ground) + _THRESHOLD, 0.0)
 
     def without(self, is_hidden: np.ndarray) -> FacadePlan:
-        """Returns the plan without openings at hidden (N + 1,) probes."""
+        """Returns the plan without the openings whose probes are hidden.
+
+        They are marked in (N + 1,) bool.
+        """
         pairs = zip(self.openings, is_hidden[:-1], strict=True)
         return replace(
             self,
@@ -142,7 +145,7 @@ class FacadePlan:
 def plan_facade(
     panel: Panel, style: Style, base: float, ground: float, to_drive: float
 ) -> FacadePlan:
-    """Returns a wall full of windows.
+    """Returns the plan of a wall that is full of windows.
 
     Args:
         panel: the wall.
@@ -174,7 +177,7 @@ def plan_facade(
 
 
 def with_shops(plan: FacadePlan, paving: upper_sides.UpperSides) -> FacadePlan:
-    """Returns a wall whose windows on the ground floor are shop windows."""
+    """Returns a plan with shop windows on the ground floor."""
     top = plan.floor + plan.style.storey - 0.75
     top = min(top, plan.ground + _SHOP_HEIGHT)
     street, openings = set(plan.on_street), []
@@ -189,7 +192,7 @@ def with_shops(plan: FacadePlan, paving: upper_sides.UpperSides) -> FacadePlan:
 
 
 def with_doors(plan: FacadePlan, paving: upper_sides.UpperSides) -> FacadePlan:
-    """Returns a wall with doors in place of windows on its ground floor."""
+    """Returns a plan with doors instead of windows on the ground floor."""
     street = plan.on_street
     if not street or any(o.kind == "shop" for o in street):
         return plan
@@ -249,7 +252,7 @@ _EXACT, _LEAST_AREA = 1e-3, 1e-4
 def add_facade(
     out: Assembly, plan: FacadePlan, rng: np.random.Generator
 ) -> Counter[str]:
-    """Adds all parts of a wall; returns how many details of each kind."""
+    """Adds all parts of a wall; returns the number of each kind of part."""
     counts: Counter[str] = Counter()
     panel, style = plan.panel, plan.style
     has_balconies = style.balconies and bool(rng.random() < 0.6)

@@ -65,14 +65,14 @@ def is_dense(structures: Sequence[Imported]) -> bool:
 
 
 def paved(structure: Structure) -> Structure:
-    """Returns a ground in the colour of stones."""
+    """Returns a ground structure in the colour of stones."""
     model = structure.model
     parts = tuple(replace(part, rgb=_PAVED) for part in model.parts)
     return replace(structure, model=replace(model, parts=parts))
 
 
 def with_kerb(one: Imported) -> Imported:
-    """Returns a sidewalk with an upright edge all around."""
+    """Returns a sidewalk with a vertical edge all around."""
     structure = one.structure
     name = f"{structure.name}_kerb"
     edges = _outer_edges(turned_up(one.triangles))

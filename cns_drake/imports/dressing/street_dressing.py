@@ -84,7 +84,7 @@ _POST, _DISC, _BALL = "round_post", "round_disc", "round_ball"
 
 
 def without_curves(model: Model) -> Model:
-    """Returns a model with prisms and polyhedra for cylinders and spheres.
+    """Returns a model whose cylinders and spheres are polyhedra.
 
     Their cross-sections have the same areas.
     """
@@ -189,7 +189,7 @@ class StreetRoom:
         return bool(shapely.dwithin(LineString(line), self.paths, distance))
 
     def keep_tree(self, tree: Imported) -> None:
-        """Keeps the place of a tree's trunk free."""
+        """Marks the place of a tree's trunk as taken."""
         x, y, _ = tree.structure.xyz
         self._taken.add(Point(x, y).buffer(_TRUNK, 4))
 
@@ -216,9 +216,9 @@ class StreetRoom:
         Only cars stand on carriageways.
 
         Args:
-            name: of the new structure.
-            kind: of object, the name of its mesh.
-            xy: its place [m].
+            name: name of the new structure.
+            kind: kind of object, the name of its mesh.
+            xy: position of its middle in W [m].
             yaw: its heading [rad].
             rng: draws its variant and colours.
         """
@@ -390,10 +390,10 @@ def dress_streets(
     bottom: Sequence[Structure],
     seed: int,
 ) -> StreetThings:
-    """Returns the small things along the streets of a city.
+    """Returns the small objects along the streets of a city.
 
-    Those of the file come first. Drives are kept free of things; without any
-    nothing is placed.
+    Those of the file come first. Drives are kept free of objects; without any
+    drive nothing is placed.
 
     Args:
         structures: what stands already.
@@ -402,7 +402,7 @@ def dress_streets(
         drives: the drives, which are kept free.
         ground: the ground on which things stand.
         bottom: structures of the ground.
-        seed: of all random draws.
+        seed: seed of all random draws.
     """
     found = StreetThings()
     if not drives:

@@ -67,10 +67,10 @@ class Style:
 def building_use(
     tags: Mapping[str, str], area: float, height: float
 ) -> tuple[str, bool]:
-    """Returns the use of a building, and whether it comes from its tags.
+    """Returns the use of a building, and whether its tags say so.
 
-    An untagged one has its use by the area of its footprint, about, and the
-    height of its walls [m^2, m].
+    Without tags it follows from the area of the footprint and the height of the
+    walls [m^2, m].
     """
     words = [tags.get(key, "") for key in _USE_KEYS]
     words += [key for key in ("shop", "office") if key in tags]
@@ -110,15 +110,15 @@ def make_style(
     is_flat: bool,
     rng: np.random.Generator,
 ) -> Style:
-    """Draws the style of a building; its tags take precedence.
+    """Returns a random style for a building; its tags take precedence.
 
     The number of draws does not depend on the tags.
 
     Args:
         tags: tags of the building, as in OpenStreetMap.
-        year: of construction; None if unknown.
-        area: of its footprint, about [m^2].
-        height: of its walls [m].
+        year: year of construction; None if unknown.
+        area: area of its footprint, about [m^2].
+        height: height of its walls [m].
         is_flat: whether its roof is flat.
         rng: draws everything that no tag says.
     """

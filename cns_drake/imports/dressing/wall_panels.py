@@ -50,12 +50,12 @@ class Panel:
 
     @property
     def outward(self) -> np.ndarray:
-        """The (2,) unit normal."""
+        """Unit normal (2,) that points outwards."""
         return np.array([self.along[1], -self.along[0]])
 
     @property
     def frame(self) -> WallFrame:
-        """Carries details of facades onto the panel."""
+        """Frame that places details of facades on the panel."""
         start = self.origin[:2]
         return WallFrame([start, start + self.length * self.along], 0)
 

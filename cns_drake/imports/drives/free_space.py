@@ -52,7 +52,10 @@ class FreeSpace:
     walls: STRtree
 
     def clearance_at(self, xy: np.ndarray) -> np.ndarray:
-        """Returns the clearance at places (N, 2), or the nearest ones [m]."""
+        """Returns the distance to obstacles at places (N, 2) [m].
+
+        Places outside of the grid have that of the nearest cell.
+        """
         index = np.floor((xy - self.low) / CELL).astype(int)
         rows, columns = self.clearance.shape
         row = np.clip(index[:, 1], 0, rows - 1)
@@ -60,7 +63,7 @@ class FreeSpace:
         return self.clearance[row, column]
 
     def obstacle(self, path: np.ndarray) -> np.ndarray | None:
-        """Returns the first (2,) place of a path without room for a car.
+        """Returns the first place (2,) of a path without room for a car.
 
         The places (N, 2) of the path are close together [m].
         """
@@ -77,7 +80,10 @@ class FreeSpace:
 def find_free_space(
     structures: Sequence[Imported], ground: Ground
 ) -> FreeSpace:
-    """Returns the room for a car at all stages, on roads if there are any."""
+    """Returns where a car has room at all stages.
+
+    The room is on roads if there are any.
+    """
     low, high = _window(structures)
     size = np.ceil((high - low) / CELL).astype(int) + 1
     window = (low, high)

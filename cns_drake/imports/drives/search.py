@@ -81,17 +81,17 @@ class WaypointDrive:
 
     @property
     def length(self) -> float:
-        """Length from above [m]."""
+        """Horizontal length of the drive [m]."""
         return float(np.linalg.norm(np.diff(self.path, axis=0), axis=1).sum())
 
 
 def steerable_drive(
     waypoints: np.ndarray, room: Room | None = None, margin: float = _MARGIN
 ) -> WaypointDrive | Obstacle:
-    """Returns the drive along waypoints (N, 2) or (N, 3), or the obstacle [m].
+    """Returns the drive along waypoints, or the first obstacle [m].
 
-    The whole path needs room, and bends a margin: their least radius, in
-    tightest radii of the car.
+    Waypoints are (N, 2) or (N, 3). The whole path needs room. The least radius
+    of bends is `margin` times the tightest radius of the car.
     """
     waypoints = np.round(waypoints, 3)
     xyz = np.zeros((len(waypoints), 3))
@@ -167,18 +167,18 @@ class WayGraph(ABC):
 
     @abstractmethod
     def beside(self, pieces: np.ndarray, joint: int) -> np.ndarray:
-        """Returns (N,) bool: the pieces that an arm must not use.
+        """Returns which pieces (N,) bool an arm must not use.
 
         Drives use some pieces; the arm begins at one of them, the joint.
         """
 
     @abstractmethod
     def is_simple(self, way: Sequence[int]) -> bool:
-        """Returns whether a way meets no place twice."""
+        """Returns whether a way never visits a place twice."""
 
     @abstractmethod
     def drive(self, way: Sequence[int]) -> WaypointDrive | Obstacle:
-        """Returns a drive along a way, or the obstacle on it."""
+        """Returns the drive along a way, or the obstacle that prevents it."""
 
     @abstractmethod
     def blocked(self, way: Sequence[int], place: Obstacle) -> np.ndarray:
@@ -198,7 +198,7 @@ class WayGraph(ABC):
         return way[: max(1, kept)]
 
     def links(self, closed: np.ndarray | None = None) -> csr_array:
-        """Returns costs from piece to piece, without those closed (N,)."""
+        """Returns the costs from piece to piece, without closed pieces (N,)."""
         is_open = self.is_open if closed is None else self.is_open & ~closed
         before, after, costs = self._links
         kept = is_open[before] & is_open[after]
@@ -487,8 +487,8 @@ def simplified_drive(
 ) -> WaypointDrive | Obstacle:
     """Returns a drive with as few waypoints as the room allows.
 
-    It passes places (N, 2), about 1 m apart, within tolerances that are tried
-    in turn [m].
+    It passes places (N, 2), about 1 m apart, within tolerances [m], which are
+    tried in turn.
     """
     found: WaypointDrive | Obstacle = xy[len(xy) // 2]
     for straightened, tolerance in product(_STRAIGHTENED, tolerances):

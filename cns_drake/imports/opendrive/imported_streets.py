@@ -55,7 +55,7 @@ _END = 0.2
 
 
 def kerb_tapers(carriageway: BaseGeometry) -> list[Polygon]:
-    """Returns areas that turn steps of a carriageway's edge into tapers [m]."""
+    """Returns areas that turn steps in a carriageway's edge into tapers [m]."""
     found: list[Polygon] = []
     for polygon in polygons_of(carriageway):
         polygon = shapely.orient_polygons(polygon)
@@ -303,7 +303,7 @@ def bridge_decks(bands: Sequence[LaneBand]) -> Iterator[Structure]:
 
 
 def bridge_ends(bands: Sequence[LaneBand]) -> BaseGeometry:
-    """Returns the area about the ends of bridges [m]."""
+    """Returns the areas around the ends of bridges [m]."""
     lines = [
         LineString([band.inner[k, :2], band.outer[k, :2]])
         for band in bands

@@ -114,9 +114,10 @@ class BandGraph(search.WayGraph):
 
 
 def find_lane_drives(bands: Sequence[LaneBand]) -> list[WaypointDrive]:
-    """Returns two drives that share a part, or one, or none.
+    """Returns two drives on lanes that share a part of their way.
 
-    The lanes are those of the whole network, on bridges too.
+    It returns one, or none, if there are no two. The lanes are those of the
+    whole network, on bridges too.
     """
     return search.find_drives(BandGraph(bands))
 
@@ -170,7 +171,7 @@ def _forwards(line: np.ndarray) -> np.ndarray:
 def lanes_for_traffic(
     bands: Sequence[LaneBand], kerbs: KerbHeights
 ) -> str | None:
-    """Returns the text of a file of lanes; None if no vehicle can drive on."""
+    """Returns the text of a lane file; None if no vehicle can drive on."""
     graph = BandGraph(bands)
     lanes = [
         DirectedLane(

@@ -61,7 +61,7 @@ _ARRAYS = (
 
 
 def lane_class(kind: str) -> str | None:
-    """Returns the semantic class of a lane, None for type none."""
+    """Returns the semantic class of a lane; None for the type `none`."""
     classes: dict[str, str] = TYPES["lanes"]
     return None if kind == "none" else classes.get(kind, "road")
 
@@ -111,7 +111,7 @@ class LaneBand:
 
     @property
     def width(self) -> np.ndarray:
-        """Its width (N,) [m]."""
+        """Width of the lane (N,) [m]."""
         return np.linalg.norm(self.outer - self.inner, axis=1)
 
 

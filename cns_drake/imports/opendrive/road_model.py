@@ -106,7 +106,7 @@ class Cubic:
         Args:
             u, v: four coefficients of each coordinate, of p^0 first [m].
             last: p at the end.
-            length: of the curve in the file [m].
+            length: length of the curve in the file [m].
             by_parameter: whether p is the distance itself.
             stretched: whether the whole curve is stretched to that length; else
                 it ends where the length is reached.
@@ -200,7 +200,7 @@ class Cubics:
 
     @property
     def starts(self) -> np.ndarray:
-        """Where the pieces begin [m]."""
+        """Distances at which the pieces begin [m]."""
         return self._table[:, 0]
 
     def at(

@@ -102,7 +102,7 @@ def _mark_lines(
 
 
 def count_dangling_links(top: Element, faults: ImportFaults) -> None:
-    """Counts the links of a file to things that are not in it."""
+    """Counts a file's links to objects that it does not contain."""
     roads = {one.attrib.get("id", ""): one for one in top.all("road")}
     junctions = {one.attrib.get("id", "") for one in top.all("junction")}
     for name, road in roads.items():
@@ -133,7 +133,7 @@ _KNOWN = parse_yaml(Path(__file__).with_name("unread.yaml").read_bytes())
 
 
 def count_unread(element: Element, faults: ImportFaults, name: str) -> None:
-    """Counts what would change a road map and is not read.
+    """Counts what is not read although it would change the road map.
 
     The name is that of the road or junction around an element.
     """

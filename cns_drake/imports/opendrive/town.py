@@ -79,7 +79,7 @@ def moved_off_kerbs(
     reach: tuple[float, float],
     carriageway: BaseGeometry,
 ) -> np.ndarray:
-    """Returns how far (N,) lines are moved to the left [m].
+    """Returns how far (N,) lines are moved to the left to leave a kerb [m].
 
     Where only one side of a border of lanes, places (N, 3), is carriageway,
     they lie on that side. Unit vectors (N, 2) lead to its left, and `reach` is
@@ -343,9 +343,9 @@ def build_town(
     progress: Callable[[str], None] = lambda line: None,
     dressed: bool = False,
 ) -> Town:
-    """Reads a road network and builds a town along it.
+    """Returns a town that is built along the roads of a file.
 
-    The road marks of the file are painted in a dressed town only.
+    The road marks of the file are painted only in a dressed town.
 
     Raises:
         InputError: if the file cannot be used.

@@ -65,7 +65,7 @@ _LARGEST = 20_000.0  # [m]
 
 
 def object_of(tags: reading.Tags) -> str | None:
-    """Returns the object of a node; None without one."""
+    """Returns the name of the object that a node's tags describe, or None."""
     found = [
         name
         for key, value, name in TABLES["objects"]
@@ -84,7 +84,7 @@ def object_of(tags: reading.Tags) -> str | None:
 
 
 def make_things(features: reading.OsmFeatures, local: Local) -> Iterator[Thing]:
-    """Yields things at their nodes, and the trees of rows."""
+    """Yields the objects at nodes, and the trees of tree rows."""
     kinds = features.kinds
     for name, tags, place in features.nodes:
         kind = object_of(tags)
@@ -334,9 +334,9 @@ class _Block:
 def standing_buildings(
     areas: Iterable[OsmArea], faults: ImportFaults, with_gone: bool = False
 ) -> Iterator[OsmArea]:
-    """Yields present and former buildings and parts above the ground.
+    """Yields buildings and parts that stand, or once stood, above ground.
 
-    Demolished ones without a date are among them on demand only. Others are
+    Demolished ones without a date are included on demand only. Others are
     counted as faults.
     """
     for one in areas:

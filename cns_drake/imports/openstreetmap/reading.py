@@ -33,7 +33,7 @@ _CHUNK = 1 << 24
 
 
 def number_in_file(number: int) -> int:
-    """Returns the number of a thing in the file that was sorted."""
+    """Returns the id in the original file of an object in the sorted file."""
     return _FIRST_NEW - number if number > _FIRST_NEW else number
 
 
@@ -47,9 +47,9 @@ class _Thing(NamedTuple):
 
 
 def sorted_file(path: Path, folder: Path, faults: ImportFaults) -> Path:
-    """Returns a file that can be read: the given one, or one in a folder.
+    """Returns a file that can be read: the given one or a sorted copy.
 
-    Things that are left out are counted.
+    A copy is made in `folder`. Objects that are left out are counted.
 
     Raises:
         RuntimeError, ValueError: it is no such file.
@@ -232,7 +232,7 @@ class Local:
         return self.metres(offset)
 
     def metres(self, offset: np.ndarray) -> np.ndarray:
-        """Returns a distance (..., 2) in degrees as one in metres."""
+        """Returns an offset (..., 2) in degrees as one in metres."""
         return np.asarray(offset * self._metres)
 
     def polygon(self, polygon: Polygon) -> Polygon:
@@ -393,7 +393,7 @@ def _is_flat(outlines: Iterable[BaseGeometry]) -> bool:
 
 
 def thing_kind(tags: Tags) -> str:
-    """Returns the kind of a thing, by its first tag that gives one."""
+    """Returns the kind of object that the first known tag gives."""
     for key in _KIND_KEYS:
         if has_tag(tags, key):
             return f"{key}={tags[key]}"

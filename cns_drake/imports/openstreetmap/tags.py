@@ -51,17 +51,17 @@ _SPEED = re.compile(r"(\d{1,3})(?:\s*(km/h|kmh|kph|mph))?")
 
 
 def length(text: str | None) -> float | None:
-    """Returns a length in metres; None if it is missing or no length.
+    """Returns a length in metres from text; None if there is none.
 
-    The greatest, where there is a list or a range.
+    Of a list or a range it is the greatest.
     """
     return _greatest(text, _length)
 
 
 def count(text: str | None) -> float | None:
-    """Returns a number, such as of levels; None if it is missing or none.
+    """Returns a number from text, such as of levels; None if there is none.
 
-    The greatest, where there is a list or a range.
+    Of a list or a range it is the greatest.
     """
     return _greatest(
         text, lambda part: _decimal(part) if _COUNT.fullmatch(part) else None
@@ -104,11 +104,11 @@ def tag_value(
     where: tuple[str, ImportFaults] | None,
     least: float = 0.0,
 ) -> float | None:
-    """Returns the value of a tag, as read; None if it has no valid one.
+    """Returns the parsed value of a tag; None if it has no valid one.
 
     Args:
-        tags: of a thing.
-        key: of the tag.
+        tags: tags of a thing.
+        key: key of the tag.
         read: reads the text; None if it cannot.
         most, least: limits of a plausible value. Others are counted.
         where: name of the thing and counts of faults; None to count nothing.
@@ -129,7 +129,7 @@ def tag_value(
 def heights(
     tags: Mapping[str, str], where: tuple[str, ImportFaults] | None = None
 ) -> tuple[float, float, float]:
-    """Returns lowest and highest point of a building, and its roof's height.
+    """Returns a building's lowest and highest point and its roof's height.
 
     All three are measured from the ground [m].
     """
@@ -169,7 +169,7 @@ def heights(
 
 
 def why_absent(tags: Mapping[str, str]) -> str | None:
-    """Returns why a building of a file is absent; None if it stands."""
+    """Returns why a building is left out; None if it stands."""
     if not ("building" in tags or "building:part" in tags):
         return "demolished"
     kinds = [tags.get("building", ""), tags.get("building:part", "")]
@@ -222,7 +222,7 @@ def street_width(
 
 
 def driven_ways(tags: Mapping[str, str]) -> tuple[bool, bool]:
-    """Returns whether cars may drive along a street's line, and against it."""
+    """Returns whether cars may drive along and against a street's line."""
     if any(
         tags.get(key) in ("no", "private", "bus", "agricultural")
         for key in ("motor_vehicle", "motorcar", "vehicle")
@@ -311,10 +311,10 @@ class LaneLayout(NamedTuple):
     width: float
 
     def offset(self, is_forward: bool, number: int) -> float:
-        """Returns the place of a lane, from the middle of the street [m].
+        """Returns the offset of a lane from the middle of the street [m].
 
-        To the side on which traffic keeps, in the direction of the lane. Number
-        0 is the innermost one.
+        It is to the side on which traffic keeps, in the direction of the lane.
+        Number 0 is the innermost one.
         """
         same, other = self.forward, self.backward
         if not is_forward:

@@ -327,7 +327,7 @@ class StreetTraffic:
         return [node for node, arms in self._arms.items() if len(arms) > 2]
 
     def setback(self, arm: _Arm) -> float:
-        """Returns the distance of lanes from an end of their stretch [m]."""
+        """Returns how far lanes end before the end of their stretch [m]."""
         stretch = self.stretches[arm[0]]
         wanted = [self._wanted_setback((arm[0], end)) for end in (0, -1)]
         room = max(stretch.length - _SHORTEST, 0.0)
@@ -499,9 +499,9 @@ def lanes_of_streets(
     drives: Sequence[WaypointDrive],
     drive_on: DriveOn,
 ) -> str | None:
-    """Returns the text of a file of lanes; None if no vehicle can drive on.
+    """Returns the text of a lane file; None if no vehicle can drive on.
 
-    Traffic keeps to the streets near drives. Parked cars and other things that
+    Traffic keeps to the streets near drives. Parked cars and other objects that
     were added beside the streets are named in the file if they stand in a lane.
 
     Args:

@@ -60,7 +60,7 @@ def add_cameras(
     """Adds cameras to a diagram.
 
     Args:
-        builder: holds the scene.
+        builder: builder of a diagram with the scene.
         scene: what they see.
         base: the vehicle's frame, as in the scene that was copied.
         cameras: name -> description.

@@ -127,7 +127,7 @@ class CameraScene(LeafSystem):
         """Copies a scene.
 
         Args:
-            scene_graph: has the geometry, of the perception role.
+            scene_graph: SceneGraph with geometry of the perception role.
             structures: gives classes to it.
             calc_X_WF: gives the poses of anchored frames.
             anchored: frames that never move, the world's included.
@@ -244,9 +244,9 @@ class CameraScene(LeafSystem):
 
 @functools.cache
 def check_renderer() -> None:
-    """Checks that Drake can draw an image.
+    """Checks that Drake can render images on this machine.
 
-    Another process draws it: without EGL, drawing ends a process.
+    A second process tries it, since without EGL rendering kills the process.
 
     Raises:
         InputError: it cannot.

@@ -12,19 +12,19 @@ _Angle = Annotated[float, Field(ge=-7.0, le=7.0)]
 
 
 class CameraSection(Section):
-    """A pinhole camera without distortion, that does not see its vehicle.
+    """A pinhole camera without distortion. It does not see its own vehicle.
 
     Attributes:
-        width: pixels in a row.
-        height: rows.
-        rate: images per second, a divisor of the rate of the scans of the first
-            LiDAR, whose stamps they have.
-        fov_y: field of view from the top to the bottom of an image [rad].
+        width: number of pixels in a row.
+        height: number of rows of pixels.
+        rate: images per second. It divides the scan rate of the first LiDAR,
+            and images have the stamps of its scans.
+        fov_y: vertical field of view [rad].
         xyz: position in `base_link` [m].
-        rpy: roll, pitch, yaw in `base_link` [rad]; without them the camera
-            looks ahead.
-        depth: whether there are images of the depth, too.
-        label: whether there are images of the classes, too.
+        rpy: roll, pitch, yaw in `base_link` [rad]; at zero the camera looks
+            ahead.
+        depth: whether to record images of the depth, too.
+        label: whether to record images of the classes, too.
     """
 
     width: _Pixels = 640

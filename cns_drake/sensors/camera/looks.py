@@ -259,7 +259,7 @@ def look_of(
 
 @functools.cache
 def texture(name: str) -> tuple[bytes, float]:
-    """Returns a look's texture, a PNG, and the light of its white.
+    """Returns a look's texture as PNG, and the brightness of its white.
 
     The mean of the product of both is 1.
     """
@@ -304,7 +304,7 @@ def sky(d_W: np.ndarray) -> np.ndarray:
 
 
 def texture_places(corners: np.ndarray, normals: np.ndarray) -> np.ndarray:
-    """Returns (N, 3, 2) places in a texture [m] of corners (N, 3, 3).
+    """Returns texture coordinates (N, 3, 2) [m] of corners (N, 3, 3).
 
     The (N, 3) normals are of unit length. Rows of a texture are heights on
     walls.

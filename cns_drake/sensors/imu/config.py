@@ -23,20 +23,22 @@ KALIBR_FILE = "imu.yaml"
 
 
 class ImuSection(Mount):
-    """An IMU, ideal and with one sample a scan unless a field says otherwise.
+    """An IMU; by default ideal, with one sample per scan.
 
     Attributes:
         xyz: position in `base_link` [m].
         rpy_deg: roll, pitch, yaw in `base_link` [deg].
-        rate: samples per second, from the rate of the scans to 1000; it divides
-            1,000,000,000 ns, as 100, 200, 250, 400 and 500 do.
-        kalibr: a file of Kalibr's with the four noise densities.
-        accelerometer_turn_on_bias: standard deviation of the accelerometer's
-            bias at the start, drawn for each axis [m/s^2].
-        gyroscope_turn_on_bias: likewise of the gyroscope [rad/s].
-        accelerometer_range: the most that an axis of the accelerometer
-            measures, either way [m/s^2].
-        gyroscope_range: likewise of the gyroscope [rad/s].
+        rate: samples per second, at least as many as scans and at most 1000. It
+            divides 1,000,000,000 ns, as 100, 200, 250, 400 and 500 do.
+        kalibr: file in the format of Kalibr with the four noise densities.
+        accelerometer_turn_on_bias: standard deviation of the initial bias of
+            each axis of the accelerometer [m/s^2].
+        gyroscope_turn_on_bias: standard deviation of the initial bias of each
+            axis of the gyroscope [rad/s].
+        accelerometer_range: largest specific force that an axis measures,
+            either way [m/s^2].
+        gyroscope_range: largest angular velocity that an axis measures, either
+            way [rad/s].
     """
 
     xyz: Triple = (-1.0, 0.0, 1.6)
@@ -49,7 +51,7 @@ class ImuSection(Mount):
 
     @property
     def is_ideal(self) -> bool:
-        """Whether it measures exactly, once a scan."""
+        """Whether the IMU has no errors, and one sample per scan."""
         return self == ImuSection(xyz=self.xyz, rpy_deg=self.rpy_deg)
 
     def sample_rate(self, scan_rate: int) -> int:
@@ -70,7 +72,7 @@ class ImuSection(Mount):
         return round(kalibr.update_rate)
 
     def noise(self, seed: int) -> ImuNoise:
-        """Returns the errors, all zero if the IMU is ideal.
+        """Returns the errors of the IMU, all zero if it is ideal.
 
         Raises:
             InputError: Kalibr's file cannot be used.
@@ -129,7 +131,7 @@ class KalibrImu(Section):
 
 
 def read_kalibr(path: Path) -> KalibrImu:
-    """Reads the noise of an IMU.
+    """Returns the noise densities and the rate from a file of Kalibr.
 
     Raises:
         InputError: the file cannot be read, or has another form.

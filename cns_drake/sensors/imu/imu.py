@@ -40,18 +40,19 @@ _NAMES = ("specific_force", "angular_velocity")
 
 @dataclass(frozen=True)
 class Imu:
-    """The systems of an IMU in frame I.
+    """The systems in a diagram that make up an IMU with the frame I.
 
-    It unpacks into accelerometer and gyroscope.
+    It can be unpacked: `accelerometer, gyroscope = imu`.
 
     Attributes:
-        accelerometer: its `measurement` is the specific force in I, at rest
-            +9.81 along the upward axis [m/s^2], without errors.
-        gyroscope: its `measurement` is the angular velocity w_WI_I [rad/s],
-            without errors.
-        rate: samples per second; None without its own rate.
-        noise: its errors, None if it is ideal.
-        noisy: the system that adds them, None if it is ideal.
+        accelerometer: system whose `measurement` is the exact specific force in
+            I [m/s^2]; at rest it is +9.81 along the upward axis.
+        gyroscope: system whose `measurement` is the exact angular velocity
+            w_WI_I [rad/s].
+        rate: samples per second; None if it follows the frames of the
+            recording.
+        noise: errors of the IMU; None if it is ideal.
+        noisy: system that adds the errors; None if it is ideal.
 
     Example:
         from cns_drake import add_imu
@@ -71,7 +72,7 @@ class Imu:
         yield self.gyroscope
 
     def ports(self) -> dict[str, OutputPort]:
-        """Returns the measured `specific_force` and `angular_velocity`."""
+        """Returns the output ports `specific_force` and `angular_velocity`."""
         if self.noisy is not None:
             return {name: self.noisy.GetOutputPort(name) for name in _NAMES}
         ideal = [one.get_measurement_output_port() for one in self]
@@ -91,13 +92,13 @@ def add_imu(
     """Adds an IMU to a diagram and connects it to the motion of its body.
 
     Args:
-        builder: holds the plant, or `motion`.
+        builder: builder of a diagram with the plant, or with `motion`.
         body: P, the body that carries the IMU, or a frame fixed on it, of a
             finalized plant.
         X_PI: pose of the IMU in P.
-        rate: samples per second of a recorder; by default its rate of frames
-            [1/s].
-        noise: its errors, which need a rate.
+        rate: samples per second [1/s]; by default one for each frame of a
+            recorder.
+        noise: errors of the IMU, which need a rate; by default none.
         motion: the source of body poses, velocities and accelerations, if not
             the plant itself.
         name: the systems are named `<name>_accelerometer`,
@@ -156,16 +157,16 @@ def add_described_imu(
     scan_rate: int,
     seed: int,
 ) -> dict[str, OutputPort]:
-    """Adds the IMU that a description describes to a diagram.
+    """Adds an IMU to a diagram, given its description in a scenario.
 
     Args:
         config: the description.
-        builder: of the diagram.
-        body: that carries the IMU.
+        builder: builder of the diagram.
+        body: body that carries the IMU.
         trajectory: motion of that body.
         motion: the system that moves it.
         scan_rate: scans per second, the rate of an IMU without one.
-        seed: of its errors.
+        seed: seed of its errors.
 
     Returns:
         The ports `specific_force` and `angular_velocity`; and `imu_samples`

@@ -17,24 +17,28 @@ _MOST_BLOCKS = 1 << 32
 
 @dataclass(frozen=True)
 class ImuNoise:
-    """The errors of an IMU; by default it is ideal.
+    """The errors of an IMU's measurements; by default it is ideal.
 
-    The model is Kalibr's: a measurement is w + b + n with white noise n and
-    a bias b that is a random walk. For samples dt apart, n has the standard
-    deviation density / sqrt(dt) and b grows by one of random_walk * sqrt(dt)
-    (Kalibr, "IMU noise model"). The errors of a sensor's three axes are
-    independent and equally large.
+    The model is Kalibr's: a measurement is w + b + n with white noise n and a
+    bias b that is a random walk. For samples dt apart, n has the standard
+    deviation density / sqrt(dt), and the standard deviation of b's increment is
+    random_walk * sqrt(dt) (Kalibr, "IMU noise model"). The errors of a sensor's
+    three axes are independent and equally large.
 
     Attributes:
-        accelerometer_noise_density: white noise [m/s^2/sqrt(Hz)].
-        accelerometer_random_walk: walk of its bias [m/s^3/sqrt(Hz)].
-        gyroscope_noise_density: white noise [rad/s/sqrt(Hz)].
-        gyroscope_random_walk: walk of its bias [rad/s^2/sqrt(Hz)].
+        accelerometer_noise_density: density of the white noise
+            [m/s^2/sqrt(Hz)].
+        accelerometer_random_walk: random walk of the bias [m/s^3/sqrt(Hz)].
+        gyroscope_noise_density: density of the white noise [rad/s/sqrt(Hz)].
+        gyroscope_random_walk: random walk of the bias [rad/s^2/sqrt(Hz)].
         accelerometer_turn_on_bias: standard deviation of the bias at time
             zero [m/s^2].
-        gyroscope_turn_on_bias: likewise [rad/s].
-        accelerometer_range: no axis measures more, either way [m/s^2].
-        gyroscope_range: likewise [rad/s].
+        gyroscope_turn_on_bias: standard deviation of the bias at time zero
+            [rad/s].
+        accelerometer_range: greatest specific force that an axis measures,
+            either way [m/s^2].
+        gyroscope_range: greatest angular velocity that an axis measures, either
+            way [rad/s].
         seed: seed of all random numbers.
         sensor_name: distinguishes the errors of several IMUs.
 
@@ -97,7 +101,7 @@ class ImuErrors:
         self._block = np.empty((_BLOCK, 6))
 
     def measure(self, first: int, exact: np.ndarray) -> np.ndarray:
-        """Returns exact values with the errors of their samples.
+        """Returns exact samples with the errors of the IMU added.
 
         Samples are numbered from `first` on, 0 at time zero. The (N, 6) values
         are specific force [m/s^2] and angular velocity [rad/s].
@@ -106,7 +110,7 @@ class ImuErrors:
         return np.minimum(np.maximum(measured, -self._range), self._range)
 
     def at(self, sample: int) -> np.ndarray:
-        """Returns the error of a sample, a row as in `measure`."""
+        """Returns the (6,) error of one sample, as in `measure`."""
         return self._of_samples(sample, 1)[0]
 
     def _of_samples(self, first: int, count: int) -> np.ndarray:

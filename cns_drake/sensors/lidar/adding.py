@@ -56,27 +56,27 @@ def add_lidar(
     """Adds a LiDAR to a diagram and connects it to the SceneGraph.
 
     Args:
-        builder: holds `scene_graph`.
+        builder: builder of a diagram with `scene_graph`.
         scene_graph: the SceneGraph to scan.
         body: P, a body or a frame fixed on one, of a finalized plant that is
             registered with `scene_graph`; or a frame that any other source has
             registered there. A frame on a body stays where its model has it,
             also if a context moves it, as for Drake's cameras.
         X_PS: pose of the sensor S in P.
-        pattern: the beams, or the name of a preset, which then turns at the
-            rate of its data sheet. Nothing is rounded.
+        pattern: beams of the LiDAR, or the name of a preset, which then turns
+            at the rate of its data sheet and does not round coordinates.
         name: name of the system.
         unseen: frames and geometries that the LiDAR does not see; by default
             its body and all bodies welded to it, without the world.
         motion_distortion: whether the LiDAR and all other bodies of the plant
             keep moving during a turn (see `Lidar`).
-        motion: the source of the bodies' velocities then, if not the plant
-            itself.
-        range_noise: standard deviation of the ranges [m].
+        motion: source of the bodies' velocities for motion distortion; by
+            default the plant.
+        range_noise: standard deviation of the Gaussian errors of ranges [m].
         dropout: probability that a return is lost.
-        seed: seed of both, and of calibrated returns. The noise depends on it,
-            on the name and on the number of the frame. `measurement` of
-            `Lidar` replaces these three.
+        seed: seed of noise, dropout and calibrated returns. The draws depend on
+            the seed, the name and the number of the frame. An option
+            `measurement` replaces `range_noise`, `dropout` and `seed`.
         returns: `ideal`, `calibrated` by the data sheet of a preset, or a
             `CalibratedReturns`.
         options: further arguments of `Lidar`, such as `causal`.
@@ -224,17 +224,17 @@ def add_described_lidar(
     period: float | None = None,
     **options: Any,
 ) -> Lidar:
-    """Adds the LiDAR that a description describes to a diagram.
+    """Adds a LiDAR to a diagram, given its description in a scenario.
 
     Args:
         config: the description.
-        builder: holds `scene_graph`.
+        builder: builder of a diagram with `scene_graph`.
         scene_graph: the SceneGraph to scan.
         body: P, or a frame on it.
         X_PS: pose of the sensor in P.
         name: name of the system.
         seed: seed of noise and returns.
-        weather: of calibrated returns.
+        weather: weather of calibrated returns.
         period: duration of a turn [s]; by default by the description's rate.
         options: further arguments of `add_lidar`.
     """
@@ -267,15 +267,17 @@ def add_lidar_view(
     color: Rgba = _VIEW_COLOR,
     point_size: float = 0.05,
 ) -> geometry.MeshcatPointCloudVisualizer:
-    """Adds a live view of a LiDAR's scans, at their places in Meshcat.
+    """Adds a live view of a LiDAR's scans in Meshcat to a diagram.
+
+    Points are shown in the world, at the path of the LiDAR's name.
 
     Args:
-        builder: holds the LiDAR.
-        lidar: its points are shown at the path of its system's name.
-        meshcat: the view.
-        period: time between two shown scans [s]; by default that of a turn.
+        builder: builder of a diagram with the LiDAR.
+        lidar: the LiDAR.
+        meshcat: server that shows the points.
+        period: time between two shown scans [s]; by default a turn.
         color: colour of the points.
-        point_size: their size [m].
+        point_size: size of a point [m].
 
     Example:
         from cns_drake import add_lidar_view

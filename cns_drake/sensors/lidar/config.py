@@ -27,12 +27,12 @@ if TYPE_CHECKING:
 
 
 class WeatherConfig(Section):
-    """The weather, which affects all LiDARs with calibrated returns.
+    """The weather. It affects all LiDARs with calibrated returns.
 
     Attributes:
         visibility: meteorological visibility in fog [m]; no fog by default.
         rain: rate of rain [mm/h].
-        snowfall: rate of snowfall, as water [mm/h].
+        snowfall: rate of snowfall, as melted water [mm/h].
     """
 
     visibility: float | None = Field(default=None, ge=5.0, le=1e6)
@@ -41,34 +41,36 @@ class WeatherConfig(Section):
 
 
 class LidarSection(Mount):
-    """A LiDAR.
+    """A LiDAR on the vehicle.
 
     Attributes:
         preset: name of the unit, from the table of presets.
         xyz: position in `base_link` [m].
         rpy_deg: roll, pitch, yaw in `base_link` [deg].
-        columns: columns in a turn, in place of the preset's.
-        min_range: nearest range, in place of the preset's [m].
-        max_range: farthest range, in place of the preset's [m].
-        resolution: step of the coordinates, 2^-10 m; 0 records exact values
-            [m].
-        range_noise: standard deviation of a Gaussian error along the beam; the
-            range limits apply to the measured range [m].
-        dropout: each return is lost with this probability.
-        faint_dropout: on top, a return of intensity I is lost with this
-            probability times (1 - I).
-        motion_distortion: each column is cast from the sensor's pose at
-            `stamp + t` and expressed in its frame at that time, as real units
-            report it.
-        returns: `ideal`, or `calibrated` with the losses, errors and brightness
-            of the unit's data sheet.
-        echoes: the echoes of a beam that calibrated returns report; `dual` is
+        columns: number of columns in a turn; by default the preset's.
+        min_range: nearest range that is measured [m]; by default the preset's.
+        max_range: farthest range that is measured [m]; by default the preset's.
+        resolution: step to which coordinates are rounded [m], by default 2^-10
+            m; 0 records exact values.
+        range_noise: standard deviation of a Gaussian error along the beam [m].
+            The range limits apply to the measured range.
+        dropout: probability that a return is lost.
+        faint_dropout: factor of a further loss: a return of intensity I is also
+            lost with this probability times (1 - I).
+        motion_distortion: whether each column is measured from the pose of the
+            LiDAR at its own firing time, `stamp + t`, and expressed in its
+            frame at that time, as real units report it. Otherwise the whole
+            scan is measured from one pose.
+        returns: `ideal`, or `calibrated` with the losses, errors and
+            intensities of the unit's data sheet.
+        echoes: which echoes of a beam calibrated returns report; `dual` reports
             the strongest and the last.
-        unit_seed: seed of this very unit's errors of range, angles and gain of
-            each laser, in calibrated returns; drives with one unit share it.
-        rate: turns per second, a divisor of the fastest LiDAR's. A unit whose
-            lasers fire at a fixed rate has more columns in a slower turn.
-        layout: the fields of a point in the recording.
+        unit_seed: seed of the errors that this individual unit has in the
+            ranges, angles and gains of its lasers, with calibrated returns.
+            Give drives with the same unit the same seed.
+        rate: turns per second. It divides the rate of the fastest LiDAR. A unit
+            whose lasers fire at a fixed rate has more columns in a slower turn.
+        layout: which fields a point has in the recording.
     """
 
     xyz: Triple = (0.0, 0.0, 1.6)
@@ -134,7 +136,7 @@ class LidarSection(Mount):
         return self
 
     def with_preset(self, preset: str) -> LidarSection:
-        """Returns another unit with the same place and measurement.
+        """Returns another unit with the same pose and measurement settings.
 
         Raises:
             InputError: there is no such preset.
@@ -156,9 +158,10 @@ def make_lidar_config(preset: str) -> LidarSection:
 def make_pattern(
     config: LidarSection, period: float | None = None
 ) -> UnitPattern:
-    """Returns the beams of one turn, of another period [s] if it is given.
+    """Returns the beam pattern of a LiDAR.
 
-    Calibrated returns have the elevations of a real unit, if they are known.
+    A turn takes another period [s] if it is given. Calibrated returns have the
+    elevations of a real unit, if they are known.
     """
     pattern = make_beam_pattern(
         config.preset,
@@ -176,7 +179,7 @@ def make_pattern(
 
 
 def describe_unit(config: LidarSection) -> dict[str, Any]:
-    """Returns what a user gets of a unit with calibrated returns.
+    """Returns the data of a calibrated unit that its user would know.
 
     Its lasers' true angles differ from these by the errors of the unit.
     """

@@ -54,7 +54,7 @@ class Structures(Protocol):
     """What gives labels and instance ids to geometries."""
 
     def labels(self, names: Sequence[str]) -> Labels:
-        """Returns those of geometries, by the names of their structures."""
+        """Returns labels of geometries, by the names of their structures."""
 
 
 class RayHits(NamedTuple):
@@ -290,7 +290,7 @@ class Lidar(LeafSystem):
         )
 
     def EvalScene(self, context: Context) -> RayCastingScene:
-        """Returns what the LiDAR sees in a Context, to cast other rays on."""
+        """Returns the geometry that the LiDAR sees, to cast rays on."""
         scene = self._eval_seen(context).scene
         assert scene is not None
         return scene
@@ -330,16 +330,16 @@ class Lidar(LeafSystem):
         d_W: np.ndarray,
         max_range: float | np.ndarray = np.inf,
     ) -> RayHits:
-        """Casts N rays on what the LiDAR sees in a Context.
+        """Casts N rays on the geometry that the LiDAR sees in a Context.
 
-        Neither its pattern nor its noise matters. Ranges are true to 1e-4 m for
-        rays that start within 1 km of the LiDAR.
+        The rays do not depend on the LiDAR's pattern or noise. Ranges are exact
+        to 1e-4 m for rays that start within 1 km of the LiDAR.
 
         Args:
-            context: of the LiDAR.
-            p_WR: (N, 3) origins in the world, or (3,) if they share one [m].
+            context: context of the LiDAR.
+            p_WR: (N, 3) origins in the world, or (3,) if all share one [m].
             d_W: (N, 3) unit directions in the world.
-            max_range: how far to look [m], one for all or (N,).
+            max_range: greatest range [m], one for all or (N,).
 
         Raises:
             ValueError: shapes do not match, a direction has another length than
@@ -629,13 +629,14 @@ class SeenGeometry:
         seen: moving_groups.Ball,
         p_WS: np.ndarray,
     ) -> None:
-        """Moves moving geometry, and builds changed geometry anew.
+        """Moves geometry whose frame has moved, and rebuilds changed geometry.
 
         Args:
-            query_object: has geometry and poses.
-            revision: of `geometry_revision_port`; without it all geometries are
-                compared.
-            motions: of frames that move during the turn.
+            query_object: query object of the SceneGraph, with geometry and
+                poses.
+            revision: revision of `geometry_revision_port`; without it all
+                geometries are compared.
+            motions: motions of frames that move during the turn.
             known: poses that replace calls of the query object.
             seen: the ball in which beams can meet geometry.
             p_WS: the place of the sensor [m].
@@ -659,13 +660,13 @@ class SeenGeometry:
         self._revision = revision
 
     def labels(self, moving: np.ndarray) -> np.ndarray:
-        """Returns the class of each geometry while some instances move."""
+        """Returns the class of each geometry; moving instances have another."""
         moves = np.zeros(MAX_INSTANCE + 1, bool)
         moves[moving] = True
         return np.where(moves[self.instance], self.moving_label, self.label)
 
     def materials(self, returns: CalibratedReturns) -> Materials:
-        """Returns the materials of `scene`."""
+        """Returns how each geometry of `scene` reflects."""
         if self._materials is None:
             self._materials = returns.materials(
                 self.built, self._lidar.structures

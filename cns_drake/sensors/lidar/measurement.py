@@ -49,7 +49,7 @@ class Returns(NamedTuple):
 
 @dataclass(frozen=True)
 class MeasurementModel:
-    """The measurement model of a LiDAR; by default it is ideal.
+    """The noise, losses and rounding of a LiDAR; by default it has none.
 
     Random numbers depend only on `seed`, `sensor_name` and the number of the
     frame, and are drawn for every beam, hit or miss. Neither earlier calls nor
@@ -62,9 +62,9 @@ class MeasurementModel:
         range_noise: standard deviation of the Gaussian error of a range,
             along the beam and before rounding [m].
         dropout: probability that a return is lost.
-        faint_dropout: probability that a return of no intensity is lost on
-            top of that. It falls linearly with intensity, to none for a
-            return of full intensity.
+        faint_dropout: additional probability that a return of no intensity is
+            lost. It falls linearly with intensity, to none for a return of full
+            intensity.
         seed: seed of the noise.
         sensor_name: distinguishes the noise of several LiDARs.
 
@@ -103,11 +103,11 @@ class MeasurementModel:
 
     @property
     def is_random(self) -> bool:
-        """Whether two frames of the same geometry differ."""
+        """Whether two scans of the same geometry can differ."""
         return max(self.range_noise, self.dropout, self.faint_dropout) > 0.0
 
     def reach(self, max_range: float) -> float:
-        """Returns the range of rays for all that may be measured [m].
+        """Returns how far rays must be cast for a maximum range [m].
 
         It is a little beyond the maximum even without noise, so that `measure`
         decides on the limit and not a ray caster's rounding.
@@ -121,13 +121,13 @@ class MeasurementModel:
         max_range: float,
         frame: int,
     ) -> Returns:
-        """Returns the measured returns of true ranges.
+        """Returns the returns that the LiDAR reports for exact ranges.
 
         Args:
             true_ranges: (num_beams,) float32 distance to the nearest surface
                 along each beam in firing order [m], inf if there is none.
-            min_range: a nearer measured range is no return [m].
-            max_range: a farther measured range is no return [m].
+            min_range: least measured range of a return [m].
+            max_range: greatest measured range of a return [m].
             frame: number of the frame.
         """
         ranges = true_ranges

@@ -100,7 +100,7 @@ class Beams:
 
     @cached_property
     def cast_columns(self) -> np.ndarray | None:
-        """(N,) columns in packet order; None if they simply repeat."""
+        """Column (N,) of each beam in packet order; None if they repeat."""
         columns = self.column[self.packet_order]
         turns, rest = divmod(len(columns), max(len(self.column_t_ns), 1))
         once = np.arange(len(self.column_t_ns))
@@ -125,16 +125,16 @@ def make_beams(d_Sset: np.ndarray, ring: np.ndarray, t_ns: np.ndarray) -> Beams:
 
 
 class BeamPattern(ABC):
-    """The beams of a LiDAR, turn by turn.
+    """The directions and firing times of a LiDAR's beams.
 
     A turn is the time of one scan, and depends on the unit. Firing times are
-    the same in all turns; directions may differ.
+    the same in all turns; directions can differ.
 
     Attributes:
         min_range: nearest measured range [m].
         max_range: farthest measured range [m].
         period: duration of one turn [s].
-        repeats: whether all turns are alike.
+        repeats: whether all turns have the same directions.
 
     Example:
         from cns_drake import make_beam_pattern
@@ -150,14 +150,14 @@ class BeamPattern(ABC):
 
     @abstractmethod
     def beams(self, frame: int) -> Beams:
-        """Returns the beams of a turn.
+        """Returns the directions of the beams of one turn.
 
         Args:
-            frame: its number.
+            frame: number of the turn.
         """
 
     def check(self) -> None:
-        """Checks the limits of ranges, and the period.
+        """Checks that the range limits and the period are possible.
 
         Raises:
             ValueError: one of them is impossible.
@@ -188,9 +188,9 @@ class BeamPattern(ABC):
         """Returns the pattern without the beams outside a field of view.
 
         Args:
-            azimuths_deg: the limits; if the first one is greater, the rear is
-                in sight.
-            elevations_deg: the limits.
+            azimuths_deg: limits of the azimuth [deg]; if the first is greater,
+                the field of view includes the rear.
+            elevations_deg: limits of the elevation [deg].
 
         Raises:
             ValueError: no beam is left.
@@ -257,22 +257,22 @@ def _limit(
 
 @dataclass(frozen=True)
 class SpinningPattern(BeamPattern):
-    """The beams of one turn of a spinning LiDAR of one ring or many.
+    """The pattern of a spinning LiDAR with one ring or many.
 
-    In the sensor frame S (x forward, y left, z up) the turn starts at the
-    rear and goes clockwise seen from above, as Ouster's and Velodyne's units
-    turn: column k of n points at azimuth pi - 2 pi k / n. With azimuth limits
-    it goes from the first to the last one, both included, and fires only in
-    that part of the turn. Ring 0 is the highest beam. Beams are ordered as they
-    fire: column by column, and from ring 0 downwards in each.
+    In the sensor frame S (x forward, y left, z up) the turn starts at the rear
+    and goes clockwise seen from above, as Ouster's and Velodyne's units turn:
+    column k of n points at azimuth pi - 2 pi k / n. With azimuth limits it goes
+    from the first to the last one, both included, and fires only in that part
+    of the turn. Ring 0 is the highest beam. Beams are ordered as they fire:
+    column by column, and from ring 0 downwards in each.
 
     Attributes:
         elevations_rad: elevation of each ring, descending [rad].
-        num_columns: columns in a turn.
+        num_columns: number of columns in a turn.
         min_range: nearest range that is measured [m].
         max_range: farthest range that is measured [m].
         period: duration of one turn [s].
-        azimuths_rad: first and last azimuth, None for the whole turn [rad].
+        azimuths_rad: first and last azimuth [rad]; None for the whole turn.
 
     Raises:
         ValueError: a value is impossible, or elevations ascend.
@@ -368,7 +368,7 @@ def _spin(pattern: SpinningPattern) -> Beams:
 
 
 class DirectionPattern(BeamPattern):
-    """Beams in chosen directions, the same in every turn.
+    """A pattern of beams in given directions, the same in every turn.
 
     Example:
         from cns_drake import DirectionPattern
@@ -392,8 +392,8 @@ class DirectionPattern(BeamPattern):
         """Takes the beams.
 
         Args:
-            directions: (N, 3), expressed in the sensor frame S, of any
-                length but zero.
+            directions: (N, 3) directions in the sensor frame S, of any length
+                except zero.
             min_range: nearest range that is measured [m].
             max_range: farthest range that is measured [m].
             period: duration of one turn [s].
@@ -445,15 +445,16 @@ def make_flash_pattern(
     max_range: float,
     period: float,
 ) -> DirectionPattern:
-    """Returns a solid-state LiDAR that lights a grid of pixels at once.
+    """Returns the pattern of a solid-state LiDAR with a grid of pixels.
 
-    Pixels are evenly spaced in azimuth and elevation; the outer ones have their
-    middles half a pixel within the field of view. Ring 0 is the uppermost row.
+    All pixels fire at once. They are evenly spaced in azimuth and elevation;
+    the middles of the outer ones are half a pixel within the field of view.
+    Ring 0 is the uppermost row.
 
     Args:
-        width: pixels in a row.
-        height: rows.
-        fov_deg: field of view, across and up.
+        width: number of pixels in a row.
+        height: number of rows.
+        fov_deg: field of view across and up [deg].
         min_range: nearest range that is measured [m].
         max_range: farthest range that is measured [m].
         period: time between two flashes [s].
@@ -613,16 +614,16 @@ def _fire(pattern: _TimedPattern, frame: int) -> Beams:
 
 @dataclass(frozen=True)
 class RosettePattern(_TimedPattern):
-    """Two wedge prisms that turn against each other, before a row of lasers.
+    """The pattern of two counter-rotating wedge prisms before a row of lasers.
 
     Each prism bends a beam by a quarter of the field of view, which therefore
-    is a disc about x, densest in its middle; the bends add up as vectors
-    (of first order: a real prism bends an oblique beam somewhat more). Lasers
-    one above the other give as many discs.
+    is a disc about x, densest in its middle; the bends add up as vectors (of
+    first order: a real prism bends an oblique beam somewhat more). Lasers one
+    above the other give as many discs.
 
     Attributes:
-        fov_deg: full angle of a disc.
-        height_deg: angle between the highest and the lowest laser.
+        fov_deg: full angle of a disc [deg].
+        height_deg: angle between the highest and the lowest laser [deg].
 
     Example:
         from cns_drake import RosettePattern
@@ -668,11 +669,11 @@ class RosettePattern(_TimedPattern):
 
 @dataclass(frozen=True)
 class NoddingPattern(_TimedPattern):
-    """Lines that rotate and, slowly, move up and down, each in its own band.
+    """A pattern of lines that rotate and slowly nod, each in its own band.
 
-    Bands of equal height fill the field of view. The turns about z, 100 a
-    second, and the ups and downs, 6.18 a second, are of no simple ratio, so
-    that frame after frame fills the gaps.
+    Bands of equal height fill the field of view. The lines turn about z 100
+    times a second and nod 6.18 times a second. The ratio is not simple, so that
+    frame after frame fills the gaps.
 
     Attributes:
         elevations_deg: lowest and highest elevation; line 0 has the highest

@@ -26,7 +26,7 @@ class LidarPreset(NamedTuple):
     def of(
         cls, *, source: str, ranges: tuple[float, float], **fields: Any
     ) -> LidarPreset:
-        """Returns a unit of its fields in presets.yaml."""
+        """Returns a preset from its fields in presets.yaml."""
         fields["min_range"], fields["max_range"] = ranges
         if "pattern" in fields:
             kind = getattr(patterns, fields.pop("pattern"))
@@ -66,15 +66,17 @@ def make_beam_pattern(
     min_range: float | None = None,
     max_range: float | None = None,
 ) -> UnitPattern:
-    """Returns the pattern of a preset, with other values if given.
+    """Returns the beam pattern of a preset.
 
     Args:
         preset: a key of `LIDAR_PRESETS`; `source` there names its data sheet.
         period: duration of a turn [s]; by default that of the data sheet.
-        num_columns: columns in a turn; by default those of the data sheet, of a
-            unit that fires steadily as many as fit into the period.
-        min_range: nearest range that is measured [m].
-        max_range: farthest range that is measured [m].
+        num_columns: columns in a turn; by default those of the data sheet. A
+            unit that fires at a fixed rate has as many as fit into the period.
+        min_range: nearest range that is measured [m]; by default that of the
+            data sheet.
+        max_range: farthest range that is measured [m]; by default that of the
+            data sheet.
 
     Raises:
         KeyError: there is no preset of that name.

@@ -18,7 +18,7 @@ from cns_drake.sensors.carriers import body_and_pose, connect_motion
 
 @dataclass(frozen=True)
 class Odometry:
-    """Pose and velocity of a body.
+    """The pose and velocity of a body at one time.
 
     Attributes:
         X_WB: its pose in the world.
@@ -79,7 +79,10 @@ class OdometrySensor(LeafSystem):
     def place_of(
         self, body: BodyIndex, X_PC: RigidTransform
     ) -> RigidTransform | None:
-        """Returns X_BC of a place C on the body P; None for another body."""
+        """Returns the pose X_BC of a frame C on the body P.
+
+        It is None if C is on another body.
+        """
         return self.X_PB.inverse() @ X_PC if body == self._body else None
 
     def _calc_odometry(self, context: Context, output: AbstractValue) -> None:
@@ -103,16 +106,15 @@ def add_odometry(
     motion: System | None = None,
     name: str = "odometry",
 ) -> OdometrySensor:
-    """Adds odometry of a body to a diagram and connects it to its motion.
+    """Adds exact odometry of a body to a diagram.
+
+    The system is connected to the motion of the body.
 
     Args:
-        builder: holds the plant, or `motion`.
-        body: the body to observe, or a frame fixed on it, of a finalized
-            plant.
-        X_PB: pose of the observed place B in it, by default the body or frame
-            itself.
-        motion: the source of body poses and velocities, if not the plant
-            itself.
+        builder: builder of a diagram with the plant, or with `motion`.
+        body: body P, or frame fixed on one, of a finalized plant.
+        X_PB: pose of the observed frame B in P; by default B is P.
+        motion: source of body poses and velocities; by default the plant.
         name: name of the system.
 
     Raises:

@@ -29,15 +29,16 @@ CLEAR = Weather()
 
 @dataclass(frozen=True)
 class CalibratedReturns:
-    """Makes returns after the data sheet of a unit.
+    """A model of returns after the data sheet of a LiDAR.
 
+    It adds the unit's noise, losses, angular errors and calibrated intensities.
     Random numbers depend only on the seed, the name of the sensor, the frame
     and the beam. Errors of the unit depend on its own seed, its name and the
     laser: two drives with one unit share them.
 
     Attributes:
         sheet: data sheet of the unit.
-        echoes: the reported echoes of a beam.
+        echoes: which echoes of a beam are reported.
         weather: weather of the drive.
         seed: seed of random numbers.
         sensor_name: distinguishes several LiDARs.
@@ -67,11 +68,11 @@ class CalibratedReturns:
         sensor_name: str = "",
         unit_seed: int = 0,
     ) -> CalibratedReturns:
-        """Returns the model of a preset's unit.
+        """Returns the calibrated returns of a preset's LiDAR.
 
         Args:
             preset: a key of `LIDAR_PRESETS`.
-            echoes: see the class.
+            echoes: which echoes of a beam are reported.
             weather: fog, rain and snowfall.
             seed: seed of random numbers.
             sensor_name: the name of the LiDAR.
@@ -95,7 +96,7 @@ class CalibratedReturns:
         geometries: Sequence[PerceptionGeometry],
         structures: object,
     ) -> Materials:
-        """Returns the materials of geometries; rain wets the ground.
+        """Returns how geometries reflect; rain wets the ground.
 
         Structures have classes if they are a `StructureTable`.
         """
@@ -105,7 +106,7 @@ class CalibratedReturns:
         return find_materials(geometries, structures, is_wet=is_wet)
 
     def reach(self, max_range: float) -> float:
-        """Returns the range of rays [m].
+        """Returns how far rays must be cast [m].
 
         It exceeds the reported range, since range noise can bring a farther
         surface into range.
@@ -145,16 +146,17 @@ class CalibratedReturns:
     ) -> Reported:
         """Returns the reported points of a turn.
 
-        Ray i of the order of casting takes pose i mod K and time i mod T.
+        Of the rays in the order of casting, ray i takes pose i mod K and time i
+        mod T.
 
         Args:
-            scene: what rays meet.
-            materials: of its geometries.
+            scene: geometry on which rays are cast.
+            materials: how each geometry reflects.
             pattern: the beams of a turn.
-            turn: what is drawn for the turn.
+            turn: random errors of the turn.
             p_WSset: (K, 3) positions of S [m].
             R_WSset: (K, 3, 3) orientations of S.
-            times: (T,) parts of the turn.
+            times: (T,) firing times as parts of the turn.
             frame: number of the turn.
         """
         key = frame_key(self.seed, self.sensor_name, frame)
@@ -229,7 +231,7 @@ class CalibratedReturns:
         return report_echoes(light, receiver, key, turn.range_error, turn.gain)
 
     def turn(self, beams: Beams) -> CalibratedTurn:
-        """Returns the beams of a turn, with the errors of the unit."""
+        """Returns the beams of a turn, with the angular errors of the unit."""
         laser = np.arange(int(beams.ring.max()) + 1)
         key = frame_key(self.unit_seed, f"unit/{self.sensor_name}", 0)
         sheet, head = self.sheet, self.sheet.head
@@ -318,12 +320,12 @@ class CalibratedTurn:
         """Takes the attributes, all in firing order.
 
         Args:
-            beams: of the pattern.
+            beams: beams of the pattern.
             d_Sset: their directions.
             reported: directions that the unit reports.
-            height: of each laser above the origin [m].
-            range_error: of each laser [m].
-            gain: of each laser.
+            height: height of each laser above the origin [m].
+            range_error: range error of each laser [m].
+            gain: gain of each laser.
         """
         self.range_error, self.gain = range_error, gain
         self.reported = reported

@@ -92,7 +92,7 @@ def report_echoes(
     range_error: np.ndarray,
     gain: np.ndarray,
 ) -> Reported:
-    """Returns the reported points of the light.
+    """Returns the points that the unit reports for the light it receives.
 
     Light less than a pulse apart is one echo, whose distance is the mean by
     energy. An echo is detected by the probability of its SNR, and its distance
@@ -100,8 +100,8 @@ def report_echoes(
 
     Args:
         light: what came back.
-        receiver: of the unit.
-        key: of the random draws.
+        receiver: receiver of the unit.
+        key: key of the random draws.
         range_error: (N,) error of range of each beam's laser [m].
         gain: (N,) gain of each beam's laser.
     """

@@ -44,9 +44,9 @@ class Sides(NamedTuple):
 
 
 def find_sides(shots: Shots, orders: np.ndarray, hits: BeamHits) -> Sides:
-    """Returns rays to cast where neighbours meet different surfaces.
+    """Returns extra rays to cast where neighbouring beams hit an edge.
 
-    Two neighbours meet one surface, or two that touch, if one place is on the
+    Two neighbours meet one surface, or two that touch, if one point is on the
     plane of the other, or both planes meet in between. Otherwise an edge is
     between them: within one of their beams, or in the gap. Neighbours follow
     each other in (2, N) orders of the beams, whose axes have the hits.
@@ -151,11 +151,12 @@ def _share(
 
 @compiled
 def meet_sides(sides: Sides, side_hits: BeamHits, hits: BeamHits) -> np.ndarray:
-    """Divides the light of N beams among their axes and their sides.
+    """Returns the share (N,) of each beam's light that its axis stands for.
 
-    A ray that passes the nearer of two surfaces has met the farther one, on its
-    plane. Hits of rays at sides are within their reach. Those on the surface of
-    their beam become misses, those that pass the nearer surface become hits.
+    The extra rays at its sides stand for the rest. A ray that passes the nearer
+    of two surfaces has met the farther one, on its plane. Hits of rays at sides
+    are within their reach. Those on the surface of their beam become misses,
+    those that pass the nearer surface become hits.
 
     Returns:
         The (N,) part of each beam's light that its axis stands for.

@@ -114,7 +114,7 @@ def reflect(
     cosine: np.ndarray,
     materials: Materials,
 ) -> Light:
-    """Returns the light of N rays that surfaces reflect.
+    """Returns the light that surfaces reflect along N rays.
 
     Args:
         beam: (N,) number of the beam of each ray.
@@ -122,7 +122,7 @@ def reflect(
         distance: (N,) whole way of the light to the surface [m].
         geometry: (N,) number of the geometry that each ray meets.
         cosine: (N,) cosine of the angle of incidence.
-        materials: of the geometries.
+        materials: materials of the geometries.
     """
     energy = np.empty(len(beam))
     for k in range(len(beam)):
@@ -174,10 +174,10 @@ def texture(
     normal_matrices: np.ndarray,
     p_WLset: np.ndarray,
 ) -> Light:
-    """Returns the light by the albedo and the depth of single places.
+    """Returns the light with the albedo and depth of single spots.
 
-    Both belong to the surface: they are a hash of the place in the surface's
-    own frame, so that all scans of all drives meet the same. What is darker is
+    Both belong to the surface: they are a hash of the spot in the surface's own
+    frame, so that all scans of all drives meet the same. Darker spots are
     deeper. No wall or floor lies along the axes of the cells.
 
     Args:
@@ -257,7 +257,7 @@ def _wave(turns: float) -> float:
 
 @compiled
 def cell_number(a: float, b: float, c: float) -> float:
-    """Returns a number from -1 to 1, the same within each unit cell."""
+    """Returns a random number from -1 to 1, constant in each unit cell."""
     z = (
         np.uint64(np.int64(np.floor(a))) * np.uint64(0x9E3779B97F4A7C15)
         ^ np.uint64(np.int64(np.floor(b))) * np.uint64(0xC2B2AE3D27D4EB4F)

@@ -46,7 +46,7 @@ class SheetRow:
 
     @property
     def snr(self) -> float:
-        """The SNR that has the stated probability."""
+        """SNR at which the stated detection probability holds."""
         # `detection_probability`, solved for the root of the SNR.
         z = NormalDist().inv_cdf(self.probability)
         root = (z + math.sqrt(z * z + 4.0 * THRESHOLD_SNR)) / 2.0
@@ -131,6 +131,6 @@ def range_deviation(budget: LinkBudget, snr: np.ndarray) -> np.ndarray:
 
 @compiled
 def echo_energy(budget: LinkBudget, snr: _Value, distance: _Value) -> _Value:
-    """Returns the energy of echoes as the unit infers it for clear air."""
+    """Returns the energy that the unit infers from echoes, for clear air."""
     gain = np.exp(2.0 * budget.own_extinction * distance)
     return snr * distance * distance * gain / budget.scale

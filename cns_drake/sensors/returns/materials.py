@@ -180,8 +180,8 @@ def _wet(reflectivity: float) -> float:
 def is_closed(surface: Surface) -> bool:
     """Returns whether a surface encloses a volume.
 
-    Triangles do if each edge, by the places of its ends, belongs to an even
-    number of them.
+    A surface of triangles does if each edge belongs to an even number of them.
+    Edges are compared by the positions of their ends.
     """
     if isinstance(surface, HalfSpaceSurface):
         return False

@@ -81,7 +81,7 @@ def start_ways(
     sides: Sides,
     side_hits: BeamHits,
 ) -> tuple[list[Light], Ways, BeamHits]:
-    """Returns what opaque surfaces send back, and the rays that meet others.
+    """Returns light from opaque surfaces, and rays that go on through others.
 
     Args:
         shots: the beams.
@@ -148,7 +148,7 @@ def _leaf_areas(p_Wset: np.ndarray) -> np.ndarray:
 
 @compiled
 def pane_shares(cosine: float) -> tuple[float, float]:
-    """Returns the reflected and the transmitted part of light at a pane."""
+    """Returns the shares of light that a pane reflects and transmits."""
     n = _GLASS_INDEX
     sine = np.sqrt(max(1.0 - cosine**2, 0.0)) / n
     inner = np.sqrt(1.0 - sine**2)
@@ -163,7 +163,10 @@ def pane_shares(cosine: float) -> tuple[float, float]:
 def follow(
     shots: Shots, ways: Ways, met: BeamHits, scale: float
 ) -> list[Light]:
-    """Returns the light that comes back; see `LinkBudget` for the scale."""
+    """Returns the light that comes back to the LiDAR from further surfaces.
+
+    See `LinkBudget` for the scale.
+    """
     found: list[Light] = []
     for step in range(_MOST_STEPS):
         light, ways = _step(

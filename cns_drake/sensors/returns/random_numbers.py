@@ -17,7 +17,7 @@ _UNIT = 2.0**-53
 
 
 def frame_key(seed: int, sensor_name: str, frame: int) -> np.uint64:
-    """Returns the key of one frame of one sensor."""
+    """Returns the key of a sensor's random numbers in one frame."""
     # A spawn key holds no negative numbers; frames before time zero do exist.
     spawn_key = (2 * abs(frame) + (frame < 0), *sensor_name.encode())
     seeds = np.random.SeedSequence(seed, spawn_key=spawn_key)
@@ -28,10 +28,11 @@ def frame_key(seed: int, sensor_name: str, frame: int) -> np.uint64:
 def uniform(
     key: np.uint64, beam: np.ndarray, draw: int | np.ndarray
 ) -> np.ndarray:
-    """Returns numbers that are uniform over [0, 1), by a `frame_key`.
+    """Returns random numbers that are uniform over [0, 1), from a key.
 
-    They are the n-th ones of SplitMix64 (Steele, Lea and Flood, OOPSLA 2014).
-    Beams are 0 or more; draws are below `DRAWS_PER_BEAM`.
+    The key is that of `frame_key`. They are the n-th ones of SplitMix64
+    (Steele, Lea and Flood, OOPSLA 2014). Beams are 0 or more; draws are below
+    `DRAWS_PER_BEAM`.
     """
     number = (beam * DRAWS_PER_BEAM + (draw + 1)).astype(np.uint64)
     z = key + number * _GOLDEN

@@ -51,7 +51,7 @@ class Response:
     def table(self) -> np.ndarray:
         """Intensities of diffuse targets, at even steps of the energy's root.
 
-        Logarithms of all points would take half a frame.
+        Computing the logarithms of all points would take half a frame.
         """
         root = np.linspace(0.0, 1.0, 4097)
         energy = np.maximum(root, 1e-6) ** 2
@@ -125,7 +125,7 @@ class UnitSheet:
 
     @property
     def range_bias(self) -> float:
-        """Standard deviation of a laser's own error of range [m]."""
+        """Standard deviation of each laser's constant range error [m]."""
         return self.own_part * self.range_floor
 
     @property
@@ -139,9 +139,9 @@ class UnitSheet:
         return _LIGHT * self.pulse_ns * 1e-9 / 2.0
 
     def aimed(self, pattern: _Pattern) -> _Pattern:
-        """Returns a pattern with the elevations of the unit, if known.
+        """Returns a pattern with the unit's own elevations, if they are known.
 
-        A pattern of another number of rings is left.
+        A pattern of another number of rings is returned unchanged.
         """
         own = tuple(map(math.radians, self.head.elevations_deg))
         if not isinstance(pattern, SpinningPattern):

@@ -48,12 +48,12 @@ _OVERLAP = (1.0, 3.0)
 
 @dataclass(frozen=True)
 class Weather:
-    """The weather of a drive; by default the air is clear.
+    """Fog, rain and snowfall during a drive; by default the air is clear.
 
     Attributes:
-        visibility: meteorological visibility in fog, None without fog [m].
-        rain: rate [mm/h].
-        snowfall: rate as water [mm/h].
+        visibility: meteorological visibility in fog [m]; None without fog.
+        rain: rate of rain [mm/h].
+        snowfall: rate of snowfall, as melted water [mm/h].
 
     Raises:
         ValueError: if a value is out of range.
@@ -80,12 +80,12 @@ class Weather:
 
     @property
     def is_clear(self) -> bool:
-        """Whether nothing in the air sends light back or weakens it."""
+        """Whether the air neither weakens light nor sends it back."""
         return self.visibility is None and self.rain == self.snowfall == 0.0
 
     @property
     def extinction(self) -> float:
-        """alpha [1/m]."""
+        """Extinction coefficient alpha of the air [1/m]."""
         fog = 0.0
         if self.visibility is not None:
             fog = math.log(20.0) / self.visibility
@@ -94,7 +94,10 @@ class Weather:
         )
 
     def drops(self, diameters_mm: np.ndarray) -> list[tuple[np.ndarray, float]]:
-        """Returns N(D) [1/(m3 mm)] and reflectivity of each kind of drops."""
+        """Returns size distribution and reflectivity of each kind of drops.
+
+        The distribution is N(D) [1/(m3 mm)].
+        """
         kinds = []
         if self.rain > 0.0:
             slope = 4.1 * self.rain**-0.21
@@ -153,7 +156,7 @@ def tabulate_scattering(
 
     Args:
         weather: fog, rain and snowfall.
-        budget: of the unit: SNR by distance and reflectivity.
+        budget: budget of the unit: SNR by distance and reflectivity.
         divergence: half the angle of a beam [rad].
         resolution: length of a pulse, there and back [m].
         min_range: least range of the unit [m].

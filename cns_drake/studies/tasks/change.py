@@ -65,7 +65,7 @@ def map_city(
 ) -> tuple[VoxelMap, np.ndarray]:
     """Maps a drive in cells of the TCR.
 
-    Scans are `spacing` apart [m]; None for all of them.
+    Scans are `spacing` apart [m]; None takes all of them.
 
     Returns:
         The map, and positions (N, 3) of the sensor [m].
@@ -84,7 +84,7 @@ def map_city(
 def measure_change(
     reporter: Reporter, first: Part, second: Part
 ) -> dict[str, tuple[float, int]]:
-    """Returns metric -> value and number of voxels, of two mapped drives."""
+    """Returns metric -> value and number of voxels, for two mapped drives."""
     del reporter
     a, b = (
         Surveyed(name, *part.read())

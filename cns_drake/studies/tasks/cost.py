@@ -61,7 +61,7 @@ def measure_costs(
         database, query: described drives, one part for each method.
         distractors: described drives through other cities.
         num_distractors: number of their places.
-        methods: those that are measured.
+        methods: methods to measure.
     """
     found = {}
     for k, choice in enumerate(reporter.track(methods, "", len(methods))):

@@ -139,9 +139,9 @@ def measure_localisation(
         database: the drive of the map.
         query: the drive whose scans are localised.
         methods: names, or Python files.
-        texts: contents of those files, which make them other inputs.
+        texts: contents of those files; a job is done again if they change.
         starts: how far away and how often each query starts.
-        spacing: between two queries [m].
+        spacing: distance between two queries [m].
 
     Returns:
         (K,) of `QUERY` for each method and start, the starts of a method side

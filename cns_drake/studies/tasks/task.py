@@ -103,7 +103,7 @@ class Jobs:
         *,
         kept: bool = False,
     ) -> DescribedSource:
-        """Returns a drive's source, or the parts of its descriptions.
+        """Returns the source of a drive, or the parts with its descriptions.
 
         Args:
             drive: the drive.
@@ -136,7 +136,7 @@ class Jobs:
     def elsewhere(
         self, pair: Pair, needs: list[str]
     ) -> tuple[tuple[Part, ...], ...]:
-        """Returns the descriptions of drives elsewhere that a pair needs."""
+        """Returns descriptions of the drives elsewhere that distract a pair."""
         if not pair.distractors:
             return ()
         found = []
@@ -159,11 +159,11 @@ class Jobs:
         """Adds the job of a part, named like it; returns the part.
 
         Args:
-            part: its file and name.
+            part: file and name of the part.
             function: what the job runs.
-            arguments: of the function.
+            arguments: arguments of the function.
             needs: names of jobs that come first.
-            cost: of the job, about [s].
+            cost: cost of the job, about [s].
         """
         name = f"{part.path.parent.name} {part.path.stem}"
         step = MakePart(part, function, arguments)
@@ -211,7 +211,7 @@ class Task(abc.ABC):
             self.check(name, value, where)
 
     def check(self, name: str, value: Any, where: str) -> None:  # noqa: B027
-        """Checks a setting.
+        """Raises an error if a setting has an impossible value.
 
         Raises:
             InputError: its value is not usable.
@@ -219,19 +219,19 @@ class Task(abc.ABC):
 
     @abc.abstractmethod
     def measure(self, pair: Pair, jobs: Jobs) -> Part:
-        """Adds the jobs that measure a pair; returns what they write."""
+        """Adds the jobs that measure a pair; returns the parts they write."""
 
     @abc.abstractmethod
     def numbers(self, found: Any, before: Any | None) -> Iterable[Number]:
-        """Yields the numbers of a pair.
+        """Yields the results of a pair, one number each.
 
         Args:
             found: value of the part.
-            before: that of the baseline condition; None if there is none.
+            before: outcome in the baseline condition; None without a baseline.
         """
 
     def answers(self, found: Any) -> Iterable[Answers]:
-        """Yields the answers to the queries; none by default."""
+        """Yields the answers to each query; by default none."""
         return ()
 
 

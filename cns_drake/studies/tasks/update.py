@@ -87,7 +87,9 @@ def measure_maps(
     methods: tuple[str, ...],
     spacing: float,
 ) -> dict[str, dict[str, float | None]]:
-    """Maps two drives and scores methods like `score_methods`.
+    """Maps two drives and returns the scores of change detectors.
+
+    The scores are those of `score_methods`.
 
     Args:
         reporter: reports progress.
