@@ -73,6 +73,10 @@ def train(
     picture = make_weights(plan, output, command, cluster, terminal.track)
     print(output)
     print(picture)
+    terminal.next_command(
+        *("cns-eval", "report", "drives", "--output", "report"),
+        *("--set", f"learned.weights={output}"),
+    )
 
 
 def export_pairs(
@@ -134,10 +138,14 @@ def export_pairs(
         protocol = RetrievalProtocol(
             query_spacing=spacing, max_range=max_range or 100.0
         )
-        print(
-            pair_export.write_overlap_table(
-                learned[0], learned[1], output, protocol, terminal.track
-            )
+        table = pair_export.write_overlap_table(
+            learned[0], learned[1], output, protocol, terminal.track
+        )
+        print(table)
+        terminal.next_command(
+            *("cns-eval", "pr", *(f"drives/{one.name}" for one in learned)),
+            *("--method", "solid", "--truth", "overlap:0.5"),
+            *("--exact-overlaps", table),
         )
         return
     taken = {one.name for one in tested}
@@ -166,6 +174,8 @@ def map_truth(
     both drives decide. cns-eval map-update scores labels of others.
 
     Args:
+        a: Recording or scenario of the older drive.
+        b: Recording or scenario of the newer drive.
         output: Folder to write.
     """
     with uninterrupted():
@@ -194,3 +204,4 @@ def map_truth(
             f" {mapped} are in its map, {right} of them gone or new"
         )
     print(output)
+    terminal.next_command("cns-eval", "map-update", output)

@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from cns_drake.base.errors import InputError
+from cns_drake.base.errors import InputError, did_you_mean
 from cns_drake.base.files import make_folder
 from cns_drake.base.jobs.cluster import Cluster
 from cns_drake.base.jobs.fingerprint import fingerprint
@@ -186,7 +186,7 @@ class Study:
             if name not in TASKS:
                 raise InputError(
                     f"{self.source}: tasks: no task {name!r} (there are:"
-                    f" {', '.join(TASKS)})"
+                    f" {', '.join(TASKS)}){did_you_mean(name, TASKS)}"
                 )
             self._tasks.append(TASKS[name](settings, self.source))
         try:
@@ -220,6 +220,7 @@ class Study:
             )
         self._announce(jobs)
         run_jobs(jobs.values(), self.cluster)
+        self.on_note("writing the tables and the page")
         results = Results.of(self._rows(measured))
         queries = QueryRows.of(self._answers(measured))
         results.write_csv(self.output / RESULTS)
@@ -256,6 +257,7 @@ class Study:
             if name not in known:
                 raise InputError(
                     f"no method {name!r} (known: {', '.join(known)})"
+                    f"{did_you_mean(name, known)}"
                 )
             choice = replace(known[name], settings=variant.settings)
             choice.make()  # A wrong setting is found before anything slow.

@@ -72,6 +72,8 @@ def tcr(
     target of the directed ratios. Drives in different world frames are aligned.
 
     Args:
+        source: Drive or map, the source of the directed ratios.
+        target: Drive or map, their target.
         control: A recording of A's route in B's stage, or of B's route in A's
             stage. It gives the TCR_sym that the routes alone cause.
     """
@@ -146,6 +148,8 @@ def pr(
     Drives in different world frames are aligned.
 
     Args:
+        database: Drive whose scans are the places.
+        query: Drive whose scans are looked up.
         mode: Count all queries, or those that have a match.
         across_maps: Allow drives of maps with different names, such as another
             draw of a city along the same streets.
@@ -326,6 +330,7 @@ def report(
     command goes on where it was.
 
     Args:
+        recordings: Folder of recordings.
         output: Folder to write.
     """
     from cns_drake.base.jobs.cluster import choose_cluster
@@ -347,6 +352,7 @@ def report(
         columns=columns,
     )
     print(path)
+    terminal.next_command("cns-eval", "compare", path.parent)
 
 
 @app.command(cls=Command, epilog=example("cns-eval compare mine/results.csv"))
@@ -369,6 +375,7 @@ def compare(
     rank alike.
 
     Args:
+        tables: Tables of results, or folders that hold one.
         metric: Column metric of the rows to compare.
         protocol: Compare only rows by this protocol.
         gate: Compare rows with the gate, instead of those without.

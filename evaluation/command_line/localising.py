@@ -44,6 +44,8 @@ def localise(
     direction and turned by --start-turn about a random axis.
 
     Args:
+        place: Drive or cloud that makes the map.
+        query: Drive whose scans are localised, or one cloud.
         method: Estimator; a Python file holds one's own function.
         start: Distance of a start from the truth [m].
         start_turn: Angle of a start to the truth [deg].

@@ -39,6 +39,7 @@ def map_update(
     file, or those of a baseline.
 
     Args:
+        folder: Folder of cns-drake map-truth.
         baseline: Score this one; free-space without labels.
         labels_a: Labels of A's map: 0 unobserved, 1 kept, 2 gone (.npy, or .ply
             with a property prediction).
@@ -94,6 +95,8 @@ def map_sessions(
     drives whose world is not known, such as real ones. Both are in one world.
 
     Args:
+        a: The older drive.
+        b: The newer drive.
         output: Folder to write.
     """
     from cns_drake.base.drives.drive import check_same_world
@@ -106,6 +109,7 @@ def map_sessions(
         for side, drive in zip(SIDES, drives, strict=True):
             write_session(drive, draft / side, spacing, terminal.track)
     print(output)
+    terminal.next_command("cns-eval", "map-update", output)
 
 
 def _rows(name: str, scores: dict) -> Iterator[tuple[str, str]]:

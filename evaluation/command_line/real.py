@@ -22,6 +22,7 @@ def real(
     Writes results.csv and queries.csv, which compare reads.
 
     Args:
+        folder: Folder of the data sets.
         output: Folder to write.
         method: Run only this method or estimator, by name, or a method of your
             own by its Python file; may be repeated.
@@ -38,3 +39,4 @@ def real(
     measuring.queries().write_csv(output / QUERIES)
     measuring.results().write_csv(output / RESULTS)
     print(output / RESULTS)
+    terminal.next_command("cns-eval", "compare", output)

@@ -29,6 +29,10 @@ def drives(
     Offsets, lanes, headings, heights and stops of B at a stop of A every 5 m,
     beside those of two pairs of real drives along one route (Boreas, 28 days
     apart; KAIST 01 and 02 of MulRan).
+
+    Args:
+        first: Drive whose way is the reference.
+        second: Drive whose offsets are measured.
     """
     from evaluation.drives.comparison import compare_drives
 
@@ -56,6 +60,8 @@ def trajectory(
     100 m of path.
 
     Args:
+        drive: Recorded drive, the truth.
+        estimate: TUM file of the estimated trajectory.
         frame: Frame whose poses are estimated: the LiDAR's or the vehicle's.
         time_offset: Time to add to that of the estimate [s].
     """

@@ -107,8 +107,8 @@ class Study:
         Args:
             pages: recording -> address of its 3-D page, relative to the report,
                 for those that have one.
-            on_note: gets a note on each city without a pair to compare; the
-                report has these notes too.
+            on_note: gets what is done, and a note on each city without a pair
+                to compare; the report has the latter, too.
 
         Returns:
             The path of `report.html`.
@@ -116,6 +116,7 @@ class Study:
         Raises:
             InputError: a job has not been done, or a file cannot be written.
         """
+        on_note("writing the report")
         folder = self._files.figures
         make_folder(folder)
         report = page.Report(pages=pages or {}, reference=self.reference)

@@ -15,6 +15,7 @@ from cns_drake.base.errors import FailedJobsError, InputError, one_line
 from cns_drake.base.jobs import processes
 from cns_drake.base.jobs.cluster import Cluster, LostSchedulerError, Workers
 from cns_drake.base.jobs.step import Step
+from cns_drake.base.terminal import resumable
 
 if TYPE_CHECKING:
     from cns_drake.base.jobs.job_progress import JobProgress
@@ -44,10 +45,13 @@ class Job:
     cost: float = 1.0
 
 
-def run_jobs(jobs: Iterable[Job], cluster: Cluster) -> None:
+def run_jobs(
+    jobs: Iterable[Job], cluster: Cluster, phase: str = "jobs"
+) -> None:
     """Runs jobs; those with the longest chain of work behind them first.
 
-    Shows progress on stderr. A job whose process or worker dies is started
+    Shows progress on stderr, with the phase: what the jobs are, in the plural.
+    A job whose process or worker dies is started
     again. A job that cannot be done stops only the jobs that need it.
 
     Raises:
@@ -75,8 +79,10 @@ def run_jobs(jobs: Iterable[Job], cluster: Cluster) -> None:
     from cns_drake.base.jobs.job_progress import JobProgress
 
     messages: queue.SimpleQueue = queue.SimpleQueue()
+    costs = {name: job.cost for name, job in left.items()}
     with (
-        JobProgress({name: job.cost for name, job in left.items()}) as shown,
+        resumable(),
+        JobProgress(costs, phase=phase, num_done=len(done)) as shown,
         cluster.connect(lambda *message: messages.put(message)) as workers,
     ):
         run = _Run(left, done, urgency, workers, messages, shown, cluster.slots)
