@@ -53,7 +53,7 @@ def record_all(
     """
     jobs = plan_recordings(scenarios, output, overwrite=overwrite)
     make_folder(output)
-    run_jobs(jobs, cluster, "drives")
+    run_jobs(jobs, cluster)
 
 
 def plan_recordings(

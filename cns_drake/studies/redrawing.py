@@ -149,7 +149,7 @@ def make_maps(steps: Sequence[MakeMap], output: Path, cluster: Cluster) -> None:
     if steps:
         files.make_folder(output)
     jobs = [Job(f"city {one.folder.name}", one, cost=_COST) for one in steps]
-    run_jobs(jobs, cluster, "cities")
+    run_jobs(jobs, cluster)
 
 
 @dataclass(frozen=True)

@@ -484,7 +484,7 @@ def make_weights(
         )
         for one, part in zip(drawn, parts, strict=True)
     ]
-    run_jobs(jobs, cluster, "cities")
+    run_jobs(jobs, cluster)
     scans = TrainingScans.of(
         [
             TrainingScans(

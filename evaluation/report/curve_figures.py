@@ -34,14 +34,15 @@ _WIDTH = 480
 def draw_pr_curves(
     map_name: str, results: Sequence[RecognitionResult], stem: Path
 ) -> None:
-    """Draws precision over recall, a column a pair and a row a mode."""
+    """Draws precision over recall, a row a pair and a column a mode."""
     pairs = list(dict.fromkeys(result.pair for result in results))
-    figure = Figure(figsize=(0.4 + 2.7 * len(pairs), 5.4), layout="constrained")
+    size = (9.2, 0.3 + 2.7 * len(pairs))
+    figure = Figure(figsize=size, layout="constrained")
     grid = figure.subplots(
-        len(MODES), len(pairs), sharex=True, sharey=True, squeeze=False
+        len(pairs), len(MODES), sharex=True, sharey=True, squeeze=False
     )
-    for row, mode in zip(grid, MODES, strict=True):
-        for axes, pair in zip(row, pairs, strict=True):
+    for row, pair in zip(grid, pairs, strict=True):
+        for axes, mode in zip(row, MODES, strict=True):
             of_method = {r.method: r for r in results if r.pair == pair}
             for method in in_table_order(of_method):
                 _draw_curve(axes, method, of_method[method].metrics[mode])
@@ -53,7 +54,13 @@ def draw_pr_curves(
                 fontsize=9,
             )
             axes.grid(alpha=0.3)
-            axes.legend(fontsize=7, framealpha=0.8)
+            # Beside the curves, which it would hide.
+            axes.legend(
+                fontsize=7,
+                frameon=False,
+                loc="upper left",
+                bbox_to_anchor=(1.0, 1.0),
+            )
         row[0].set_ylabel("precision")
     for axes in grid[-1]:
         axes.set_xlabel("recall")

@@ -118,7 +118,6 @@ class JobProgress:
         self,
         costs: Mapping[str, float],
         console: Console | None = None,
-        phase: str = "jobs",
         num_done: int = 0,
     ):
         """Takes the jobs that are left.
@@ -126,7 +125,6 @@ class JobProgress:
         Args:
             costs: name -> expected time on one core [s].
             console: stderr by default.
-            phase: what the jobs are, in the plural.
             num_done: how many more were done before.
         """
         self._left = TimeLeft(costs)
@@ -134,7 +132,10 @@ class JobProgress:
         self._console = console
         self._tasks: dict[str, TaskID] = {}
         self._notes: dict[str, str] = {}
-        self._phase = phase
+        # The jobs of a phase have the same first word.
+        words = {name.split()[0] for name in costs}
+        is_phase = len(words) == 1 < len(costs)
+        self._phase = f"{words.pop()} jobs" if is_phase else "jobs"
         self._num_ended = num_done
         self._num_jobs = num_done + len(costs)
         self._start = time.monotonic()

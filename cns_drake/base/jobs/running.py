@@ -45,13 +45,10 @@ class Job:
     cost: float = 1.0
 
 
-def run_jobs(
-    jobs: Iterable[Job], cluster: Cluster, phase: str = "jobs"
-) -> None:
+def run_jobs(jobs: Iterable[Job], cluster: Cluster) -> None:
     """Runs jobs; those with the longest chain of work behind them first.
 
-    Shows progress on stderr, with the phase: what the jobs are, in the plural.
-    A job whose process or worker dies is started
+    Shows progress on stderr. A job whose process or worker dies is started
     again. A job that cannot be done stops only the jobs that need it.
 
     Raises:
@@ -82,7 +79,7 @@ def run_jobs(
     costs = {name: job.cost for name, job in left.items()}
     with (
         resumable(),
-        JobProgress(costs, phase=phase, num_done=len(done)) as shown,
+        JobProgress(costs, num_done=len(done)) as shown,
         cluster.connect(lambda *message: messages.put(message)) as workers,
     ):
         run = _Run(left, done, urgency, workers, messages, shown, cluster.slots)

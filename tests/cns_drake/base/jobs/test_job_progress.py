@@ -82,8 +82,8 @@ def test_without_a_terminal_there_is_a_line_now_and_then(monkeypatch):
     now = [100.0]
     monkeypatch.setattr(job_progress.time, "monotonic", lambda: now[0])
     paper = Console(file=io.StringIO(), width=40)
-    costs = {"a drive": 100.0, "b": 900.0}
-    with JobProgress(costs, paper, "drives", num_done=3) as shown:
+    costs = {"a drive": 100.0, "a walk": 900.0}
+    with JobProgress(costs, paper, num_done=3) as shown:
         shown.start("a drive")
         for done in range(11):
             shown.progress("a drive", done, 10)
@@ -98,7 +98,7 @@ def test_without_a_terminal_there_is_a_line_now_and_then(monkeypatch):
         "a drive 10 of 10, writing",
     ]
     # A tenth of a drive a second, and ten such drives.
-    assert lines[0].startswith("3 of 5 drives, elapsed 0:00; ")
-    assert lines[1].startswith("3 of 5 drives, elapsed 0:05, about 1:35 left; ")
-    assert lines[-2] == "a drive: done, 4 of 5 drives"
+    assert lines[0].startswith("3 of 5 a jobs, elapsed 0:00; ")
+    assert lines[1].startswith("3 of 5 a jobs, elapsed 0:05, about 1:35 left; ")
+    assert lines[-2] == "a drive: done, 4 of 5 a jobs"
     assert lines[-1].startswith("[bold] word word")
