@@ -16,8 +16,8 @@ from evaluation.recognition.place_recognition import RecognitionResult
 from evaluation.report.page import Report
 from evaluation.report.page_data import Illustration, Section
 from evaluation.report.rows import STAGE
-from evaluation.results.charts import draw
-from evaluation.results.drawing import method_style, plain, save
+from evaluation.results.charts import draw, styles, titled
+from evaluation.results.drawing import plain, save
 from evaluation.results.table import Results
 from evaluation.results.table_forms import in_table_order, title
 
@@ -36,6 +36,7 @@ def draw_pr_curves(
 ) -> None:
     """Draws precision over recall, a row a pair and a column a mode."""
     pairs = list(dict.fromkeys(result.pair for result in results))
+    style_of = styles(in_table_order(result.method for result in results))
     size = (9.2, 0.3 + 2.7 * len(pairs))
     figure = Figure(figsize=size, layout="constrained")
     grid = figure.subplots(
@@ -45,7 +46,8 @@ def draw_pr_curves(
         for axes, mode in zip(row, MODES, strict=True):
             of_method = {r.method: r for r in results if r.pair == pair}
             for method in in_table_order(of_method):
-                _draw_curve(axes, method, of_method[method].metrics[mode])
+                metrics = of_method[method].metrics[mode]
+                _draw_curve(axes, method, style_of[titled(method)], metrics)
             axes.set(xlim=(0.0, 1.0), ylim=(0.0, 1.02))
             # A phone shows one panel at a time.
             axes.tick_params(labelleft=True)
@@ -68,9 +70,12 @@ def draw_pr_curves(
 
 
 def _draw_curve(
-    axes: Axes, method: str, metrics: PlaceRecognitionMetrics
+    axes: Axes,
+    method: str,
+    look: tuple[str, str, str],
+    metrics: PlaceRecognitionMetrics,
 ) -> None:
-    colour, style, marker = method_style(method)
+    colour, style, marker = look
     curve = metrics.curve
     # The curve begins at recall 0 with the precision of its first point. The
     # drawn area is then the AUC.

@@ -32,13 +32,13 @@ from evaluation.report.leaderboard import ranked_methods
 from evaluation.report.page_data import Illustration, PageDrive, browser_data
 from evaluation.report.reference import NO_REFERENCE, Reference
 from evaluation.report.rows import Controlled, change_rows, place_rows
-from evaluation.results.charts import titled
-from evaluation.results.drawing import method_style
+from evaluation.results.charts import styles, titled
 from evaluation.results.table import RESULTS, Results
 from evaluation.results.table_forms import (
     MISSING,
     Table,
     escape_markdown,
+    in_table_order,
     title,
 )
 
@@ -275,6 +275,7 @@ def _content(
         "report": report,
         "tables": tables,
         "ranked": ranked,
+        "styles": styles(in_table_order(one.method for one in ranked)),
         "headline": headline if report.pairs else "",
         "judgements": report.reference.judge(
             [*report.recognitions, *report.repeated], report.changes
@@ -393,7 +394,6 @@ def _environment() -> jinja2.Environment:
         "data_address": _data_address,
         "interval_text": survival.interval_text,
         "markdown": escape_markdown,
-        "label_colour": lambda label: method_style(label.partition(",")[0])[0],
         "label_title": titled,
         "method_title": title,
         "percent": survival.percent,
