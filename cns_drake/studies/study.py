@@ -16,6 +16,7 @@ from cns_drake.base.jobs.fingerprint import fingerprint
 from cns_drake.base.jobs.running import Job, run_jobs
 from cns_drake.base.map_folder import MapFolder
 from cns_drake.base.process import num_cores
+from cns_drake.base.terminal import note
 from cns_drake.scenarios.scenario import Scenario
 from cns_drake.scenarios.scenario_files import load_scenario
 from cns_drake.scenarios.shipped import (
@@ -220,7 +221,7 @@ class Study:
             )
         self._announce(jobs)
         run_jobs(jobs.values(), self.cluster)
-        self.on_note("writing the tables and the page")
+        note("writing the tables and the page")
         results = Results.of(self._rows(measured))
         queries = QueryRows.of(self._answers(measured))
         results.write_csv(self.output / RESULTS)

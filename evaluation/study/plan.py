@@ -6,6 +6,7 @@ from dataclasses import dataclass, field
 from functools import cached_property
 from pathlib import Path
 
+from cns_drake.base import terminal
 from cns_drake.base.files import make_folder
 from cns_drake.base.jobs.cluster import Cluster
 from cns_drake.base.jobs.running import Job, run_jobs
@@ -107,8 +108,8 @@ class Study:
         Args:
             pages: recording -> address of its 3-D page, relative to the report,
                 for those that have one.
-            on_note: gets what is done, and a note on each city without a pair
-                to compare; the report has the latter, too.
+            on_note: gets a note on each city without a pair to compare; the
+                report has these notes too.
 
         Returns:
             The path of `report.html`.
@@ -116,7 +117,7 @@ class Study:
         Raises:
             InputError: a job has not been done, or a file cannot be written.
         """
-        on_note("writing the report")
+        terminal.note("writing the report")
         folder = self._files.figures
         make_folder(folder)
         report = page.Report(pages=pages or {}, reference=self.reference)

@@ -178,7 +178,7 @@ class JobProgress:
             total=total,
             note=self._notes[name],
         )
-        if self._silent:  # Something has begun: a line soon says so.
+        if self._silent:  # A line soon says what has begun, and how fast.
             self._due = 0.0
         self.refresh()
 
@@ -198,7 +198,8 @@ class JobProgress:
     def refresh(self) -> None:
         """Redraws the display."""
         now = time.monotonic()
-        times = shown_times(now - self._start, self._left.seconds())
+        left = self._left.seconds()
+        times = shown_times(now - self._start, left)
         self._bars.update(
             self._total,
             description=self._summary(),
@@ -208,7 +209,7 @@ class JobProgress:
         if self._bars.console.is_terminal or now < self._due:
             return
         self._due = now + LINE_INTERVAL
-        self._silent = self._silent and not self._notes
+        self._silent = self._silent and left is None
         running = [f"{name} {note}" for name, note in self._notes.items()]
         self.note("; ".join([f"{self._summary()}, {times}", *running]))
 

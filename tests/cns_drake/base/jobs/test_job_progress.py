@@ -91,14 +91,15 @@ def test_without_a_terminal_there_is_a_line_now_and_then(monkeypatch):
         shown.end("a drive")
         shown.note("[bold] " + "word " * 20)
     lines = paper.file.getvalue().splitlines()
-    # The begin is reported at once, then the progress every five seconds.
-    assert [line.rpartition("; ")[2] for line in lines[:-2]] == [
+    # The begin is reported at once, and the first measure; then the progress
+    # every five seconds.
+    assert [line.rpartition("; ")[2] for line in lines[:3]] == [
         "a drive 0 of 10",
-        "a drive 5 of 10",
-        "a drive 10 of 10, writing",
+        "a drive 1 of 10",
+        "a drive 6 of 10",
     ]
     # A tenth of a drive a second, and ten such drives.
     assert lines[0].startswith("3 of 5 a jobs, elapsed 0:00; ")
-    assert lines[1].startswith("3 of 5 a jobs, elapsed 0:05, about 1:35 left; ")
-    assert lines[-2] == "a drive: done, 4 of 5 a jobs"
+    assert lines[1].startswith("3 of 5 a jobs, elapsed 0:01, about 1:39 left; ")
+    assert lines[3] == "a drive: done, 4 of 5 a jobs"
     assert lines[-1].startswith("[bold] word word")
