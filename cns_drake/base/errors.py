@@ -11,7 +11,7 @@ import typing
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator, Mapping, Sequence
+    from collections.abc import Iterable, Iterator, Mapping, Sequence
 
     from pydantic import BaseModel, ValidationError
 
@@ -160,8 +160,17 @@ def nearest_field(
 
     The place is the keys and indices that lead to the field, and its name.
     """
-    names = sorted(set(_fields_at(model, place[:-1])))
-    close = difflib.get_close_matches(str(place[-1]), names, n=1)
+    return _nearest(place[-1], sorted(set(_fields_at(model, place[:-1]))))
+
+
+def did_you_mean(given: object, names: Iterable[str]) -> str:
+    """Returns the end of a message on an unknown name: one like it, or ""."""
+    near = _nearest(given, names)
+    return f"; did you mean {near}?" if near else ""
+
+
+def _nearest(given: object, names: Iterable[str]) -> str | None:
+    close = difflib.get_close_matches(str(given), list(names), n=1)
     return close[0] if close else None
 
 

@@ -2,6 +2,7 @@
 
 from collections.abc import Callable, Iterator
 import contextlib
+import datetime
 import time
 
 from rich.console import Console
@@ -9,12 +10,12 @@ from rich.progress import (
     BarColumn,
     Progress,
     ProgressColumn,
+    Task,
     TaskID,
     TextColumn,
-    TimeElapsedColumn,
-    TimeRemainingColumn,
 )
 from rich.table import Column
+from rich.text import Text
 
 from cns_drake.base.progress import LINE_INTERVAL
 
@@ -58,8 +59,31 @@ def show_bars(
 
 def print_note(progress: Progress, text: str) -> None:
     """Prints a line above the progress bars."""
-    # Without a terminal a line is not wrapped.
-    progress.console.print(text, soft_wrap=True, markup=False, highlight=False)
+    progress.console.print(
+        text,
+        # Without a terminal a line is not wrapped.
+        soft_wrap=not progress.console.is_terminal,
+        markup=False,
+        highlight=False,
+    )
+
+
+def shown_times(elapsed: float, left: float | None) -> str:
+    """Returns two durations [s] for people; None if one is not known yet."""
+    text = f"elapsed {_clock(elapsed)}"
+    return text if left is None else f"{text}, about {_clock(left)} left"
+
+
+def _clock(seconds: float) -> str:
+    text = str(datetime.timedelta(seconds=round(seconds)))
+    return text.removeprefix("0:").removeprefix("0")
+
+
+class _Times(ProgressColumn):
+    """The times of a task, whose field `left` `count_progress` sets."""
+
+    def render(self, task: Task) -> Text:
+        return Text(shown_times(task.elapsed or 0.0, task.fields.get("left")))
 
 
 def show_progress(
@@ -69,20 +93,16 @@ def show_progress(
 
     See `show_bars`; without a terminal see `count_progress`.
     """
-    return show_bars(
-        TimeElapsedColumn(table_column=fixed_column()),
-        TextColumn("left", table_column=fixed_column()),
-        TimeRemainingColumn(table_column=fixed_column()),
-        console=console,
-    )
+    return show_bars(_Times(table_column=fixed_column()), console=console)
 
 
 def count_progress(
-    progress: Progress, task: TaskID, unit: str = "frames"
+    progress: Progress, task: TaskID, unit: str = "frames", after: str = ""
 ) -> Callable[[int, int], None]:
     """Returns a callback that shows how many frames of how many are done.
 
     On a terminal the bar moves; elsewhere a line is printed every few seconds.
+    The text `after` says what is done after the last frame.
     """
     console = progress.console
     interval = 0.5 if console.is_terminal else LINE_INTERVAL
@@ -100,11 +120,14 @@ def count_progress(
             return
         shown = now
         elapsed, new = now - first[0], done - first[1]
-        progress.update(task, completed=done, total=total, note="")
+        is_measured = new > 0 and done < total
+        left = elapsed * (total - done) / new if is_measured else None
+        note = after if done >= total else ""
+        progress.update(task, completed=done, total=total, note=note, left=left)
         if not console.is_terminal:
             name = progress.tasks[task].description
-            left = elapsed * (total - done) / max(new, 1)
-            counted = f"{name}: {done}/{total} {unit}"
-            print_note(progress, f"{counted}, {left:.0f} s left")
+            times = shown_times(progress.tasks[task].elapsed or 0.0, left)
+            counted = f"{name}: {done}/{total} {unit}, {times}"
+            print_note(progress, "; ".join(filter(None, (counted, note))))
 
     return on_frame

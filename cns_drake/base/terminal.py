@@ -6,7 +6,10 @@ import json
 import logging
 import math
 import os
+import shlex
+import shutil
 import sys
+import textwrap
 import traceback
 from typing import Annotated, Any, NoReturn
 
@@ -29,6 +32,8 @@ from cns_drake.base.version import __version__
 # All errors of usage are click's UsageError. New versions of Typer contain it
 # under a private name; only this derived class is public.
 _UsageError: Any = typer.BadParameter.__base__
+# Help is as wide as the terminal.
+WIDE_HELP = {"max_content_width": 1000}
 
 
 def plain_app(**settings: Any) -> typer.Typer:
@@ -38,7 +43,10 @@ def plain_app(**settings: Any) -> typer.Typer:
     columns leave little room for words on a narrow terminal.
     """
     return typer.Typer(
-        rich_markup_mode=None, pretty_exceptions_enable=False, **settings
+        rich_markup_mode=None,
+        pretty_exceptions_enable=False,
+        context_settings=WIDE_HELP,
+        **settings,
     )
 
 
@@ -186,8 +194,7 @@ def run(app: typer.Typer, program: str) -> NoReturn:
     # The command has done its work; nothing is left to interrupt.
     interrupts.ignore_interrupts()
     if message is not None:
-        text = one_line(" ".join(message.split()))
-        print(f"{program}: {text}", file=sys.stderr)
+        note(f"{program}: {one_line(' '.join(message.split()))}")
     if status == interrupts.INTERRUPTED:
         interrupts.end_interrupted()
     raise SystemExit(status)
@@ -267,8 +274,31 @@ def check_finite(values: Mapping[str, object]) -> None:
 
 
 def note(message: str) -> None:
-    """Prints a note for the user on stderr."""
-    print(printable(message), file=sys.stderr)
+    """Prints a note for the user on stderr; terminals break it at spaces."""
+    lines = printable(message).split("\n")
+    if sys.stderr.isatty():
+        wrap = textwrap.TextWrapper(
+            shutil.get_terminal_size().columns,
+            break_long_words=False,
+            break_on_hyphens=False,
+        )
+        lines = [wrap.fill(line) for line in lines]
+    print("\n".join(lines), file=sys.stderr)
+
+
+@contextlib.contextmanager
+def resumable() -> Iterator[None]:
+    """Says, when work is interrupted, that the same command goes on with it."""
+    try:
+        yield
+    except KeyboardInterrupt:
+        note("What is finished is kept; the same command goes on from there.")
+        raise
+
+
+def next_command(*words: object) -> None:
+    """Prints the command that usually comes next, on stderr."""
+    note(f"next: {shlex.join(map(str, words))}")
 
 
 def print_json(values: dict) -> None:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+import contextlib
 from pathlib import Path
 from typing import TYPE_CHECKING, Literal
 
@@ -99,9 +100,11 @@ def run_drive(
         )
     if frames is not None:
         scenario = scenario.replaced(frames=frames)
-    with progress_bars.show_progress() as progress:
+    goes_on = contextlib.nullcontext if overwrite else terminal.resumable
+    with goes_on(), progress_bars.show_progress() as progress:
         task = progress.add_task(scenario.name, total=None, note="loading")
-        on_frame = progress_bars.count_progress(progress, task)
+        after = "writing the page" if recording else "closing the recording"
+        on_frame = progress_bars.count_progress(progress, task, after=after)
         run = simulate(
             scenario,
             output,
@@ -116,6 +119,10 @@ def run_drive(
         f"{run.folder}: {run.num_frames} frames, {run.simulated_s:.2f} s "
         f"simulated in {run.wall_s:.2f} s "
         f"({run.real_time_factor:.1f} times real time)"
+    )
+    terminal.next_command(
+        *("cns-drake", "export", run.folder),
+        *("--format", "kitti", "--output", "kitti"),
     )
     return run
 
@@ -153,5 +160,9 @@ def run_script(name: str, description: str) -> None:
 
     app = terminal.plain_app(add_completion=False)
     epilog = terminal.example(f"python diagrams/{name}.py --frames 200")
-    app.command(help=description, epilog=epilog)(script)
+    app.command(
+        help=description,
+        epilog=epilog,
+        context_settings=terminal.WIDE_HELP,
+    )(script)
     terminal.run(app, "cns-drake")

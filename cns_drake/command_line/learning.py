@@ -74,6 +74,10 @@ def train(
     picture = make_weights(plan, output, command, cluster, terminal.track)
     print(output)
     print(picture)
+    terminal.next_command(
+        *("cns-eval", "report", "drives", "--output", "report"),
+        *("--set", f"learned.weights={output}"),
+    )
 
 
 def export_pairs(
@@ -137,10 +141,14 @@ def export_pairs(
         protocol = RetrievalProtocol(
             query_spacing=spacing, max_range=max_range or 100.0
         )
-        print(
-            pair_export.write_overlap_table(
-                learned[0], learned[1], output, protocol, terminal.track
-            )
+        table = pair_export.write_overlap_table(
+            learned[0], learned[1], output, protocol, terminal.track
+        )
+        print(table)
+        terminal.next_command(
+            *("cns-eval", "pr", *(f"drives/{one.name}" for one in learned)),
+            *("--method", "solid", "--truth", "overlap:0.5"),
+            *("--exact-overlaps", table),
         )
         return
     taken = {one.name for one in tested}
@@ -201,3 +209,4 @@ def map_truth(
             f" {mapped} are in its map, {right} of them gone or new"
         )
     print(output)
+    terminal.next_command("cns-eval", "map-update", output)

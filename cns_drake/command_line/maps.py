@@ -12,9 +12,9 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from cns_drake.base.csv_files import whole_number
-from cns_drake.base.errors import InputError
+from cns_drake.base.errors import InputError, did_you_mean
 from cns_drake.base.interrupts import uninterrupted
-from cns_drake.base.terminal import note, print_rows
+from cns_drake.base.terminal import next_command, note, print_rows
 from cns_drake.imports.options import (
     REPORT_NAME,
     DriveOn,
@@ -335,6 +335,7 @@ def city(
     files = generate_city(folder, note, repair_stages=repair_stages)
     write_table(folder, note)
     note(f"{len(files)} files")
+    _name_next(folder)
 
 
 def maps_and_years(
@@ -393,7 +394,7 @@ def age(
     if not folder.is_dir():
         raise InputError(
             f"{maps[0]}: neither a shipped map ({', '.join(shipped_maps())}) "
-            "nor a folder"
+            f"nor a folder{did_you_mean(maps[0], shipped_maps())}"
         )
     aged = age_map(
         folder,
@@ -412,3 +413,9 @@ def age(
     ]
     rows += [(event, str(number)) for event, number in aged.events.items()]
     print_rows([*rows, ("written", str(output))])
+    _name_next(output)
+
+
+def _name_next(folder: Path) -> None:
+    words = ("reproduce", folder, "--output", "study", "--quick")
+    next_command("cns-drake", *words)

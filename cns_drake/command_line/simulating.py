@@ -13,7 +13,7 @@ from cns_drake.base import commands
 from cns_drake.base.errors import InputError
 from cns_drake.base.interrupts import uninterrupted
 from cns_drake.base.progress_bars import count_progress, show_progress
-from cns_drake.base.terminal import note
+from cns_drake.base.terminal import next_command, note
 from cns_drake.command_line import options
 
 if TYPE_CHECKING:
@@ -296,6 +296,7 @@ def generate(
     record_all(scenarios, output, cluster, overwrite=overwrite)
     for scenario in scenarios:
         typer.echo(output / scenario.name)
+    next_command("cns-eval", "report", output, "--output", "report")
 
 
 def export(
@@ -340,6 +341,11 @@ def export(
             on_frame=count_progress(progress, task),
         )
     typer.echo(drive)
+    if layout != "tum":
+        next_command(
+            *("cns-eval", "pr", drive, drive),
+            *("--method", "solid", "--exclude-recent", 30),
+        )
 
 
 def repair(

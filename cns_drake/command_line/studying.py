@@ -8,7 +8,7 @@ import typer
 from cns_drake.base import commands
 from cns_drake.base.errors import InputError
 from cns_drake.base.interrupts import uninterrupted
-from cns_drake.base.terminal import note
+from cns_drake.base.terminal import next_command, note
 from cns_drake.command_line import options
 from evaluation.recognition.protocol import RetrievalProtocol
 from evaluation.recognition.protocol_options import with_protocol
@@ -61,6 +61,7 @@ def reproduce(
         on_note=note,
     )
     typer.echo(report)
+    next_command("cns-eval", "compare", report.parent)
 
 
 def study(
@@ -145,3 +146,4 @@ def study(
         on_note=note,
     )
     typer.echo(page)
+    next_command("cns-eval", "compare", output)

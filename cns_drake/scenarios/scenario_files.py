@@ -5,7 +5,12 @@ import os
 from pathlib import Path
 import re
 
-from cns_drake.base.errors import InputError, validated, value_errors
+from cns_drake.base.errors import (
+    InputError,
+    did_you_mean,
+    validated,
+    value_errors,
+)
 from cns_drake.base.map_folder import MapFolder, drive_name
 from cns_drake.base.yaml_files import read_yaml
 from cns_drake.scenarios.scenario import Scenario
@@ -51,6 +56,7 @@ def load_scenario(name_or_file: str | Path) -> Scenario:
             raise InputError(
                 f"unknown drive '{name_or_file}'; there are: "
                 f"{', '.join(shipped)}; or give a scenario file"
+                f"{did_you_mean(name_or_file, shipped)}"
             )
         raise InputError(f"{path}: no such scenario file")
     scenario = read_scenario_file(path)
@@ -112,7 +118,7 @@ def _find_base(
     if not (isinstance(base, str) and os.path.isfile(file)):
         raise InputError(
             f"{path}: base: {base!r} is neither a file nor a shipped drive "
-            f"({', '.join(drives)})"
+            f"({', '.join(drives)}){did_you_mean(base, drives)}"
         )
     if any(file.samefile(one) for one in found):
         raise InputError(f"{path}: base: '{base}' has this drive as its base")
@@ -194,6 +200,7 @@ def check_files(scenario: Scenario, source: object = None) -> None:
         raise InputError(
             f"{source}: map: '{scenario.map}' is neither a shipped map "
             f"({known}) nor a folder"
+            f"{did_you_mean(scenario.map, shipped_maps())}"
         )
     if not os.path.isfile(world_file(scenario)):
         stages = ", ".join(folder.stages()) or "none"

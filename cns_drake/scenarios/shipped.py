@@ -7,7 +7,7 @@ import shutil
 import tarfile
 import tempfile
 
-from cns_drake.base.errors import InputError
+from cns_drake.base.errors import InputError, did_you_mean
 from cns_drake.base.files import cache_folder
 from cns_drake.base.map_folder import MapFolder, drive_name
 
@@ -66,9 +66,10 @@ def recordable_map(name: str) -> Path:
     """
     folder = shipped_maps().get(name, Path(name))
     if not folder.is_dir():
-        known = ", ".join(recordable_maps())
+        maps = recordable_maps()
         raise InputError(
-            f"unknown map '{name}'; there are: {known}; or give a folder"
+            f"unknown map '{name}'; there are: {', '.join(maps)}; or give a "
+            f"folder{did_you_mean(name, maps)}"
         )
     if not MapFolder(folder).recordable_drives():
         raise InputError(

@@ -26,7 +26,7 @@ from pydantic import (
     model_validator,
 )
 
-from cns_drake.base.errors import InputError, validated
+from cns_drake.base.errors import InputError, did_you_mean, validated
 from cns_drake.base.yaml_files import parse_yaml, read_yaml
 from cns_drake.scenarios.scenario import Name
 from cns_drake.sensors.sensor_config import Section
@@ -280,6 +280,7 @@ def load_experiment(
         raise InputError(
             f"{name_or_file}: neither an experiment of this package "
             f"({', '.join(shipped)}) nor a file"
+            f"{did_you_mean(name_or_file, shipped)}"
         )
     values = read_yaml(path)
     if not isinstance(values, dict):

@@ -9,13 +9,14 @@ from typing import Any
 
 import numpy as np
 
-from cns_drake.base.errors import InputError
+from cns_drake.base.errors import InputError, did_you_mean
 from cns_drake.base.files import make_folder
 from cns_drake.base.jobs.cluster import Cluster
 from cns_drake.base.jobs.fingerprint import fingerprint
 from cns_drake.base.jobs.running import Job, run_jobs
 from cns_drake.base.map_folder import MapFolder
 from cns_drake.base.process import num_cores
+from cns_drake.base.terminal import note
 from cns_drake.scenarios.scenario import Scenario
 from cns_drake.scenarios.scenario_files import load_scenario
 from cns_drake.scenarios.shipped import (
@@ -186,7 +187,7 @@ class Study:
             if name not in TASKS:
                 raise InputError(
                     f"{self.source}: tasks: no task {name!r} (there are:"
-                    f" {', '.join(TASKS)})"
+                    f" {', '.join(TASKS)}){did_you_mean(name, TASKS)}"
                 )
             self._tasks.append(TASKS[name](settings, self.source))
         try:
@@ -220,6 +221,7 @@ class Study:
             )
         self._announce(jobs)
         run_jobs(jobs.values(), self.cluster)
+        note("writing the tables and the page")
         results = Results.of(self._rows(measured))
         queries = QueryRows.of(self._answers(measured))
         results.write_csv(self.output / RESULTS)
@@ -256,6 +258,7 @@ class Study:
             if name not in known:
                 raise InputError(
                     f"no method {name!r} (known: {', '.join(known)})"
+                    f"{did_you_mean(name, known)}"
                 )
             choice = replace(known[name], settings=variant.settings)
             choice.make()  # A wrong setting is found before anything slow.

@@ -20,6 +20,7 @@ from cns_drake.base.jobs.cluster import Cluster
 from cns_drake.base.jobs.fingerprint import fingerprint
 from cns_drake.base.jobs.running import Job, run_jobs
 from cns_drake.base.progress import Track, silent
+from cns_drake.base.terminal import resumable
 from cns_drake.base.version import __version__
 from cns_drake.studies.training_drives import DrawnCity, scan_city
 from evaluation.methods.learned import (
@@ -507,9 +508,10 @@ def make_weights(
         ]
     )
     digest = fingerprint({"cities": [part.identity() for part in parts]})
-    values, curve = train(
-        scans, plan.steps, plan.seed, work / "state.data", digest, track
-    )
+    with resumable():
+        values, curve = train(
+            scans, plan.steps, plan.seed, work / "state.data", digest, track
+        )
     seen = scans.images.any(axis=(1, 3)).mean(axis=1)
     least = float(seen.min()) * (1.0 - _HIDDEN_DEG[1] / 360.0)
     made_by = {

@@ -355,6 +355,7 @@ def report(
         columns=columns,
     )
     print(path)
+    terminal.next_command("cns-eval", "compare", path.parent)
 
 
 @app.command(cls=Command, epilog=example("cns-eval compare mine/results.csv"))

@@ -111,6 +111,7 @@ def map_sessions(
         for side, drive in zip(SIDES, drives, strict=True):
             write_session(drive, draft / side, spacing, terminal.track)
     print(output)
+    terminal.next_command("cns-eval", "map-update", output)
 
 
 def _rows(name: str, scores: dict) -> Iterator[tuple[str, str]]:

@@ -40,3 +40,4 @@ def real(
     measuring.queries().write_csv(output / QUERIES)
     measuring.results().write_csv(output / RESULTS)
     print(output / RESULTS)
+    terminal.next_command("cns-eval", "compare", output)

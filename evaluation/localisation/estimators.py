@@ -25,7 +25,7 @@ import small_gicp
 from cns_drake.base import points as clouds
 from cns_drake.base import poses
 from cns_drake.base.drives.drive import Drive
-from cns_drake.base.errors import InputError
+from cns_drake.base.errors import InputError, did_you_mean
 from cns_drake.base.progress import Track, silent
 from evaluation.alignment.registration import (
     Surface,
@@ -477,7 +477,7 @@ def make_estimator(method: str, settings: Settings) -> Estimator:
     if not method.endswith(".py"):
         raise InputError(
             f"--method: no method {method!r} (known: {', '.join(METHODS)}, or"
-            " FILE.py)"
+            f" FILE.py){did_you_mean(method, METHODS)}"
         )
     path = Path(method)
     module = run_module(path)

@@ -19,7 +19,7 @@ import numpy as np
 from pydantic import BaseModel, ConfigDict, NonNegativeFloat, ValidationError
 
 from cns_drake.base.drives.lidar_fields import LidarField
-from cns_drake.base.errors import InputError
+from cns_drake.base.errors import InputError, did_you_mean
 from cns_drake.base.poses import make_pose
 
 Descriptor = TypeVar("Descriptor")
@@ -325,13 +325,19 @@ def make_method(name: str, parameters: Mapping[str, Any]) -> Method:
     if name in _OPTIONAL:
         importlib.import_module(_OPTIONAL[name])
     if name not in _METHODS:
-        known = ", ".join(sorted({*_METHODS, *_OPTIONAL}))
-        raise InputError(f"--method: no method {name!r} (known: {known})")
+        known = sorted({*_METHODS, *_OPTIONAL})
+        raise InputError(
+            f"--method: no method {name!r} (known: {', '.join(known)})"
+            f"{did_you_mean(name, known)}"
+        )
     method = _METHODS[name]
     for key in parameters:
         if key not in method.Config.model_fields:
-            known = ", ".join(method.Config.model_fields)
-            raise InputError(f"{name}: no parameter {key!r} (known: {known})")
+            known = list(method.Config.model_fields)
+            raise InputError(
+                f"{name}: no parameter {key!r} (known: {', '.join(known)})"
+                f"{did_you_mean(key, known)}"
+            )
     try:
         return method(method.Config(**parameters))
     except ValidationError as error:

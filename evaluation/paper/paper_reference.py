@@ -44,6 +44,7 @@ UNDECIDED = "cannot be judged"
 FITTED = "was fitted"
 MET = "is met"
 MISSED = "is missed"
+_BOTH = "Tables I and II"
 
 _TCR_TOLERANCE = 0.015
 # Method, greatest difference of AUC, part of the pairs.
@@ -252,6 +253,7 @@ def _larger_than_real(changes: Sequence[ChangeResult]) -> Finding:
         f"First stage against last, TCR_sym: {values};"
         f" {len(reached)} of {len(widest)} do. These values were fitted to the"
         " paper's, of which only Suburbia (0.1840) and Metropolis (0.2920) do.",
+        "Table I",
     )
 
 
@@ -273,6 +275,7 @@ def _ring_is_best(
         " counts.",
         _part(sum(_RING in methods for methods in best), len(best)),
         evidence,
+        "Table II",
     )
 
 
@@ -345,7 +348,7 @@ def _falls(trends: Mapping[str, Trend], too_few: str) -> Finding:
         "Rank correlation of AUC (mode all) with TCR_sym over"
         f" {next(iter(trends.values())).num_pairs} pairs: {'; '.join(parts)}."
     )
-    return Finding(claim, _part(sum(falls), len(falls)), evidence)
+    return Finding(claim, _part(sum(falls), len(falls)), evidence, _BOTH)
 
 
 def _btc_is_flat(trends: Mapping[str, Trend], too_few: str) -> Finding:
@@ -364,6 +367,7 @@ def _btc_is_flat(trends: Mapping[str, Trend], too_few: str) -> Finding:
         f"Slope {btc.slope:+.3f} AUC for 0.1 of TCR_sym (rank correlation"
         f" {btc.rho:+.2f}, p = {btc.p_value:.2f}); the flattest is"
         f" {title(flattest)}. Greatest less least AUC: {spreads}.",
+        _BOTH,
     )
 
 
@@ -399,6 +403,7 @@ def aims(
             f"TCR_sym within {_TCR_TOLERANCE:g} of the paper's",
             [value <= _TCR_TOLERANCE for value in tcr],
             1.0,
+            table="Table I",
         ),
         _counted(
             "RING++ is the best of the paper's methods by AUC, as the paper"
@@ -431,6 +436,7 @@ def aims(
         MET if mean <= _MEAN_DIFFERENCE else MISSED,
         f"It is {mean:.3f}. The greatest is that of {title(farthest)},"
         f" {means[farthest]:.3f}.",
+        "Table II",
     )
     return [*found, last]
 
@@ -450,11 +456,16 @@ def _differences(
 
 
 def _counted(
-    claim: str, reached: Sequence[bool], share: float, more: str = ""
+    claim: str,
+    reached: Sequence[bool],
+    share: float,
+    more: str = "",
+    table: str = "Table II",
 ) -> Finding:
     wanted = round(share * len(reached))
     return Finding(
         f"{claim}, on {wanted} of {len(reached)} pairs.",
         MET if sum(reached) >= wanted else MISSED,
         f"It is so on {sum(reached)}.{more}",
+        table,
     )

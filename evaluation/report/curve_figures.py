@@ -16,8 +16,8 @@ from evaluation.recognition.place_recognition import RecognitionResult
 from evaluation.report.page import Report
 from evaluation.report.page_data import Illustration, Section
 from evaluation.report.rows import STAGE
-from evaluation.results.charts import draw
-from evaluation.results.drawing import method_style, plain, save
+from evaluation.results.charts import draw, styles, titled
+from evaluation.results.drawing import plain, save
 from evaluation.results.table import Results
 from evaluation.results.table_forms import in_table_order, title
 
@@ -34,17 +34,20 @@ _WIDTH = 480
 def draw_pr_curves(
     map_name: str, results: Sequence[RecognitionResult], stem: Path
 ) -> None:
-    """Draws precision-recall curves: a column per pair, a row per mode."""
+    """Draws precision over recall, a row a pair and a column a mode."""
     pairs = list(dict.fromkeys(result.pair for result in results))
-    figure = Figure(figsize=(0.4 + 2.7 * len(pairs), 5.4), layout="constrained")
+    style_of = styles(in_table_order(result.method for result in results))
+    size = (9.2, 0.3 + 2.7 * len(pairs))
+    figure = Figure(figsize=size, layout="constrained")
     grid = figure.subplots(
-        len(MODES), len(pairs), sharex=True, sharey=True, squeeze=False
+        len(pairs), len(MODES), sharex=True, sharey=True, squeeze=False
     )
-    for row, mode in zip(grid, MODES, strict=True):
-        for axes, pair in zip(row, pairs, strict=True):
+    for row, pair in zip(grid, pairs, strict=True):
+        for axes, mode in zip(row, MODES, strict=True):
             of_method = {r.method: r for r in results if r.pair == pair}
             for method in in_table_order(of_method):
-                _draw_curve(axes, method, of_method[method].metrics[mode])
+                metrics = of_method[method].metrics[mode]
+                _draw_curve(axes, method, style_of[titled(method)], metrics)
             axes.set(xlim=(0.0, 1.0), ylim=(0.0, 1.02))
             # A phone shows one panel at a time.
             axes.tick_params(labelleft=True)
@@ -53,7 +56,13 @@ def draw_pr_curves(
                 fontsize=9,
             )
             axes.grid(alpha=0.3)
-            axes.legend(fontsize=7, framealpha=0.8)
+            # Beside the curves, which it would hide.
+            axes.legend(
+                fontsize=7,
+                frameon=False,
+                loc="upper left",
+                bbox_to_anchor=(1.0, 1.0),
+            )
         row[0].set_ylabel("precision")
     for axes in grid[-1]:
         axes.set_xlabel("recall")
@@ -61,9 +70,12 @@ def draw_pr_curves(
 
 
 def _draw_curve(
-    axes: Axes, method: str, metrics: PlaceRecognitionMetrics
+    axes: Axes,
+    method: str,
+    look: tuple[str, str, str],
+    metrics: PlaceRecognitionMetrics,
 ) -> None:
-    colour, style, marker = method_style(method)
+    colour, style, marker = look
     curve = metrics.curve
     # The curve begins at recall 0 with the precision of its first point. The
     # drawn area is then the AUC.

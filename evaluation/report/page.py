@@ -28,14 +28,17 @@ from evaluation.recognition.metrics import MODES, Mode
 from evaluation.recognition.place_recognition import RecognitionResult
 from evaluation.report import result_tables, survival
 from evaluation.report.figures import ROUTE_COLOURS
+from evaluation.report.leaderboard import ranked_methods
 from evaluation.report.page_data import Illustration, PageDrive, browser_data
 from evaluation.report.reference import NO_REFERENCE, Reference
 from evaluation.report.rows import Controlled, change_rows, place_rows
+from evaluation.results.charts import styles, titled
 from evaluation.results.table import RESULTS, Results
 from evaluation.results.table_forms import (
     MISSING,
     Table,
     escape_markdown,
+    in_table_order,
     title,
 )
 
@@ -43,8 +46,8 @@ _TEMPLATES = "page_template"
 _MEDIA_TYPES = {"svg": "image/svg+xml", "webp": "image/webp"}
 # Name of a section -> its heading, in the order of the page.
 _SECTIONS = {
+    "summary": "Ranking",
     "survival": "Survival",
-    "summary": "Summary",
     "maps": "Maps",
     "change": "Change",
     "recognition": "Recognition",
@@ -52,7 +55,7 @@ _SECTIONS = {
     "browser": "Queries",
 }
 # Each script uses only those before it.
-_SCRIPTS = ("state.js", "pictures.js", "page.js")
+_SCRIPTS = ("tables.js", "state.js", "pictures.js", "page.js")
 # Number of pieces of one colour in a drawn route.
 _NUM_PIECES = 48
 # Size of the marks of start and end, as a part of the picture.
@@ -220,7 +223,6 @@ def write_page(path: Path, report: Report) -> None:
         },
         illustrations=illustrations,
         survivals_by_pair=survival.by_pair(report.survivals),
-        facts=_facts(report),
         drives_of_maps=drives_of_maps,
         other_forms=list(forms_of_table)[1:],
         fault_kinds=FAULT_KINDS,
@@ -268,9 +270,13 @@ def _content(
     report: Report, tables: Mapping[str, Sequence[Table]]
 ) -> dict[str, object]:
     """Returns what both the text and the page show."""
+    ranked, headline = ranked_methods(report.results)
     return {
         "report": report,
         "tables": tables,
+        "ranked": ranked,
+        "styles": styles(in_table_order(one.method for one in ranked)),
+        "headline": headline if report.pairs else "",
         "judgements": report.reference.judge(
             [*report.recognitions, *report.repeated], report.changes
         ),
@@ -280,16 +286,6 @@ def _content(
 
 def _captioned(table: Table) -> str:
     return f"{escape_markdown(table.caption)}\n\n{table.to_markdown()}"
-
-
-def _facts(report: Report) -> list[tuple[str, int]]:
-    """Returns the labels and numbers of maps, pairs and methods."""
-    return [
-        ("maps", len({one.map_name for one in report.changes})),
-        ("pairs of stages", len(report.changes)),
-        ("database → query", len({one.pair for one in report.recognitions})),
-        ("methods", len({one.method for one in report.recognitions})),
-    ]
 
 
 def _drives_of_maps(report: Report) -> dict[str, list[str]]:
@@ -398,6 +394,7 @@ def _environment() -> jinja2.Environment:
         "data_address": _data_address,
         "interval_text": survival.interval_text,
         "markdown": escape_markdown,
+        "label_title": titled,
         "method_title": title,
         "percent": survival.percent,
         "quoted": quote,

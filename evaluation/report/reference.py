@@ -22,11 +22,12 @@ class Published:
 
 @dataclass(frozen=True)
 class Finding:
-    """A claim, and its verdict by our numbers."""
+    """A claim, its verdict by our numbers, and the table that has them."""
 
     claim: str
     verdict: str
     evidence: str
+    table: str = ""
 
 
 @dataclass(frozen=True)

@@ -437,6 +437,11 @@ class _Faults(NamedTuple):
     kinds: Counter[str]
     changed: Counter[str]
 
+    @property
+    def wrong(self) -> int:
+        """The number of these of queries that have a place."""
+        return self.kinds.total() - self.kinds["no_place"]
+
 
 def fault_table(
     results: Sequence[RecognitionResult], evidence: Evidence
@@ -444,15 +449,15 @@ def fault_table(
     """Returns the reasons for wrong best places for print."""
 
     def share(one: _Faults, kind: str) -> str | None:
-        part = one.kinds[kind] / max(one.kinds.total(), 1)
+        part = one.kinds[kind] / max(one.wrong, 1)
         return f"{100.0 * part:.0f} %" if part else None
 
     return Table.of(
         _count_faults(results, evidence),
         {
             **_inner(_SHOWN),
-            "wrong": lambda one: one.kinds.total(),
-            **keyed({k.replace("_", " "): k for k in FAULT_KINDS}, share),
+            "wrong": lambda one: one.wrong,
+            **keyed({k.replace("_", " "): k for k in FAULT_KINDS[1:]}, share),
             "changed by": lambda one: (
                 ", ".join(
                     f"{n} {name}" for name, n in one.changed.most_common()
@@ -473,7 +478,7 @@ def fault_numbers(
         {
             **_inner(_KEYS),
             "queries": lambda one: len(one.result.outcome.outcomes),
-            "wrong": lambda one: one.kinds.total(),
+            "wrong": lambda one: one.wrong,
             **keyed(
                 {kind: kind for kind in FAULT_KINDS},
                 lambda one, kind: one.kinds[kind],

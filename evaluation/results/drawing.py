@@ -19,7 +19,6 @@ METHOD_STYLES = {
     "layered-overlap": ("#E69F00", "-", "v"),
     "learned": ("#56B4E9", "--", "P"),
 }
-_OTHER_STYLES = (("#000000", "-.", "X"), ("#8C564B", ":", "p"))
 
 # Colours (red, green, blue) and what they mean.
 Legend = tuple[tuple[tuple[int, int, int], str], ...]
@@ -31,13 +30,6 @@ PIXELS = ("png", "webp")
 _DPI = 200
 _PAGE_DPI = 130
 _WEBP_QUALITY = 82
-
-
-def method_style(method: str) -> tuple[str, str, str]:
-    """Returns colour, line style and marker of a method."""
-    if method in METHOD_STYLES:
-        return METHOD_STYLES[method]
-    return _OTHER_STYLES[sum(method.encode()) % len(_OTHER_STYLES)]
 
 
 def unit(rgb: tuple[int, int, int]) -> tuple[float, float, float]:

@@ -4,7 +4,7 @@ from collections.abc import Iterable
 from dataclasses import dataclass, replace
 from pathlib import Path
 
-from cns_drake.base.errors import InputError
+from cns_drake.base.errors import InputError, did_you_mean
 from cns_drake.base.jobs.fingerprint import script_digest
 from evaluation.methods import (
     Method,
@@ -117,8 +117,10 @@ def choose_methods(
         if not dot:
             raise InputError(f"--set: {text!r} is not {_FORM}")
         if method not in named:
-            known = ", ".join(named)
-            raise InputError(f"--set: no method {method!r} (known: {known})")
+            raise InputError(
+                f"--set: no method {method!r} (known: {', '.join(named)})"
+                f"{did_you_mean(method, named)}"
+            )
         named[method][name] = value
     chosen = [
         replace(one, settings=tuple(named[one.name].items())) for one in chosen

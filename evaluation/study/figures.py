@@ -4,6 +4,7 @@ from pathlib import Path
 
 from cns_drake.base.files import file_name, make_folder
 from cns_drake.base.jobs.step import Reporter
+from evaluation.recognition.metrics import MODES
 from evaluation.report import figures
 from evaluation.report.page_data import Illustration, PageDrive, make_drive
 from evaluation.results.drawing import PIXELS
@@ -135,14 +136,13 @@ def illustrations(city: City, folder: Path) -> list[Illustration]:
                 strict=True,
             )
         ]
-    num_pairs = len(city.recognition_pairs())
-    if num_pairs:
+    if city.recognition_pairs():
         shown.append(
             Illustration(
                 folder / curves_stem(city),
                 f"Precision over recall in {city.name}; numbers are AUC",
                 "svg",
-                num_panels=num_pairs,
+                num_panels=len(MODES),
             )
         )
     return shown

@@ -6,6 +6,7 @@ from dataclasses import dataclass, field
 from functools import cached_property
 from pathlib import Path
 
+from cns_drake.base import terminal
 from cns_drake.base.files import make_folder
 from cns_drake.base.jobs.cluster import Cluster
 from cns_drake.base.jobs.running import Job, run_jobs
@@ -116,6 +117,7 @@ class Study:
         Raises:
             InputError: a job has not been done, or a file cannot be written.
         """
+        terminal.note("writing the report")
         folder = self._files.figures
         make_folder(folder)
         report = page.Report(pages=pages or {}, reference=self.reference)

@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Mapping
 import contextlib
 from dataclasses import dataclass
-import datetime
 import time
 from typing import Any
 
@@ -13,10 +12,12 @@ from rich.console import Console, RenderableType
 from rich.progress import TaskID
 
 from cns_drake.base.progress import LINE_INTERVAL
-from cns_drake.base.progress_bars import print_note, show_bars
+from cns_drake.base.progress_bars import (
+    print_note,
+    show_bars,
+    shown_times,
+)
 
-# Within this time the given costs outweigh the measured pace [s].
-_PRIOR = 10.0
 # A job that takes less than this share of its cost was done before, and is no
 # measure of the pace.
 _REAL_SHARE = 0.05
@@ -84,12 +85,11 @@ class TimeLeft:
         done = sum(work.cost * work.done for work in self._works.values())
         return done / max(total, 1e-9)
 
-    def seconds(self) -> float:
-        """Returns an estimate of the remaining time [s]."""
+    def seconds(self) -> float | None:
+        """Returns the time that is left [s]; None before any is measured."""
         works = self._works.values()
         taken = sum(work.taken for work in works)
         expected = sum(work.cost * work.measured for work in works)
-        pace = (_PRIOR + taken) / (_PRIOR + expected)
         left = [
             (work.cost * (1 - work.done), work.since is not None)
             for work in works
@@ -97,13 +97,15 @@ class TimeLeft:
         ]
         if not left:
             return 0.0
+        if expected == 0.0:
+            return None
         # As many jobs run side by side as before, and the longest job bounds
         # the time.
         even = sum(cost for cost, _ in left) / min(
             self._most_running, len(left)
         )
         longest = max((cost for cost, runs in left if runs), default=0.0)
-        return pace * max(even, longest)
+        return taken / expected * max(even, longest)
 
 
 class JobProgress:
@@ -113,16 +115,30 @@ class JobProgress:
     """
 
     def __init__(
-        self, costs: Mapping[str, float], console: Console | None = None
+        self,
+        costs: Mapping[str, float],
+        console: Console | None = None,
+        num_done: int = 0,
     ):
-        """Takes name -> expected time on one core [s], and the console."""
-        self._costs = costs
+        """Takes the jobs that are left.
+
+        Args:
+            costs: name -> expected time on one core [s].
+            console: stderr by default.
+            num_done: how many more were done before.
+        """
         self._left = TimeLeft(costs)
         self._stack = contextlib.ExitStack()
         self._console = console
         self._tasks: dict[str, TaskID] = {}
         self._notes: dict[str, str] = {}
-        self._num_ended = 0
+        # The jobs of a phase have the same first word.
+        words = {name.split()[0] for name in costs}
+        is_phase = len(words) == 1 < len(costs)
+        self._phase = f"{words.pop()} jobs" if is_phase else "jobs"
+        self._num_ended = num_done
+        self._num_jobs = num_done + len(costs)
+        self._start = time.monotonic()
         # When the next line is due without a terminal.
         self._due = time.monotonic() + LINE_INTERVAL
         self._silent = True
@@ -154,13 +170,15 @@ class JobProgress:
         share = done / max(total, 1)
         self._left.progress(name, share, time.monotonic())
         self._notes[name] = f"{done} of {total}"
+        if done >= total:
+            self._notes[name] += ", writing"
         self._bars.update(
             self._tasks[name],
             completed=done,
             total=total,
             note=self._notes[name],
         )
-        if self._silent:  # Something has begun: a line soon says so.
+        if self._silent:  # A line soon says what has begun, and how fast.
             self._due = 0.0
         self.refresh()
 
@@ -179,23 +197,24 @@ class JobProgress:
 
     def refresh(self) -> None:
         """Redraws the display."""
-        left = datetime.timedelta(seconds=round(self._left.seconds()))
+        now = time.monotonic()
+        left = self._left.seconds()
+        times = shown_times(now - self._start, left)
         self._bars.update(
             self._total,
             description=self._summary(),
             completed=self._left.share(),
-            note=f"{left} left",
+            note=times,
         )
-        now = time.monotonic()
         if self._bars.console.is_terminal or now < self._due:
             return
         self._due = now + LINE_INTERVAL
-        self._silent = self._silent and not self._notes
+        self._silent = self._silent and left is None
         running = [f"{name} {note}" for name, note in self._notes.items()]
-        self.note("; ".join([f"{self._summary()}, {left} left", *running]))
+        self.note("; ".join([f"{self._summary()}, {times}", *running]))
 
     def _summary(self) -> str:
-        return f"{self._num_ended} of {len(self._costs)} jobs"
+        return f"{self._num_ended} of {self._num_jobs} {self._phase}"
 
     def _remove(self, name: str) -> None:
         self._notes.pop(name, None)

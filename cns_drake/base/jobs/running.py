@@ -15,6 +15,7 @@ from cns_drake.base.errors import FailedJobsError, InputError, one_line
 from cns_drake.base.jobs import processes
 from cns_drake.base.jobs.cluster import Cluster, LostSchedulerError, Workers
 from cns_drake.base.jobs.step import Step
+from cns_drake.base.terminal import resumable
 
 if TYPE_CHECKING:
     from cns_drake.base.jobs.job_progress import JobProgress
@@ -75,8 +76,10 @@ def run_jobs(jobs: Iterable[Job], cluster: Cluster) -> None:
     from cns_drake.base.jobs.job_progress import JobProgress
 
     messages: queue.SimpleQueue = queue.SimpleQueue()
+    costs = {name: job.cost for name, job in left.items()}
     with (
-        JobProgress({name: job.cost for name, job in left.items()}) as shown,
+        resumable(),
+        JobProgress(costs, num_done=len(done)) as shown,
         cluster.connect(lambda *message: messages.put(message)) as workers,
     ):
         run = _Run(left, done, urgency, workers, messages, shown, cluster.slots)

@@ -8,6 +8,7 @@ from typing import Any, NamedTuple, TypeAlias
 
 import numpy as np
 
+from cns_drake.base.errors import did_you_mean
 from cns_drake.base.yaml_files import parse_yaml
 from cns_drake.sensors.lidar import patterns
 
@@ -91,6 +92,7 @@ def make_beam_pattern(
     if preset not in LIDAR_PRESETS:
         raise KeyError(
             f"no LiDAR preset '{preset}'; there are: {', '.join(LIDAR_PRESETS)}"
+            f"{did_you_mean(preset, LIDAR_PRESETS)}"
         )
     base = LIDAR_PRESETS[preset].pattern
     if num_columns is not None and base.num_columns is None:

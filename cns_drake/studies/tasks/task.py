@@ -10,7 +10,7 @@ from typing import Any, ClassVar, NamedTuple
 
 import numpy as np
 
-from cns_drake.base.errors import InputError
+from cns_drake.base.errors import InputError, did_you_mean
 from cns_drake.base.jobs.fingerprint import fingerprint
 from cns_drake.base.jobs.running import Job
 from evaluation.recognition.description import Role
@@ -205,6 +205,7 @@ class Task(abc.ABC):
                 known = ", ".join(self.defaults) or "none"
                 raise InputError(
                     f"{where}: no such setting (there are: {known})"
+                    f"{did_you_mean(name, self.defaults)}"
                 )
             if name == "methods":
                 value = self.settings[name] = _names(value, where)

@@ -99,12 +99,12 @@ def test_without_a_terminal_progress_is_whole_lines():
     paper = Console(file=io.StringIO(), width=40)
     with progress_bars.show_progress(paper) as progress:
         task = progress.add_task("metropolis_01_stage_04", note="loading")
-        on_frame = progress_bars.count_progress(progress, task)
+        on_frame = progress_bars.count_progress(progress, task, after="writing")
         on_frame(2400, 2400)
         on_frame(2400, 2400)
         progress_bars.print_note(progress, "[bold] " + "word " * 30)
     lines = paper.file.getvalue().splitlines()
-    assert lines[0].endswith("2400/2400 frames, 0 s left")
+    assert lines[0].endswith("2400/2400 frames, elapsed 0:00; writing")
     assert lines[1].split() == ["[bold]"] + 30 * ["word"]
 
 
@@ -126,7 +126,52 @@ def test_what_an_earlier_run_did_is_no_speed(monkeypatch):
         now[0] = 110.0  # 99 frames in 10 s.
         on_frame(1100, 1200)
     (line,) = paper.file.getvalue().splitlines()
-    assert line == "drive: 1100/1200 frames, 10 s left"
+    assert line == "drive: 1100/1200 frames, elapsed 0:00, about 0:10 left"
+
+
+@pytest.mark.parametrize(
+    ("seconds", "text"),
+    [(16.4, "0:16"), (59.6, "1:00"), (725, "12:05"), (36_001, "10:00:01")],
+)
+def test_durations_are_labelled(seconds, text):
+    shown = progress_bars.shown_times
+    assert shown(seconds, None) == f"elapsed {text}"
+    assert shown(0.0, seconds) == f"elapsed 0:00, about {text} left"
+
+
+def test_terminals_break_messages_between_words(monkeypatch, capsys):
+    message = f"{'x' * 50}/{'y' * 30}: a-b " + "hyphen-ated " * 20
+    terminal.note(message)
+    assert capsys.readouterr().err == f"{message}\n"
+    monkeypatch.setenv("COLUMNS", "40")
+    monkeypatch.setattr(terminal.sys.stderr, "isatty", lambda: True)
+    terminal.note(message)
+    lines = capsys.readouterr().err.splitlines()
+    assert " ".join(lines).split() == message.split()
+    assert max(map(len, lines[1:])) <= 40 < len(lines[0])
+
+
+def test_an_interrupt_says_what_goes_on(capsys):
+    with pytest.raises(KeyboardInterrupt), terminal.resumable():
+        raise KeyboardInterrupt
+    assert "the same command goes on" in capsys.readouterr().err
+
+
+@pytest.mark.parametrize("columns", [60, 120, 200])
+def test_help_is_as_wide_as_the_terminal(monkeypatch, capsys, columns):
+    app = terminal.make_program("program", "word " * 90, "")
+
+    @app.command()
+    def make():
+        """Make."""
+
+    def main():
+        terminal.run(app, "program")
+
+    monkeypatch.setenv("COLUMNS", str(columns))
+    _, out, _ = run_program(capsys, "program", main, "--help")
+    widest = max(map(len, out.splitlines()))
+    assert columns - 8 <= widest <= columns
 
 
 @pytest.mark.slow

@@ -223,6 +223,17 @@ def test_diagram_script_has_options():
             "--quick and --pages exclude each other",
         ),
         (["teleport"], "teleport"),
+        (["simulat"], "Did you mean 'simulate'"),
+        (["simulate", "metropolis_9"], r"mean metropolis_0\d\?"),
+        (
+            ["simulate", "{files}/drive.yaml", "--lidar", "os1_64"],
+            "mean os1-64\\?",
+        ),
+        (["age", "subrbia", "--years", "1"], "mean suburbia\\?"),
+        (["reproduce", "metropolos"], "mean metropolis\\?"),
+        (["study", "laddr"], "mean ladder\\?"),
+        (["study", "ladder", "--method", "ring+++"], "mean ring\\+\\+\\?"),
+        (["study", "ladder", "--task", "plaec"], "mean place\\?"),
     ],
 )
 def test_faults_are_one_line(files, tmp_path, capfd, arguments, fault):

@@ -190,7 +190,9 @@ def test_files_that_are_no_scenario(tmp_path, text, fault):
 
 
 def test_unknown_drive_names_the_known_ones():
-    with pytest.raises(InputError, match=r"'metropolis_99'; .*metropolis_04"):
+    with pytest.raises(
+        InputError, match=r"'metropolis_99'; .*did you mean metropolis_0\d\?"
+    ):
         load_scenario("metropolis_99")
 
 

@@ -1,3 +1,4 @@
+from helpers.small_page import make_result
 from matplotlib.figure import Figure
 from matplotlib.image import imread
 from matplotlib.patches import Patch
@@ -6,6 +7,7 @@ import pytest
 
 from cns_drake.base.points import from_xyz
 from evaluation.maps.voxel_maps import VoxelAccumulator, VoxelMap
+from evaluation.report import curve_figures
 from evaluation.report.figures import judge_points, top_view, voxel_of_each
 from evaluation.results.drawing import PIXELS, save
 
@@ -74,3 +76,21 @@ def test_legend_of_a_figure_is_not_in_the_picture_of_the_page(tmp_path):
     red = [1.0, 0.0, 0.0]
     assert (np.abs(printed - red) < 0.2).all(axis=2).any()
     assert on_page.min() > 0.9
+
+
+def test_legends_stand_beside_the_curves(tmp_path, monkeypatch):
+    drawn = []
+    monkeypatch.setattr(
+        curve_figures, "save", lambda figure, stem: drawn.append(figure)
+    )
+    result = make_result("scan-context++", [0, 1, 4, 6, 3])
+    curve_figures.draw_pr_curves("town", [result], tmp_path / "pr")
+    (figure,) = drawn
+    figure.draw_without_rendering()
+    for axes in figure.axes:
+        legend = axes.get_legend().get_window_extent()
+        assert legend.x0 >= axes.get_window_extent().x1
+        assert legend.x1 <= figure.bbox.x1
+        assert not any(
+            legend.overlaps(other.get_window_extent()) for other in figure.axes
+        )

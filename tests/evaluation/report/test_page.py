@@ -1,13 +1,17 @@
 import base64
 import itertools
+from math import nan
 import re
 
 from helpers.small_page import make_content
 import pytest
 
 from evaluation.recognition.fault_kinds import FAULT_KINDS
+from evaluation.report.leaderboard import ranked_methods
 from evaluation.report.page import route_picture, write_page
 from evaluation.report.page_data import browser_data
+from evaluation.report.rows import LAST, OWN, STAGE
+from evaluation.results.table import Results, Row
 
 PAIR = ("metropolis", "01", "04")
 PAGES = {"metropolis_04": "../pages/metropolis_04.html?a=1&b"}
@@ -39,13 +43,87 @@ def test_links_lead_to_sections(text):
     assert links == [
         # It is at the top, and among all tables.
         "browser",
-        "survival", "summary", "maps", "change", "recognition", "figures",
+        "summary", "survival", "maps", "change", "recognition", "figures",
         "browser",
     ]  # fmt: skip
     assert re.findall(r'<section id="(\w+)">', text) == links[1:]
 
 
-def test_survival_comes_first(text):
+def test_the_ranking_comes_first(text):
+    section = text[text.index('<section id="summary">') :]
+    section = section[: section.index("</section>")]
+    rows = re.findall(r'<th scope="row">(.*?)</th>\s*<td>([\d.]+)', section)
+    # By hand: on the pair that both have, RING++ is right on three of five
+    # queries, and Scan Context++ on two.
+    assert [name for name, _ in rows] == ["RING++", "Scan Context++"]
+    (_, first), (_, second) = rows
+    assert (
+        f"RING++ ranks first of 2 methods, with a mean AUC of {first} over one"
+        f" pair; Scan Context++ follows with {second}."
+    ) in section
+    assert "<details" not in section
+    # Its colour in all pictures.
+    assert 'fill="#0072B2"' in section
+
+
+@pytest.mark.parametrize(
+    ("aucs", "words"),
+    [
+        ({}, "No pair of drives has an AUC of every method"),
+        ({"btc": [0.5, nan], "solid": [nan, 0.5]}, "No pair of drives"),
+        ({"btc": [0.5, 0.7]}, "BTC has a mean AUC of 0.600 over 2 pairs"),
+        (
+            {"btc": [0.5, 0.7], "solid": [0.7, 0.5], "x": [0.1, 0.1]},
+            "BTC and SOLiD tie at a mean AUC of 0.600 (2 pairs of drives).",
+        ),
+        (
+            {"btc": [0.9, nan], "solid": [0.2, 0.9]},
+            "BTC ranks first of 2 methods, with a mean AUC of 0.900 over one"
+            " pair; SOLiD follows with 0.200.",
+        ),
+        (
+            {"btc": [0.9, 0.8], "solid": [0.2, 0.1]},
+            "SOLiD follows with 0.150. Its lead is beyond chance (95 %).",
+        ),
+        (
+            {"btc": [0.9, 0.1], "solid": [0.2, 0.2]},
+            "follows with 0.200. With other pairs, the two might change",
+        ),
+    ],
+)
+def test_a_headline_is_true(aucs, words):
+    place = {"experiment": "stages", "database": "a", "seed": 1}
+    place |= {"factors": {STAGE: OWN}, "task": "place", "gate": False}
+    rows = [
+        Row(
+            **place,
+            map="town",
+            query=str(k),
+            method=method,
+            protocol="fair",
+            metric="auc",
+            value=value,
+        )
+        for method, values in aucs.items()
+        for k, value in enumerate(values)
+    ]
+    # The names of factors come from the rows.
+    rows.append(
+        Row(
+            **{**place, "factors": {STAGE: LAST}},
+            map="town",
+            query="0",
+            method="btc",
+            protocol="fair",
+            metric="auc",
+            value=0.0,
+        )
+    )
+    _, headline = ranked_methods(Results.of(rows))
+    assert words in headline
+
+
+def test_survival_comes_next(text):
     section = text[text.index('<section id="survival">') :]
     section = section[: section.index("</section>")]
     # One pair has a control. By hand: of four queries with a match two are
@@ -56,7 +134,7 @@ def test_survival_comes_first(text):
         body,
     )
     assert row.groups() == ("1.000", "0.500", "50 %")
-    assert "For 1 of 2 pairs no control was driven" in section
+    assert "For 1 of 2 pairs no control was driven" in text
     assert section.count("<td>no control</td>") == 4
     assert 'alt="kept"' in section
 
@@ -123,8 +201,9 @@ def test_reasons_are_offered_and_counted(text):
     assert re.findall(r'value="(\w*)"', choice) == ["", *FAULT_KINDS]
     section = text[text.index("Why best places are wrong") :]
     row = re.search(r"<tr>.*?Scan Context\+\+.*?</tr>", section, re.S).group()
-    # Three are wrong: a twin, no candidate, no place.
-    assert re.findall(r"(\d+) %", row) == ["33", "33", "33"]
+    # Two that have a place are wrong: a twin, and no candidate.
+    assert "<td>2</td>" in row
+    assert re.findall(r"(\d+) %", row) == ["50", "50"]
 
 
 def test_many_scans_are_thinned(content, monkeypatch):

@@ -57,6 +57,13 @@ def shown(browser, *state):
     browser.wait_for(f'document.body.dataset.shown === "{text}"')
 
 
+def unfold(browser):
+    browser.evaluate(
+        'document.querySelectorAll("details.part")'
+        ".forEach((one) => { one.open = true; })"
+    )
+
+
 def status(browser):
     return browser.evaluate('byId("status").textContent')
 
@@ -91,6 +98,7 @@ def on_map(browser, content, x, y):
 def test_page_fits_its_screen(browser, address, size, scheme):
     browser.open(address, *size, scheme)
     shown(browser, 0, 1, 0, 0)
+    unfold(browser)
     width = browser.evaluate("document.scrollingElement.scrollWidth")
     assert width <= size[0]
     assert browser.complaints == []
@@ -144,17 +152,52 @@ def test_table_ii_fits_its_box(browser, content, tmp_path):
     )
     write_page(path, page)
     browser.open(path.as_uri(), *DESKTOP)
+    unfold(browser)
     widths = browser.evaluate(
-        """[...document.querySelectorAll("#recognition > .table")].map(
+        """[...document.querySelectorAll("#recognition .part > .table")].map(
           (one) => [one.scrollWidth, one.clientWidth])"""
     )
     assert len(widths) > 2
     assert [width for width, box in widths if width > box] == []
 
 
+def test_a_link_unfolds_its_section(browser, address):
+    browser.open(address, *PHONE)
+    folded = (
+        '[...document.querySelectorAll("details.part:not([open])")]'
+        ".map((one) => one.parentElement.id)"
+    )
+    names = browser.evaluate(folded)
+    assert names == ["survival", "maps", "change", "recognition", "figures"]
+    browser.evaluate("document.querySelector(\"nav a[href='#maps']\").click()")
+    names.remove("maps")
+    assert browser.evaluate(folded) == names
+
+
+def test_a_heading_sorts_its_table(browser, address):
+    browser.open(address, *DESKTOP)
+    order = (
+        '[...document.querySelectorAll(".board tbody tr")]'
+        ".map((one) => one.cells[0].textContent)"
+    )
+    assert browser.evaluate(order) == ["1", "2"]
+    heading = 'document.querySelectorAll(".board thead th")[2]'
+    # The mean AUC: the greatest first, then the least.
+    browser.evaluate(f"{heading}.click()")
+    assert browser.evaluate(order) == ["1", "2"]
+    browser.evaluate(
+        f'{heading}.dispatchEvent(new KeyboardEvent("keydown",'
+        ' {key: "Enter"}))'
+    )
+    assert browser.evaluate(order) == ["2", "1"]
+    assert browser.evaluate(f"{heading}.ariaSort") == "ascending"
+    assert browser.complaints == []
+
+
 def test_fingers_hit(browser, address):
     browser.open(address, *PHONE)
     shown(browser, 0, 1, 0, 0)
+    unfold(browser)
     low = browser.evaluate(
         """[...document.querySelectorAll(
           "a, button, select, summary, label, input[type=range]")]
@@ -370,6 +413,7 @@ def test_print_fits_its_paper(browser, address):
 
 def test_full_size(browser, address):
     browser.open(address, *PHONE)
+    unfold(browser)
     figures = browser.evaluate('document.querySelectorAll(".enlarge").length')
     assert figures == 5
     for index in range(figures):
