@@ -13,14 +13,7 @@ from evaluation.command_line import options
 def localise(
     place: Annotated[Path, typer.Argument(metavar="MAP")],
     query: Annotated[Path, typer.Argument(metavar="QUERY")],
-    method: Annotated[
-        str,
-        typer.Option(
-            "--method",
-            metavar="icp|plane-icp|gicp|vgicp|robust-plane-icp|robust-gicp"
-            "|kiss-matcher|FILE.py",
-        ),
-    ],
+    method: Annotated[str, typer.Option("--method", metavar="NAME|FILE.py")],
     start: float = 0.5,
     start_turn: float = 2.0,
     seed: int = 0,
@@ -46,7 +39,9 @@ def localise(
     Args:
         place: Drive or cloud that makes the map.
         query: Drive whose scans are localised, or one cloud.
-        method: Estimator; a Python file holds one's own function.
+        method: Estimator: icp, plane-icp, gicp, vgicp, robust-plane-icp,
+            robust-gicp, kiss-matcher, or a Python file with a function of your
+            own.
         start: Distance of a start from the truth [m].
         start_turn: Angle of a start to the truth [deg].
         seed: Seed of the starts.
