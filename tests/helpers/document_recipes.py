@@ -888,8 +888,8 @@ RECIPES = {
         ".venv/bin/cns-eval map-sessions",
         changes=(_FIRST, _LAST, ("drives/", "output/")),
         after=("own city",),
-        prints=("real",),
-        makes=("real/A/map.ply",),
+        prints=("two_sessions",),
+        makes=("two_sessions/A/map.ply",),
     ),
     "help: map-sessions": Recipe(
         "cns-eval map-sessions mulran",
@@ -938,7 +938,7 @@ NOT_RUN = {
     ".venv/bin/python docs/reference_pages.py": "writes into this project; "
     "test_fields compares the pages with what is there",
     "python docs/weather_pictures.py": "renders shipped cities, for minutes",
-    "python docs/street_pictures.py": "renders shipped cities, for minutes",
+    "python docs/street_pictures.py": "renders twelve streets, for minutes",
     "python docs/noise_figures.py": "runs many drives, for minutes",
     "mkdocs serve": "a server, which does not end; test_site builds the site",
     "python3 -m venv .venv\n": "installs from the network; test_wheel installs "
