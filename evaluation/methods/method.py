@@ -282,14 +282,16 @@ def register(name: str) -> Callable[[_MethodClass], _MethodClass]:
 
 
 def known_methods() -> tuple[str, ...]:
-    """Returns the names of all registered methods.
+    """Returns the names of all methods that need not be asked for.
+
+    They are those that run by default, and registered ones of your own.
 
     Example:
         from evaluation import known_methods
 
         print(known_methods())
     """
-    return tuple(sorted(_METHODS))
+    return tuple(sorted(set(_METHODS) - set(_OPTIONAL)))
 
 
 def optional_methods() -> tuple[str, ...]:
@@ -304,7 +306,6 @@ def shipped_methods() -> tuple[str, ...]:
         name
         for name in known_methods()
         if _METHODS[name].__module__.startswith(f"{package}.")
-        and name not in _OPTIONAL
     )
 
 

@@ -189,7 +189,7 @@ def cut_ears(
         else:
             a, b = ring[left[0]], ring[left[1]]
             if any(_cross(a, b, ring[i]) for i in left):
-                raise ValueError("the polygon crosses itself")
+                raise ValueError("the polygon crosses itself or runs clockwise")
             return triangles
     a, b, c = (ring[i] for i in left)
     return [*triangles, tuple(left)] if _cross(a, b, c) > 0 else triangles

@@ -62,6 +62,7 @@ def test_columns_give_way_but_not_names(width, columns):
         assert len({len(line) for line in lines}) == 1
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("width", [60, 80])
 def test_shipped_drives_fit_the_terminal(width, capsys, monkeypatch):
     monkeypatch.setenv("COLUMNS", str(width))
@@ -74,6 +75,7 @@ def test_shipped_drives_fit_the_terminal(width, capsys, monkeypatch):
     assert "triangles" in lines[0]
 
 
+@pytest.mark.slow
 def test_the_terminal_does_not_narrow_what_is_piped(capsys, monkeypatch):
     monkeypatch.setenv("COLUMNS", "20")
     list_drives()

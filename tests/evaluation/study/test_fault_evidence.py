@@ -217,11 +217,11 @@ def test_reasons_are_counted(judged):
     (row,) = csv.DictReader(
         fault_numbers([result], known).to_csv().splitlines()
     )
-    assert (row["queries"], row["wrong"]) == ("10", "9")
+    assert (row["queries"], row["wrong"]) == ("10", "8")
     assert [row[kind] for kind in FAULT_KINDS] == ["1"] * 7 + ["2"]
     assert row["changed_by"] == "car:1"
     table = fault_table([result], known)
     (shown,) = table.rows
-    assert shown[3:5] == (9, "11 %")
-    assert shown[-2:] == ("22 %", "1 car")
+    assert shown[3:5] == (8, "12 %")
+    assert shown[-2:] == ("25 %", "1 car")
     assert fault_table([result], {}).rows == ()
