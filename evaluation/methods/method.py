@@ -282,16 +282,16 @@ def register(name: str) -> Callable[[_MethodClass], _MethodClass]:
 
 
 def known_methods() -> tuple[str, ...]:
-    """Returns the names of all methods that need not be asked for.
+    """Returns the names of all registered methods.
 
-    They are those that run by default, and registered ones of your own.
+    Methods that run only on request are registered once they were made.
 
     Example:
         from evaluation import known_methods
 
         print(known_methods())
     """
-    return tuple(sorted(set(_METHODS) - set(_OPTIONAL)))
+    return tuple(sorted(_METHODS))
 
 
 def optional_methods() -> tuple[str, ...]:
@@ -306,6 +306,7 @@ def shipped_methods() -> tuple[str, ...]:
         name
         for name in known_methods()
         if _METHODS[name].__module__.startswith(f"{package}.")
+        and name not in _OPTIONAL
     )
 
 

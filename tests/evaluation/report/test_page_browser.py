@@ -8,7 +8,7 @@ import numpy as np
 from PIL import Image
 import pytest
 
-from evaluation.methods import known_methods
+from evaluation.methods import shipped_methods
 from evaluation.paper.paper_reference import paper
 from evaluation.report.page import write_page
 
@@ -145,7 +145,7 @@ def test_text_stands_out(browser, address, scheme):
 
 def test_table_ii_fits_its_box(browser, content, tmp_path):
     path = tmp_path / "report.html"
-    results = [make_result(name, [0, 1, 4, 6, 3]) for name in known_methods()]
+    results = [make_result(name, [0, 1, 4, 6, 3]) for name in shipped_methods()]
     assert len(results) == 6
     page = replace(
         content, recognitions=results, evidence={}, reference=paper()

@@ -9,7 +9,7 @@ from helpers.small_towns import drive
 import numpy as np
 import pytest
 
-from evaluation.methods import known_methods
+from evaluation.methods import shipped_methods
 
 pytestmark = pytest.mark.slow
 
@@ -93,12 +93,12 @@ def test_place_recognition(report):
     table = read(report / "place_recognition.csv")
     # Two modes; two pairs by each method, and the paper's own by its protocol.
     of_paper = [key for key in groups if key[-1] == "paper"]
-    assert {key[3] for key in of_paper} == set(known_methods()) - {
+    assert {key[3] for key in of_paper} == set(shipped_methods()) - {
         "layered-overlap",
         "learned",
     }
     assert len(table) == 2 * len(groups)
-    assert len(groups) - len(of_paper) == 2 * len(known_methods())
+    assert len(groups) - len(of_paper) == 2 * len(shipped_methods())
     for row in table:
         pair = row["DB → query"].split(" → ")
         rows = groups[(row["map"], *pair, row["method"], row["protocol"])]
