@@ -208,8 +208,7 @@ def compare(
             )
         if rankings and protocol is None:
             chosen_rows = _by_one_protocol(chosen_rows, path)
-        queries = (path if path.is_dir() else path.parent) / QUERIES
-        answers = QueryRows.read(queries).answers if queries.exists() else ()
+        answers = _answers((path if path.is_dir() else path.parent) / QUERIES)
         asked = [a for a in answers if (a.task, a.gate) == (task, gate)]
         own.append(
             _Table(_name(path, paths), _by_place(chosen_rows), _by_place(asked))
@@ -284,6 +283,19 @@ def _by_one_protocol(rows: Sequence[Row], path: Path) -> tuple[Row, ...]:
         )
     chosen = "fair" if "fair" in names else names[0]
     return tuple(row for row in rows if row.protocol == chosen)
+
+
+def _answers(path: Path) -> Sequence[Answers]:
+    """Returns the answers of a table of queries; none if it is not there.
+
+    The table of a report has columns of its own, and does not count.
+    """
+    if not path.is_file():
+        return ()
+    with path.open("rb") as stream:
+        if stream.readline(80).startswith(b"map,db,"):
+            return ()
+    return QueryRows.read(path).answers
 
 
 def _by_place(keys: Iterable[Any]) -> dict[_Place, Any]:

@@ -325,3 +325,15 @@ def test_faults_are_one_line(tmp_path, capsys):
     assert_refused(capsys, pair, "fewer than two methods")
     assert_refused(capsys, ["compare", tmp_path / "none.csv"], "none.csv")
     assert_refused(capsys, ["ranking", one, other], "cns-eval compare")
+
+
+def test_the_queries_of_a_report_do_not_count(tmp_path):
+    """A report has a table of queries with other columns beside its results."""
+    pair = [
+        write_table(tmp_path / name, {"town": {name: part}})
+        for name, part in (("one", 0.9), ("other", 0.5))
+    ]
+    found = compare(pair).to_json()
+    for folder in pair:
+        (folder / "queries.csv").write_text("map,db,query,method,correct\n")
+    assert compare(pair).to_json() == found
