@@ -7,7 +7,7 @@ coverage-masked one).
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -203,6 +203,7 @@ def compare(
     target: Surveyed,
     control: Surveyed | None = None,
     alignment: AlignmentReport | None = None,
+    grids: Sequence[tuple[float, float, float]] = GRIDS,
 ) -> ChangeReport:
     """Returns the change between two maps.
 
@@ -213,6 +214,7 @@ def compare(
             stage. Its route shows which one. It is compared with the drive of
             its own stage: these two have the routes of A and B in one stage.
         alignment: alignment of the two, for the report.
+        grids: shifts of the grid [m] whose values make the spread.
 
     Raises:
         InputError: if the three are not of one world, or the control is on
@@ -222,7 +224,7 @@ def compare(
         check_same_world(source.drive, target.drive)
     change, clouds = _change(source, target)
     values = [change.symmetric]
-    values += [_change(source, target, at)[0].symmetric for at in GRIDS]
+    values += [_change(source, target, at)[0].symmetric for at in grids]
     masked = None
     if source.positions is not None and target.positions is not None:
         both = (source.positions, target.positions)

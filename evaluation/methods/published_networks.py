@@ -16,6 +16,7 @@ points backwards. Deliberate differences:
 - A cloud with fewer points than 4096 repeats some.
 """
 
+import abc
 import bisect
 from collections.abc import Mapping, Sequence
 import hashlib
@@ -425,9 +426,9 @@ class _Network(Method[np.ndarray, np.ndarray]):
         return self.infer(self._weights, cloud).astype(np.float64)
 
     @staticmethod
+    @abc.abstractmethod
     def infer(weights: Weights, cloud: np.ndarray) -> np.ndarray:
         """Returns the descriptor of a prepared cloud."""
-        raise NotImplementedError
 
     def build_database(self, places: Sequence[np.ndarray]) -> np.ndarray:
         return np.stack(places)

@@ -255,7 +255,10 @@ class Measuring:
                     overlaps,
                     _REAL.radius,
                 )
-                numbers = [n[2:5] for n in place_numbers(now, None)]
+                numbers = [
+                    (n.metric, n.value, n.interval)
+                    for n in place_numbers(now, None)
+                ]
                 key = self._add(
                     one, "place", method.name, numbers, len(drive), gate=gate
                 )
@@ -265,7 +268,10 @@ class Measuring:
                     for name, values in now.columns().items()
                 }
                 self.answers.append(Answers(**vars(key), columns=columns))
-                poses = [n[2:5] for n in pose_numbers(now, None)]
+                poses = [
+                    (n.metric, n.value, n.interval)
+                    for n in pose_numbers(now, None)
+                ]
                 self._add(
                     one,
                     "pose",
