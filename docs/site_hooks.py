@@ -12,6 +12,7 @@ from pathlib import Path
 import re
 from typing import Any
 
+from latex2mathml.converter import convert
 from mkdocs.config.defaults import MkDocsConfig
 from mkdocs.structure.files import File, Files
 from mkdocs.structure.pages import Page
@@ -25,6 +26,7 @@ _API_TAB = -2
 # Blocks of code have a `span` before `code`.
 _INLINE_CODE = re.compile(r"(?<!</span>)<code>[^<]*</code>")
 _WITH_HYPHEN = re.compile(r"[^\s<>]{,40}-[^\s<>]{,40}")
+_FORMULA = re.compile(r"^( *)```math\n(.*?)\n *```$", re.DOTALL | re.MULTILINE)
 _LINK = re.compile(r"(!?)\[([^\]]*)\]\(([^)\s]+)\)")
 
 
@@ -52,10 +54,11 @@ def on_config(config: MkDocsConfig, **_: Any) -> MkDocsConfig:
 
 
 def on_page_markdown(markdown: str, page: Page, files: Files, **_: Any) -> str:
-    """Leads links to where the site has their target.
+    """Sets formulas, and leads links to where the site has their target.
 
     Files of the repository that are no pages are named without a link.
     """
+    markdown = _FORMULA.sub(_set, markdown)
     src = page.file.src_uri
     folder = os.path.dirname(_in_repository(src))
 
@@ -84,6 +87,12 @@ def on_page_content(html: str, **_: Any) -> str:
         ),
         html,
     )
+
+
+def _set(formula: re.Match[str]) -> str:
+    """Returns a formula as MathML, which browsers set without a script."""
+    indent, latex = formula.groups()
+    return f'{indent}<div class="formula">{convert(latex, display="block")}</div>'
 
 
 def _in_repository(src: str) -> str:
