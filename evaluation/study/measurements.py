@@ -1,4 +1,8 @@
-"""Measurements between two surveyed recordings."""
+"""Measurements between two recordings, or on one."""
+
+from collections.abc import Callable
+from dataclasses import replace
+from typing import TypeAlias
 
 import numpy as np
 from threadpoolctl import threadpool_limits
@@ -9,14 +13,40 @@ from evaluation.change.drive_change import compare as compare_maps
 from evaluation.drives import check_same_world
 from evaluation.drives.drive_views import MovedDrive
 from evaluation.drives.sampling import gather
+from evaluation.methods.method import Method
 from evaluation.recognition import place_recognition
-from evaluation.recognition.costs import Cost, measure_cost
+from evaluation.recognition.costs import Cost, measure_cost, query_ms
+from evaluation.recognition.description import (
+    DescribedDrive,
+    DescribedScans,
+    Role,
+)
+from evaluation.recognition.overlap_truth import best_overlaps
+from evaluation.recognition.place_outcome import PlaceOutcome
 from evaluation.recognition.protocol import RetrievalProtocol
 from evaluation.recognition.retrieval import compare as score
+from evaluation.recognition.retrieval import compare_with_gates
 from evaluation.study.chosen_methods import MethodChoice
 from evaluation.study.parts import Part
-from evaluation.study.surveys import DriveSource, SurveyedDrive
+from evaluation.study.surveys import (
+    DriveSource,
+    SurveyedDrive,
+    describe_recording,
+)
 
+# The source of a drive, or the parts of its scans and of its descriptions by
+# each method.
+DescribedSource: TypeAlias = "DriveSource | tuple[Part, ...]"
+
+# Distance between a city and the next distracting one [m]. No scan reaches so
+# far.
+_APART = 1e5
+# Queries whose time is measured, and the longest time for all queries at a size
+# [ms].
+TIMED = 9
+_LONGEST_MS = 3.6e6
+# Places that no method is known to take so long for.
+_MANY = 5000
 # Number of clouds and of queries whose costs are measured; the time of the
 # first does not count.
 _NUM_TRIALS = 12
@@ -132,3 +162,141 @@ def measure_costs(
                 )
             )
     return costs
+
+
+def measure_places(
+    reporter: Reporter,
+    database: DescribedSource,
+    query: DescribedSource,
+    distractors: tuple[tuple[Part, ...], ...],
+    num_distractors: int,
+    methods: tuple[MethodChoice, ...],
+    protocol: RetrievalProtocol,
+) -> list[PlaceOutcome]:
+    """Returns two outcomes of each method, without the gate and with it.
+
+    A method that would take over an hour for all queries has no outcome.
+
+    Args:
+        reporter: reports progress.
+        database: described drive of the places.
+        query: described drive in the same world, whose scans ask.
+        distractors: described drives through other cities, one part for each
+            method.
+        num_distractors: number of their places that are added to the database.
+        methods: the methods.
+        protocol: the protocol of the comparison.
+    """
+    place_scans, places = _describe(
+        database, "places", methods, protocol, reporter
+    )
+    query_scans, queries = _describe(
+        query, "queries", methods, protocol, reporter
+    )
+    overlaps = None
+    outcomes = []
+    for k, choice in enumerate(
+        reporter.track(methods, "comparing", len(methods))
+    ):
+        method = choice.make()
+        mapped, asked = places(k), queries(k)
+        searched, drives = crowded(mapped, distractors, k, num_distractors)
+        if len(searched.places.frames) > _MANY and _takes_long(
+            method, searched, asked
+        ):
+            reporter.note(f"{choice.name}: it would take over an hour")
+            continue
+        both = compare_with_gates(
+            method, searched, asked, protocol, [None, protocol.radius]
+        )
+        if overlaps is None:
+            overlaps = best_overlaps(
+                place_scans,
+                mapped.places.X_WS,
+                query_scans,
+                asked.queries.X_WS,
+                both[0].matches[:, : len(place_scans)],
+            )
+        outcomes += [
+            PlaceOutcome.of(
+                choice.key,
+                is_gated,
+                one,
+                (asked.queries.stamps_ns, asked.queries.p_WSs),
+                drives,
+                overlaps,
+                protocol.radius,
+            )
+            for is_gated, one in zip((False, True), both, strict=True)
+        ]
+    return outcomes
+
+
+def _takes_long(
+    method: Method,
+    database: DescribedDrive,
+    query: DescribedDrive,
+) -> bool:
+    one_ms = query_ms(
+        method, database.places, query.queries, TIMED + 1, with_pose=False
+    )
+    return one_ms * len(query.queries.frames) > _LONGEST_MS
+
+
+def _describe(
+    drive: DescribedSource,
+    role: Role,
+    methods: tuple[MethodChoice, ...],
+    protocol: RetrievalProtocol,
+    reporter: Reporter,
+) -> tuple[list[np.ndarray], Callable[[int], DescribedDrive]]:
+    """Returns the scans of a drive, and what gives each description once."""
+    if isinstance(drive, tuple):
+        scans, *parts = drive
+        return scans.read(), lambda k: parts[k].read()[1]
+    asked = {one.key: (one.make(), {role}, protocol) for one in methods}
+    found = describe_recording(drive(), {role}, asked, protocol, reporter.track)
+    assert isinstance(found.scans, list)
+    return found.scans, lambda k: found.described.pop(methods[k].key)
+
+
+def crowded(
+    database: DescribedDrive,
+    distractors: tuple[tuple[Part, ...], ...],
+    method: int,
+    num_others: int,
+) -> tuple[DescribedDrive, list[str]]:
+    """Returns a drive with the places of drives elsewhere behind its own.
+
+    The others are moved so far away that none of their places is a match. They
+    add `num_others` places at most, from the first one on.
+
+    Args:
+        database: the drive.
+        distractors: described drives elsewhere, one part for each method.
+        method: number of the method.
+        num_others: number of places.
+
+    Returns:
+        The drive, and the name of the drive of each place.
+    """
+    known, poses = [database], [database.places.X_WS]
+    for parts in distractors:
+        if sum(len(d.places.frames) for d in known[1:]) >= num_others:
+            break
+        other = parts[method].read()[1]
+        X_WS = other.places.X_WS.copy()
+        X_WS[:, 0, 3] += len(known) * _APART
+        known.append(other)
+        poses.append(X_WS)
+    every = [one.places for one in known]
+    end = len(database.places.frames) + num_others
+    joined = DescribedScans(
+        frames=np.concatenate([one.frames for one in every])[:end],
+        stamps_ns=np.concatenate([one.stamps_ns for one in every])[:end],
+        X_WS=np.concatenate(poses)[:end],
+        descriptors=[d for one in every for d in one.descriptors][:end],
+        clouds=[cloud for one in every for cloud in one.clouds][:end],
+    )
+    drives = [one.name for one in known for _ in one.places.frames]
+    return replace(database, places=joined), drives

@@ -355,16 +355,14 @@ class Survey(Step):
             for key, (choice, roles, protocol) in self._asked.items()
             if self.files.described(key) in missing
         }
-        drive, kept = self.source(), {"with_scans": self.with_scans}
-        survey = survey_recording if self.with_map else describe_recording
-        found = survey(
-            drive,
-            self.roles,
-            asked,
-            self.protocol,
-            reporter.track,
-            **(kept if self.with_map else {}),
+        arguments = (
+            *(self.source(), self.roles, asked),
+            *(self.protocol, reporter.track),
         )
+        if self.with_map:
+            found = survey_recording(*arguments, with_scans=self.with_scans)
+        else:
+            found = describe_recording(*arguments)
         values: dict[Part, object] = {
             self.files.scans: found.scans,
             self.files.fine: found.fine,
@@ -378,7 +376,9 @@ class Survey(Step):
     @property
     def _asked(self) -> dict[str, Further]:
         """Name of each description -> what is described."""
-        asked = {one.key: (one, self.roles, self.protocol) for one in self.methods}
+        asked = {
+            one.key: (one, self.roles, self.protocol) for one in self.methods
+        }
         for choice, roles, protocol in self.further:
             key = described_key(choice.key, protocol)
             asked[key] = choice, roles, protocol

@@ -10,8 +10,8 @@ from cns_drake.studies.tasks.task import Jobs, Pair, Task
 from evaluation.recognition.costs import cpu_ms, query_ms
 from evaluation.recognition.place_outcome import Number
 from evaluation.study.chosen_methods import MethodChoice
+from evaluation.study.measurements import TIMED, crowded
 from evaluation.study.parts import Part
-from evaluation.study.place_outcomes import TIMED, joined_places
 
 _COST = 30.0
 
@@ -66,12 +66,8 @@ def measure_costs(
     found = {}
     for k, choice in enumerate(reporter.track(methods, "", len(methods))):
         method = choice.make()
-        known = [database[k].read()[1].places]
-        for parts in distractors:
-            if sum(len(one.frames) for one in known[1:]) >= num_distractors:
-                break
-            known.append(parts[k].read()[1].places)
-        places = joined_places(known, num_distractors)
+        mapped = database[k].read()[1]
+        places = crowded(mapped, distractors, k, num_distractors)[0].places
         asked = query[k].read()[1].queries
         found[choice.key] = (
             len(places.frames),

@@ -11,8 +11,8 @@ from evaluation.recognition.place_outcome import (
     place_numbers,
     pose_numbers,
 )
+from evaluation.study.measurements import measure_places
 from evaluation.study.parts import Part
-from evaluation.study.place_outcomes import measure_places
 
 # Expected seconds to describe a pair and to compare it by all methods.
 _COST = 60.0
