@@ -30,8 +30,8 @@ from cns_drake.studies.comparisons import (
     MissingError,
     PairOfDrives,
     beside,
+    check_frozen,
 )
-from cns_drake.studies.elsewhere import distracting_drives
 from cns_drake.studies.experiment import (
     CAUSE,
     FRESH,
@@ -45,23 +45,27 @@ from cns_drake.studies.experiment import (
     conditions,
     method_variants,
 )
-from cns_drake.studies.frozen import check_frozen
-from cns_drake.studies.made_maps import MadeMaps, made_map_step
+from cns_drake.studies.made_maps import (
+    MadeMaps,
+    distracting_drives,
+    made_map_step,
+)
 from cns_drake.studies.recording import is_recorded
 from cns_drake.studies.redrawing import draw_fresh_cities, make_maps
 from cns_drake.studies.tasks.change import ChangeTask
-from cns_drake.studies.tasks.cost import CostTask
 from cns_drake.studies.tasks.localise import LocaliseTask
-from cns_drake.studies.tasks.place import PlaceTask, PoseTask
+from cns_drake.studies.tasks.place import CostTask, PlaceTask, PoseTask
 from cns_drake.studies.tasks.task import Jobs, NamedDrive, Pair, Task
 from cns_drake.studies.tasks.update import MapTask
 from evaluation.methods import optional_methods
 from evaluation.recognition.protocol import RetrievalProtocol
-from evaluation.report.rows import LAST, OWN, STAGE
 from evaluation.results.page import write_page
 from evaluation.results.table import (
+    LAST,
+    OWN,
     QUERIES,
     RESULTS,
+    STAGE,
     Answers,
     QueryRows,
     Results,

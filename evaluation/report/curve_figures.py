@@ -12,13 +12,12 @@ from cns_drake.base.errors import InputError
 from evaluation.localisation.localise import RIGHT_TRANSLATION
 from evaluation.localisation.tracking import LOST
 from evaluation.recognition.metrics import MODES, PlaceRecognitionMetrics
-from evaluation.recognition.place_recognition import RecognitionResult
+from evaluation.recognition.place_recognition import PlaceRecognition
 from evaluation.report.page import Report
 from evaluation.report.page_data import Illustration, Section
-from evaluation.report.rows import STAGE
 from evaluation.results.charts import draw, styles, titled
 from evaluation.results.drawing import plain, save
-from evaluation.results.table import Results
+from evaluation.results.table import STAGE, Results
 from evaluation.results.table_forms import in_table_order, title
 
 _SCATTER = {"kind": "scatter", "x": "tcr_sym", "y": "auc"}
@@ -32,7 +31,7 @@ _WIDTH = 480
 
 
 def draw_pr_curves(
-    map_name: str, results: Sequence[RecognitionResult], stem: Path
+    map_name: str, results: Sequence[PlaceRecognition], stem: Path
 ) -> None:
     """Draws precision over recall, a row a pair and a column a mode."""
     pairs = list(dict.fromkeys(result.pair for result in results))
@@ -46,7 +45,7 @@ def draw_pr_curves(
         for axes, mode in zip(row, MODES, strict=True):
             of_method = {r.method: r for r in results if r.pair == pair}
             for method in in_table_order(of_method):
-                metrics = of_method[method].metrics[mode]
+                metrics = of_method[method].by_mode[mode]
                 _draw_curve(axes, method, style_of[titled(method)], metrics)
             axes.set(xlim=(0.0, 1.0), ylim=(0.0, 1.02))
             # A phone shows one panel at a time.

@@ -36,6 +36,9 @@ _BEFORE = ("experiment", "map", "database", "query", "seed")
 _BEHIND = ("task", "method", "gate", "protocol")
 KEYS = (*_BEFORE, *_BEHIND)
 _MEASURED = ("metric", "value", "low", "high", "n")
+# A factor, and two of its values: a drive's own stage, or that of the query.
+STAGE = "both.stage"
+OWN, LAST = "own", "last"
 # What `Key` gives by name beside factors, which cannot have such a name.
 _NAMED = frozenset(("label", *KEYS, *_MEASURED))
 # Columns of a query -> what kind of value they have.

@@ -8,13 +8,10 @@ import numpy as np
 from threadpoolctl import threadpool_limits
 
 from cns_drake.base.jobs.step import Reporter
-from evaluation.change.drive_change import ChangeResult, Surveyed
-from evaluation.change.drive_change import compare as compare_maps
 from evaluation.drives import check_same_world
 from evaluation.drives.drive_views import MovedDrive
 from evaluation.drives.sampling import gather
 from evaluation.methods.method import Method
-from evaluation.recognition import place_recognition
 from evaluation.recognition.costs import Cost, measure_cost, query_ms
 from evaluation.recognition.description import (
     DescribedDrive,
@@ -23,6 +20,10 @@ from evaluation.recognition.description import (
 )
 from evaluation.recognition.overlap_truth import best_overlaps
 from evaluation.recognition.place_outcome import PlaceOutcome
+from evaluation.recognition.place_recognition import (
+    PlaceRecognition,
+    judge_retrieval,
+)
 from evaluation.recognition.protocol import RetrievalProtocol
 from evaluation.recognition.retrieval import compare as score
 from evaluation.recognition.retrieval import compare_with_gates
@@ -30,7 +31,6 @@ from evaluation.study.chosen_methods import MethodChoice
 from evaluation.study.parts import Part
 from evaluation.study.surveys import (
     DriveSource,
-    SurveyedDrive,
     describe_recording,
 )
 
@@ -52,43 +52,20 @@ _MANY = 5000
 _NUM_TRIALS = 12
 
 
-def measure_change(
-    reporter: Reporter,
-    map_name: str,
-    stages: tuple[str, str],
-    drives: tuple[Part, ...],
-) -> ChangeResult:
-    """Returns the change between two drives; they must be of one world.
-
-    The earlier, the later and maybe a control are each a `SurveyedDrive`.
-    """
-    del reporter
-    read: list[SurveyedDrive] = [part.read() for part in drives]
-    earlier, later, *controls = (
-        Surveyed(one.name, one.coarse, one.positions, one.placed)
-        for one in read
-    )
-    control = controls[0] if controls else None
-    report = compare_maps(earlier, later, control)
-    return ChangeResult(map_name, stages, report)
-
-
 def recognise_places(
     reporter: Reporter,
-    map_name: str,
-    stages: tuple[str, str],
+    names: tuple[str, str, str],
     described: tuple[Part, Part],
     choice: MethodChoice,
     protocol: RetrievalProtocol,
-) -> place_recognition.RecognitionResult | None:
+) -> PlaceRecognition | None:
     """Returns the result of a method on two drives of one world.
 
     It is None if a drive is compared with itself and closes no loop.
 
     Args:
         reporter: reports progress.
-        map_name: name of the map.
-        stages: stages of the database and of the query.
+        names: those of the map, and of the stages of database and query.
         described: descriptions of the database and of the query.
         choice: the method.
         protocol: protocol of the comparison.
@@ -103,10 +80,9 @@ def recognise_places(
         # A route need not close a loop.
         reporter.note(f"{query.name}: it never comes back to where it was")
         return None
-    outcome = place_recognition.judge_retrieval(
-        method, database.name, query.name, retrieval, protocol
+    return judge_retrieval(
+        method, database.name, query.name, retrieval, protocol, pair=names
     )
-    return place_recognition.RecognitionResult.of(map_name, stages, outcome)
 
 
 def measure_costs(

@@ -240,33 +240,25 @@ class Study:
         drives = [*pair, *(one for one in both if one not in pair)]
         earlier, later = pair
         surveys = tuple(self._files.survey(one.name) for one in drives)
-        change = self._files.part("changes", earlier.name, later.name)
-        names = figures.change_stems(city, pair)
-        stems = tuple(self._files.figures / name for name in names)
-        steps = (
-            MakePart(
-                change,
-                measurements.measure_change,
-                (
-                    city.name,
-                    (earlier.stage, later.stage),
-                    tuple(one.drive for one in surveys),
-                ),
+        stems = tuple(
+            self._files.figures / name
+            for name in figures.change_stems(city, pair)
+        )
+        step = MakePart(
+            self._files.part("changes", earlier.name, later.name),
+            figures.compare_stages,
+            (
+                city.name,
+                (earlier.stage, later.stage),
+                tuple(one.drive for one in surveys),
+                (surveys[0].fine, surveys[1].fine),
+                stems,
             ),
-            MakePart(
-                self._files.part("figures", names[0]),
-                figures.draw_changes,
-                (
-                    change,
-                    tuple((one.drive, one.fine) for one in surveys[:2]),
-                    stems,
-                ),
-                figures.figure_files(*stems),
-            ),
+            figures.figure_files(*stems),
         )
         return Job(
             f"change {city.name} {earlier.stage} > {later.stage}",
-            Steps(change.path, steps),
+            step,
             _survey_names(drives),
             _DRAWING_COST,
         )
@@ -286,8 +278,7 @@ class Study:
                 self._result(pair, run.queries),
                 measurements.recognise_places,
                 (
-                    city.name,
-                    (database.stage, query.stage),
+                    (city.name, database.stage, query.stage),
                     (
                         surveys[0].described(run.places),
                         surveys[1].described(run.queries),

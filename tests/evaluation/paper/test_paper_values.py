@@ -33,7 +33,7 @@ def result(method, mode_protocol, pair=("riverside", "01", "02")):
     return SimpleNamespace(
         pair=pair,
         method=method,
-        outcome=SimpleNamespace(protocol=mode_protocol),
+        protocol=mode_protocol,
     )
 
 

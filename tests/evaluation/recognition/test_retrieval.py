@@ -213,7 +213,7 @@ def test_metrics_of_a_pair(tmp_path):
         "place": None,
         "sequence": 0.0,
     }
-    filtered = result.counting("filtered").to_json()
+    filtered = replace(result, mode="filtered").to_json()
     assert filtered["mode"] == "filtered"
     assert filtered["f1_max"] == pytest.approx(2 * 0.75 / 1.75)
     assert len(values["recall_at_n"]) == 25

@@ -234,7 +234,7 @@ def test_drives_of_two_worlds_are_not_compared(tmp_path, recorded):
     survey(other, (solid,), surveys[1])
     part = Part(tmp_path / "results" / "solid.data")
     described = tuple(survey.described(solid.name) for survey in surveys)
-    arguments = "metropolis", ("01", "04"), described, solid, PAPER_PROTOCOL
+    arguments = ("metropolis", "01", "04"), described, solid, PAPER_PROTOCOL
     step = MakePart(part, recognise_places, arguments)
     with pytest.raises(InputError, match="poses in frame 'utm'"):
         step.run(Reporter())
