@@ -92,11 +92,9 @@ def paper() -> Reference:
     }
     return Reference(
         title=_TITLE,
-        counting=(
-            "counted as the paper seems to have done: RING++ on the queries"
-            " that have a match (mode filtered), the others on all (mode all)",
-            "the paper (RING++ filtered, others all)",
-        ),
+        counting="counted as the paper seems to have done: RING++ on the"
+        " queries that have a match (mode filtered), the others on all (mode"
+        " all)",
         changes=changes,
         # Real drives, four years apart.
         further=[("kaist (real)", "01 ↔ 06", changes[_KAIST])],

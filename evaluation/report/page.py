@@ -17,9 +17,10 @@ from urllib.parse import quote
 import jinja2
 from markupsafe import Markup
 from matplotlib import colormaps
-from matplotlib.colors import to_hex
+from matplotlib.colors import to_hex, to_rgb
 import numpy as np
 
+from cns_drake.base.errors import InputError
 from cns_drake.base.files import write_text
 from evaluation.change.drive_change import ChangeResult, symmetric_changes
 from evaluation.recognition.costs import Cost
@@ -28,10 +29,16 @@ from evaluation.recognition.metrics import MODES, Mode
 from evaluation.recognition.place_recognition import PlaceRecognition
 from evaluation.report import result_tables, rows
 from evaluation.report.figures import ROUTE_COLOURS
-from evaluation.report.page_data import Illustration, PageDrive, browser_data
+from evaluation.report.page_data import (
+    Illustration,
+    PageDrive,
+    Section,
+    browser_data,
+)
 from evaluation.report.reference import NO_REFERENCE, Reference
-from evaluation.results.charts import styles, titled
-from evaluation.results.table import RESULTS, Results
+from evaluation.results.charts import draw, styles, titled
+from evaluation.results.drawing import save
+from evaluation.results.table import RESULTS, STAGE, Results
 from evaluation.results.table_forms import (
     MISSING,
     Table,
@@ -60,6 +67,14 @@ _NUM_PIECES = 48
 _MARK = 0.016
 # Length of the scale bar [m].
 _BAR_LENGTH = 50.0
+_SCATTER = {"kind": "scatter", "x": "tcr_sym", "y": "auc"}
+_DUMBBELL = {"kind": "dumbbell", "over": STAGE, "metric": "auc"}
+_SURVIVAL = (
+    "AUC without the change (hollow) and with it (filled), and the share that"
+    " is kept"
+)
+# Width of charts [px].
+_WIDTH = 480
 
 
 @dataclass
@@ -123,6 +138,49 @@ class Report:
         """Results for which the reference has published numbers."""
         known = filter(self.reference.covers, self.recognitions)
         return [*known, *self.repeated]
+
+
+def chart_illustrations(report: Report, folder: Path) -> list[Illustration]:
+    """Draws the charts over all cities; returns those that have data.
+
+    The charts of a reference stand next to ours.
+    """
+    name = "AUC against TCR_sym"
+    charts: list[tuple[str, str, Section, dict[str, str], Results]] = [
+        ("auc_over_tcr", name, "figures", _SCATTER, report.results)
+    ]
+    if report.compared:
+        published = report.reference.to_results()
+        name = f"{name}, of {report.reference.title}"
+        stem = "auc_over_tcr_published"
+        charts.insert(0, (stem, name, "figures", _SCATTER, published))
+    if any(control for _, control in report.pairs):
+        charts.append(
+            ("survival", _SURVIVAL, "survival", _DUMBBELL, report.results)
+        )
+    shown = []
+    for stem, words, section, chart, results in charts if report.pairs else ():
+        gates = {"gate": tuple(results.distinct("gate"))}
+        try:
+            drawn = draw({**chart, **gates}, results, _WIDTH, alone=True)
+        except InputError as error:
+            report.notes = [*report.notes, f"{words}: left out: {error}"]
+            continue
+        save(drawn.figure, folder / stem)
+        legend = []
+        for label, (colour, *_) in drawn.legend.items():
+            red, green, blue = (round(255 * part) for part in to_rgb(colour))
+            legend.append(((red, green, blue), label))
+        shown.append(
+            Illustration(
+                folder / stem,
+                words,
+                "svg",
+                section=section,
+                legend=tuple(legend),
+            )
+        )
+    return shown
 
 
 def write_report(report: Report, folder: Path) -> Path:

@@ -44,9 +44,8 @@ class Reference:
 
     Attributes:
         title: the source's name in the report.
-        counting: the modes in which the source counted its methods, in words
-            for a caption and in brief for a figure; used only if something is
-            published.
+        counting: the modes in which the source counted its methods, in words;
+            used only if something is published.
         changes: (map, earlier stage, later stage) -> TCR_sym.
         further: changes elsewhere to compare with: label, stages and TCR_sym.
         recognitions: (map, database, query, method, mode) -> numbers; each
@@ -59,7 +58,7 @@ class Reference:
     """
 
     title: str = ""
-    counting: tuple[str, str] = ("", "")
+    counting: str = ""
     changes: Mapping[tuple[str, str, str], float] = field(default_factory=dict)
     further: Sequence[tuple[str, str, float]] = ()
     recognitions: Mapping[tuple[str, str, str, str, Mode], Published] = field(

@@ -206,7 +206,7 @@ def recognition_table(
         name = " → ".join(pair[1:])
         rows.append((pair[0], name, tcr.get(pair), visible, *cells))
     captions = {
-        None: f", {reference.counting[0]}",
+        None: f", {reference.counting}",
         "all": ", all queries counted (mode all)",
         "filtered": ", only queries counted that have a match (mode filtered)",
     }

@@ -15,8 +15,8 @@ from evaluation.methods.method import Method
 from evaluation.recognition.costs import Cost, measure_cost, query_ms
 from evaluation.recognition.description import (
     DescribedDrive,
-    DescribedScans,
     Role,
+    joined_scans,
 )
 from evaluation.recognition.overlap_truth import best_overlaps
 from evaluation.recognition.place_outcome import PlaceOutcome
@@ -38,9 +38,6 @@ from evaluation.study.surveys import (
 # each method.
 DescribedSource: TypeAlias = "DriveSource | tuple[Part, ...]"
 
-# Distance between a city and the next distracting one [m]. No scan reaches so
-# far.
-_APART = 1e5
 # Queries whose time is measured, and the longest time for all queries at a size
 # [ms].
 TIMED = 9
@@ -256,23 +253,15 @@ def crowded(
     Returns:
         The drive, and the name of the drive of each place.
     """
-    known, poses = [database], [database.places.X_WS]
+    known = [database]
     for parts in distractors:
         if sum(len(d.places.frames) for d in known[1:]) >= num_others:
             break
-        other = parts[method].read()[1]
-        X_WS = other.places.X_WS.copy()
-        X_WS[:, 0, 3] += len(known) * _APART
-        known.append(other)
-        poses.append(X_WS)
-    every = [one.places for one in known]
-    end = len(database.places.frames) + num_others
-    joined = DescribedScans(
-        frames=np.concatenate([one.frames for one in every])[:end],
-        stamps_ns=np.concatenate([one.stamps_ns for one in every])[:end],
-        X_WS=np.concatenate(poses)[:end],
-        descriptors=[d for one in every for d in one.descriptors][:end],
-        clouds=[cloud for one in every for cloud in one.clouds][:end],
+        known.append(parts[method].read()[1])
+    places = joined_scans(
+        [one.places for one in known],
+        range(len(known)),
+        len(database.places.frames) + num_others,
     )
     drives = [one.name for one in known for _ in one.places.frames]
-    return replace(database, places=joined), drives
+    return replace(database, places=places), drives

@@ -15,7 +15,7 @@ from cns_drake.base.version import __version__
 from evaluation.recognition.description import Role
 from evaluation.recognition.protocol import FAIR_PROTOCOL, RetrievalProtocol
 from evaluation.report import page, result_tables
-from evaluation.report.curve_figures import chart_illustrations, draw_pr_curves
+from evaluation.report.curve_figures import draw_pr_curves
 from evaluation.report.reference import NO_REFERENCE, Reference
 from evaluation.study import figures, measurements
 from evaluation.study.chosen_methods import MethodChoice, choose_methods
@@ -135,7 +135,7 @@ class Study:
         report.differences = result_tables.method_differences(
             report.recognitions
         )
-        for shown in chart_illustrations(report, folder):
+        for shown in page.chart_illustrations(report, folder):
             report.illustrations.insert(0, shown)
         if self._costed_pairs:
             report.costs = self._files.part("costs", "costs").read()
@@ -338,11 +338,8 @@ class Study:
                 elif result is not None:
                     compared.append(result)
                     if pair[0] is not pair[1]:
-                        unchanged = None
-                        if control is not None:
-                            beside = self._result(control, run.queries)
-                            unchanged = beside.read()
-                        report.pairs.append((result, unchanged))
+                        beside = control and self._result(control, run.queries)
+                        report.pairs.append((result, beside and beside.read()))
             evidence = self._evidence(pair).read()
             if evidence is not None:
                 report.evidence[pair[0].name, pair[1].name] = evidence
