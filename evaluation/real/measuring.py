@@ -20,7 +20,7 @@ from cns_drake.base.progress import Track
 from evaluation.clouds.cloud_files import OnNote
 from evaluation.drives import Drive
 from evaluation.localisation import estimators, localise
-from evaluation.maps.voxel_maps import VoxelAccumulator
+from evaluation.maps.voxel_maps import map_drive
 from evaluation.methods import Method, make_method, shipped_methods
 from evaluation.methods.method import load_method
 from evaluation.real.data_sets import (
@@ -294,11 +294,10 @@ class Measuring:
             apart[k] = math.inf
             if apart.min() > localise.NEAR:
                 continue
-            mapped = VoxelAccumulator(estimators.Settings.voxel)
-            for other in np.flatnonzero(apart < _AROUND).tolist():
-                mapped.add(drive.scan(other), X_WS[other])
+            around = np.flatnonzero(apart < _AROUND).tolist()
+            mapped = map_drive(drive, estimators.Settings.voxel, frames=around)
             surroundings = estimators.map_of(
-                mapped.to_map().centroids_W, one.name, estimators.Settings()
+                mapped.centroids_W, one.name, estimators.Settings()
             )
             for name, (estimator, settings) in self._estimators.items():
                 by = localise.Localiser(surroundings, estimator, settings)

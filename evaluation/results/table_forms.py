@@ -129,7 +129,7 @@ class Table:
         )
 
     def to_csv(self) -> str:
-        """Returns the table as CSV with all digits, without its groups."""
+        """Returns the table as CSV with all digits."""
         cells = (
             [
                 int(v) if isinstance(v, bool) else "" if _is_missing(v) else v
@@ -137,7 +137,7 @@ class Table:
             ]
             for row in self.rows
         )
-        return csv_text(self.header, cells)
+        return csv_text(self._full_names(), cells)
 
     def write_csv(self, path: Path) -> None:
         """Writes the table as CSV, as `to_csv` returns it.
