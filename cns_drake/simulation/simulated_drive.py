@@ -13,13 +13,12 @@ from functools import cached_property
 import numpy as np
 from pydrake.common.value import AbstractValue
 from pydrake.math import RigidTransform, RotationMatrix
-from pydrake.systems.analysis import Simulator
 from pydrake.systems.framework import Context
 
 from cns_drake.base import poses
 from cns_drake.base.drives.drive import Drive, index_instances
 from cns_drake.base.jobs.fingerprint import code_digest
-from cns_drake.motion.trajectory import Trajectory, pose_at
+from cns_drake.motion.trajectory import pose_at
 from cns_drake.ray_casting.ray_casting_scene import RayCastingScene
 from cns_drake.recording.messages import MAP_FRAME, to_quat_xyzw
 from cns_drake.recording.schedule import frame_stamp_ns
@@ -30,29 +29,75 @@ from cns_drake.scenarios.scenario_files import check_files, describe_scenario
 from cns_drake.scene.world import structures_in
 from cns_drake.sensors.carriers import sensor_pose
 from cns_drake.sensors.lidar.patterns import BeamPattern
-from cns_drake.simulation import loaded_drive, recording_schedule
+from cns_drake.simulation import loaded_drive
 from cns_drake.simulation.station import make_station
 
 
-class PlannedDrive(Drive):
-    """The contents of a scenario's recording, except its scans.
+@dataclass(frozen=True)
+class DriveSimulation:
+    """Opens a scenario's drive, as seen by its first LiDAR."""
 
-    Frames are a period [s] apart; X_BS is the first LiDAR's pose in base_link.
+    scenario: Scenario
+
+    def __call__(self) -> SimulatedDrive:
+        return SimulatedDrive(self.scenario)
+
+    def identity(self) -> dict:
+        """Returns the scenario, with digests of its files and of the code."""
+        return {
+            "simulated": self.scenario.model_dump(mode="json"),
+            "inputs": digest_inputs(self.scenario),
+            "code": code_digest(__name__, without=("cns_drake.pictures",)),
+        }
+
+
+class SimulatedDrive(Drive):
+    """The scans of a scenario, as in its recording.
+
+    A scan is simulated on each access. Frames are a period [s] apart; X_BS is
+    the first LiDAR's pose in base_link. `structures` has the names of all
+    structures in the world.
     """
 
-    # Each kind of drive sets it when its world is loaded.
-    _instances: Mapping[int, Mapping]
+    def __init__(self, scenario: Scenario):
+        """Loads the stage and plans the drive.
 
-    def __init__(
-        self, scenario: Scenario, trajectory: Trajectory, num_frames: int
-    ):
+        Raises:
+            InputError: the scenario cannot be run.
+        """
+        check_files(scenario)
+        trajectory = plan_drive(scenario)
+        world, traffic, trajectory = loaded_drive.load_stage_and_traffic(
+            scenario, trajectory
+        )
         self.name = scenario.name
         self.world_frame = MAP_FRAME
         self.trajectory = trajectory
         self.period = scenario.frame_period
         self.X_BS = sensor_pose(next(iter(scenario.lidars.values())))
         self._scenario = scenario
-        self._num_frames = num_frames
+        self._num_frames = count_frames(scenario, trajectory)
+        self._instances = index_instances(
+            loaded_drive.structure_list(world), self.name
+        )
+        self.structures = structures_in(world)
+        self._diagram = make_station(
+            scenario, world=world, trajectory=trajectory, traffic=traffic
+        )
+        self._context = self._diagram.CreateDefaultContext()
+        # The vehicle's motion, which the station computes with its wheels, is
+        # known beforehand.
+        self._base = world.plant.GetBodyByName("base_link", world.vehicle)
+        poses = self._diagram.GetSubsystemByName("frame_poses")
+        context = poses.GetMyMutableContextFromRoot(self._context)
+        port = poses.GetInputPort("body_poses")
+        self._X_WBodies = list(port.Eval(context))
+        self._fixed_poses = port.FixValue(
+            context, AbstractValue.Make(self._X_WBodies)
+        )
+        self._lidar = self._diagram.GetSubsystemByName(
+            next(iter(scenario.lidars))
+        )
 
     def __len__(self) -> int:
         return self._num_frames
@@ -97,115 +142,6 @@ class PlannedDrive(Drive):
     @property
     def instances(self) -> Mapping[int, Mapping]:
         return self._instances
-
-
-class DriveInProgress(PlannedDrive):
-    """The scans of the first LiDAR, at the time of their recording.
-
-    Reading a scan advances the simulation to its frame.
-    """
-
-    def __init__(self, drive: loaded_drive.LoadedDrive, simulator: Simulator):
-        """Takes the station of a drive before its first frame."""
-        super().__init__(drive.scenario, drive.trajectory, drive.num_frames)
-        self._instances = index_instances(
-            loaded_drive.structure_list(drive.world), self.name
-        )
-        self._simulator = simulator
-        self._lidar = next(iter(drive.scenario.lidars))
-        schedule = recording_schedule.drive_schedule(drive.scenario)
-        steps = schedule.steps[
-            recording_schedule.first_points_topic(drive.scenario)
-        ]
-        self._frame_period = float(schedule.tick * steps)
-        self._fault: BaseException | None = None
-
-    def raise_fault(self) -> None:
-        """Raises the simulation's exception again, if there was one."""
-        if self._fault is not None:
-            raise self._fault
-
-    def scan(self, index: int) -> np.ndarray:
-        """Simulates up to a frame and returns its scan.
-
-        Raises:
-            ValueError: the simulation is beyond the frame, or the vehicle is
-                not at its planned place.
-        """
-        simulator = self._simulator
-        try:
-            simulator.AdvanceTo(index * self._frame_period)
-        except BaseException as error:
-            self._fault = error
-            raise
-        context, diagram = simulator.get_context(), simulator.get_system()
-        X_WB = diagram.GetOutputPort("odometry").Eval(context).X_WB
-        if not X_WB.IsExactlyEqualTo(self.X_WBs[index]):
-            raise ValueError(
-                f"frame {index}: the vehicle is not at its planned place"
-            )
-        return diagram.GetOutputPort(f"{self._lidar}_scan").Eval(context)
-
-
-@dataclass(frozen=True)
-class DriveSimulation:
-    """Opens a scenario's drive, as seen by its first LiDAR."""
-
-    scenario: Scenario
-
-    def __call__(self) -> SimulatedDrive:
-        return SimulatedDrive(self.scenario)
-
-    def identity(self) -> dict:
-        """Returns the scenario, with digests of its files and of the code."""
-        return {
-            "simulated": self.scenario.model_dump(mode="json"),
-            "inputs": digest_inputs(self.scenario),
-            "code": code_digest(__name__, without=("cns_drake.pictures",)),
-        }
-
-
-class SimulatedDrive(PlannedDrive):
-    """The scans of a scenario, as in its recording.
-
-    A scan is simulated on each access. `structures` has the names of all
-    structures in the world.
-    """
-
-    def __init__(self, scenario: Scenario):
-        """Loads the stage and plans the drive.
-
-        Raises:
-            InputError: the scenario cannot be run.
-        """
-        check_files(scenario)
-        trajectory = plan_drive(scenario)
-        world, traffic, trajectory = loaded_drive.load_stage_and_traffic(
-            scenario, trajectory
-        )
-        num_frames = count_frames(scenario, trajectory)
-        super().__init__(scenario, trajectory, num_frames)
-        self._instances = index_instances(
-            loaded_drive.structure_list(world), self.name
-        )
-        self.structures = structures_in(world)
-        self._diagram = make_station(
-            scenario, world=world, trajectory=trajectory, traffic=traffic
-        )
-        self._context = self._diagram.CreateDefaultContext()
-        # The vehicle's motion, which the station computes with its wheels, is
-        # known beforehand.
-        self._base = world.plant.GetBodyByName("base_link", world.vehicle)
-        poses = self._diagram.GetSubsystemByName("frame_poses")
-        context = poses.GetMyMutableContextFromRoot(self._context)
-        port = poses.GetInputPort("body_poses")
-        self._X_WBodies = list(port.Eval(context))
-        self._fixed_poses = port.FixValue(
-            context, AbstractValue.Make(self._X_WBodies)
-        )
-        self._lidar = self._diagram.GetSubsystemByName(
-            next(iter(scenario.lidars))
-        )
 
     @property
     def pattern(self) -> BeamPattern:

@@ -9,7 +9,6 @@ import time
 from pydrake.systems.analysis import Simulator
 from pydrake.systems.framework import Context, Diagram
 
-from cns_drake.base.drives.drive import Drive
 from cns_drake.base.files import check_writable, write_text
 from cns_drake.base.interrupts import interrupts_wait
 from cns_drake.base.version import __version__
@@ -32,7 +31,6 @@ from cns_drake.sensors.carriers import sensor_pose
 from cns_drake.sensors.imu.config import KALIBR_FILE
 from cns_drake.sensors.lidar.config import describe_unit
 from cns_drake.simulation import loaded_drive, recording_schedule
-from cns_drake.simulation.simulated_drive import DriveInProgress
 from cns_drake.simulation.station import make_station
 
 # Reports how many frames of how many are done.
@@ -84,7 +82,6 @@ def simulate(
     graphviz_file: Path | str | None = None,
     overwrite: bool = False,
     num_threads: int = 1,
-    reader: Callable[[Drive], None] | None = None,
     on_frame: ProgressCallback = lambda done, total: None,
     on_note: NoteCallback = lambda text: None,
 ) -> Run:
@@ -102,10 +99,6 @@ def simulate(
         overwrite: whether to replace an existing recording of that name.
         num_threads: number of threads that cast the rays of a LiDAR; the
             recording does not depend on it.
-        reader: reads the drive while it is recorded, each scan of the first
-            LiDAR once and in order, and must not raise. Scans that it does not
-            read are simulated all the same. It is called only for a recording
-            that begins with the first frame.
         on_frame: called with the progress.
         on_note: called with notes for the user, on an interrupted run or on the
             world's table of structures.
@@ -163,7 +156,7 @@ def simulate(
             strike()
             loaded = time.perf_counter()
             simulated_s = _advance(
-                diagram, writer, drive, resumed_frames, report_frames, reader
+                diagram, writer, drive, resumed_frames, report_frames
             )
         finished = time.perf_counter()
         if page is not None and page_file is not None:
@@ -289,7 +282,6 @@ def _advance(
     drive: loaded_drive.LoadedDrive,
     first: int,
     on_frame: Callable[[int], None],
-    reader: Callable[[Drive], None] | None,
 ) -> float:
     """Simulates frames and writes their messages.
 
@@ -317,9 +309,5 @@ def _advance(
     start = max(begin - 0.5, 0.0) * schedule.period
     simulator.get_mutable_context().SetTime(start)
     with writer:
-        if reader is not None and first == 0:
-            in_progress = DriveInProgress(drive, simulator)
-            reader(in_progress)
-            in_progress.raise_fault()
         simulator.AdvanceTo((end + 0.5) * schedule.period)
     return (end - begin) * schedule.period

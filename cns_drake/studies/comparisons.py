@@ -2,16 +2,18 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 import math
 import re
 from typing import Any
 
+from cns_drake.base.csv_files import read_records
 from cns_drake.base.errors import InputError, validated
 from cns_drake.base.jobs.fingerprint import fingerprint
 from cns_drake.scenarios.scenario import Scenario
 from cns_drake.scenarios.scenario_files import map_folder
+from cns_drake.scenarios.shipped import worlds_folder
 from cns_drake.scenarios.variation import Family, vary
 from cns_drake.sensors.lidar.config import WeatherConfig
 from cns_drake.simulation.loaded_drive import load_ways
@@ -26,7 +28,7 @@ from cns_drake.studies.experiment import (
 )
 from cns_drake.traffic.vehicles import room_for_vehicles
 from evaluation.recognition.protocol import RetrievalProtocol
-from evaluation.report.rows import LAST, OWN
+from evaluation.results.table import LAST, OWN
 
 # Fields of a side that are no fields of a scenario.
 FAMILY_FIELDS = ("missing", "scattered", "towards")
@@ -53,6 +55,8 @@ VIEWPOINTS: Mapping[str, tuple[float, float]] = {
 _MOST_ROOM = 0.5
 # Likewise for a car that follows others, since all wait for each other.
 _FOLLOWED_ROOM = 0.25
+# Columns of a table of frozen drives.
+_FROZEN = ("map", "level", "drives")
 
 
 class MissingError(Exception):
@@ -512,3 +516,40 @@ def moved(
             rpy_deg=(roll, pitch, yaw + heading_deg),
         )
     return drive.replaced(lidars=lidars)
+
+
+def frozen_drives(table: str) -> dict[tuple[str, int], str]:
+    """Returns (map, level) -> fingerprint of the drives when frozen.
+
+    Args:
+        table: a file of the shipped worlds.
+
+    Raises:
+        InputError: there is no such file.
+    """
+    rows = read_records(worlds_folder() / table, _FROZEN)
+    return {(row["map"], int(row["level"])): row["drives"] for _, row in rows}
+
+
+def check_frozen(
+    table: str, compared: Mapping[tuple[str, int], Sequence[str]]
+) -> None:
+    """Checks that drives of frozen conditions still have their fingerprints.
+
+    Maps that the table lacks are not checked.
+
+    Args:
+        table: a file of the shipped worlds.
+        compared: (map, level) -> fingerprints of what is compared.
+
+    Raises:
+        InputError: one is another.
+    """
+    frozen = frozen_drives(table)
+    for (name, level), prints in compared.items():
+        wanted = frozen.get((name, level))
+        if wanted not in (None, fingerprint({"drives": list(prints)})):
+            raise InputError(
+                f"{table}: level {level} of {name}: the experiment's drives are"
+                " not the frozen ones; leave out `frozen` to measure them"
+            )

@@ -322,9 +322,7 @@ def _override(text: str) -> dict[str, Any]:
         parsed = parse_yaml(value)
     except ValueError as error:
         raise InputError(f"--set: {name}: {error}") from None
-    for part in reversed(name.split(".")):
-        parsed = {part: parsed}
-    return parsed
+    return _nested(name, parsed)
 
 
 def merged(values: Any, changes: Any) -> Any:

@@ -8,7 +8,6 @@ from pathlib import Path
 import shutil
 import sys
 
-from cns_drake.base.drives.drive import Drive
 from cns_drake.base.errors import InputError
 from cns_drake.base.files import make_folder, read_bytes, user_errors
 from cns_drake.base.jobs.cluster import Cluster
@@ -26,7 +25,6 @@ from cns_drake.scenarios.scenario import Scenario
 from cns_drake.scenarios.scenario_files import world_file
 from cns_drake.simulation.simulation import simulate
 from evaluation.study.parts import Part
-from evaluation.study.surveys import RecordingSurvey, Survey
 
 # Expected time to load a stage, and to simulate a frame with the default LiDAR
 # [s]; assumed frames of a drive without a number.
@@ -108,17 +106,12 @@ def plan_recordings(
 
 @dataclass(frozen=True)
 class Record(Step):
-    """Records a scenario, and saves a web page of the drive.
-
-    A survey is made during the simulation. After an interruption, the step that
-    needs the survey makes it.
-    """
+    """Records a scenario, and saves a web page of the drive."""
 
     scenario: Scenario
     folder: Path
     overwrite: bool = True
     page: Path | None = None
-    survey: Survey | None = None
 
     @property
     def output(self) -> Path:
@@ -130,35 +123,17 @@ class Record(Step):
     def run(self, reporter: Reporter) -> None:
         shown = None if self.page is None else self._shown()
         is_new = not is_recorded(self.scenario, self.folder)
-        survey = self.survey if is_new and self._is_first_read() else None
-        found: list[RecordingSurvey] = []
-
-        def read(drive: Drive) -> None:
-            assert survey is not None
-            # The survey's own job reports the error again.
-            with contextlib.suppress(Exception):
-                found.append(survey.find(drive, Reporter()))
-
         with self._place(is_new) as (folder, overwrite):
             simulate(
                 self.scenario,
                 folder,
                 page_file=self.page,
                 overwrite=overwrite,
-                reader=None if survey is None else read,
                 on_frame=reporter.progress,
                 on_note=reporter.note,
             )
-        for one in found:
-            assert survey is not None
-            survey.write(one)
         if shown is not None:
             self._page_part.write(shown, None)
-
-    def _is_first_read(self) -> bool:
-        """Returns whether the first LiDAR's scans are surveyed."""
-        first, *others = self.scenario.lidars
-        return first == "lidar" or not others
 
     @contextlib.contextmanager
     def _place(self, is_new: bool) -> Iterator[tuple[Path, bool]]:

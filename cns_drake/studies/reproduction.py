@@ -8,7 +8,7 @@ from cns_drake.base.drives.drive import driven_way
 from cns_drake.base.errors import InputError
 from cns_drake.base.files import make_folder
 from cns_drake.base.jobs.cluster import Cluster
-from cns_drake.base.jobs.running import Job, run_jobs
+from cns_drake.base.jobs.running import run_jobs
 from cns_drake.base.map_folder import MapFolder
 from cns_drake.scenarios import scenario_files
 from cns_drake.scenarios.scenario import Scenario
@@ -16,13 +16,12 @@ from cns_drake.scenarios.shipped import recordable_map, recordable_maps
 from cns_drake.simulation.simulated_drive import DriveSimulation
 from cns_drake.studies.comparisons import control_drive
 from cns_drake.studies.map_pictures import plan_pictures
-from cns_drake.studies.recording import Record, is_recorded, plan_recordings
+from cns_drake.studies.recording import is_recorded, plan_recordings
 from evaluation.paper import reference_for
 from evaluation.recognition.protocol import FAIR_PROTOCOL, RetrievalProtocol
 from evaluation.study.chosen_methods import choose_methods
 from evaluation.study.collection import RecordingInfo
 from evaluation.study.plan import Study
-from evaluation.study.surveys import Survey
 
 
 def reproduce_maps(
@@ -99,25 +98,13 @@ def reproduce_maps(
         with_costs,
         reference_for(folder.name for folder in folders),
     )
-    measuring = study.jobs()
-    jobs = [_surveyed(job, measuring) for job in jobs]
-    run_jobs([*jobs, *measuring, *pictures], cluster)
+    run_jobs([*jobs, *study.jobs(), *pictures], cluster)
     addresses = {
         name: f"../pages/{page.name}"
         for name, page in pages.items()
         if page.is_file()
     }
     return study.assemble(addresses, on_note)
-
-
-def _surveyed(recording: Job, study: Sequence[Job]) -> Job:
-    """Returns the job of a recording, which makes the survey as well."""
-    for job in study:
-        if recording.name in job.needs and isinstance(job.step, Survey):
-            assert isinstance(recording.step, Record)
-            step = replace(recording.step, survey=job.step)
-            return replace(recording, step=step, cost=recording.cost + job.cost)
-    return recording
 
 
 def _drives(folder: Path) -> list[Scenario]:

@@ -13,6 +13,7 @@ from cns_drake.base.errors import InputError, did_you_mean
 from cns_drake.base.files import make_folder
 from cns_drake.base.jobs.cluster import Cluster
 from cns_drake.base.jobs.fingerprint import fingerprint
+from cns_drake.base.jobs.processes import nothing_left
 from cns_drake.base.jobs.running import Job, run_jobs
 from cns_drake.base.map_folder import MapFolder
 from cns_drake.base.process import num_cores
@@ -30,8 +31,8 @@ from cns_drake.studies.comparisons import (
     MissingError,
     PairOfDrives,
     beside,
+    check_frozen,
 )
-from cns_drake.studies.elsewhere import distracting_drives
 from cns_drake.studies.experiment import (
     CAUSE,
     FRESH,
@@ -45,23 +46,27 @@ from cns_drake.studies.experiment import (
     conditions,
     method_variants,
 )
-from cns_drake.studies.frozen import check_frozen
-from cns_drake.studies.made_maps import MadeMaps, made_map_step
+from cns_drake.studies.made_maps import (
+    MadeMaps,
+    distracting_drives,
+    made_map_step,
+)
 from cns_drake.studies.recording import is_recorded
 from cns_drake.studies.redrawing import draw_fresh_cities, make_maps
 from cns_drake.studies.tasks.change import ChangeTask
-from cns_drake.studies.tasks.cost import CostTask
 from cns_drake.studies.tasks.localise import LocaliseTask
-from cns_drake.studies.tasks.place import PlaceTask, PoseTask
+from cns_drake.studies.tasks.place import CostTask, PlaceTask, PoseTask
 from cns_drake.studies.tasks.task import Jobs, NamedDrive, Pair, Task
 from cns_drake.studies.tasks.update import MapTask
 from evaluation.methods import optional_methods
 from evaluation.recognition.protocol import RetrievalProtocol
-from evaluation.report.rows import LAST, OWN, STAGE
 from evaluation.results.page import write_page
 from evaluation.results.table import (
+    LAST,
+    OWN,
     QUERIES,
     RESULTS,
+    STAGE,
     Answers,
     QueryRows,
     Results,
@@ -133,7 +138,6 @@ def run_study(
     cluster: Cluster,
     maps: Sequence[str] = (),
     *,
-    own_methods: Sequence[Path] = (),
     source: str = "",
     on_note: Callable[[str], None] = lambda text: None,
 ) -> Path:
@@ -148,7 +152,6 @@ def run_study(
         output: folder of the results.
         cluster: does the work.
         maps: maps in place of the experiment's.
-        own_methods: Python files of further methods.
         source: file of the experiment, for errors.
         on_note: takes notes on what is left out, and how long it takes.
 
@@ -164,7 +167,6 @@ def run_study(
         output.absolute(),
         source or experiment.name,
         cluster,
-        tuple(own_methods),
         on_note,
     )
     return study.run(maps)
@@ -178,7 +180,6 @@ class Study:
     output: Path
     source: str
     cluster: Cluster
-    own_methods: tuple[Path, ...] = ()
     on_note: Callable[[str], None] = lambda text: None
 
     def __post_init__(self) -> None:
@@ -241,9 +242,7 @@ class Study:
     def _choose_methods(self) -> dict[str, tuple[MethodChoice, MethodVariant]]:
         """Returns key -> method of the experiment, with its variant."""
         wanted = self.experiment.methods
-        files = [*self.own_methods]
-        if wanted is not None:
-            files += [Path(one) for one in wanted if one.endswith(".py")]
+        files = [Path(one) for one in wanted or () if one.endswith(".py")]
         known = {one.name: one for one in choose_methods(files)}
         if wanted is None:
             wanted = {name: {} for name in known}
@@ -549,7 +548,9 @@ class Study:
         longest = _LONG * workers
         if sum(job.cost for job in jobs.values()) <= longest:
             return
-        left = sum(job.cost for job in jobs.values() if not _is_done(job))
+        left = sum(
+            job.cost for job in jobs.values() if not nothing_left(job.step)
+        )
         if left > longest:
             hours = left / workers / 3600.0
             self.on_note(
@@ -626,13 +627,6 @@ class Study:
     def _protocol_of(self, condition: Condition) -> RetrievalProtocol:
         fields = condition.changes.get("protocol", {})
         return base_protocol(fields, self.source)
-
-
-def _is_done(job: Job) -> bool:
-    try:
-        return job.step.is_done()
-    except InputError:
-        return False  # It needs what another job has yet to write.
 
 
 def _recording(info: RecordingInfo) -> NamedDrive:

@@ -523,25 +523,25 @@ def make_weights(
     }
     write_weights(output, values, (least, float(seen.max())), made_by)
     picture = output.with_suffix(".png")
-    _draw_curve(curve, picture)
+    _draw_curve(curve, picture.with_suffix(""))
     return picture
 
 
-def _draw_curve(curve: np.ndarray, path: Path) -> None:
+def _draw_curve(curve: np.ndarray, stem: Path) -> None:
     """Draws the loss, and the share of right best places, over the steps."""
     from matplotlib.figure import Figure
+
+    from evaluation.results.drawing import save
 
     size = max(1, len(curve) // 40)
     kept = curve[: len(curve) // size * size].reshape(-1, size, 2).mean(axis=1)
     steps = (np.arange(len(kept)) + 0.5) * size
-    figure = Figure(figsize=(6.0, 3.2), layout="constrained")
-    axes = figure.subplots()
-    axes.plot(steps, kept[:, 0], color="#0072B2")
-    axes.set(xlabel="step", ylabel="loss", ylim=(0.0, None))
-    axes.yaxis.label.set_color("#0072B2")
-    other = axes.twinx()
-    other.plot(steps, kept[:, 1], color="#D55E00", linestyle="--")
-    other.set(ylabel="right best places in a batch", ylim=(0.0, 1.0))
-    other.yaxis.label.set_color("#D55E00")
-    with completing(path) as part:
-        figure.savefig(part, format="png", dpi=130)
+    figure = Figure(figsize=(6.0, 4.2), layout="constrained")
+    loss, right = figure.subplots(2, 1, sharex=True)
+    loss.plot(steps, kept[:, 0])
+    right.plot(steps, kept[:, 1])
+    loss.set(ylabel="loss", ylim=(0.0, None))
+    right.set(
+        xlabel="step", ylabel="right best places in a batch", ylim=(0.0, 1.0)
+    )
+    save(figure, stem, ("png",))

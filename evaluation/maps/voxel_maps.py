@@ -8,6 +8,7 @@ voxel is represented by the centroid of its points.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -402,11 +403,12 @@ def map_drive(
     drive: Drive,
     voxel_size: float = VOXEL_SIZE,
     track: Track = silent,
+    frames: Sequence[int] | None = None,
 ) -> VoxelMap:
-    """Returns the voxel map of all scans of a drive, in the world frame.
+    """Returns the voxel map of scans of a drive, in the world frame.
 
     Scans are read once, one at a time. The default voxel size is the one for
-    which structural change is defined.
+    which structural change is defined; by default all frames are mapped.
 
     Raises:
         InputError: if a scan or a pose cannot be read.
@@ -418,9 +420,9 @@ def map_drive(
     """
     accumulator = VoxelAccumulator(voxel_size)
     X_WS = drive.X_WS
-    indices = track(range(len(drive)), f"mapping {drive.name}", len(drive))
-    for index in indices:
-        accumulator.add(drive.scan(index), X_WS[index])
+    frames = range(len(drive)) if frames is None else frames
+    for frame in track(frames, f"mapping {drive.name}", len(frames)):
+        accumulator.add(drive.scan(frame), X_WS[frame])
     return accumulator.to_map()
 
 

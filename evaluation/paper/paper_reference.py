@@ -17,7 +17,7 @@ import numpy as np
 
 from evaluation.change.drive_change import ChangeResult, symmetric_changes
 from evaluation.recognition.metrics import Mode
-from evaluation.recognition.place_recognition import RecognitionResult
+from evaluation.recognition.place_recognition import PlaceRecognition
 from evaluation.recognition.protocol import PAPER_PROTOCOL
 from evaluation.report.reference import (
     NO_REFERENCE,
@@ -92,11 +92,9 @@ def paper() -> Reference:
     }
     return Reference(
         title=_TITLE,
-        counting=(
-            "counted as the paper seems to have done: RING++ on the queries"
-            " that have a match (mode filtered), the others on all (mode all)",
-            "the paper (RING++ filtered, others all)",
-        ),
+        counting="counted as the paper seems to have done: RING++ on the"
+        " queries that have a match (mode filtered), the others on all (mode"
+        " all)",
         changes=changes,
         # Real drives, four years apart.
         further=[("kaist (real)", "01 ↔ 06", changes[_KAIST])],
@@ -117,7 +115,7 @@ def _rows(name: str) -> list[dict[str, str]]:
 
 
 def _judge(
-    results: Sequence[RecognitionResult], changes: Sequence[ChangeResult]
+    results: Sequence[PlaceRecognition], changes: Sequence[ChangeResult]
 ) -> list[Judgement]:
     found = (
         (f"What {_TITLE} claims", findings(results, changes)),
@@ -151,7 +149,7 @@ class Trend:
 
 
 def findings(
-    results: Sequence[RecognitionResult], changes: Sequence[ChangeResult]
+    results: Sequence[PlaceRecognition], changes: Sequence[ChangeResult]
 ) -> list[Finding]:
     """Returns which of the paper's findings hold, if there are data for them.
 
@@ -212,7 +210,7 @@ def paper_trend(method: str) -> Trend:
 
 
 def _trends(
-    results: Sequence[RecognitionResult],
+    results: Sequence[PlaceRecognition],
     tcr: Mapping[tuple[str, str, str], float],
     methods: Sequence[str],
 ) -> dict[str, Trend]:
@@ -220,7 +218,7 @@ def _trends(
     trends = {}
     for method in methods:
         points = [
-            (tcr[r.pair], r.metrics["all"].auc)
+            (tcr[r.pair], r.by_mode["all"].auc)
             for r in results
             if r.method == method
         ]
@@ -258,7 +256,7 @@ def _larger_than_real(changes: Sequence[ChangeResult]) -> Finding:
 
 
 def _ring_is_best(
-    results: Sequence[RecognitionResult], shown: Sequence[RecognitionResult]
+    results: Sequence[PlaceRecognition], shown: Sequence[PlaceRecognition]
 ) -> Finding:
     best = _best_methods(results)
     evidence = (
@@ -266,7 +264,7 @@ def _ring_is_best(
         f" {len(best)} pairs of the paper's cities, the best of the paper's"
         f" methods is {_listed(best)}. {_counted_alike(results)}"
     )
-    asked = shown[0].outcome.protocol.name
+    asked = shown[0].protocol.name
     if asked != "paper":
         words = f"By the protocol {asked} of the tables of all methods"
         evidence += f" {_counted_alike(shown, words)}"
@@ -280,7 +278,7 @@ def _ring_is_best(
 
 
 def _counted_alike(
-    results: Sequence[RecognitionResult],
+    results: Sequence[PlaceRecognition],
     words: str = "When all methods are counted alike",
 ) -> str:
     """Returns a sentence on the best methods if all count all queries."""
@@ -293,7 +291,7 @@ def _counted_alike(
 
 
 def _best_methods(
-    results: Sequence[RecognitionResult], mode: Mode | None = None
+    results: Sequence[PlaceRecognition], mode: Mode | None = None
 ) -> list[list[str]]:
     """Returns the methods of the greatest AUC on each pair.
 
@@ -378,7 +376,7 @@ def _part(number: int, total: int) -> str:
 
 
 def aims(
-    results: Sequence[RecognitionResult], changes: Sequence[ChangeResult]
+    results: Sequence[PlaceRecognition], changes: Sequence[ChangeResult]
 ) -> list[Finding]:
     """Returns whether each aim is met, if all pairs of the paper are there.
 
@@ -442,7 +440,7 @@ def aims(
 
 
 def _differences(
-    results: Sequence[RecognitionResult],
+    results: Sequence[PlaceRecognition],
 ) -> dict[tuple[str, str, str, str], float]:
     """Returns (map, database, query, method) -> AUC here less the paper's."""
     found = {}
@@ -451,7 +449,7 @@ def _differences(
         theirs = paper().values(result, mode)
         if theirs is not None:
             key = (*result.pair, result.method)
-            found[key] = result.metrics[mode].auc - theirs.auc
+            found[key] = result.by_mode[mode].auc - theirs.auc
     return found
 
 

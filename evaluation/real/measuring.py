@@ -20,7 +20,7 @@ from cns_drake.base.progress import Track
 from evaluation.clouds.cloud_files import OnNote
 from evaluation.drives import Drive
 from evaluation.localisation import estimators, localise
-from evaluation.maps.voxel_maps import VoxelAccumulator
+from evaluation.maps.voxel_maps import map_drive
 from evaluation.methods import Method, make_method, shipped_methods
 from evaluation.methods.method import load_method
 from evaluation.real.data_sets import (
@@ -30,8 +30,8 @@ from evaluation.real.data_sets import (
 )
 from evaluation.recognition.description import (
     DescribedDrive,
-    DescribedScans,
     describe_drive,
+    joined_scans,
 )
 from evaluation.recognition.metrics import UNKNOWN, Interval
 from evaluation.recognition.overlap_truth import best_overlaps
@@ -47,8 +47,6 @@ from evaluation.results.table import Answers, Key, QueryRows, Results, Row
 _SIMULATED = replace(FAIR_PROTOCOL, scans_per_place=1)
 # Every real scan is a query and a place.
 _REAL = replace(_SIMULATED, query_spacing=1e-6, place_spacing=1e-6)
-# Between worlds [m]. No scan reaches so far.
-_APART = 1e5
 # A study's default start [m, deg].
 _STARTS = localise.Starts(2.0, 10.0)
 # Scans this near make the map of a query [m].
@@ -223,6 +221,8 @@ class Measuring:
         )
         scans = [scan for part in parts for scan in part.scans]
         worlds = [part.world for part in parts for _ in part.scans]
+        known = list(dict.fromkeys(part.world for part in parts))
+        numbers = [known.index(part.world) for part in parts]
         is_known = np.ones((len(drive), len(scans)), bool)
         np.fill_diagonal(is_known, False)
         shown = [_REAL.query_scan(drive, k) for k in range(len(drive))]
@@ -231,7 +231,9 @@ class Measuring:
             self._track(methods, one.name, len(methods))
         ):
             own = parts[0].described[k]
-            places = _joined(parts, k)
+            places = joined_scans(
+                [part.described[k].places for part in parts], numbers
+            )
             both = compare_with_gates(
                 method,
                 replace(own, places=places),
@@ -292,11 +294,10 @@ class Measuring:
             apart[k] = math.inf
             if apart.min() > localise.NEAR:
                 continue
-            mapped = VoxelAccumulator(estimators.Settings.voxel)
-            for other in np.flatnonzero(apart < _AROUND).tolist():
-                mapped.add(drive.scan(other), X_WS[other])
+            around = np.flatnonzero(apart < _AROUND).tolist()
+            mapped = map_drive(drive, estimators.Settings.voxel, frames=around)
             surroundings = estimators.map_of(
-                mapped.to_map().centroids_W, one.name, estimators.Settings()
+                mapped.centroids_W, one.name, estimators.Settings()
             )
             for name, (estimator, settings) in self._estimators.items():
                 by = localise.Localiser(surroundings, estimator, settings)
@@ -340,21 +341,3 @@ class Measuring:
             known = [(n, v, UNKNOWN) for n, v in values.items() if v == v]
             number = found["patches"][0]
             self._add(one, "judge", group, known, number, database="simulated")
-
-
-def _joined(parts: Sequence[_Part], method: int) -> DescribedScans:
-    """Returns all places, those of other worlds far away."""
-    worlds = list(dict.fromkeys(part.world for part in parts))
-    every = [part.described[method].places for part in parts]
-    poses = []
-    for part, one in zip(parts, every, strict=True):
-        X_WS = one.X_WS.copy()
-        X_WS[:, 0, 3] += _APART * worlds.index(part.world)
-        poses.append(X_WS)
-    return DescribedScans(
-        frames=np.concatenate([one.frames for one in every]),
-        stamps_ns=np.concatenate([one.stamps_ns for one in every]),
-        X_WS=np.concatenate(poses),
-        descriptors=[d for one in every for d in one.descriptors],
-        clouds=[cloud for one in every for cloud in one.clouds],
-    )

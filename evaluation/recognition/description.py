@@ -1,6 +1,6 @@
 """Descriptions of a drive's places and queries, by methods."""
 
-from collections.abc import Callable, Iterable, Mapping, Set
+from collections.abc import Callable, Iterable, Mapping, Sequence, Set
 from dataclasses import dataclass, field
 from typing import Literal, TypeAlias, get_args
 
@@ -23,6 +23,8 @@ Request: TypeAlias = "tuple[Method, Set[Role], RetrievalProtocol]"
 # Number of merged scans of a cloud, of those before its frame, and fields of
 # its points.
 _Kind: TypeAlias = "tuple[int, int, tuple[str, ...]]"
+# Distance between two worlds of joined scans [m].
+_APART = 1e5
 
 
 @dataclass(frozen=True)
@@ -51,6 +53,29 @@ class DescribedScans:
     def p_WSs(self) -> np.ndarray:
         """(K, 3) positions of the sensor [m]."""
         return self.X_WS[:, :3, 3]
+
+
+def joined_scans(
+    every: Sequence[DescribedScans],
+    worlds: Iterable[int],
+    most: int | None = None,
+) -> DescribedScans:
+    """Returns the scans of several drives, by default all of them.
+
+    Those of the k-th world lie k times so far away that no scan reaches there.
+    """
+    poses = []
+    for one, world in zip(every, worlds, strict=True):
+        X_WS = one.X_WS.copy()
+        X_WS[:, 0, 3] += world * _APART
+        poses.append(X_WS)
+    return DescribedScans(
+        frames=np.concatenate([one.frames for one in every])[:most],
+        stamps_ns=np.concatenate([one.stamps_ns for one in every])[:most],
+        X_WS=np.concatenate(poses)[:most],
+        descriptors=[d for one in every for d in one.descriptors][:most],
+        clouds=[cloud for one in every for cloud in one.clouds][:most],
+    )
 
 
 @dataclass(frozen=True)

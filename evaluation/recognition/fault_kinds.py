@@ -6,7 +6,7 @@ import math
 
 import numpy as np
 
-from evaluation.recognition.place_recognition import RecognitionResult
+from evaluation.recognition.place_recognition import PlaceRecognition
 
 # The kinds in order of precedence: a wrong answer gets the first one that fits.
 FAULT_KINDS = (
@@ -87,7 +87,7 @@ def mean_visible_change(overlaps: np.ndarray) -> tuple[float, int]:
     return float(1.0 - known.mean()), len(known)
 
 
-def fault_kinds(result: RecognitionResult, evidence: PairEvidence) -> list[str]:
+def fault_kinds(result: PlaceRecognition, evidence: PairEvidence) -> list[str]:
     """Returns the reason for each query's wrong best place.
 
     Returns:
@@ -99,24 +99,21 @@ def fault_kinds(result: RecognitionResult, evidence: PairEvidence) -> list[str]:
         `changed` if a quarter of the surroundings has come or gone; `twin` if
         it fits the query as well as the right place does; else `elsewhere`.
     """
-    outcome = result.outcome
-    retrieval = outcome.retrieval
-    best = retrieval.best_places
-    distances = retrieval.distances[np.arange(len(best)), best]
+    retrieval = result.retrieval
     little = evidence.overlaps < _ENOUGH
     unseen = 1.0 - evidence.overlaps
     is_hidden = little & (evidence.hidden >= 0.5 * unseen)
     conditions = [
-        ~outcome.outcomes.has_match,
-        best < 0,
-        distances <= NEARLY * outcome.protocol.radius,
+        ~result.outcomes.has_match,
+        retrieval.best_places < 0,
+        retrieval.best_distances <= NEARLY * result.protocol.radius,
         is_hidden,
         little,
         evidence.changed >= MUCH_CHANGED,
         evidence.fits[result.method] >= evidence.right_fits,
     ]
     return np.where(
-        outcome.outcomes.is_right,
+        result.outcomes.is_right,
         "",
         np.select(conditions, FAULT_KINDS[:-1], FAULT_KINDS[-1]),
     ).tolist()

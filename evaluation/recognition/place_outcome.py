@@ -85,9 +85,8 @@ class PlaceOutcome:
             overlaps: (Q,) of the best match of each query.
             radius: radius of a match [m].
         """
-        best = retrieval.best_places
-        rows = np.arange(len(best))
-        names = [drives[k] if k >= 0 else "" for k in best.tolist()]
+        best = retrieval.best_places.tolist()
+        names = [drives[k] if k >= 0 else "" for k in best]
         at_home = np.array([name == drives[0] for name in names])
         return cls(
             method=method,
@@ -99,12 +98,8 @@ class PlaceOutcome:
             stamps_ns=query[0],
             p_WQs=query[1],
             match_drives=names,
-            match_frames=np.where(
-                best >= 0, retrieval.database_frames[best], -1
-            ),
-            distances=np.where(
-                at_home, retrieval.distances[rows, best], np.nan
-            ),
+            match_frames=retrieval.best_frames,
+            distances=np.where(at_home, retrieval.best_distances, np.nan),
             pose_errors=retrieval.pose_errors,
             overlaps=overlaps,
             radius=radius,

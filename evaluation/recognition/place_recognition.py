@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import asdict, dataclass, replace
+from dataclasses import asdict, dataclass
 import math
 
 import numpy as np
@@ -40,9 +40,12 @@ class PlaceRecognition:
         query: name of the drive of the queries.
         retrieval: scores and truth of all pairs.
         outcomes: outcomes of the queries.
-        metrics: the numbers.
+        by_mode: the numbers in each mode.
         pose: errors of the estimated poses.
         protocol: protocol of the run, without open choices.
+        mode: the mode that `metrics` is in.
+        pair: names of the map, and of the stages of database and query, in a
+            report.
     """
 
     method: str
@@ -51,13 +54,16 @@ class PlaceRecognition:
     query: str
     retrieval: Retrieval
     outcomes: QueryOutcomes
-    metrics: PlaceRecognitionMetrics
+    by_mode: Mapping[Mode, PlaceRecognitionMetrics]
     pose: PoseMetrics
     protocol: RetrievalProtocol
+    mode: Mode = "all"
+    pair: tuple[str, str, str] = ("", "", "")
 
-    def counting(self, mode: Mode) -> PlaceRecognition:
-        """Returns the outcome with its scores in another mode."""
-        return replace(self, metrics=evaluate(self.outcomes, mode))
+    @property
+    def metrics(self) -> PlaceRecognitionMetrics:
+        """The numbers."""
+        return self.by_mode[self.mode]
 
     def auc_over_radius(self) -> dict[float, float]:
         """Returns radius [m] -> AUC if matches have that radius (mode all).
@@ -164,6 +170,7 @@ def judge_retrieval(
     retrieval: Retrieval,
     protocol: RetrievalProtocol,
     mode: Mode = "all",
+    pair: tuple[str, str, str] = ("", "", ""),
 ) -> PlaceRecognition:
     """Returns the scores of a method, given what it retrieved.
 
@@ -173,6 +180,7 @@ def judge_retrieval(
         retrieval: what the method found.
         protocol: protocol of the retrieval.
         mode: which queries count.
+        pair: see `PlaceRecognition`.
 
     Raises:
         InputError: if no query has a match.
@@ -196,7 +204,7 @@ def judge_retrieval(
     outcomes = judge(
         retrieval.scores, retrieval.matches, retrieval.query_blocks
     )
-    metrics = evaluate(outcomes)
+    by_mode = {one: evaluate(outcomes, one) for one in MODES}
     return PlaceRecognition(
         method=method.name,
         parameters=method.config.model_dump(mode="json"),
@@ -204,45 +212,9 @@ def judge_retrieval(
         query=query,
         retrieval=retrieval,
         outcomes=outcomes,
-        metrics=metrics if mode == "all" else evaluate(outcomes, mode),
-        pose=pose_metrics(retrieval.pose_errors, outcomes, metrics),
+        by_mode=by_mode,
+        pose=pose_metrics(retrieval.pose_errors, outcomes, by_mode["all"]),
         protocol=protocol.of(method),
+        mode=mode,
+        pair=pair,
     )
-
-
-@dataclass(frozen=True)
-class RecognitionResult:
-    """The result of a method on two stages of a map.
-
-    Attributes:
-        map_name: name of the city.
-        stages: stages of the database, and of the query.
-        outcome: outcome of the method.
-        metrics: in each mode.
-    """
-
-    map_name: str
-    stages: tuple[str, str]
-    outcome: PlaceRecognition
-    metrics: Mapping[Mode, PlaceRecognitionMetrics]
-
-    @classmethod
-    def of(
-        cls, map_name: str, stages: tuple[str, str], outcome: PlaceRecognition
-    ) -> RecognitionResult:
-        """Returns the result of an outcome, with scores in both modes."""
-        return cls(
-            map_name,
-            stages,
-            outcome,
-            {mode: outcome.counting(mode).metrics for mode in MODES},
-        )
-
-    @property
-    def method(self) -> str:
-        return self.outcome.method
-
-    @property
-    def pair(self) -> tuple[str, str, str]:
-        """Names of map, database and query."""
-        return (self.map_name, *self.stages)

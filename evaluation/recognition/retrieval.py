@@ -65,6 +65,19 @@ class Retrieval:
         best = ranking(self.scores)[:, 0] if self.scores.size else -1
         return np.where(candidate.any(axis=1), best, -1)
 
+    @property
+    def best_frames(self) -> np.ndarray:
+        """(Q,) frame of each query's best place; -1 for none."""
+        best = self.best_places
+        return np.where(best < 0, -1, self.database_frames[best])
+
+    @property
+    def best_distances(self) -> np.ndarray:
+        """(Q,) distance of each query to its best place [m]; NaN for none."""
+        best = self.best_places
+        distances = self.distances[np.arange(len(best)), best]
+        return np.where(best < 0, np.nan, distances)
+
 
 def retrieve(
     database: Drive,

@@ -1,38 +1,23 @@
-"""Figures of numbers: precision and recall, charts of a report, a track."""
+"""Curves: precision over recall, and the errors along a track."""
 
 from collections.abc import Sequence
 from pathlib import Path
 
 from matplotlib.axes import Axes
-from matplotlib.colors import to_rgb
 from matplotlib.figure import Figure
 import numpy as np
 
-from cns_drake.base.errors import InputError
 from evaluation.localisation.localise import RIGHT_TRANSLATION
 from evaluation.localisation.tracking import LOST
 from evaluation.recognition.metrics import MODES, PlaceRecognitionMetrics
-from evaluation.recognition.place_recognition import RecognitionResult
-from evaluation.report.page import Report
-from evaluation.report.page_data import Illustration, Section
-from evaluation.report.rows import STAGE
-from evaluation.results.charts import draw, styles, titled
+from evaluation.recognition.place_recognition import PlaceRecognition
+from evaluation.results.charts import styles, titled
 from evaluation.results.drawing import plain, save
-from evaluation.results.table import Results
 from evaluation.results.table_forms import in_table_order, title
-
-_SCATTER = {"kind": "scatter", "x": "tcr_sym", "y": "auc"}
-_DUMBBELL = {"kind": "dumbbell", "over": STAGE, "metric": "auc"}
-_SURVIVAL = (
-    "AUC without the change (hollow) and with it (filled), and the share that"
-    " is kept"
-)
-# Width of charts [px].
-_WIDTH = 480
 
 
 def draw_pr_curves(
-    map_name: str, results: Sequence[RecognitionResult], stem: Path
+    map_name: str, results: Sequence[PlaceRecognition], stem: Path
 ) -> None:
     """Draws precision over recall, a row a pair and a column a mode."""
     pairs = list(dict.fromkeys(result.pair for result in results))
@@ -46,7 +31,7 @@ def draw_pr_curves(
         for axes, mode in zip(row, MODES, strict=True):
             of_method = {r.method: r for r in results if r.pair == pair}
             for method in in_table_order(of_method):
-                metrics = of_method[method].metrics[mode]
+                metrics = of_method[method].by_mode[mode]
                 _draw_curve(axes, method, style_of[titled(method)], metrics)
             axes.set(xlim=(0.0, 1.0), ylim=(0.0, 1.02))
             # A phone shows one panel at a time.
@@ -92,49 +77,6 @@ def _draw_curve(
         markevery=0.2,
         label=plain(f"{title(method)} {metrics.auc:.3f}"),
     )
-
-
-def chart_illustrations(report: Report, folder: Path) -> list[Illustration]:
-    """Draws the charts over all cities; returns those that have data.
-
-    The charts of a reference stand next to ours.
-    """
-    name = "AUC against TCR_sym"
-    charts: list[tuple[str, str, Section, dict[str, str], Results]] = [
-        ("auc_over_tcr", name, "figures", _SCATTER, report.results)
-    ]
-    if report.compared:
-        published = report.reference.to_results()
-        name = f"{name}, of {report.reference.title}"
-        stem = "auc_over_tcr_published"
-        charts.insert(0, (stem, name, "figures", _SCATTER, published))
-    if any(control for _, control in report.pairs):
-        charts.append(
-            ("survival", _SURVIVAL, "survival", _DUMBBELL, report.results)
-        )
-    shown = []
-    for stem, words, section, chart, results in charts if report.pairs else ():
-        gates = {"gate": tuple(results.distinct("gate"))}
-        try:
-            drawn = draw({**chart, **gates}, results, _WIDTH, alone=True)
-        except InputError as error:
-            report.notes = [*report.notes, f"{words}: left out: {error}"]
-            continue
-        save(drawn.figure, folder / stem)
-        legend = []
-        for label, (colour, *_) in drawn.legend.items():
-            red, green, blue = (round(255 * part) for part in to_rgb(colour))
-            legend.append(((red, green, blue), label))
-        shown.append(
-            Illustration(
-                folder / stem,
-                words,
-                "svg",
-                section=section,
-                legend=tuple(legend),
-            )
-        )
-    return shown
 
 
 def draw_track(rows: np.ndarray, stem: Path) -> None:

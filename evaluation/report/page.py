@@ -17,23 +17,28 @@ from urllib.parse import quote
 import jinja2
 from markupsafe import Markup
 from matplotlib import colormaps
-from matplotlib.colors import to_hex
+from matplotlib.colors import to_hex, to_rgb
 import numpy as np
 
+from cns_drake.base.errors import InputError
 from cns_drake.base.files import write_text
 from evaluation.change.drive_change import ChangeResult, symmetric_changes
 from evaluation.recognition.costs import Cost
 from evaluation.recognition.fault_kinds import FAULT_KINDS, PairEvidence
 from evaluation.recognition.metrics import MODES, Mode
-from evaluation.recognition.place_recognition import RecognitionResult
-from evaluation.report import result_tables, survival
+from evaluation.recognition.place_recognition import PlaceRecognition
+from evaluation.report import result_tables, rows
 from evaluation.report.figures import ROUTE_COLOURS
-from evaluation.report.leaderboard import ranked_methods
-from evaluation.report.page_data import Illustration, PageDrive, browser_data
+from evaluation.report.page_data import (
+    Illustration,
+    PageDrive,
+    Section,
+    browser_data,
+)
 from evaluation.report.reference import NO_REFERENCE, Reference
-from evaluation.report.rows import Controlled, change_rows, place_rows
-from evaluation.results.charts import styles, titled
-from evaluation.results.table import RESULTS, Results
+from evaluation.results.charts import draw, styles, titled
+from evaluation.results.drawing import save
+from evaluation.results.table import RESULTS, STAGE, Results
 from evaluation.results.table_forms import (
     MISSING,
     Table,
@@ -62,6 +67,14 @@ _NUM_PIECES = 48
 _MARK = 0.016
 # Length of the scale bar [m].
 _BAR_LENGTH = 50.0
+_SCATTER = {"kind": "scatter", "x": "tcr_sym", "y": "auc"}
+_DUMBBELL = {"kind": "dumbbell", "over": STAGE, "metric": "auc"}
+_SURVIVAL = (
+    "AUC without the change (hollow) and with it (filled), and the share that"
+    " is kept"
+)
+# Width of charts [px].
+_WIDTH = 480
 
 
 @dataclass
@@ -82,8 +95,8 @@ class Report:
     """
 
     changes: list[ChangeResult] = field(default_factory=list)
-    pairs: list[Controlled] = field(default_factory=list)
-    recognitions: list[RecognitionResult] = field(default_factory=list)
+    pairs: list[rows.Controlled] = field(default_factory=list)
+    recognitions: list[PlaceRecognition] = field(default_factory=list)
     differences: Sequence[result_tables.MethodDifference] = ()
     evidence: dict[tuple[str, str], PairEvidence] = field(default_factory=dict)
     tracks: dict[str, result_tables.DriveTrack] = field(default_factory=dict)
@@ -94,37 +107,80 @@ class Report:
     made_by: Sequence[str] = ()
     pages: Mapping[str, str] = field(default_factory=dict)
     reference: Reference = NO_REFERENCE
-    repeated: list[RecognitionResult] = field(default_factory=list)
+    repeated: list[PlaceRecognition] = field(default_factory=list)
 
     @functools.cached_property
     def results(self) -> Results:
         """The table of the pairs and of their controls."""
         return Results.of(
             [
-                *place_rows(self.pairs, self.tracks, self.evidence),
-                *change_rows(self.pairs, self.changes),
+                *rows.place_rows(self.pairs, self.tracks, self.evidence),
+                *rows.change_rows(self.pairs, self.changes),
             ]
         )
 
     @functools.cached_property
-    def survivals(self) -> list[survival.Survival]:
+    def survivals(self) -> list[rows.Survival]:
         """How much each method keeps of its AUC on each pair."""
         stages = {
             name: stage
             for one, _ in self.pairs
             for name, stage in zip(
-                (one.outcome.database, one.outcome.query),
-                one.stages,
+                (one.database, one.query),
+                one.pair[1:],
                 strict=True,
             )
         }
-        return survival.survivals(self.results.rows, stages)
+        return rows.survivals(self.results.rows, stages)
 
     @property
-    def compared(self) -> list[RecognitionResult]:
+    def compared(self) -> list[PlaceRecognition]:
         """Results for which the reference has published numbers."""
         known = filter(self.reference.covers, self.recognitions)
         return [*known, *self.repeated]
+
+
+def chart_illustrations(report: Report, folder: Path) -> list[Illustration]:
+    """Draws the charts over all cities; returns those that have data.
+
+    The charts of a reference stand next to ours.
+    """
+    name = "AUC against TCR_sym"
+    charts: list[tuple[str, str, Section, dict[str, str], Results]] = [
+        ("auc_over_tcr", name, "figures", _SCATTER, report.results)
+    ]
+    if report.compared:
+        published = report.reference.to_results()
+        name = f"{name}, of {report.reference.title}"
+        stem = "auc_over_tcr_published"
+        charts.insert(0, (stem, name, "figures", _SCATTER, published))
+    if any(control for _, control in report.pairs):
+        charts.append(
+            ("survival", _SURVIVAL, "survival", _DUMBBELL, report.results)
+        )
+    shown = []
+    for stem, words, section, chart, results in charts if report.pairs else ():
+        gates = {"gate": tuple(results.distinct("gate"))}
+        try:
+            drawn = draw({**chart, **gates}, results, _WIDTH, alone=True)
+        except InputError as error:
+            report.notes = [*report.notes, f"{words}: left out: {error}"]
+            continue
+        save(drawn.figure, folder / stem)
+        legend = []
+        for label, (colour, *_) in drawn.legend.items():
+            red, green, blue = (round(255 * part) for part in to_rgb(colour))
+            legend.append(((red, green, blue), label))
+        shown.append(
+            Illustration(
+                folder / stem,
+                words,
+                "svg",
+                section=section,
+                legend=tuple(legend),
+            )
+        )
+    return shown
 
 
 def write_report(report: Report, folder: Path) -> Path:
@@ -136,12 +192,11 @@ def write_report(report: Report, folder: Path) -> Path:
     results = report.recognitions
     tables = _shown_tables(report)
     every = [*results, *report.repeated]
-    asked = [(one.pair, one) for one in results]
-    queries = result_tables.query_table(asked, report.tracks, report.evidence)
+    queries = result_tables.query_table(results, report.tracks, report.evidence)
     # Evidence is of the queries that the other results got wrong.
-    again = [(one.pair, one) for one in report.repeated]
+    again = result_tables.query_table(report.repeated, report.tracks, {})
     numbers = {
-        "survival": survival.survival_numbers(report.survivals),
+        "survival": rows.survival_numbers(report.survivals),
         "tcr": result_tables.change_table(
             report.changes, report.reference, report.evidence
         ),
@@ -150,13 +205,13 @@ def write_report(report: Report, folder: Path) -> Path:
         "metrics": result_tables.metric_numbers(every),
         "differences": result_tables.difference_numbers(report.differences),
         "why": result_tables.fault_numbers(results, report.evidence),
-        "queries": replace(
-            queries,
-            rows=queries.rows
-            + result_tables.query_table(again, report.tracks, {}).rows,
-        ),
+        "queries": replace(queries, rows=queries.rows + again.rows),
         "queries_unchanged": result_tables.query_table(
-            [(one.pair, control) for one, control in report.pairs if control],
+            [
+                replace(control, pair=one.pair)
+                for one, control in report.pairs
+                if control
+            ],
             report.tracks,
             {},
         ),
@@ -222,7 +277,7 @@ def write_page(path: Path, report: Report) -> None:
             if has_section.get(name, True)
         },
         illustrations=illustrations,
-        survivals_by_pair=survival.by_pair(report.survivals),
+        survivals_by_pair=rows.by_pair(report.survivals),
         drives_of_maps=drives_of_maps,
         other_forms=list(forms_of_table)[1:],
         fault_kinds=FAULT_KINDS,
@@ -237,16 +292,16 @@ def _shown_tables(report: Report) -> dict[str, list[Table]]:
     """Returns name of a file -> its tables for print."""
     results = report.recognitions
     # The last one is counted as the reference did.
-    counted: list[
-        tuple[Sequence[RecognitionResult], Mode | None, Reference]
-    ] = [(results, mode, NO_REFERENCE) for mode in MODES]
+    counted: list[tuple[Sequence[PlaceRecognition], Mode | None, Reference]] = [
+        (results, mode, NO_REFERENCE) for mode in MODES
+    ]
     if report.compared:
         counted.append((report.compared, None, report.reference))
     changes = result_tables.change_table(
         report.changes, report.reference, report.evidence
     )
     return {
-        "survival": [survival.survival_table(report.survivals)],
+        "survival": [rows.survival_table(report.survivals)],
         "tcr": [changes.without_empty("paper")],
         "place_recognition": [
             result_tables.recognition_table(
@@ -270,7 +325,7 @@ def _content(
     report: Report, tables: Mapping[str, Sequence[Table]]
 ) -> dict[str, object]:
     """Returns what both the text and the page show."""
-    ranked, headline = ranked_methods(report.results)
+    ranked, headline = rows.ranked_methods(report.results)
     return {
         "report": report,
         "tables": tables,
@@ -280,7 +335,7 @@ def _content(
         "judgements": report.reference.judge(
             [*report.recognitions, *report.repeated], report.changes
         ),
-        "survival_summary": survival.survival_summary(report.survivals),
+        "survival_summary": rows.survival_summary(report.survivals),
     }
 
 
@@ -295,9 +350,9 @@ def _drives_of_maps(report: Report) -> dict[str, list[str]]:
     """
     found: dict[str, dict[str, str]] = {}
     for result in report.recognitions:
-        names = (result.outcome.database, result.outcome.query)
-        found.setdefault(result.map_name, {}).update(
-            zip(result.stages, names, strict=True)
+        names = (result.database, result.query)
+        found.setdefault(result.pair[0], {}).update(
+            zip(result.pair[1:], names, strict=True)
         )
     groups = {
         map_name: [stages[stage] for stage in sorted(stages)]
@@ -392,18 +447,18 @@ def _environment() -> jinja2.Environment:
     found.filters |= {
         "captioned": _captioned,
         "data_address": _data_address,
-        "interval_text": survival.interval_text,
+        "interval_text": rows.interval_text,
         "markdown": escape_markdown,
         "label_title": titled,
         "method_title": title,
-        "percent": survival.percent,
+        "percent": rows.percent,
         "quoted": quote,
         "route_picture": route_picture,
     }
     found.globals |= {
         "bar_length": round(_BAR_LENGTH),
         "missing": MISSING,
-        "no_control": survival.NO_CONTROL,
+        "no_control": rows.NO_CONTROL,
         "route_colours": _route_colours(),
     }
     return found

@@ -15,7 +15,7 @@ from evaluation.drives.sampling import sample_frames
 from evaluation.maps.thumbnails import CELL, HEIGHT_STEP, MAX_POINTS
 from evaluation.recognition.fault_kinds import PairEvidence, fault_kinds
 from evaluation.recognition.metrics import MODES
-from evaluation.recognition.place_recognition import RecognitionResult
+from evaluation.recognition.place_recognition import PlaceRecognition
 from evaluation.recognition.scoring import ranking
 from evaluation.report.figures import Picture
 from evaluation.results.drawing import Legend
@@ -110,7 +110,7 @@ def make_drive(
 
 
 def browser_data(
-    recognitions: Sequence[RecognitionResult],
+    recognitions: Sequence[PlaceRecognition],
     drives: Mapping[str, PageDrive],
     changes: Mapping[tuple[str, str, str], float],
     pages: Mapping[str, str],
@@ -129,18 +129,18 @@ def browser_data(
         evidence: names of database and query -> why queries went wrong; some
             may be absent.
     """
-    pairs: dict[tuple, list[RecognitionResult]] = {}
+    pairs: dict[tuple, list[PlaceRecognition]] = {}
     for result in recognitions:
         pairs.setdefault(result.pair, []).append(result)
     used = {
         name
         for result in recognitions
-        for name in (result.outcome.database, result.outcome.query)
+        for name in (result.database, result.query)
     }
     num_scans = sum(len(drives[name].frames) for name in used)
     num_points = min(MAX_POINTS, _POINTS_OF_A_PAGE // max(num_scans, 1))
     return {
-        "radius": recognitions[0].outcome.protocol.radius,
+        "radius": recognitions[0].protocol.radius,
         "cell": CELL,
         "heightStep": HEIGHT_STEP,
         "drives": {
@@ -178,13 +178,13 @@ def _drive_data(drive: PageDrive, num_points: int) -> dict:
 
 def _pair_data(
     pair: tuple[str, str, str],
-    results: Sequence[RecognitionResult],
+    results: Sequence[PlaceRecognition],
     drives: Mapping[str, PageDrive],
     change: float | None,
     evidence: Mapping[tuple[str, str], PairEvidence],
 ) -> dict:
     by_method = {result.method: result for result in results}
-    first = results[0].outcome
+    first = results[0]
     retrieval = first.retrieval
     database, query = drives[first.database], drives[first.query]
     if change is not None:
@@ -212,9 +212,9 @@ def _pair_data(
 
 
 def _method_data(
-    result: RecognitionResult, evidence: PairEvidence | None
+    result: PlaceRecognition, evidence: PairEvidence | None
 ) -> dict:
-    scores = result.outcome.retrieval.scores
+    scores = result.retrieval.scores
     best, values = [], []
     for row, places in zip(scores, ranking(scores)[:, :_NUM_BEST], strict=True):
         places = places[~np.isnan(row[places])]
@@ -222,18 +222,18 @@ def _method_data(
         values.append(np.round(row[places], 4).tolist())
     metrics = {
         mode: {
-            "auc": round(result.metrics[mode].auc, 4),
-            "f1": round(result.metrics[mode].f1_max, 4),
+            "auc": round(result.by_mode[mode].auc, 4),
+            "f1": round(result.by_mode[mode].f1_max, 4),
         }
         for mode in MODES
     }
-    recall = result.metrics[MODES[0]].recall_at_1
+    recall = result.by_mode[MODES[0]].recall_at_1
     return {
         "name": result.method,
         "title": title(result.method),
         "best": best,
         "scores": values,
-        "ranks": result.outcome.outcomes.known_ranks,
+        "ranks": result.outcomes.known_ranks,
         "why": fault_kinds(result, evidence) if evidence else None,
         "metrics": metrics,
         "recall": None if np.isnan(recall) else round(recall, 4),

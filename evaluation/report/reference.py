@@ -6,7 +6,7 @@ from typing import Any
 
 from evaluation.change.drive_change import ChangeResult
 from evaluation.recognition.metrics import Mode
-from evaluation.recognition.place_recognition import RecognitionResult
+from evaluation.recognition.place_recognition import PlaceRecognition
 from evaluation.recognition.protocol import RetrievalProtocol
 from evaluation.results.table import Results, Row
 
@@ -44,9 +44,8 @@ class Reference:
 
     Attributes:
         title: the source's name in the report.
-        counting: the modes in which the source counted its methods, in words
-            for a caption and in brief for a figure; used only if something is
-            published.
+        counting: the modes in which the source counted its methods, in words;
+            used only if something is published.
         changes: (map, earlier stage, later stage) -> TCR_sym.
         further: changes elsewhere to compare with: label, stages and TCR_sym.
         recognitions: (map, database, query, method, mode) -> numbers; each
@@ -59,7 +58,7 @@ class Reference:
     """
 
     title: str = ""
-    counting: tuple[str, str] = ("", "")
+    counting: str = ""
     changes: Mapping[tuple[str, str, str], float] = field(default_factory=dict)
     further: Sequence[tuple[str, str, float]] = ()
     recognitions: Mapping[tuple[str, str, str, str, Mode], Published] = field(
@@ -67,7 +66,7 @@ class Reference:
     )
     protocols: Mapping[str, RetrievalProtocol] = field(default_factory=dict)
     judge: Callable[
-        [Sequence[RecognitionResult], Sequence[ChangeResult]], list[Judgement]
+        [Sequence[PlaceRecognition], Sequence[ChangeResult]], list[Judgement]
     ] = lambda results, changes: []
 
     @property
@@ -106,7 +105,7 @@ class Reference:
             return None
         return self.protocols[method]
 
-    def covers(self, result: RecognitionResult) -> bool:
+    def covers(self, result: PlaceRecognition) -> bool:
         """Returns whether map, method and protocol are the source's."""
         return result.pair[0] in self.city_names and self._ran(result)
 
@@ -115,7 +114,7 @@ class Reference:
         modes = (key[4] for key in self.recognitions if key[3] == method)
         return next(modes, "all")
 
-    def values(self, result: RecognitionResult, mode: Mode) -> Published | None:
+    def values(self, result: PlaceRecognition, mode: Mode) -> Published | None:
         """Returns the published numbers, if they were counted in this mode.
 
         None for numbers that were found by another protocol.
@@ -151,9 +150,9 @@ class Reference:
                 rows.append(Row(**where, **whole))
         return Results.of(rows)
 
-    def _ran(self, result: RecognitionResult) -> bool:
+    def _ran(self, result: PlaceRecognition) -> bool:
         """Returns whether the source ran the method by the same protocol."""
-        protocol = replace(result.outcome.protocol, exclude_recent=None)
+        protocol = replace(result.protocol, exclude_recent=None)
         return protocol == self.protocols.get(result.method)
 
 

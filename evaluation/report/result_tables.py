@@ -31,10 +31,8 @@ from evaluation.recognition.metrics import (
     auc_difference,
     holm,
 )
-from evaluation.recognition.place_recognition import RADII, RecognitionResult
-from evaluation.recognition.pose_errors import PoseErrors
+from evaluation.recognition.place_recognition import RADII, PlaceRecognition
 from evaluation.recognition.protocol import PROTOCOL_COLUMNS, check_one_protocol
-from evaluation.recognition.query_outcomes import QueryOutcomes
 from evaluation.report.reference import NO_REFERENCE, Published, Reference
 from evaluation.results.table_forms import (
     CAPTIONS,
@@ -59,24 +57,24 @@ _MOMENT = ("frame", "stamp_ns", "x", "y", "z", "qx", "qy", "qz", "qw")
 Evidence = Mapping[tuple[str, str], PairEvidence]
 
 
-def _inner(columns: Columns[RecognitionResult]) -> Columns[Any]:
+def _inner(columns: Columns[PlaceRecognition]) -> Columns[Any]:
     """Returns the columns for items that hold a `result`."""
     return keyed(columns, lambda item, value: value(item.result))
 
 
 # The first columns, for print and in files, and the last ones in files.
-_SHOWN: Columns[RecognitionResult] = {
-    "map": lambda r: r.map_name,
-    "DB → query": lambda r: " → ".join(r.stages),
+_SHOWN: Columns[PlaceRecognition] = {
+    "map": lambda r: r.pair[0],
+    "DB → query": lambda r: " → ".join(r.pair[1:]),
     "method": lambda r: title(r.method),
 }
-_KEYS: Columns[RecognitionResult] = {
-    "map": lambda r: r.map_name,
-    "db": lambda r: r.stages[0],
-    "query": lambda r: r.stages[1],
+_KEYS: Columns[PlaceRecognition] = {
+    "map": lambda r: r.pair[0],
+    "db": lambda r: r.pair[1],
+    "query": lambda r: r.pair[2],
     "method": lambda r: r.method,
 }
-_PROTOCOL = protocol_columns("outcome.protocol")
+_PROTOCOL = protocol_columns("protocol")
 
 
 def change_table(
@@ -130,8 +128,8 @@ def _visible_change(
 
 
 def _by_pair_and_method(
-    results: Sequence[RecognitionResult],
-) -> list[RecognitionResult]:
+    results: Sequence[PlaceRecognition],
+) -> list[PlaceRecognition]:
     """Returns results pair by pair, methods in the order of tables."""
     pairs = list(dict.fromkeys(result.pair for result in results))
     methods = in_table_order(result.method for result in results)
@@ -143,16 +141,16 @@ def _by_pair_and_method(
 class _Counted(NamedTuple):
     """A result in a mode, with what is published of it."""
 
-    result: RecognitionResult
+    result: PlaceRecognition
     metrics: PlaceRecognitionMetrics
     printed: Published | None
 
     @classmethod
     def of(
-        cls, result: RecognitionResult, mode: Mode, reference: Reference
+        cls, result: PlaceRecognition, mode: Mode, reference: Reference
     ) -> _Counted:
         printed = reference.values(result, mode)
-        return cls(result, result.metrics[mode], printed)
+        return cls(result, result.by_mode[mode], printed)
 
     def at_f1_max(self, counts: np.ndarray) -> int | None:
         """Returns the count at the greatest F1, of those along the curve."""
@@ -161,7 +159,7 @@ class _Counted(NamedTuple):
 
 
 def recognition_table(
-    results: Sequence[RecognitionResult],
+    results: Sequence[PlaceRecognition],
     changes: Sequence[ChangeResult],
     mode: Mode | None = None,
     reference: Reference = NO_REFERENCE,
@@ -182,7 +180,7 @@ def recognition_table(
     Raises:
         InputError: results of two protocols.
     """
-    check_one_protocol(result.outcome.protocol for result in results)
+    check_one_protocol(result.protocol for result in results)
     methods = in_table_order(result.method for result in results)
     measures = _PUBLISHED if mode is None else _MEASURES
     tcr = symmetric_changes(changes)
@@ -203,21 +201,19 @@ def recognition_table(
             for name in measures.values()
         ]
         cells = [column[i] for i in range(len(methods)) for column in columns]
-        outcome = next(iter(of_method.values())).result.outcome
+        outcome = next(iter(of_method.values())).result
         visible, _ = _visible_change(evidence, outcome.database, outcome.query)
         name = " → ".join(pair[1:])
         rows.append((pair[0], name, tcr.get(pair), visible, *cells))
     captions = {
-        None: f", {reference.counting[0]}",
+        None: f", {reference.counting}",
         "all": ", all queries counted (mode all)",
         "filtered": ", only queries counted that have a match (mode filtered)",
     }
     protocol = beside = ""
     if results:
         # Each method sets its scans per place.
-        shared = replace(
-            results[0].outcome.protocol, scans_per_place=None, place=None
-        )
+        shared = replace(results[0].protocol, scans_per_place=None, place=None)
         protocol = shared.to_text() + _merging_text(results)
     if any(map(reference.covers, results)):
         beside = f" In brackets or small: the value of {reference.title}."
@@ -237,14 +233,12 @@ def recognition_table(
     )
 
 
-def _merging_text(results: Sequence[RecognitionResult]) -> str:
+def _merging_text(results: Sequence[PlaceRecognition]) -> str:
     """Returns a sentence on where merged scans stand; empty without them."""
     methods: dict[str, list[str]] = {}
     for one in in_table_order(result.method for result in results):
         (place,) = {
-            result.outcome.protocol.place
-            for result in results
-            if result.method == one
+            result.protocol.place for result in results if result.method == one
         }
         if place is not None:
             methods.setdefault(place, []).append(title(one))
@@ -258,14 +252,14 @@ def _merging_text(results: Sequence[RecognitionResult]) -> str:
 
 
 def audit_table(
-    results: Sequence[RecognitionResult], reference: Reference = NO_REFERENCE
+    results: Sequence[PlaceRecognition], reference: Reference = NO_REFERENCE
 ) -> Table:
     """Returns a table of all numbers with the counts behind them."""
     return Table.of(
         [_Counted.of(r, mode, reference) for r in results for mode in MODES],
         {
-            "map": lambda c: c.result.map_name,
-            "DB → query": lambda c: " → ".join(c.result.stages),
+            "map": lambda c: c.result.pair[0],
+            "DB → query": lambda c: " → ".join(c.result.pair[1:]),
             "method": lambda c: c.result.method,
             "mode": lambda c: c.metrics.mode,
             "AUC": lambda c: c.metrics.auc,
@@ -289,34 +283,32 @@ def audit_table(
                 c.metrics.curve.true_positives
             ),
             "T of F1max": lambda c: c.at_f1_max(c.metrics.curve.counted),
-            **protocol_columns("result.outcome.protocol"),
+            **protocol_columns("result.protocol"),
         },
         CAPTIONS["audit"],
     )
 
 
-def metric_numbers(results: Sequence[RecognitionResult]) -> Table:
+def metric_numbers(results: Sequence[PlaceRecognition]) -> Table:
     """Returns the metrics of other publications, as `metrics.csv` has them."""
     return Table.of(
         _by_pair_and_method(results),
         {
             **_KEYS,
-            "auc_strict": lambda r: r.metrics["all"].auc_strict,
-            "recall_at_1": lambda r: r.outcome.outcomes.recall_at(1),
-            "recall_at_1_percent": lambda r: r.outcome.outcomes.recall_at(
-                r.outcome.outcomes.one_percent_rank
+            "auc_strict": lambda r: r.by_mode["all"].auc_strict,
+            "recall_at_1": lambda r: r.outcomes.recall_at(1),
+            "recall_at_1_percent": lambda r: r.outcomes.recall_at(
+                r.outcomes.one_percent_rank
             ),
-            "mean_reciprocal_rank": lambda r: (
-                r.outcome.outcomes.mean_reciprocal_rank
-            ),
+            "mean_reciprocal_rank": lambda r: r.outcomes.mean_reciprocal_rank,
             "recall_at_full_precision": lambda r: (
-                r.metrics["all"].curve.recall_at_full_precision
+                r.by_mode["all"].curve.recall_at_full_precision
             ),
-            "match_auroc": lambda r: r.outcome.outcomes.match_auroc,
-            "pose_success": lambda r: r.outcome.pose.success,
+            "match_auroc": lambda r: r.outcomes.match_auroc,
+            "pose_success": lambda r: r.pose.success,
             **keyed(
                 {f"auc_within_{radius:g}_m": radius for radius in RADII},
-                lambda r, radius: r.outcome.auc_over_radius()[radius],
+                lambda r, radius: r.auc_over_radius()[radius],
             ),
             **_PROTOCOL,
         },
@@ -329,23 +321,21 @@ class MethodDifference(NamedTuple):
     The p-value is corrected for the number of all differences; NaN if unknown.
     """
 
-    result: RecognitionResult
-    other: RecognitionResult
+    result: PlaceRecognition
+    other: PlaceRecognition
     difference: Difference
     p_value: float
 
 
 def method_differences(
-    results: Sequence[RecognitionResult],
+    results: Sequence[PlaceRecognition],
 ) -> list[MethodDifference]:
     """Returns the AUC difference of any two methods on each pair (mode all)."""
     both, found = [], []
     for one, other in itertools.combinations(_by_pair_and_method(results), 2):
         if one.pair == other.pair:
             both.append((one, other))
-            found.append(
-                auc_difference(one.outcome.outcomes, other.outcome.outcomes)
-            )
+            found.append(auc_difference(one.outcomes, other.outcomes))
     corrected = holm(np.array([one.p_value for one in found])).tolist()
     return [
         MethodDifference(*pair, one, p)
@@ -359,14 +349,14 @@ def difference_numbers(differences: Sequence[MethodDifference]) -> Table:
         differences,
         {
             **_inner({n: _KEYS[n] for n in ("map", "db", "query")}),
-            "gate": lambda d: d.result.outcome.protocol.gate,
+            "gate": lambda d: d.result.protocol.gate,
             "method_a": lambda d: d.result.method,
             "method_b": lambda d: d.other.method,
             "difference": lambda d: d.difference.value,
             "low": lambda d: d.difference.interval.low,
             "high": lambda d: d.difference.interval.high,
             "p": lambda d: d.p_value,
-            "protocol": lambda d: d.result.outcome.protocol.name,
+            "protocol": lambda d: d.result.protocol.name,
         },
     )
 
@@ -390,19 +380,19 @@ def difference_table(differences: Sequence[MethodDifference]) -> Table:
 
 
 # Name in files -> value.
-_POSE_ERRORS: Columns[RecognitionResult] = {
-    "translation_median": lambda r: r.outcome.pose.translation_median,
-    "translation_90": lambda r: r.outcome.pose.translation_90,
-    "rotation_median_deg": lambda r: r.outcome.pose.rotation_median_deg,
-    "rotation_90_deg": lambda r: r.outcome.pose.rotation_90_deg,
-    "success": lambda r: r.outcome.pose.success,
+_POSE_ERRORS: Columns[PlaceRecognition] = {
+    "translation_median": lambda r: r.pose.translation_median,
+    "translation_90": lambda r: r.pose.translation_90,
+    "rotation_median_deg": lambda r: r.pose.rotation_median_deg,
+    "rotation_90_deg": lambda r: r.pose.rotation_90_deg,
+    "success": lambda r: r.pose.success,
     "recall_at_full_precision": lambda r: (
-        r.metrics["all"].curve.recall_at_full_precision
+        r.by_mode["all"].curve.recall_at_full_precision
     ),
 }
 
 
-def pose_table(results: Sequence[RecognitionResult]) -> Table:
+def pose_table(results: Sequence[PlaceRecognition]) -> Table:
     """Returns the errors of estimated poses for print."""
     names: list[str | tuple[str, str]] = [
         *(("translation [m]", part) for part in ("median", "90 %")),
@@ -417,13 +407,13 @@ def pose_table(results: Sequence[RecognitionResult]) -> Table:
     )
 
 
-def pose_numbers(results: Sequence[RecognitionResult]) -> Table:
+def pose_numbers(results: Sequence[PlaceRecognition]) -> Table:
     """Returns the errors of estimated poses, for `poses.csv`."""
     return Table.of(
         results,
         {
             **_KEYS,
-            "accepted_matches": lambda r: r.outcome.pose.num_accepted,
+            "accepted_matches": lambda r: r.pose.num_accepted,
             **_POSE_ERRORS,
             **_PROTOCOL,
         },
@@ -433,7 +423,7 @@ def pose_numbers(results: Sequence[RecognitionResult]) -> Table:
 class _Faults(NamedTuple):
     """The wrong best places of a result: their kinds, and what changed."""
 
-    result: RecognitionResult
+    result: PlaceRecognition
     kinds: Counter[str]
     changed: Counter[str]
 
@@ -444,7 +434,7 @@ class _Faults(NamedTuple):
 
 
 def fault_table(
-    results: Sequence[RecognitionResult], evidence: Evidence
+    results: Sequence[PlaceRecognition], evidence: Evidence
 ) -> Table:
     """Returns the reasons for wrong best places for print."""
 
@@ -470,14 +460,14 @@ def fault_table(
 
 
 def fault_numbers(
-    results: Sequence[RecognitionResult], evidence: Evidence
+    results: Sequence[PlaceRecognition], evidence: Evidence
 ) -> Table:
     """Returns the counts of wrong best places by reason, for `why.csv`."""
     return Table.of(
         _count_faults(results, evidence),
         {
             **_inner(_KEYS),
-            "queries": lambda one: len(one.result.outcome.outcomes),
+            "queries": lambda one: len(one.result.outcomes),
             "wrong": lambda one: one.wrong,
             **keyed(
                 {kind: kind for kind in FAULT_KINDS},
@@ -487,16 +477,16 @@ def fault_numbers(
                 " ".join(f"{name}:{n}" for name, n in one.changed.most_common())
                 or None
             ),
-            **protocol_columns("result.outcome.protocol"),
+            **protocol_columns("result.protocol"),
         },
     )
 
 
 def _count_faults(
-    results: Sequence[RecognitionResult], evidence: Evidence
+    results: Sequence[PlaceRecognition], evidence: Evidence
 ) -> Iterator[_Faults]:
     for result in _by_pair_and_method(results):
-        known = evidence.get((result.outcome.database, result.outcome.query))
+        known = evidence.get((result.database, result.query))
         if known is None:
             continue
         kinds = fault_kinds(result, known)
@@ -560,26 +550,12 @@ class DriveTrack:
 
 
 class _Queries(NamedTuple):
-    """The queries of a result, for a pair: map, database and query.
+    """The queries of a result: moments of these, and of their best places."""
 
-    `query` and `match` are moments of the queries, and of their best places;
-    the distances to these are NaN without one [m].
-    """
-
-    pair: tuple[str, str, str]
-    result: RecognitionResult
+    result: PlaceRecognition
     query: list[np.ndarray]
     match: list[np.ndarray]
-    distances: np.ndarray
     evidence: PairEvidence | None
-
-    @property
-    def outcomes(self) -> QueryOutcomes:
-        return self.result.outcome.outcomes
-
-    @property
-    def errors(self) -> PoseErrors:
-        return self.result.outcome.retrieval.pose_errors
 
 
 def _moment_columns(side: str) -> Columns[_Queries]:
@@ -590,25 +566,22 @@ def _moment_columns(side: str) -> Columns[_Queries]:
 
 
 _QUERY_COLUMNS: Columns[_Queries] = {
-    "map": lambda q: q.pair[0],
-    "db": lambda q: q.pair[1],
-    "query": lambda q: q.pair[2],
-    "method": lambda q: q.result.method,
-    "correct": lambda q: q.outcomes.is_right,
-    "has_match": lambda q: q.outcomes.has_match,
-    "score": lambda q: q.outcomes.best_scores,
-    "first_right_rank": lambda q: q.outcomes.known_ranks,
-    "places": lambda q: q.outcomes.num_places,
-    "query_drive": lambda q: q.result.outcome.query,
+    **_inner(_KEYS),
+    "correct": lambda q: q.result.outcomes.is_right,
+    "has_match": lambda q: q.result.outcomes.has_match,
+    "score": lambda q: q.result.outcomes.best_scores,
+    "first_right_rank": lambda q: q.result.outcomes.known_ranks,
+    "places": lambda q: q.result.outcomes.num_places,
+    "query_drive": lambda q: q.result.query,
     **_moment_columns("query"),
-    "match_drive": lambda q: q.result.outcome.database,
+    "match_drive": lambda q: q.result.database,
     **_moment_columns("match"),
-    "distance": lambda q: q.distances,
-    "translation_error": lambda q: q.errors.translation,
-    "rotation_error_deg": lambda q: q.errors.rotation_deg,
+    "distance": lambda q: q.result.retrieval.best_distances,
+    "translation_error": lambda q: q.result.retrieval.pose_errors.translation,
+    "rotation_error_deg": lambda q: q.result.retrieval.pose_errors.rotation_deg,
     **keyed(
         {name: name for name in PROTOCOL_COLUMNS},
-        lambda q, name: getattr(q.result.outcome.protocol, name),
+        lambda q, name: getattr(q.result.protocol, name),
     ),
     "why": lambda q: q.evidence and fault_kinds(q.result, q.evidence),
     "overlap": lambda q: q.evidence and q.evidence.overlaps,
@@ -618,34 +591,27 @@ _QUERY_COLUMNS: Columns[_Queries] = {
     "right_fit": lambda q: q.evidence and q.evidence.right_fits,
     "wrong_fit": lambda q: q.evidence and q.evidence.fits[q.result.method],
     "visible_change": lambda q: q.evidence and q.evidence.visible_changes,
-    "protocol": attrgetter("result.outcome.protocol.name"),
+    "protocol": attrgetter("result.protocol.name"),
 }
 
 
 def query_table(
-    results: Iterable[tuple[tuple[str, str, str], RecognitionResult]],
+    results: Iterable[PlaceRecognition],
     tracks: Mapping[str, DriveTrack],
     evidence: Evidence,
 ) -> Table:
-    """Returns a row for each pair, method and query, in the queries' order.
+    """Returns a row for each result and query, in the queries' order.
 
     All drives have a track. The columns of the evidence are empty for pairs
     without it.
     """
 
-    def queries() -> Iterator[_Queries]:
-        for pair, result in results:
-            outcome, found = result.outcome, result.outcome.retrieval
-            best = found.best_places
-            frames = np.where(best < 0, -1, found.database_frames[best])
-            distances = found.distances[np.arange(len(best)), best]
-            yield _Queries(
-                pair,
-                result,
-                tracks[outcome.query].moments(found.query_frames),
-                tracks[outcome.database].moments(frames),
-                np.where(best < 0, np.nan, distances),
-                evidence.get((outcome.database, outcome.query)),
-            )
+    def queries(one: PlaceRecognition) -> _Queries:
+        return _Queries(
+            one,
+            tracks[one.query].moments(one.retrieval.query_frames),
+            tracks[one.database].moments(one.retrieval.best_frames),
+            evidence.get((one.database, one.query)),
+        )
 
-    return Table.of(queries(), _QUERY_COLUMNS)
+    return Table.of(map(queries, results), _QUERY_COLUMNS)

@@ -1,7 +1,15 @@
-"""The numbers of a report as rows of the table of results."""
+"""The numbers of a report as rows of the table of results, and what they say.
 
-from collections.abc import Iterable, Iterator, Mapping
-from typing import Any
+How the methods rank, and what of each survives structural change. A control
+drive takes the place of one drive of a pair: it follows the same route, but in
+the stage of the other drive. What a method loses from the control to the pair
+is due to the change alone, and not to the routes.
+"""
+
+from collections import Counter
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+import math
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -12,16 +20,17 @@ from evaluation.recognition.place_outcome import (
     place_numbers,
     pose_numbers,
 )
-from evaluation.recognition.place_recognition import RecognitionResult
-from evaluation.results.table import Row
+from evaluation.recognition.place_recognition import PlaceRecognition
+from evaluation.results import table_forms as tables
+from evaluation.results.charts import titled
+from evaluation.results.summaries import Ranked, ranking
+from evaluation.results.table import LAST, OWN, STAGE, Results, Row
 
 EXPERIMENT = "stages"
-STAGE = "both.stage"
-# The stage of the database: its own, or that of the query on the same routes.
-OWN, LAST = "own", "last"
 _SEED = 1
+NO_CONTROL = "no control"
 # A result, and that of its control, if there is one.
-Controlled = tuple[RecognitionResult, RecognitionResult | None]
+Controlled = tuple[PlaceRecognition, PlaceRecognition | None]
 
 
 def place_rows(
@@ -36,18 +45,18 @@ def place_rows(
     have a `DriveTrack`.
     """
 
-    def outcome(result: RecognitionResult) -> PlaceOutcome:
-        one, found = result.outcome, result.outcome.retrieval
-        frames, track = found.query_frames, tracks[one.query]
-        known = evidence.get((one.database, one.query))
+    def outcome(result: PlaceRecognition) -> PlaceOutcome:
+        found = result.retrieval
+        frames, track = found.query_frames, tracks[result.query]
+        known = evidence.get((result.database, result.query))
         return PlaceOutcome.of(
-            one.method,
-            one.protocol.gate,
+            result.method,
+            result.protocol.gate,
             found,
             (track.stamps_ns[frames], track.X_WS[frames, :3, 3]),
-            [one.database] * len(found.database_frames),
+            [result.database] * len(found.database_frames),
             np.full(len(frames), np.nan) if known is None else known.overlaps,
-            one.protocol.radius,
+            result.protocol.radius,
         )
 
     outcomes = [
@@ -71,13 +80,13 @@ def place_rows(
                     yield Row.of(
                         number,
                         experiment=EXPERIMENT,
-                        map=changed.map_name,
-                        database=changed.outcome.database,
-                        query=changed.outcome.query,
+                        map=changed.pair[0],
+                        database=changed.database,
+                        query=changed.query,
                         seed=_SEED,
                         factors={STAGE: stage},
                         task=task,
-                        protocol=changed.outcome.protocol.name,
+                        protocol=changed.protocol.name,
                     )
 
 
@@ -90,7 +99,7 @@ def change_rows(
         for one in changes
         for stages in (one.stages, one.stages[::-1])
     }
-    keys = {(one.map_name, *one.stages): one.outcome for one, _ in pairs}
+    keys = {one.pair: one for one, _ in pairs}
     for pair in filter(of_stages.__contains__, keys):
         outcome, report = keys[pair], of_stages[pair]
         for stage, change in ((LAST, report.control), (OWN, report.change)):
@@ -110,3 +119,218 @@ def change_rows(
                     value=float(change.symmetric),
                     n=change.num_in_hull,
                 )
+
+
+def ranked_methods(results: Results) -> tuple[list[Ranked], str]:
+    """Returns the methods by their mean AUC with the change, and a headline.
+
+    The means are over the pairs of drives that all methods have; without one
+    there are no methods, and the headline says so.
+    """
+    rows = results.where({STAGE: OWN}, task="place", metric="auc").rows
+    ranked, samples = ranking(rows)
+    measured = Counter(
+        row.but("method") for row in rows if not math.isnan(row.value)
+    )
+    num_pairs = sum(n == len(ranked) for n in measured.values())
+    return ranked, _headline(ranked, samples, num_pairs)
+
+
+def _headline(
+    ranked: Sequence[Ranked], samples: np.ndarray, num_pairs: int
+) -> str:
+    if not ranked:
+        return "No pair of drives has an AUC of every method to rank."
+    over = f"{num_pairs} pairs of drives" if num_pairs > 1 else "one pair"
+    best, *others = [(titled(one.method), f"{one.value:.3f}") for one in ranked]
+    if not others:
+        return f"{best[0]} has a mean AUC of {best[1]} over {over}."
+    ties = [name for name, value in others if value == best[1]]
+    if ties:
+        names = ", ".join([best[0], *ties[:-1]])
+        return (
+            f"{names} and {ties[-1]} tie at a mean AUC of {best[1]} ({over})."
+        )
+    text = (
+        f"{best[0]} ranks first of {len(ranked)} methods, with a mean AUC of"
+        f" {best[1]} over {over}; {others[0][0]} follows with {others[0][1]}."
+    )
+    if num_pairs == 1:
+        return text
+    lead = np.percentile(samples[:, 0] - samples[:, 1], 2.5)
+    if lead > 0.0:
+        return f"{text} Its lead is beyond chance (95 %)."
+    return f"{text} With other pairs, the two might change places (95 %)."
+
+
+class Survival(NamedTuple):
+    """A method on a pair of drives: metric -> row.
+
+    Attributes:
+        pair: map, stage of the database, and of the query.
+        method: its name.
+        before: without the change; empty without a control.
+        after: with the change.
+    """
+
+    pair: tuple[str, str, str]
+    method: str
+    before: Mapping[str, Row]
+    after: Mapping[str, Row]
+
+    def number(self, side: str, metric: str, end: str = "value") -> float:
+        """Returns the value before or after the change, or a limit of it.
+
+        The limits are those of its interval.
+        """
+        row = getattr(self, side).get(metric)
+        return math.nan if row is None else getattr(row, end)
+
+
+def survivals(rows: Iterable[Row], stages: Mapping[str, str]) -> list[Survival]:
+    """Returns what each method keeps on each pair, in the order of tables.
+
+    The stages are those of drives.
+    """
+    found: dict[
+        tuple[tuple[str, str, str], str],
+        tuple[dict[str, Row], dict[str, Row]],
+    ] = {}
+    for row in rows:
+        if row.task == "place":
+            pair = row.map, stages[row.database], stages[row.query]
+            sides = found.setdefault((pair, row.method), ({}, {}))
+            sides[row[STAGE] == OWN][row.metric] = row
+    pairs = list(dict.fromkeys(pair for pair, _ in found))
+    methods = tables.in_table_order(method for _, method in found)
+    return sorted(
+        (
+            Survival(pair, method, before, after)
+            for (pair, method), (before, after) in found.items()
+        ),
+        key=lambda s: (pairs.index(s.pair), methods.index(s.method)),
+    )
+
+
+def by_pair(
+    survivals: Iterable[Survival],
+) -> dict[tuple[str, str, str], list[Survival]]:
+    """Returns (map, database, query) -> what each method keeps."""
+    groups: dict[tuple[str, str, str], list[Survival]] = {}
+    for one in survivals:
+        groups.setdefault(one.pair, []).append(one)
+    return groups
+
+
+def percent(share: float) -> str:
+    """Returns a share as text in per cent."""
+    return tables.MISSING if math.isnan(share) else f"{100.0 * share:.0f} %"
+
+
+def interval_text(kept: Row) -> str:
+    """Returns the interval of a kept share as text; empty without one."""
+    if math.isnan(kept.low):
+        return ""
+    return f"({100.0 * kept.low:.0f}–{100.0 * kept.high:.0f})"
+
+
+def survival_numbers(survivals: Sequence[Survival]) -> tables.Table:
+    """Returns what methods keep, for `survival.csv`."""
+    numbers: dict[str | tuple[str, str], tuple[str, ...]] = {
+        "auc_unchanged": ("before", "auc"),
+        "auc_changed": ("after", "auc"),
+        "kept": ("after", "kept"),
+        "kept_low": ("after", "kept", "low"),
+        "kept_high": ("after", "kept", "high"),
+        "r1_unchanged": ("before", "r1"),
+        "r1_changed": ("after", "r1"),
+        "r1_kept": ("after", "kept_r1"),
+        "r1_kept_low": ("after", "kept_r1", "low"),
+        "r1_kept_high": ("after", "kept_r1", "high"),
+        "recall_at_full_precision": ("after", "recall_at_full_precision"),
+        "auc_strict_unchanged": ("before", "auc_strict"),
+        "auc_strict_changed": ("after", "auc_strict"),
+    }
+    return tables.Table.of(
+        survivals,
+        {
+            "map": lambda s: s.pair[0],
+            "db": lambda s: s.pair[1],
+            "query": lambda s: s.pair[2],
+            "method": lambda s: s.method,
+            **tables.keyed(numbers, lambda s, place: s.number(*place)),
+            "protocol": lambda s: s.after["auc"].protocol,
+        },
+    )
+
+
+def survival_table(survivals: Sequence[Survival]) -> tables.Table:
+    """Returns what methods keep, for print: a row per pair and method."""
+    return tables.Table.of(
+        survivals,
+        {
+            "map": lambda s: s.pair[0],
+            "DB → query": lambda s: " → ".join(s.pair[1:]),
+            "method": lambda s: tables.title(s.method),
+            **_shown("AUC", "auc", "kept"),
+            **_shown("AUC strict", "auc_strict"),
+            **_shown("R@1", "r1", "kept_r1"),
+            ("recall at full precision", "with change"): lambda s: s.number(
+                "after", "recall_at_full_precision"
+            ),
+        },
+        tables.CAPTIONS["survival"],
+    )
+
+
+def _shown(
+    group: str, metric: str, kept: str | None = None
+) -> tables.Columns[Survival]:
+    """Returns the columns of a number without change, with it, and kept."""
+
+    def share(one: Survival) -> str | None:
+        row = one.after.get(str(kept))
+        if row is None:
+            return None
+        return f"{percent(row.value)} {interval_text(row)}".rstrip()
+
+    columns: dict[str | tuple[str, str], Callable[[Survival], object]] = {
+        (group, "without change"): lambda s: (
+            s.number("before", metric) if s.before else NO_CONTROL
+        ),
+        (group, "with change"): lambda s: s.number("after", metric),
+    }
+    return columns if kept is None else columns | {(group, "kept"): share}
+
+
+def survival_summary(survivals: Sequence[Survival]) -> str:
+    """Returns one or two sentences on the share of AUC that methods keep."""
+    groups = by_pair(survivals)
+    known = [one for one in survivals if one.before]
+    without = len(groups) - len(by_pair(known))
+    shares: dict[str, list[float]] = {}
+    for one in known:
+        if not math.isnan(share := one.number("after", "kept")):
+            shares.setdefault(one.method, []).append(share)
+    medians = {
+        m: float(np.median(shares[m])) for m in tables.in_table_order(shares)
+    }
+    parts = []
+    if medians:
+        listed = ", ".join(
+            f"{tables.title(method)} {percent(medians[method])}"
+            for method in sorted(medians, key=lambda m: -medians[m])
+        )
+        number = len(groups) - without
+        over = f"median of {number} pairs" if number > 1 else "one pair"
+        parts.append(
+            f"Each method keeps part of its AUC without change ({over}):"
+            f" {listed}."
+        )
+    if without:
+        which = f"For {without} of {len(groups)} pairs" if known else "Here"
+        parts.append(
+            f"{which} no control was driven (both routes in one stage), so the"
+            " cost of the change alone is not known."
+        )
+    return " ".join(parts)

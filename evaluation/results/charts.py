@@ -456,8 +456,8 @@ def _scatter(chart: _Chart) -> tuple[str, Figure]:
         + list(chart.rows)
     )
     found = {
-        titled(one.method): (-one.rho[0][0], f"{-one.rho[0][0]:+.2f}")
-        for one in correlations(selected, [x_name], y_name)
+        titled(one.method): (-one.value, f"{-one.value:+.2f}")
+        for one in correlations(selected, x_name, y_name)
     }
     message = f"{words(y_name)} over {words(x_name)}"
     if not all(math.isnan(rho) for rho, _ in found.values()):

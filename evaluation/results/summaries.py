@@ -8,8 +8,10 @@ rank correlations are by bootstrap over conditions.
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
+import itertools
 import math
+from operator import itemgetter
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -76,32 +78,34 @@ def means(rows: Iterable[Row], *columns: str) -> list[Mean]:
     ]
 
 
-@dataclass(frozen=True)
-class Excess:
-    """A method under two causes at once, and under each alone.
+class Summary(NamedTuple):
+    """A number that is made of a table, with its 95 % interval or range.
 
-    Attributes:
-        answers: under both, with the first seed.
-        names: names of the two causes.
-        kept: shares of the baseline's AUC: under the first, under the second,
-            under both.
-        value: what both cost beyond the product of what each leaves, as a
-            share of the baseline's AUC.
-        interval: its 95 % interval; above 0 if that is beyond doubt.
+    `n` is the number of conditions that it is made of, or None.
     """
 
-    answers: Answers
-    names: tuple[str, str]
-    kept: tuple[float, float, float]
+    what: str
+    map: str
+    task: str
+    method: str
+    gate: bool
     value: float
-    interval: Interval
+    low: float = math.nan
+    high: float = math.nan
+    n: int | None = None
+
+    @classmethod
+    def of(cls, what: str, key: Key, *numbers: float) -> Summary:
+        """Returns value, low and high end of what a method has on a map."""
+        return cls(what, key.map, key.task, key.label, key.gate, *numbers)
 
 
-def excesses(queries: QueryRows) -> list[Excess]:
+def excesses(queries: QueryRows) -> list[Summary]:
     """Returns what two causes of failure cost together, for all pairs.
 
-    A pair is a cause whose name joins two by "+", each of which is also there
-    alone (at its strongest level). Seeds are joined.
+    It is what both cost beyond the product of what each leaves, as a share of
+    the baseline's AUC. A pair is a cause whose name joins two by "+", each of
+    which is also there alone (at its strongest level). Seeds are joined.
     """
     conditions: dict[tuple, list[Answers]] = {}
     levels: dict[object, Any] = {}
@@ -143,12 +147,10 @@ def excesses(queries: QueryRows) -> list[Excess]:
             a, b, ab = (kept_share(one, base) for one in samples)
             interval = percentile_interval(a * b - ab)
         found.append(
-            Excess(
+            Summary.of(
+                f"excess of {' and '.join(names)}",
                 key,
-                (names[0], names[1]),
-                (first, second, together),
-                first * second - together,
-                interval,
+                *(first * second - together, interval.low, interval.high),
             )
         )
     return found
@@ -172,33 +174,15 @@ def lifetime(
     return math.inf
 
 
-@dataclass(frozen=True)
-class Lifetime:
-    """How much of a factor it takes until a share is left.
-
-    Attributes:
-        row: one that has the map, the drives and the method.
-        share: that is left.
-        value: value of the mean over seeds; infinite if more is left at `last`.
-        low, high: the least and the greatest of a seed.
-        last: greatest value of the factor that was measured.
-    """
-
-    row: Row
-    share: float
-    value: float
-    low: float
-    high: float
-    last: float
-
-
 def lifetimes(
     results: Results, factor: str, shares: Iterable[float] = (0.9, 0.5)
-) -> list[Lifetime]:
-    """Returns lifetimes over a numeric factor, of all rows of `kept`.
+) -> list[Summary]:
+    """Returns how much of a numeric factor it takes until shares are left.
 
-    The least value of the factor is the baseline. What is there with one seed
-    alone, as the baseline may be, belongs to all seeds.
+    They are of all rows of `kept`: the value of the mean over seeds, infinite
+    if more is left, with the least and the greatest of a seed. The least value
+    of the factor is the baseline. What is there with one seed alone, as the
+    baseline may be, belongs to all seeds.
     """
     groups: dict[tuple, list[Row]] = {}
     for row in results.where(metric="kept").rows:
@@ -218,13 +202,11 @@ def lifetimes(
                 lifetime(*_curve_of(curves, seed), share) for seed in seeds
             ] or [lifetime(times, mean, share)]
             found.append(
-                Lifetime(
+                Summary.of(
+                    f"{factor} until {100.0 * share:g} % is left (of"
+                    f" {times[-1]:g})",
                     some[0],
-                    share,
-                    lifetime(times, mean, share),
-                    min(single),
-                    max(single),
-                    times[-1],
+                    *(lifetime(times, mean, share), min(single), max(single)),
                 )
             )
     return found
@@ -272,21 +254,11 @@ def paired_values(results: Results, x: str, y: str) -> list[tuple[Row, float]]:
     return found
 
 
-class Growth(NamedTuple):
-    """The exponent with which a number grows over another one.
-
-    It is from the point before, which has less of `at`; NaN for the first.
-    """
-
-    row: Row
-    at: float
-    exponent: float
-
-
-def growths(results: Results, over: str, metric: str) -> list[Growth]:
+def growths(results: Results, over: str, metric: str) -> list[Summary]:
     """Returns the growth exponents of a metric over a factor or metric.
 
-    Points with the same map, method and gate belong together.
+    Each is from the point before, which has less of it. Points with the same
+    map, method and gate belong together.
     """
     groups: dict[tuple, list[tuple[float, Row]]] = {}
     for row, at in paired_values(results, over, metric):
@@ -294,79 +266,54 @@ def growths(results: Results, over: str, metric: str) -> list[Growth]:
         groups.setdefault(key, []).append((at, row))
     found = []
     for some in groups.values():
-        before: tuple[float, Row] | None = None
-        for at, row in sorted(some, key=lambda point: point[0]):
-            exponent = math.nan
-            if before is not None and 0.0 < before[0] < at:
-                grown = math.log(row.value / before[1].value)
-                exponent = grown / math.log(at / before[0])
-            found.append(Growth(row, at, exponent))
-            before = at, row
+        some.sort(key=itemgetter(0))
+        for (less, before), (at, row) in itertools.pairwise(some):
+            if 0.0 < less < at:
+                grown = math.log(row.value / before.value)
+                what = f"exponent of {metric} over {over}, at {at:g}"
+                exponent = grown / math.log(at / less)
+                found.append(Summary.of(what, row, exponent))
     return found
 
 
-@dataclass(frozen=True)
-class Correlation:
-    """How well numbers predict what a method misses.
-
-    Attributes:
-        method: with its settings.
-        number: number of conditions.
-        rho: Spearman's rank correlation of 1 less the metric with each number,
-            and its 95 % interval by bootstrap over conditions.
-        difference: the second correlation less the first; None of one number.
-    """
-
-    method: str
-    number: int
-    rho: tuple[tuple[float, Interval], ...]
-    difference: tuple[float, Interval] | None
-
-
 def correlations(
-    results: Results, numbers: Sequence[str], metric: str = "auc"
-) -> list[Correlation]:
-    """Returns the rank correlations of a metric with factors or metrics.
+    results: Results, x: str, metric: str = "auc"
+) -> list[Summary]:
+    """Returns how well a factor or metric predicts what each method misses.
 
-    Conditions count where all numbers are known. With and without the gate is
-    to be selected before.
+    It is Spearman's rank correlation of 1 less the metric with it, over the
+    conditions where both are known, with its interval by bootstrap over these.
+    With and without the gate is to be selected before.
     """
-    points: dict[str, dict[int, list[float]]] = {}
-    for name in numbers:
-        for row, at in paired_values(results, name, metric):
-            methods = points.setdefault(row.label, {})
-            methods.setdefault(id(row), [1.0 - row.value]).append(at)
+    points: dict[str, list[tuple[float, float]]] = {}
+    for row, at in paired_values(results, x, metric):
+        points.setdefault(row.label, []).append((1.0 - row.value, at))
     found = []
     for method, rows in points.items():
-        known = np.array([r for r in rows.values() if len(r) > len(numbers)])
-        if len(known) == 0:
-            continue
+        known = np.array(rows)
         rng = np.random.default_rng(0)
         draws = rng.integers(len(known), size=(_SAMPLES, len(known)))
-        rho, samples = _spearman(known), _spearman(known[draws])
-        difference = None
-        if len(numbers) == 2:
-            apart = percentile_interval(samples[:, 1] - samples[:, 0])
-            difference = float(rho[1] - rho[0]), apart
-        each = tuple(
-            (float(value), percentile_interval(sampled))
-            for value, sampled in zip(rho, samples.T, strict=True)
+        interval = percentile_interval(_spearman(known[draws]))
+        found.append(
+            Summary(
+                f"rank correlation of 1 - {metric} with {x}",
+                *("", "place", method, False, float(_spearman(known))),
+                *(interval.low, interval.high, len(known)),
+            )
         )
-        found.append(Correlation(method, len(known), each, difference))
     return found
 
 
 def _spearman(values: np.ndarray) -> np.ndarray:
-    """Returns Spearman's correlation of the first column with the others.
+    """Returns Spearman's correlation (...) of two columns, (..., N, 2).
 
-    Values are (..., N, C), correlations (..., C - 1); NaN where a column is
-    constant.
+    NaN where a column is constant.
     """
     ranks = rankdata(values, axis=-2)
     ranks -= ranks.mean(axis=-2, keepdims=True)
     with np.errstate(invalid="ignore", divide="ignore"):
         ranks /= np.linalg.norm(ranks, axis=-2, keepdims=True)
-    return (ranks[..., :1] * ranks[..., 1:]).sum(axis=-2)
+    return ranks.prod(axis=-1).sum(axis=-1)
 
 
 def check_same_queries(one: Answers, other: Answers) -> None:
@@ -441,23 +388,6 @@ def _numbered(units: Sequence[object]) -> np.ndarray:
     return np.array([known.index(one) for one in units])
 
 
-class Summary(NamedTuple):
-    """A number that is made of a table, with its 95 % interval or range.
-
-    `n` is the number of conditions that it is made of, or None.
-    """
-
-    what: str
-    map: str
-    task: str
-    method: str
-    gate: bool
-    value: float
-    low: float
-    high: float
-    n: int | None = None
-
-
 def summarised(
     results: Results,
     queries: QueryRows | None,
@@ -474,47 +404,12 @@ def summarised(
         over, metric = str(chart.get("over")), str(chart.get("metric"))
         if chart.get("kind") == "scatter":
             x, y = str(chart.get("x")), str(chart.get("y"))
-            for one in correlations(results.where(gate=False), [x], y):
-                value, interval = one.rho[0]
-                found.append(
-                    Summary(
-                        f"rank correlation of 1 - {y} with {x}",
-                        *("", "place", one.method, False, value),
-                        *(interval.low, interval.high, one.number),
-                    )
-                )
+            found += correlations(results.where(gate=False), x, y)
         elif chart.get("kind") == "lines" and metric == "kept":
-            for life in lifetimes(results, over):
-                found.append(
-                    Summary(
-                        f"{over} until {100.0 * life.share:g} % is left (of"
-                        f" {life.last:g})",
-                        *_named(life.row),
-                        *(life.value, life.low, life.high),
-                    )
-                )
+            found += lifetimes(results, over)
         elif chart.get("kind") == "lines" and metric.endswith("_ms"):
             x = "places" if "places" in results.distinct("metric") else over
-            found += [
-                Summary(
-                    f"exponent of {metric} over {x}, at {one.at:g}",
-                    *_named(one.row),
-                    *(one.exponent, math.nan, math.nan),
-                )
-                for one in growths(results, x, metric)
-                if not math.isnan(one.exponent)
-            ]
+            found += growths(results, x, metric)
     if queries is not None and CAUSE in queries.factors:
-        found += [
-            Summary(
-                f"excess of {' and '.join(one.names)}",
-                *_named(one.answers),
-                *(one.value, one.interval.low, one.interval.high),
-            )
-            for one in excesses(queries)
-        ]
+        found += excesses(queries)
     return found
-
-
-def _named(key: Key) -> tuple[str, str, str, bool]:
-    return key.map, key.task, key.label, key.gate

@@ -36,6 +36,9 @@ _BEFORE = ("experiment", "map", "database", "query", "seed")
 _BEHIND = ("task", "method", "gate", "protocol")
 KEYS = (*_BEFORE, *_BEHIND)
 _MEASURED = ("metric", "value", "low", "high", "n")
+# A factor, and two of its values: a drive's own stage, or that of the query.
+STAGE = "both.stage"
+OWN, LAST = "own", "last"
 # What `Key` gives by name beside factors, which cannot have such a name.
 _NAMED = frozenset(("label", *KEYS, *_MEASURED))
 # Columns of a query -> what kind of value they have.
@@ -265,9 +268,7 @@ class Results:
                 version, lacks a column, has one twice, or has a value that
                 cannot be. The line, the column and the fault are named.
         """
-        path = Path(path)
-        file = path / RESULTS if path.is_dir() else path
-        table = _Cells.read(file, (*KEYS, *_MEASURED))
+        table = _Cells.read(path, RESULTS, (*KEYS, *_MEASURED))
         rows: list[Row] = []
         lines: dict[tuple[object, ...], int] = {}
         for one, key, identity in table.keyed():
@@ -352,9 +353,9 @@ class QueryRows:
         Raises:
             InputError: as `Results.read`.
         """
-        path = Path(path)
-        file = path / QUERIES if path.is_dir() else path
-        table = _Cells.read(file, (*KEYS, *_NEEDED_ANSWERS), tuple(_ANSWERS))
+        table = _Cells.read(
+            path, QUERIES, (*KEYS, *_NEEDED_ANSWERS), tuple(_ANSWERS)
+        )
         names = [name for name in _ANSWERS if name in table.columns]
         found: dict[tuple[object, ...], tuple[dict, list[_Line]]] = {}
         for one, key, identity in table.keyed():
@@ -580,8 +581,15 @@ class _Cells:
 
     @classmethod
     def read(
-        cls, file: Path, needed: Iterable[str], known: Iterable[str] = ()
+        cls,
+        path: str | Path,
+        usual: str,
+        needed: Iterable[str],
+        known: Iterable[str] = (),
     ) -> _Cells:
+        """Reads a file, or the one in a folder that has the usual name."""
+        path = Path(path)
+        file = path / usual if path.is_dir() else path
         try:
             text = read_bytes(file).decode("utf-8-sig")
             reader = csv.reader(io.StringIO(text, newline=""), strict=True)

@@ -129,29 +129,15 @@ class Table:
         )
 
     def to_csv(self) -> str:
-        """Returns the table as CSV with all digits.
-
-        A cell becomes two columns; the second holds the paper's number.
-        """
-        columns = list(zip(*self.rows, strict=True)) or [()] * len(self.header)
-        expanded = []
-        for name, column in zip(self._full_names(), columns, strict=True):
-            if any(isinstance(value, Cell) for value in column):
-                expanded.append([name, *(value.value for value in column)])
-                expanded.append(
-                    [f"paper's {name}", *(value.printed for value in column)]
-                )
-            else:
-                expanded.append([name, *column])
-        header, *rows = zip(*expanded, strict=True)
+        """Returns the table as CSV with all digits."""
         cells = (
             [
                 int(v) if isinstance(v, bool) else "" if _is_missing(v) else v
                 for v in row
             ]
-            for row in rows
+            for row in self.rows
         )
-        return csv_text(header, cells)
+        return csv_text(self._full_names(), cells)
 
     def write_csv(self, path: Path) -> None:
         """Writes the table as CSV, as `to_csv` returns it.

@@ -22,7 +22,7 @@ from evaluation.methods import MethodConfig
 from evaluation.methods.layered_overlap import LayeredOverlap, LayeredScan
 from evaluation.recognition.fault_kinds import NEARLY, PairEvidence
 from evaluation.recognition.overlap_truth import sampled
-from evaluation.recognition.place_recognition import RecognitionResult
+from evaluation.recognition.place_recognition import PlaceRecognition
 from evaluation.recognition.protocol import RetrievalProtocol
 from evaluation.recognition.seen_surfaces import SeenSurfaces
 from evaluation.study.chosen_methods import MethodChoice
@@ -67,7 +67,7 @@ def explain_faults(
 def find_evidence(
     database: Drive | KeptDrive,
     query: Drive | KeptDrive,
-    results: Sequence[RecognitionResult],
+    results: Sequence[PlaceRecognition],
     protocol: RetrievalProtocol,
     track: Track = silent,
 ) -> PairEvidence:
@@ -83,7 +83,7 @@ def find_evidence(
     Raises:
         InputError: a scan cannot be read.
     """
-    first = results[0].outcome.retrieval
+    first = results[0].retrieval
     wrong = {one.method: _wrong_places(one) for one in results}
     is_needed = np.asarray(first.matches.any(axis=0))
     for places in wrong.values():
@@ -137,17 +137,12 @@ def find_evidence(
     )
 
 
-def _wrong_places(result: RecognitionResult) -> np.ndarray:
+def _wrong_places(result: PlaceRecognition) -> np.ndarray:
     """Returns (Q,) best places that are wrong and not just too far; or -1."""
-    outcome = result.outcome
-    best = outcome.retrieval.best_places
-    rows = np.arange(len(best))
-    is_far = (
-        outcome.retrieval.distances[rows, best]
-        > NEARLY * outcome.protocol.radius
-    )
-    is_wrong = outcome.outcomes.has_match & ~outcome.outcomes.is_right
-    return np.where(is_wrong & is_far, best, -1)
+    found, outcomes = result.retrieval, result.outcomes
+    is_far = found.best_distances > NEARLY * result.protocol.radius
+    is_wrong = outcomes.has_match & ~outcomes.is_right
+    return np.where(is_wrong & is_far, found.best_places, -1)
 
 
 @dataclass(frozen=True, eq=False)

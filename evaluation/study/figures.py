@@ -1,15 +1,17 @@
-"""The figures of a study: how they are drawn, file names, what they show."""
+"""What a study draws of its cities: figures, file names, what they show."""
 
 from pathlib import Path
 
 from cns_drake.base.files import file_name, make_folder
 from cns_drake.base.jobs.step import Reporter
+from evaluation.change.drive_change import ChangeResult, Surveyed, compare
 from evaluation.recognition.metrics import MODES
 from evaluation.report import figures
 from evaluation.report.page_data import Illustration, PageDrive, make_drive
 from evaluation.results.drawing import PIXELS
 from evaluation.study.collection import City, RecordingInfo
 from evaluation.study.parts import Part
+from evaluation.study.surveys import SurveyedDrive
 
 # Format of pictures on the page.
 _PAGE_KIND = PIXELS[-1]
@@ -42,25 +44,41 @@ def draw_city(
     return drives
 
 
-def draw_changes(
+def compare_stages(
     reporter: Reporter,
-    change: Part,
-    drives: tuple[tuple[Part, Part], tuple[Part, Part]],
+    map_name: str,
+    stages: tuple[str, str],
+    drives: tuple[Part, ...],
+    clouds: tuple[Part, Part],
     stems: tuple[Path, Path],
-) -> None:
-    """Draws what changed between two stages, and the sets of the TCR.
+) -> ChangeResult:
+    """Returns the change between two drives, and draws it.
 
-    Each drive is a `SurveyedDrive` and a cloud; the earlier one comes first.
+    Args:
+        reporter: reports progress.
+        map_name: name of the map.
+        stages: the earlier stage, and the later one.
+        drives: the earlier, the later and maybe a control, each a
+            `SurveyedDrive` of one world.
+        clouds: those of the earlier and the later drive.
+        stems: paths of the figures without ending: what changed, and the sets
+            of the TCR.
     """
     del reporter
-    earlier, later = drives
+    read: list[SurveyedDrive] = [part.read() for part in drives]
+    report = compare(
+        *(Surveyed(d.name, d.coarse, d.positions, d.placed) for d in read)
+    )
+    result = ChangeResult(map_name, stages, report)
     make_folder(stems[0].parent)
+    earlier, later, *_ = read
     figures.draw_change(
-        change.read(),
-        (earlier[1].read(), later[1].read()),
-        (earlier[0].read().coarse.merged(), later[0].read().coarse.merged()),
+        result,
+        (clouds[0].read(), clouds[1].read()),
+        (earlier.coarse.merged(), later.coarse.merged()),
         stems,
     )
+    return result
 
 
 def figure_files(*stems: Path) -> tuple[Path, ...]:

@@ -1,64 +1,68 @@
-"""Measurements between two surveyed recordings."""
+"""Measurements between two recordings, or on one."""
+
+from collections.abc import Callable
+from dataclasses import replace
+from typing import TypeAlias
 
 import numpy as np
 from threadpoolctl import threadpool_limits
 
 from cns_drake.base.jobs.step import Reporter
-from evaluation.change.drive_change import ChangeResult, Surveyed
-from evaluation.change.drive_change import compare as compare_maps
 from evaluation.drives import check_same_world
 from evaluation.drives.drive_views import MovedDrive
 from evaluation.drives.sampling import gather
-from evaluation.recognition import place_recognition
-from evaluation.recognition.costs import Cost, measure_cost
+from evaluation.methods.method import Method
+from evaluation.recognition.costs import Cost, measure_cost, query_ms
+from evaluation.recognition.description import (
+    DescribedDrive,
+    Role,
+    joined_scans,
+)
+from evaluation.recognition.overlap_truth import best_overlaps
+from evaluation.recognition.place_outcome import PlaceOutcome
+from evaluation.recognition.place_recognition import (
+    PlaceRecognition,
+    judge_retrieval,
+)
 from evaluation.recognition.protocol import RetrievalProtocol
 from evaluation.recognition.retrieval import compare as score
+from evaluation.recognition.retrieval import compare_with_gates
 from evaluation.study.chosen_methods import MethodChoice
 from evaluation.study.parts import Part
-from evaluation.study.surveys import DriveSource, SurveyedDrive
+from evaluation.study.surveys import (
+    DriveSource,
+    describe_recording,
+)
 
+# The source of a drive, or the parts of its scans and of its descriptions by
+# each method.
+DescribedSource: TypeAlias = "DriveSource | tuple[Part, ...]"
+
+# Queries whose time is measured, and the longest time for all queries at a size
+# [ms].
+TIMED = 9
+_LONGEST_MS = 3.6e6
+# Places that no method is known to take so long for.
+_MANY = 5000
 # Number of clouds and of queries whose costs are measured; the time of the
 # first does not count.
 _NUM_TRIALS = 12
 
 
-def measure_change(
-    reporter: Reporter,
-    map_name: str,
-    stages: tuple[str, str],
-    drives: tuple[Part, ...],
-) -> ChangeResult:
-    """Returns the change between two drives; they must be of one world.
-
-    The earlier, the later and maybe a control are each a `SurveyedDrive`.
-    """
-    del reporter
-    read: list[SurveyedDrive] = [part.read() for part in drives]
-    earlier, later, *controls = (
-        Surveyed(one.name, one.coarse, one.positions, one.placed)
-        for one in read
-    )
-    control = controls[0] if controls else None
-    report = compare_maps(earlier, later, control)
-    return ChangeResult(map_name, stages, report)
-
-
 def recognise_places(
     reporter: Reporter,
-    map_name: str,
-    stages: tuple[str, str],
+    names: tuple[str, str, str],
     described: tuple[Part, Part],
     choice: MethodChoice,
     protocol: RetrievalProtocol,
-) -> place_recognition.RecognitionResult | None:
+) -> PlaceRecognition | None:
     """Returns the result of a method on two drives of one world.
 
     It is None if a drive is compared with itself and closes no loop.
 
     Args:
         reporter: reports progress.
-        map_name: name of the map.
-        stages: stages of the database and of the query.
+        names: those of the map, and of the stages of database and query.
         described: descriptions of the database and of the query.
         choice: the method.
         protocol: protocol of the comparison.
@@ -73,10 +77,9 @@ def recognise_places(
         # A route need not close a loop.
         reporter.note(f"{query.name}: it never comes back to where it was")
         return None
-    outcome = place_recognition.judge_retrieval(
-        method, database.name, query.name, retrieval, protocol
+    return judge_retrieval(
+        method, database.name, query.name, retrieval, protocol, pair=names
     )
-    return place_recognition.RecognitionResult.of(map_name, stages, outcome)
 
 
 def measure_costs(
@@ -132,3 +135,133 @@ def measure_costs(
                 )
             )
     return costs
+
+
+def measure_places(
+    reporter: Reporter,
+    database: DescribedSource,
+    query: DescribedSource,
+    distractors: tuple[tuple[Part, ...], ...],
+    num_distractors: int,
+    methods: tuple[MethodChoice, ...],
+    protocol: RetrievalProtocol,
+) -> list[PlaceOutcome]:
+    """Returns two outcomes of each method, without the gate and with it.
+
+    A method that would take over an hour for all queries has no outcome.
+
+    Args:
+        reporter: reports progress.
+        database: described drive of the places.
+        query: described drive in the same world, whose scans ask.
+        distractors: described drives through other cities, one part for each
+            method.
+        num_distractors: number of their places that are added to the database.
+        methods: the methods.
+        protocol: the protocol of the comparison.
+    """
+    place_scans, places = _describe(
+        database, "places", methods, protocol, reporter
+    )
+    query_scans, queries = _describe(
+        query, "queries", methods, protocol, reporter
+    )
+    overlaps = None
+    outcomes = []
+    for k, choice in enumerate(
+        reporter.track(methods, "comparing", len(methods))
+    ):
+        method = choice.make()
+        mapped, asked = places(k), queries(k)
+        searched, drives = crowded(mapped, distractors, k, num_distractors)
+        if len(searched.places.frames) > _MANY and _takes_long(
+            method, searched, asked
+        ):
+            reporter.note(f"{choice.name}: it would take over an hour")
+            continue
+        both = compare_with_gates(
+            method, searched, asked, protocol, [None, protocol.radius]
+        )
+        if overlaps is None:
+            overlaps = best_overlaps(
+                place_scans,
+                mapped.places.X_WS,
+                query_scans,
+                asked.queries.X_WS,
+                both[0].matches[:, : len(place_scans)],
+            )
+        outcomes += [
+            PlaceOutcome.of(
+                choice.key,
+                is_gated,
+                one,
+                (asked.queries.stamps_ns, asked.queries.p_WSs),
+                drives,
+                overlaps,
+                protocol.radius,
+            )
+            for is_gated, one in zip((False, True), both, strict=True)
+        ]
+    return outcomes
+
+
+def _takes_long(
+    method: Method,
+    database: DescribedDrive,
+    query: DescribedDrive,
+) -> bool:
+    one_ms = query_ms(
+        method, database.places, query.queries, TIMED + 1, with_pose=False
+    )
+    return one_ms * len(query.queries.frames) > _LONGEST_MS
+
+
+def _describe(
+    drive: DescribedSource,
+    role: Role,
+    methods: tuple[MethodChoice, ...],
+    protocol: RetrievalProtocol,
+    reporter: Reporter,
+) -> tuple[list[np.ndarray], Callable[[int], DescribedDrive]]:
+    """Returns the scans of a drive, and what gives each description once."""
+    if isinstance(drive, tuple):
+        scans, *parts = drive
+        return scans.read(), lambda k: parts[k].read()[1]
+    asked = {one.key: (one.make(), {role}, protocol) for one in methods}
+    found = describe_recording(drive(), {role}, asked, protocol, reporter.track)
+    assert isinstance(found.scans, list)
+    return found.scans, lambda k: found.described.pop(methods[k].key)
+
+
+def crowded(
+    database: DescribedDrive,
+    distractors: tuple[tuple[Part, ...], ...],
+    method: int,
+    num_others: int,
+) -> tuple[DescribedDrive, list[str]]:
+    """Returns a drive with the places of drives elsewhere behind its own.
+
+    The others are moved so far away that none of their places is a match. They
+    add `num_others` places at most, from the first one on.
+
+    Args:
+        database: the drive.
+        distractors: described drives elsewhere, one part for each method.
+        method: number of the method.
+        num_others: number of places.
+
+    Returns:
+        The drive, and the name of the drive of each place.
+    """
+    known = [database]
+    for parts in distractors:
+        if sum(len(d.places.frames) for d in known[1:]) >= num_others:
+            break
+        known.append(parts[method].read()[1])
+    places = joined_scans(
+        [one.places for one in known],
+        range(len(known)),
+        len(database.places.frames) + num_others,
+    )
+    drives = [one.name for one in known for _ in one.places.frames]
+    return replace(database, places=places), drives

@@ -15,7 +15,7 @@ from cns_drake.base.version import __version__
 from evaluation.recognition.description import Role
 from evaluation.recognition.protocol import FAIR_PROTOCOL, RetrievalProtocol
 from evaluation.report import page, result_tables
-from evaluation.report.curve_figures import chart_illustrations, draw_pr_curves
+from evaluation.report.curve_figures import draw_pr_curves
 from evaluation.report.reference import NO_REFERENCE, Reference
 from evaluation.study import figures, measurements
 from evaluation.study.chosen_methods import MethodChoice, choose_methods
@@ -135,7 +135,7 @@ class Study:
         report.differences = result_tables.method_differences(
             report.recognitions
         )
-        for shown in chart_illustrations(report, folder):
+        for shown in page.chart_illustrations(report, folder):
             report.illustrations.insert(0, shown)
         if self._costed_pairs:
             report.costs = self._files.part("costs", "costs").read()
@@ -240,33 +240,25 @@ class Study:
         drives = [*pair, *(one for one in both if one not in pair)]
         earlier, later = pair
         surveys = tuple(self._files.survey(one.name) for one in drives)
-        change = self._files.part("changes", earlier.name, later.name)
-        names = figures.change_stems(city, pair)
-        stems = tuple(self._files.figures / name for name in names)
-        steps = (
-            MakePart(
-                change,
-                measurements.measure_change,
-                (
-                    city.name,
-                    (earlier.stage, later.stage),
-                    tuple(one.drive for one in surveys),
-                ),
+        stems = tuple(
+            self._files.figures / name
+            for name in figures.change_stems(city, pair)
+        )
+        step = MakePart(
+            self._files.part("changes", earlier.name, later.name),
+            figures.compare_stages,
+            (
+                city.name,
+                (earlier.stage, later.stage),
+                tuple(one.drive for one in surveys),
+                (surveys[0].fine, surveys[1].fine),
+                stems,
             ),
-            MakePart(
-                self._files.part("figures", names[0]),
-                figures.draw_changes,
-                (
-                    change,
-                    tuple((one.drive, one.fine) for one in surveys[:2]),
-                    stems,
-                ),
-                figures.figure_files(*stems),
-            ),
+            figures.figure_files(*stems),
         )
         return Job(
             f"change {city.name} {earlier.stage} > {later.stage}",
-            Steps(change.path, steps),
+            step,
             _survey_names(drives),
             _DRAWING_COST,
         )
@@ -286,8 +278,7 @@ class Study:
                 self._result(pair, run.queries),
                 measurements.recognise_places,
                 (
-                    city.name,
-                    (database.stage, query.stage),
+                    (city.name, database.stage, query.stage),
                     (
                         surveys[0].described(run.places),
                         surveys[1].described(run.queries),
@@ -347,11 +338,8 @@ class Study:
                 elif result is not None:
                     compared.append(result)
                     if pair[0] is not pair[1]:
-                        unchanged = None
-                        if control is not None:
-                            beside = self._result(control, run.queries)
-                            unchanged = beside.read()
-                        report.pairs.append((result, unchanged))
+                        beside = control and self._result(control, run.queries)
+                        report.pairs.append((result, beside and beside.read()))
             evidence = self._evidence(pair).read()
             if evidence is not None:
                 report.evidence[pair[0].name, pair[1].name] = evidence

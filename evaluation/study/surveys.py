@@ -5,7 +5,7 @@ before or after the drive is recorded. The job therefore has the source of the
 drive, not the drive.
 """
 
-from collections.abc import Collection, Mapping, Sequence, Set
+from collections.abc import Callable, Mapping, Set
 from dataclasses import dataclass, field
 import os
 from pathlib import Path
@@ -24,7 +24,7 @@ from evaluation.drives.drive_views import RecentScans
 from evaluation.drives.sampling import cropped, within_range
 from evaluation.maps.thumbnails import thumbnail
 from evaluation.maps.voxel_maps import CELL_SIZE, VoxelAccumulator, VoxelMap
-from evaluation.methods import Method, MethodConfig
+from evaluation.methods import MethodConfig
 from evaluation.recognition import description
 from evaluation.recognition.protocol import FAIR_PROTOCOL, RetrievalProtocol
 from evaluation.study.chosen_methods import MethodChoice
@@ -206,14 +206,14 @@ class RecordingSurvey:
 
     Each method has its descriptions of the drive, by another protocol under a
     `described_key`; there are none without a role. The scans of places and
-    queries are None unless kept; without maps they are (N, 3) float32, as their
-    role sees them, and there is neither a surveyed drive nor `fine`, a cloud
-    (K, 3) for pictures, in W [m].
+    queries are None unless kept; `fine` is a cloud (K, 3) for pictures, in W
+    [m]. A drive that is not mapped has neither, and the scans are (N, 3)
+    float32, as their role sees them.
     """
 
     placed: PlacedDrive
     described: dict[str, description.DescribedDrive]
-    scans: KeptDrive | list[np.ndarray] | None = None
+    scans: KeptDrive | list[np.ndarray] | None
     drive: SurveyedDrive | None = None
     fine: np.ndarray | None = None
 
@@ -226,14 +226,11 @@ def described_key(method: str, protocol: RetrievalProtocol) -> str:
 def survey_recording(
     recording: Drive,
     roles: Set[description.Role],
-    methods: Sequence[Method],
+    asked: Mapping[str, description.Request],
     protocol: RetrievalProtocol = FAIR_PROTOCOL,
     track: Track = silent,
     *,
     with_scans: bool = False,
-    with_map: bool = True,
-    further: Sequence[description.Request] = (),
-    keys: Sequence[str] | None = None,
 ) -> RecordingSurvey:
     """Maps a recording and describes its places and queries.
 
@@ -243,40 +240,23 @@ def survey_recording(
         recording: the drive.
         roles: whether it makes a database, asks queries, or both; it may have
             no role.
-        methods: methods that describe it.
-        protocol: protocol of the descriptions.
+        asked: name of a description -> what is described; none without a role.
+        protocol: protocol of the frames that are shown and kept.
         track: reports progress.
         with_scans: whether to keep the scans of places and queries.
-        with_map: whether to make a map; without one, only the scans of places
-            and queries are read.
-        further: descriptions by other protocols; none without a role.
-        keys: names of the descriptions, those of `methods` first; by default
-            made from the names of the methods.
 
     Raises:
         InputError: if it cannot be read, or holds no point.
     """
     frames: list[int] = []
     thumbnails = []
-    number = max(
-        [
-            *map(protocol.scans, methods),
-            *(other.scans(method) for method, _, other in further),
-        ],
-        default=1,
-    )
-    mapped = MappedDrive(recording, number) if with_map else None
-    drive = mapped or RecentScans(recording, number)
-    seen: list[np.ndarray] = []
+    mapped = MappedDrive(recording, _most_scans(asked))
     kept: KeptDrive | None = None
-    if with_map and with_scans:
+    if with_scans:
         known = recording.instances
-        kept = KeptDrive(drive.name, drive.X_WS, known and dict(known))
+        kept = KeptDrive(mapped.name, mapped.X_WS, known and dict(known))
 
     def keep(frame: int, cloud: np.ndarray) -> None:
-        if mapped is None:
-            seen.append(cloud.astype(np.float32))
-            return
         # Pictures show the scan as recorded, whatever its query sees.
         frames.append(frame)
         scan = mapped.scan(frame)
@@ -288,27 +268,11 @@ def survey_recording(
 
     described = {}
     if roles:
-        found = description.describe_drive(
-            drive,
-            methods,
-            roles,
-            protocol,
-            track,
-            visit=keep if with_map or with_scans else None,
-            further=further,
-        )
-        if keys is None:
-            keys = [method.name for method in methods]
-            keys += [
-                described_key(one.name, other) for one, _, other in further
-            ]
-        described = dict(zip(keys, found, strict=True))
-    placed = PlacedDrive.of(recording)
-    if mapped is None:
-        return RecordingSurvey(placed, described, seen if with_scans else None)
+        described = _described(mapped, roles, asked, protocol, track, keep)
     coarse, fine = mapped.finish(track)
     if len(coarse) == 0:
         raise InputError(f"{mapped.name}: no scan holds a point")
+    placed = PlacedDrive.of(recording)
     surveyed = SurveyedDrive(
         placed=placed,
         stamps_ns=mapped.stamps_ns,
@@ -320,12 +284,52 @@ def survey_recording(
     return RecordingSurvey(placed, described, kept, surveyed, fine)
 
 
+def describe_recording(
+    recording: Drive,
+    roles: Set[description.Role],
+    asked: Mapping[str, description.Request],
+    protocol: RetrievalProtocol = FAIR_PROTOCOL,
+    track: Track = silent,
+) -> RecordingSurvey:
+    """Describes the places or queries of a recording, and keeps their scans.
+
+    Only these scans are read, each once. See `survey_recording`.
+    """
+    drive = RecentScans(recording, _most_scans(asked))
+    seen: list[np.ndarray] = []
+
+    def keep(frame: int, cloud: np.ndarray) -> None:
+        seen.append(cloud.astype(np.float32))
+
+    described = _described(drive, roles, asked, protocol, track, keep)
+    return RecordingSurvey(PlacedDrive.of(recording), described, seen)
+
+
+def _most_scans(asked: Mapping[str, description.Request]) -> int:
+    """Returns the greatest number of scans that a method merges."""
+    return max((p.scans(method) for method, _, p in asked.values()), default=1)
+
+
+def _described(
+    drive: Drive,
+    roles: Set[description.Role],
+    asked: Mapping[str, description.Request],
+    protocol: RetrievalProtocol,
+    track: Track,
+    visit: Callable[[int, np.ndarray], None],
+) -> dict[str, description.DescribedDrive]:
+    found = description.describe_drive(
+        drive, (), roles, protocol, track, visit, asked.values()
+    )
+    return dict(zip(asked, found, strict=True))
+
+
 @dataclass(frozen=True)
 class Survey(Step):
     """Writes the survey of a drive, or its missing parts.
 
-    See `survey_recording`. Further descriptions are by a second protocol; there
-    are none without a role.
+    See `survey_recording`, and without a map `describe_recording`. Further
+    descriptions are by a second protocol; there are none without a role.
     """
 
     source: DriveSource
@@ -346,73 +350,39 @@ class Survey(Step):
 
     def run(self, reporter: Reporter) -> None:
         missing = self._missing()
-        found = self.find(self.source(), reporter, missing)
-        self.write(found, missing)
-
-    def find(
-        self,
-        drive: Drive,
-        reporter: Reporter,
-        missing: Collection[Part] | None = None,
-    ) -> RecordingSurvey:
-        """Returns the survey of the source's drive.
-
-        It may read the drive while that is made. The `missing` parts are
-        needed; all by default.
-
-        Raises:
-            InputError: see `survey_recording`.
-        """
-
-        def needed(key: str) -> bool:
-            part = self.files.described(key)
-            return bool(self.roles) and (missing is None or part in missing)
-
-        methods = [one for one in self.methods if needed(one.key)]
-        further = [
-            (described_key(one.key, protocol), one, roles, protocol)
-            for one, roles, protocol in self.further
-            if needed(described_key(one.key, protocol))
-        ]
-        return survey_recording(
-            drive,
-            self.roles,
-            [one.make() for one in methods],
-            self.protocol,
-            reporter.track,
-            with_scans=self.with_scans,
-            with_map=self.with_map,
-            further=[
-                (one.make(), roles, protocol)
-                for _, one, roles, protocol in further
-            ],
-            keys=[*(one.key for one in methods), *(key for key, *_ in further)],
+        asked = {
+            key: (choice.make(), roles, protocol)
+            for key, (choice, roles, protocol) in self._asked.items()
+            if self.files.described(key) in missing
+        }
+        arguments = (
+            *(self.source(), self.roles, asked),
+            *(self.protocol, reporter.track),
         )
+        if self.with_map:
+            found = survey_recording(*arguments, with_scans=self.with_scans)
+        else:
+            found = describe_recording(*arguments)
+        values: dict[Part, object] = {
+            self.files.scans: found.scans,
+            self.files.fine: found.fine,
+            self.files.drive: found.drive,
+        }
+        for key, described in found.described.items():
+            values[self.files.described(key)] = found.placed, described
+        for part, made_of in missing.items():
+            part.write(made_of, values[part])
 
-    def write(
-        self,
-        found: RecordingSurvey,
-        missing: Mapping[Part, Mapping] | None = None,
-    ) -> None:
-        """Writes the parts of the survey that were missing.
-
-        Raises:
-            InputError: a file cannot be written.
-        """
-        missing = self._missing() if missing is None else missing
-        for key in list(found.described):
-            part = self.files.described(key)
-            # Each value is dropped when it is written.
-            value = found.placed, found.described.pop(key)
-            if part in missing:
-                part.write(missing[part], value)
-        for part, one in (
-            (self.files.scans, found.scans),
-            (self.files.fine, found.fine),
-            (self.files.drive, found.drive),
-        ):
-            if part in missing:
-                part.write(missing[part], one)
+    @property
+    def _asked(self) -> dict[str, Further]:
+        """Name of each description -> what is described."""
+        asked = {
+            one.key: (one, self.roles, self.protocol) for one in self.methods
+        }
+        for choice, roles, protocol in self.further:
+            key = described_key(choice.key, protocol)
+            asked[key] = choice, roles, protocol
+        return asked if self.roles else {}
 
     def _missing(self) -> dict[Part, Mapping]:
         """Returns the parts that are missing or stale, and their inputs."""
@@ -432,21 +402,17 @@ class Survey(Step):
             )
 
         own = inputs(self.roles, self.protocol)
-        expected: dict[Part, Mapping] = {}
-        if self.with_map:
-            expected = dict.fromkeys([self.files.fine, self.files.drive], own)
+        expected: dict[Part, Mapping] = {
+            self.files.described(key): {
+                **inputs(roles, protocol),
+                "method": choice.identity(),
+            }
+            for key, (choice, roles, protocol) in self._asked.items()
+        }
         if self.with_scans:
             expected[self.files.scans] = own
-        if self.roles:
-            for choice in self.methods:
-                part = self.files.described(choice.key)
-                expected[part] = {**own, "method": choice.identity()}
-            for choice, roles, protocol in self.further:
-                key = described_key(choice.key, protocol)
-                expected[self.files.described(key)] = {
-                    **inputs(roles, protocol),
-                    "method": choice.identity(),
-                }
+        if self.with_map:
+            expected |= dict.fromkeys([self.files.fine, self.files.drive], own)
         return {
             part: made_of
             for part, made_of in expected.items()

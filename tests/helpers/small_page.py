@@ -6,10 +6,7 @@ from evaluation.maps.thumbnails import thumbnail
 from evaluation.methods import make_method
 from evaluation.recognition.costs import Cost
 from evaluation.recognition.fault_kinds import PairEvidence
-from evaluation.recognition.place_recognition import (
-    RecognitionResult,
-    judge_retrieval,
-)
+from evaluation.recognition.place_recognition import judge_retrieval
 from evaluation.recognition.pose_errors import PoseErrors
 from evaluation.recognition.protocol import PAPER_PROTOCOL
 from evaluation.recognition.retrieval import Retrieval
@@ -133,7 +130,10 @@ def make_result(method, best, back=False):
     )
     stages = ("04", "01") if back else ("01", "04")
     names = [f"{MAP}_{stage}" for stage in stages]
-    outcome = judge_retrieval(
-        make_method(method, {}), *names, retrieval, PAPER_PROTOCOL
+    return judge_retrieval(
+        make_method(method, {}),
+        *names,
+        retrieval,
+        PAPER_PROTOCOL,
+        pair=(MAP, *stages),
     )
-    return RecognitionResult.of(MAP, stages, outcome)

@@ -18,7 +18,7 @@ from cns_drake.studies.tasks.task import (
 )
 from evaluation.change.drive_change import Surveyed, compare
 from evaluation.drives.sampling import sample_frames
-from evaluation.maps.voxel_maps import CELL_SIZE, VoxelAccumulator, VoxelMap
+from evaluation.maps.voxel_maps import CELL_SIZE, VoxelMap, map_drive
 from evaluation.recognition.place_outcome import Number
 from evaluation.study.parts import Part
 from evaluation.study.surveys import DriveSource
@@ -72,13 +72,10 @@ def map_city(
     """
     drive = source()
     positions = drive.X_WS[:, :3, 3]
-    frames = np.arange(len(drive))
+    frames = None
     if spacing is not None:
-        frames = sample_frames(positions, spacing)
-    voxels = VoxelAccumulator(CELL_SIZE)
-    for frame in reporter.track(frames, "mapping", len(frames)):
-        voxels.add(drive.scan(frame), drive.X_WS[frame])
-    return voxels.to_map(), positions
+        frames = sample_frames(positions, spacing).tolist()
+    return map_drive(drive, CELL_SIZE, reporter.track, frames), positions
 
 
 def measure_change(

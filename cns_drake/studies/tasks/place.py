@@ -1,21 +1,26 @@
-"""Place recognition, and the poses that come with it."""
+"""Place recognition, the poses that come with it, and what both cost."""
 
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
+from typing import Any
 
+from cns_drake.base.jobs.step import Reporter
 from cns_drake.studies.tasks.task import Answers, Jobs, Pair, Task
+from evaluation.recognition.costs import cpu_ms, query_ms
 from evaluation.recognition.place_outcome import (
     Number,
     PlaceOutcome,
     place_numbers,
     pose_numbers,
 )
+from evaluation.study.chosen_methods import MethodChoice
+from evaluation.study.measurements import TIMED, crowded, measure_places
 from evaluation.study.parts import Part
-from evaluation.study.place_outcomes import measure_places
 
-# Expected seconds to describe a pair and to compare it by all methods.
-_COST = 60.0
+# Expected seconds to describe a pair and to compare it by all methods, and to
+# measure their costs.
+_COST, _COSTS_COST = 60.0, 30.0
 
 Outcomes = Sequence[PlaceOutcome]
 
@@ -64,6 +69,71 @@ class PoseTask(PlaceTask):
     def answers(self, found: Outcomes) -> Iterator[Answers]:
         # Those of `place` have the errors of poses.
         yield from ()
+
+
+class CostTask(Task):
+    """What a query costs, and a database made of descriptions."""
+
+    name = "cost"
+    asks = True
+
+    def measure(self, pair: Pair, jobs: Jobs) -> Part:
+        needs: list[str] = []
+        database, query = (
+            jobs.described(drive, role, pair.protocol, needs, kept=True)
+            for drive, role in pair.roles
+        )
+        assert isinstance(database, tuple)
+        assert isinstance(query, tuple)
+        arguments = (
+            *(database[1:], query[1:], jobs.elsewhere(pair, needs)),
+            *(pair.distractors, jobs.methods),
+        )
+        part = jobs.files.part("cost", pair.name)
+        return jobs.add(part, measure_costs, arguments, needs, _COSTS_COST)
+
+    def numbers(self, found: Any, before: Any | None) -> Iterator[Number]:
+        for method, (places, values) in found.items():
+            for name, value in values.items():
+                yield Number(method, False, name, value, n=places)
+
+
+def measure_costs(
+    reporter: Reporter,
+    database: tuple[Part, ...],
+    query: tuple[Part, ...],
+    distractors: tuple[tuple[Part, ...], ...],
+    num_distractors: int,
+    methods: tuple[MethodChoice, ...],
+) -> dict[str, tuple[int, dict[str, float]]]:
+    """Returns key of a method -> number of places, and times [ms].
+
+    `query_ms` is the median CPU time of some queries, `build_ms` that of a
+    database from descriptions.
+
+    Args:
+        reporter: reports progress.
+        database, query: described drives, one part for each method.
+        distractors: described drives through other cities.
+        num_distractors: number of their places.
+        methods: methods to measure.
+    """
+    found = {}
+    for k, choice in enumerate(reporter.track(methods, "", len(methods))):
+        method = choice.make()
+        mapped = database[k].read()[1]
+        places = crowded(mapped, distractors, k, num_distractors)[0].places
+        asked = query[k].read()[1].queries
+        found[choice.key] = (
+            len(places.frames),
+            {
+                "build_ms": cpu_ms(method.build_database, places.descriptors),
+                "query_ms": query_ms(
+                    method, places, asked, TIMED + 1, with_pose=False
+                ),
+            },
+        )
+    return found
 
 
 def _same(before: Outcomes | None, now: PlaceOutcome) -> PlaceOutcome | None:

@@ -17,8 +17,8 @@ from evaluation.recognition.description import Role
 from evaluation.recognition.place_outcome import Number
 from evaluation.recognition.protocol import RetrievalProtocol
 from evaluation.study.chosen_methods import MethodChoice
+from evaluation.study.measurements import DescribedSource
 from evaluation.study.parts import MakePart, Part, StudyFiles
-from evaluation.study.place_outcomes import DescribedSource
 from evaluation.study.surveys import DriveSource, Survey
 
 # Expected seconds to describe a drive by all methods.

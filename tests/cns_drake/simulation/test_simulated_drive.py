@@ -39,7 +39,7 @@ def test_scans_and_poses_are_those_of_a_recording(short_recording):
     ]
     # All maps of these scans are equal as well.
     ours, theirs = (
-        survey_recording(s, set(), []) for s in (source(), recorded)
+        survey_recording(s, set(), {}) for s in (source(), recorded)
     )
     np.testing.assert_array_equal(ours.fine, theirs.fine)
     np.testing.assert_array_equal(

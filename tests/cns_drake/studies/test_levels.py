@@ -8,8 +8,8 @@ from cns_drake.base.errors import InputError
 from cns_drake.base.jobs.cluster import Cluster
 from cns_drake.base.jobs.fingerprint import fingerprint
 from cns_drake.scenarios.shipped import worlds_folder
+from cns_drake.studies.comparisons import check_frozen, frozen_drives
 from cns_drake.studies.experiment import load_experiment
-from cns_drake.studies.frozen import check_frozen, frozen_drives
 from cns_drake.studies.study import Study
 
 TABLE = "levels.csv"

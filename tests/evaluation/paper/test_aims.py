@@ -12,11 +12,11 @@ from evaluation.recognition.protocol import PAPER_PROTOCOL
 
 def asked(method):
     scans = 10 if method == "btc" else 1
-    return SimpleNamespace(
-        protocol=replace(PAPER_PROTOCOL, scans_per_place=scans),
-        database="a",
-        query="b",
-    )
+    return {
+        "protocol": replace(PAPER_PROTOCOL, scans_per_place=scans),
+        "database": "a",
+        "query": "b",
+    }
 
 
 def make_results(change=lambda key: 0.0):
@@ -33,8 +33,8 @@ def make_results(change=lambda key: 0.0):
             SimpleNamespace(
                 pair=key[:3],
                 method=key[3],
-                metrics=dict.fromkeys(MODES, metrics),
-                outcome=asked(key[3]),
+                by_mode=dict.fromkeys(MODES, metrics),
+                **asked(key[3]),
             )
         )
     return results

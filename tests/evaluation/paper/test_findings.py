@@ -24,11 +24,11 @@ def metrics(auc):
 
 def asked(method):
     scans = 10 if method == "btc" else 1
-    return SimpleNamespace(
-        protocol=replace(PAPER_PROTOCOL, scans_per_place=scans),
-        database="a",
-        query="b",
-    )
+    return {
+        "protocol": replace(PAPER_PROTOCOL, scans_per_place=scans),
+        "database": "a",
+        "query": "b",
+    }
 
 
 def make_results(city="metropolis", **aucs):
@@ -40,8 +40,8 @@ def make_results(city="metropolis", **aucs):
         SimpleNamespace(
             pair=(city, f"{i + 1:02d}", "09"),
             method=method.replace("ring", "ring++"),
-            metrics={mode: metrics(value) for mode in MODES},
-            outcome=asked(method),
+            by_mode={mode: metrics(value) for mode in MODES},
+            **asked(method),
         )
         for method, values in aucs.items()
         for i, value in enumerate(values)
@@ -115,8 +115,8 @@ def test_the_best_method_is_that_of_table_ii(seed):
     results = make_results(**dict(zip(names, values, strict=True)))
     for one in results:
         if one.method == "ring++":
-            one.metrics["filtered"] = metrics(
-                min(one.metrics["all"].auc + 0.3, 1.0)
+            one.by_mode["filtered"] = metrics(
+                min(one.by_mode["all"].auc + 0.3, 1.0)
             )
     alike = recognition_table(results, (), "all")
     of_paper = recognition_table(results, (), None, paper())
@@ -137,7 +137,7 @@ def test_a_verdict_names_the_tables_that_contradict_it():
     own = make_results(ring=[0.3, 0.8], btc=[0.9, 0.9], learned=[1.0, 1.0])
     for one in own:
         asked_so = {"turn_queries": True, "tilt_queries": 1.5}
-        one.outcome.protocol = replace(one.outcome.protocol, **asked_so)
+        one.protocol = replace(one.protocol, **asked_so)
     (ring,) = findings(own + by_paper, [])
     assert ring.verdict == "holds"
     assert ring.claim.endswith("as the paper counts.")

@@ -33,7 +33,7 @@ def result(method, mode_protocol, pair=("riverside", "01", "02")):
     return SimpleNamespace(
         pair=pair,
         method=method,
-        outcome=SimpleNamespace(protocol=mode_protocol),
+        protocol=mode_protocol,
     )
 
 
@@ -72,7 +72,7 @@ def test_a_city_of_one_s_own_has_no_reference():
 def test_a_study_does_not_load_the_paper():
     code = (
         "import sys\n"
-        "from evaluation.study import plan, place_outcomes\n"
+        "from evaluation.study import measurements, plan\n"
         "assert not [m for m in sys.modules if 'evaluation.paper' in m]\n"
     )
     subprocess.run([sys.executable, "-c", code], check=True)

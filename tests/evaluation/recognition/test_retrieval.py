@@ -8,10 +8,15 @@ from cns_drake.base.errors import InputError
 from evaluation.drives import open_drive
 from evaluation.drives.sampling import gather, sample_frames, within_range
 from evaluation.methods import Method, MethodConfig, make_method
-from evaluation.recognition.description import describe_drive
+from evaluation.recognition.description import (
+    DescribedScans,
+    describe_drive,
+    joined_scans,
+)
 from evaluation.recognition.place_recognition import run
+from evaluation.recognition.pose_errors import PoseErrors
 from evaluation.recognition.protocol import RetrievalProtocol
-from evaluation.recognition.retrieval import retrieve
+from evaluation.recognition.retrieval import Retrieval, retrieve
 
 
 def line(xs):
@@ -213,7 +218,7 @@ def test_metrics_of_a_pair(tmp_path):
         "place": None,
         "sequence": 0.0,
     }
-    filtered = result.counting("filtered").to_json()
+    filtered = replace(result, mode="filtered").to_json()
     assert filtered["mode"] == "filtered"
     assert filtered["f1_max"] == pytest.approx(2 * 0.75 / 1.75)
     assert len(values["recall_at_n"]) == 25
@@ -255,3 +260,37 @@ def test_different_worlds(tmp_path):
     for compare in (retrieve, run):
         with pytest.raises(InputError, match="frame 'utm'"):
             compare(database, query, OddOneOut())
+
+
+def test_the_best_place_has_a_frame_and_a_distance():
+    nan = np.nan
+    scores = np.array([[0.1, 0.5], [0.7, 0.7], [nan, nan]])
+    found = Retrieval(
+        query_frames=np.array([0, 4, 8]),
+        database_frames=np.array([3, 6]),
+        scores=scores,
+        distances=np.array([[1.0, 2.0], [3.0, 4.0], [5.0, 6.0]]),
+        matches=np.zeros((3, 2), dtype=bool),
+        pose_errors=PoseErrors.unknown(3),
+        is_known=np.ones((3, 2), dtype=bool),
+    )
+    # The first of equal ones is the best.
+    assert found.best_frames.tolist() == [6, 3, -1]
+    np.testing.assert_array_equal(found.best_distances, [2.0, 3.0, nan])
+
+
+def test_joined_scans_of_other_worlds_lie_far_away():
+    one, other = (
+        DescribedScans(
+            frames=np.arange(number),
+            stamps_ns=np.arange(number),
+            X_WS=np.tile(np.eye(4), (number, 1, 1)),
+            descriptors=[name] * number,
+        )
+        for name, number in (("a", 2), ("b", 3))
+    )
+    joined = joined_scans([one, other, one], [0, 2, 0], most=6)
+    assert joined.descriptors == ["a", "a", "b", "b", "b", "a"]
+    assert joined.p_WSs[:, 0].tolist() == [0.0, 0.0, 2e5, 2e5, 2e5, 0.0]
+    assert joined.frames.tolist() == [0, 1, 0, 1, 2, 0]
+    assert not other.p_WSs.any()

@@ -7,11 +7,10 @@ from helpers.small_page import make_content
 import pytest
 
 from evaluation.recognition.fault_kinds import FAULT_KINDS
-from evaluation.report.leaderboard import ranked_methods
 from evaluation.report.page import route_picture, write_page
 from evaluation.report.page_data import browser_data
-from evaluation.report.rows import LAST, OWN, STAGE
-from evaluation.results.table import Results, Row
+from evaluation.report.rows import ranked_methods
+from evaluation.results.table import LAST, OWN, STAGE, Results, Row
 
 PAIR = ("metropolis", "01", "04")
 PAGES = {"metropolis_04": "../pages/metropolis_04.html?a=1&b"}

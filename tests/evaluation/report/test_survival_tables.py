@@ -4,7 +4,7 @@ from helpers.small_page import make_content
 import pytest
 
 from evaluation.report.page import Report, write_page
-from evaluation.report.survival import (
+from evaluation.report.rows import (
     survival_numbers,
     survival_summary,
     survival_table,

@@ -1,6 +1,3 @@
-import csv
-import io
-
 import numpy as np
 import pytest
 
@@ -51,21 +48,6 @@ def test_a_column_without_values_can_go():
     table = Table(("map", "paper"), (("a", None), ("b", float("nan"))))
     assert table.without_empty("paper") == Table(("map",), (("a",), ("b",)))
     assert PLAIN.without_empty("value") is PLAIN
-
-
-def test_cells_become_two_columns_of_csv():
-    rows = list(csv.reader(io.StringIO(GROUPED.to_csv())))
-    assert rows == [
-        [
-            "pair_of",
-            "RING++ AUC",
-            "paper's RING++ AUC",
-            "BTC AUC",
-            "paper's BTC AUC",
-        ],
-        ["01 → 04", "0.75", "0.5", "0.25", ""],
-        ["x & y", "", "0.125", "0.5", ""],
-    ]
 
 
 def test_markdown_marks_best_and_second():

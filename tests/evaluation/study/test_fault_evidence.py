@@ -14,7 +14,6 @@ from evaluation.recognition.fault_kinds import (
     fault_kinds,
 )
 from evaluation.recognition.place_recognition import (
-    RecognitionResult,
     judge_retrieval,
 )
 from evaluation.recognition.pose_errors import PoseErrors
@@ -97,10 +96,14 @@ def result_of(best, distances, protocol, method="solid"):
         PoseErrors.unknown(rows),
         np.ones(distances.shape, dtype=bool),
     )
-    outcome = judge_retrieval(
-        make_method(method, {}), "a", "b", retrieval, protocol
+    return judge_retrieval(
+        make_method(method, {}),
+        "a",
+        "b",
+        retrieval,
+        protocol,
+        pair=("town", "a", "b"),
     )
-    return RecognitionResult.of("town", ("a", "b"), outcome)
 
 
 def test_what_scans_say(tmp_path):

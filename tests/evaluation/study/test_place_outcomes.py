@@ -12,10 +12,10 @@ from evaluation.methods import make_method
 from evaluation.recognition.overlap_truth import overlap_matrix
 from evaluation.recognition.place_recognition import run
 from evaluation.recognition.protocol import RetrievalProtocol
-from evaluation.study import place_outcomes
+from evaluation.study import measurements
 from evaluation.study.chosen_methods import MethodChoice
+from evaluation.study.measurements import measure_places
 from evaluation.study.parts import MakePart, Part, SurveyFiles
-from evaluation.study.place_outcomes import measure_places
 from evaluation.study.surveys import RecordedDrive, Survey
 
 METHODS = (
@@ -182,7 +182,7 @@ def test_another_database_is_another_pair(folder, tmp_path):
 def test_methods_that_would_take_very_long_are_left_out(
     folder, tmp_path, monkeypatch
 ):
-    monkeypatch.setattr(place_outcomes, "_LONGEST_MS", 0.0)
+    monkeypatch.setattr(measurements, "_LONGEST_MS", 0.0)
     notes = []
     reporter = Reporter(
         lambda kind, *values: kind == "note" and notes.extend(values)
@@ -192,7 +192,7 @@ def test_methods_that_would_take_very_long_are_left_out(
     step.run(reporter)
     assert len(step.part.read()) == 2 * len(METHODS)
     assert not notes
-    monkeypatch.setattr(place_outcomes, "_MANY", 3)
+    monkeypatch.setattr(measurements, "_MANY", 3)
     step = pair(folder, tmp_path / "many.data")
     step.run(reporter)
     assert step.part.read() == []

@@ -132,7 +132,8 @@ def test_stored_surveys_equal_computed_ones(recorded, source, files):
     choices = choose_methods()
     survey(source, choices, files)
     methods = [choice.make() for choice in choices]
-    found = survey_recording(recorded, BOTH, methods)
+    asked = {one.name: (one, BOTH, PAPER_PROTOCOL) for one in methods}
+    found = survey_recording(recorded, BOTH, asked)
     assert_equal(files.drive.read(), found.drive)
     assert_equal(files.fine.read(), found.fine)
     direct = describe_drive(recorded, methods, BOTH, PAPER_PROTOCOL)
@@ -164,8 +165,8 @@ def test_scans_of_places_and_queries_are_kept(recorded, source, files):
 
 @pytest.mark.parametrize("roles", [frozenset(), BOTH])
 def test_maps_are_those_of_which_the_tcr_is_measured(folder, recorded, roles):
-    methods = [choose_methods()[0].make()]
-    found = survey_recording(recorded, roles, methods)
+    asked = {"a": (choose_methods()[0].make(), roles, PAPER_PROTOCOL)}
+    found = survey_recording(recorded, roles, asked)
     assert_equal(found.drive.coarse, drive_change.survey(folder).voxels)
 
 
@@ -233,7 +234,7 @@ def test_drives_of_two_worlds_are_not_compared(tmp_path, recorded):
     survey(other, (solid,), surveys[1])
     part = Part(tmp_path / "results" / "solid.data")
     described = tuple(survey.described(solid.name) for survey in surveys)
-    arguments = "metropolis", ("01", "04"), described, solid, PAPER_PROTOCOL
+    arguments = ("metropolis", "01", "04"), described, solid, PAPER_PROTOCOL
     step = MakePart(part, recognise_places, arguments)
     with pytest.raises(InputError, match="poses in frame 'utm'"):
         step.run(Reporter())
