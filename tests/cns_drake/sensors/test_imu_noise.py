@@ -53,13 +53,15 @@ def test_the_walk_has_its_density_at_three_seconds(walk):
     np.testing.assert_allclose(slope, 0.5, atol=0.06)
 
 
-def test_the_walk_starts_at_zero_and_spreads_as_the_root_of_time():
+# The last one is half of the way to where the walk is drawn first.
+@pytest.mark.parametrize("blocks", [50, 2**31])
+def test_the_walk_starts_at_zero_and_spreads_as_the_root_of_time(blocks):
     ends = []
     for seed in range(200):
         errors = ImuErrors(replace(WALK, seed=seed), RATE)
         assert not errors.at(0).any()
-        ends.append(errors.at(50 * BLOCK + 300)[:3])
-    time = (50 * BLOCK + 300) / RATE
+        ends.append(errors.at(blocks * BLOCK + 300)[:3])
+    time = (blocks * BLOCK + 300) / RATE
     # 600 independent numbers: 3 standard errors are 9 %.
     assert np.std(ends) == pytest.approx(2e-4 * np.sqrt(time), rel=0.09)
 

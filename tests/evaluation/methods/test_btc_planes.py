@@ -242,22 +242,27 @@ class TestBasePlane:
         np.testing.assert_allclose(normal, [0.0, 0.0, 1.0], atol=1e-12)
 
     def test_second_time_the_largest_go_first(self):
-        # Groups of a chain, by height: 20 points, 60, 40 and 80. Only
-        # neighbours are alike; the smallest founds a group first.
-        sizes = [20, 60, 40, 80]
-        heights = [0.0, 0.25, 0.5, 0.75]
-        pairs = [(h, s) for h, s in zip(heights, sizes, strict=True)] * 2
+        # Pairs of patches that lean in four ways, and whose points do not
+        # lean: a chain, by height, of 40 points, 120, 80 and 160. Only
+        # neighbours are alike; the smallest founds a group first, and leaves
+        # 80 to 160.
+        sizes = np.array([20, 60, 40, 80] * 2)
+        heights, angles = 0.25 * np.arange(4), 0.3 * np.arange(4)
+        none = np.zeros(8)
         planes = Planes(
-            np.array([[100.0 * s, 0.0, h] for h, s in pairs]),
-            np.tile([0.0, 0.0, 1.0], (8, 1)),
+            np.stack([none, none, np.tile(heights, 2)], axis=1),
+            np.stack(
+                [none, np.tile(np.sin(angles), 2), np.tile(np.cos(angles), 2)],
+                axis=1,
+            ),
             np.tile(np.diag([0.3, 0.3, 0.0]), (8, 1, 1)),
-            np.array([s for _, s in pairs]),
+            sizes,
         )
-        exact = merge(planes, 0.1, 1e-6, keep_single=False)
-        assert sorted(exact.counts) == [40, 80, 120, 160]
-        by_size = exact.take(np.argsort(-exact.counts))
-        twice = merge(by_size, 0.1, 0.3, keep_single=True)
-        assert sorted(twice.counts) == [160, 240]
+        once = merge(planes, 0.1, 0.3, keep_single=False)
+        assert sorted(once.counts) == [40, 80, 120, 160]
+        center, _ = base_plane(planes, 0.1, 0.3)
+        expected = [0.0, 0.0, (80 * 0.5 + 160 * 0.75) / 240]
+        np.testing.assert_allclose(center, expected, atol=1e-12)
 
     def test_none_without_a_pair(self):
         alone = voxels(patch(0, 30, [1.0, 1.0, 1.0], [0.0, 0.0, 1.0]))

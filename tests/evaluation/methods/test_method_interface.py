@@ -10,6 +10,7 @@ from evaluation.methods import Method, MethodConfig
 from evaluation.recognition.place_recognition import run
 from evaluation.recognition.retrieval import retrieve
 from evaluation.recognition.scan_folders import write_scores
+from evaluation.recognition.scoring import score_places
 
 
 def record(folder, heights, y=0.0):
@@ -201,6 +202,16 @@ def test_scores_that_are_none(drives, scores):
         InputError, match=r"highest: score returned .* instead of 6"
     ):
         run(*drives, Wrong())
+
+
+def test_rows_of_different_lengths_are_no_score_of_one_place():
+    class Ragged(Highest):
+        def score(self, query, database, *, exhaustive=False):
+            return [[1.0], [1.0, 2.0]]
+
+    known = np.ones(1, dtype=bool)
+    with pytest.raises(InputError, match=r"list of shape \(0,\) .* 1 numbers"):
+        score_places(Ragged(), [0.0], None, [0.0], [], known)
 
 
 class SomeNan(Highest):

@@ -4,7 +4,11 @@ import tracemalloc
 import numpy as np
 import pytest
 
-from evaluation.recognition.metrics import evaluate
+from evaluation.recognition.metrics import (
+    evaluate,
+    resampled_metrics,
+    resampled_weights,
+)
 from evaluation.recognition.query_outcomes import judge
 from evaluation.recognition.scoring import ranking
 
@@ -289,6 +293,17 @@ def test_bootstrap_is_that_of_resampled_queries():
     metrics = evaluate(outcomes_of([(0.9, False, True), (0.4, True, True)]))
     assert metrics.auc_interval.low == 0.0
     assert metrics.auc_interval.high == 1.0
+
+
+def test_samples_have_the_metrics_of_repeated_queries():
+    rows = [*HAND, (0.7, False, True), (NAN, False, True), (0.2, True, True)]
+    weights = resampled_weights(len(rows))[:20]
+    samples = np.stack(resampled_metrics(outcomes_of(rows), weights), axis=1)
+    for weight, sample in zip(weights.astype(int), samples, strict=True):
+        queries = np.repeat(np.arange(len(rows)), weight)
+        one = evaluate(outcomes_of([rows[query] for query in queries]))
+        expected = [one.auc, one.recall_at_1, one.auc_strict]
+        np.testing.assert_allclose(sample, expected, atol=1e-12)
 
 
 def test_scores_must_not_be_compared_by_value():

@@ -69,6 +69,18 @@ def test_metrics_of_hand_made_queries():
     assert metrics.curve.recall_at_full_precision == pytest.approx(2 / 5)
 
 
+def test_quantiles_of_accepted_poses():
+    # Of 0 to 10 m, the median is 5 m, and nine tenths are within 9 m.
+    right = np.ones(11, dtype=bool)
+    outcomes = make_outcomes(np.arange(11.0), right, right)
+    values = np.random.default_rng(0).permutation(11) + 0.0
+    found = pose_metrics(
+        PoseErrors(values, 3.0 * values), outcomes, evaluate(outcomes)
+    )
+    assert (found.translation_median, found.translation_90) == (5.0, 9.0)
+    assert (found.rotation_median_deg, found.rotation_90_deg) == (15.0, 27.0)
+
+
 def test_full_precision_that_is_never_reached():
     outcomes = make_outcomes([0.9, 0.8], [False, True], [True, True])
     assert evaluate(outcomes).curve.recall_at_full_precision == 0.0
