@@ -27,6 +27,25 @@ def ranked_methods(results: Results) -> tuple[list[Ranked], str]:
     return ranked, _headline(ranked, samples, num_pairs)
 
 
+def beside(results: Results) -> dict[str, dict[str, float]]:
+    """Returns what stands beside the mean AUC: column -> method -> mean.
+
+    All are shares of the queries with a match, over the pairs that all methods
+    have: those whose best place is right; those whose best place is wrong, but
+    within two radii; those with a right pose.
+    """
+    rows = results.where({STAGE: OWN})
+    r1, far, matched, pose = (
+        {one.method: one.value for one in ranking(some.rows)[0]}
+        for some in (
+            rows.where(metric=name)
+            for name in ("r1", "too_far", "with_match", "pose_success")
+        )
+    )
+    far = {name: far[name] / max(matched[name], 1.0) for name in far}
+    return {"R@1": r1, "only too far": far, "right pose": pose}
+
+
 def _headline(
     ranked: Sequence[Ranked], samples: np.ndarray, num_pairs: int
 ) -> str:

@@ -28,7 +28,7 @@ from evaluation.recognition.metrics import MODES, Mode
 from evaluation.recognition.place_recognition import RecognitionResult
 from evaluation.report import result_tables, survival
 from evaluation.report.figures import ROUTE_COLOURS
-from evaluation.report.leaderboard import ranked_methods
+from evaluation.report.leaderboard import beside, ranked_methods
 from evaluation.report.page_data import Illustration, PageDrive, browser_data
 from evaluation.report.reference import NO_REFERENCE, Reference
 from evaluation.report.rows import Controlled, change_rows, place_rows
@@ -275,6 +275,7 @@ def _content(
         "report": report,
         "tables": tables,
         "ranked": ranked,
+        "beside": beside(report.results),
         "styles": styles(in_table_order(one.method for one in ranked)),
         "headline": headline if report.pairs else "",
         "judgements": report.reference.judge(

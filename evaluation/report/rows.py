@@ -36,28 +36,28 @@ def place_rows(
     have a `DriveTrack`.
     """
 
-    def outcome(result: RecognitionResult) -> PlaceOutcome:
+    def outcome(
+        result: RecognitionResult, overlaps: np.ndarray | None
+    ) -> PlaceOutcome:
         one, found = result.outcome, result.outcome.retrieval
         frames, track = found.query_frames, tracks[one.query]
-        known = evidence.get((one.database, one.query))
         return PlaceOutcome.of(
             one.method,
             one.protocol.gate,
             found,
             (track.stamps_ns[frames], track.X_WS[frames, :3, 3]),
             [one.database] * len(found.database_frames),
-            np.full(len(frames), np.nan) if known is None else known.overlaps,
+            np.full(len(frames), np.nan) if overlaps is None else overlaps,
             one.protocol.radius,
         )
 
-    outcomes = [
-        (
-            changed,
-            outcome(changed),
-            None if unchanged is None else outcome(unchanged),
-        )
-        for changed, unchanged in pairs
-    ]
+    outcomes = []
+    for changed, unchanged in pairs:
+        both = changed.outcome.database, changed.outcome.query
+        known = evidence.get(both)
+        after = outcome(changed, known and known.overlaps)
+        before = unchanged and outcome(unchanged, known and known.unchanged)
+        outcomes.append((changed, after, before))
     for stage in (LAST, OWN):
         for changed, after, before in outcomes:
             now = before if stage == LAST else after
