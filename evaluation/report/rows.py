@@ -55,8 +55,10 @@ def place_rows(
     for changed, unchanged in pairs:
         both = changed.outcome.database, changed.outcome.query
         known = evidence.get(both)
-        after = outcome(changed, known and known.overlaps)
-        before = unchanged and outcome(unchanged, known and known.unchanged)
+        after = outcome(changed, getattr(known, "overlaps", None))
+        before = None
+        if unchanged is not None:
+            before = outcome(unchanged, getattr(known, "unchanged", None))
         outcomes.append((changed, after, before))
     for stage in (LAST, OWN):
         for changed, after, before in outcomes:
