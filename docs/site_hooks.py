@@ -89,10 +89,11 @@ def on_page_content(html: str, **_: Any) -> str:
     )
 
 
-def _set(formula: re.Match[str]) -> str:
+def _set(block: re.Match[str]) -> str:
     """Returns a formula as MathML, which browsers set without a script."""
-    indent, latex = formula.groups()
-    return f'{indent}<div class="formula">{convert(latex, display="block")}</div>'
+    indent, latex = block.groups()
+    formula = convert(latex, display="block")
+    return f'{indent}<div class="formula">{formula}</div>'
 
 
 def _in_repository(src: str) -> str:

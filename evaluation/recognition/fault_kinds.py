@@ -49,6 +49,7 @@ class PairEvidence:
             no method is wrong.
         fits: method -> (Q,) the same of the query and the wrong best place;
             NaN where that is right or just too far.
+        unchanged: (Q,) `overlaps` in the control; None without one.
     """
 
     overlaps: np.ndarray
@@ -57,6 +58,7 @@ class PairEvidence:
     changed_classes: list[str]
     right_fits: np.ndarray
     fits: Mapping[str, np.ndarray]
+    unchanged: np.ndarray | None = None
 
     @property
     def visible_changes(self) -> np.ndarray:
@@ -67,6 +69,30 @@ class PairEvidence:
     def visible_change(self) -> tuple[float, int]:
         """Mean visible change, and the number of queries that have one."""
         return mean_visible_change(self.overlaps)
+
+    @property
+    def visible_change_added(self) -> float:
+        """Mean visible change less the control's; NaN without a control."""
+        return visible_change_added(self.overlaps, self.unchanged)
+
+
+def visible_change_added(now: np.ndarray, before: np.ndarray | None) -> float:
+    """Returns the mean visible change less that of a baseline.
+
+    What two viewpoints hide from each other, their parallax, is in both.
+
+    Args:
+        now: (Q,) overlaps, see `PairEvidence`.
+        before: (Q,) those of the same queries in the baseline.
+
+    Returns:
+        NaN if no query has both, or the queries are not the same.
+    """
+    if before is None or len(before) != len(now):
+        return math.nan
+    added = before - now
+    known = added[~np.isnan(added)]
+    return float(known.mean()) if len(known) else math.nan
 
 
 def mean_visible_change(overlaps: np.ndarray) -> tuple[float, int]:

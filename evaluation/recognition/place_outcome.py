@@ -9,7 +9,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from evaluation.recognition.fault_kinds import NEARLY
+from evaluation.recognition.fault_kinds import NEARLY, visible_change_added
 from evaluation.recognition.metrics import (
     UNKNOWN,
     Interval,
@@ -229,11 +229,9 @@ def place_numbers(
             right, was = outcomes.is_right, before.outcomes.is_right
             yield now.number("lost", float((was & ~right).sum()))
             yield now.number("found", float((right & ~was).sum()))
-            # What two viewpoints hide from each other is in both.
-            added = before.overlaps - now.overlaps
-            added = added[~np.isnan(added)]
-            if len(added):
-                yield now.number("visible_change_added", float(added.mean()))
+            added = visible_change_added(now.overlaps, before.overlaps)
+            if not math.isnan(added):
+                yield now.number("visible_change_added", added)
     yield now.number("with_match", float(outcomes.has_match.sum()))
     yield now.number("places", float(outcomes.num_places))
     yield now.number(

@@ -9,6 +9,7 @@ from collections import Counter
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, fields, replace
 import itertools
+import math
 from operator import attrgetter
 from types import MappingProxyType
 from typing import Any, NamedTuple
@@ -36,6 +37,7 @@ from evaluation.recognition.protocol import PROTOCOL_COLUMNS, check_one_protocol
 from evaluation.report.reference import NO_REFERENCE, Published, Reference
 from evaluation.results.table_forms import (
     CAPTIONS,
+    Cell,
     Columns,
     Table,
     in_table_order,
@@ -84,8 +86,8 @@ def change_table(
 ) -> Table:
     """Returns Table I: the change between the drives of each pair."""
 
-    def visible(one: ChangeResult) -> tuple[float | None, int | None]:
-        return _visible_change(evidence, one.report.source, one.report.target)
+    def visible(one: ChangeResult) -> _Visible:
+        return _Visible.of(evidence, one.report.source, one.report.target)
 
     table = Table.of(
         results,
@@ -104,8 +106,10 @@ def change_table(
             ),
             "voxels in hulls": lambda r: r.report.change.num_in_hull,
             "unchanged": lambda r: r.report.change.num_unchanged,
-            "visible change": lambda r: visible(r)[0],
-            "queries": lambda r: visible(r)[1],
+            "visible change": lambda r: visible(r).all,
+            "less the control's": lambda r: visible(r).added,
+            "share left": lambda r: visible(r).left,
+            "queries": lambda r: visible(r).queries,
             "least of the grids": lambda r: r.report.spread[0],
             "greatest": lambda r: r.report.spread[1],
         },
@@ -119,12 +123,28 @@ def change_table(
     return replace(table, rows=table.rows + further)
 
 
-def _visible_change(
-    evidence: Evidence, database: str, query: str
-) -> tuple[float | None, int | None]:
-    """Returns the mean visible change of a pair, and of how many queries."""
-    known = evidence.get((database, query))
-    return (None, None) if known is None else known.visible_change
+class _Visible(NamedTuple):
+    """The mean visible change of a pair, and of how many queries.
+
+    And what is left of it less that of the control, also as a share.
+    """
+
+    all: float | None = None
+    queries: int | None = None
+    added: float | None = None
+    left: str | None = None
+
+    @classmethod
+    def of(cls, evidence: Evidence, database: str, query: str) -> _Visible:
+        known = evidence.get((database, query))
+        if known is None:
+            return cls()
+        all_of_it, queries = known.visible_change
+        added = known.visible_change_added
+        if math.isnan(added) or not all_of_it > 0.0:
+            return cls(all_of_it, queries)
+        left = f"{100.0 * added / all_of_it:.0f} %"
+        return cls(all_of_it, queries, added, left)
 
 
 def _by_pair_and_method(
@@ -202,9 +222,9 @@ def recognition_table(
         ]
         cells = [column[i] for i in range(len(methods)) for column in columns]
         outcome = next(iter(of_method.values())).result
-        visible, _ = _visible_change(evidence, outcome.database, outcome.query)
-        name = " → ".join(pair[1:])
-        rows.append((pair[0], name, tcr.get(pair), visible, *cells))
+        visible = _Visible.of(evidence, outcome.database, outcome.query)
+        shown = tcr.get(pair), Cell(visible.all, visible.added)
+        rows.append((pair[0], " → ".join(pair[1:]), *shown, *cells))
     captions = {
         None: f", {reference.counting}",
         "all": ", all queries counted (mode all)",
@@ -229,7 +249,8 @@ def recognition_table(
         ),
         caption=f"Place recognition{captions[mode]}. {protocol}{beside}"
         " Strict: the AUC with recall = TP / N, which wrong accepted answers"
-        " lower, too. Bold: best of a row; underlined: second.",
+        " lower, too. Bold: best of a row; underlined: second. Beside"
+        " visible change: what is left of it without the control's.",
     )
 
 
@@ -318,7 +339,8 @@ def metric_numbers(results: Sequence[PlaceRecognition]) -> Table:
 class MethodDifference(NamedTuple):
     """Two results of a pair, and the AUC of the first less the second.
 
-    The p-value is corrected for the number of all differences; NaN if unknown.
+    The p-value is corrected for the differences of that pair of drives, so that
+    it does not depend on the other pairs of a report; NaN if unknown.
     """
 
     result: PlaceRecognition
@@ -331,16 +353,22 @@ def method_differences(
     results: Sequence[PlaceRecognition],
 ) -> list[MethodDifference]:
     """Returns the AUC difference of any two methods on each pair (mode all)."""
-    both, found = [], []
-    for one, other in itertools.combinations(_by_pair_and_method(results), 2):
-        if one.pair == other.pair:
-            both.append((one, other))
-            found.append(auc_difference(one.outcomes, other.outcomes))
-    corrected = holm(np.array([one.p_value for one in found])).tolist()
-    return [
-        MethodDifference(*pair, one, p)
-        for pair, one, p in zip(both, found, corrected, strict=True)
-    ]
+    found: list[MethodDifference] = []
+    for _, some in itertools.groupby(
+        _by_pair_and_method(results), attrgetter("pair")
+    ):
+        both = list(itertools.combinations(some, 2))
+        differences = [
+            auc_difference(*(one.outcomes for one in two)) for two in both
+        ]
+        corrected = holm(np.array([one.p_value for one in differences]))
+        found += [
+            MethodDifference(*two, one, p)
+            for two, one, p in zip(
+                both, differences, corrected.tolist(), strict=True
+            )
+        ]
+    return found
 
 
 def difference_numbers(differences: Sequence[MethodDifference]) -> Table:

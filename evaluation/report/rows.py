@@ -45,28 +45,30 @@ def place_rows(
     have a `DriveTrack`.
     """
 
-    def outcome(result: PlaceRecognition) -> PlaceOutcome:
+    def outcome(
+        result: PlaceRecognition, overlaps: np.ndarray | None
+    ) -> PlaceOutcome:
         found = result.retrieval
         frames, track = found.query_frames, tracks[result.query]
-        known = evidence.get((result.database, result.query))
         return PlaceOutcome.of(
             result.method,
             result.protocol.gate,
             found,
             (track.stamps_ns[frames], track.X_WS[frames, :3, 3]),
             [result.database] * len(found.database_frames),
-            np.full(len(frames), np.nan) if known is None else known.overlaps,
+            np.full(len(frames), np.nan) if overlaps is None else overlaps,
             result.protocol.radius,
         )
 
-    outcomes = [
-        (
-            changed,
-            outcome(changed),
-            None if unchanged is None else outcome(unchanged),
-        )
-        for changed, unchanged in pairs
-    ]
+    outcomes = []
+    for changed, unchanged in pairs:
+        both = changed.database, changed.query
+        known = evidence.get(both)
+        after = outcome(changed, getattr(known, "overlaps", None))
+        before = None
+        if unchanged is not None:
+            before = outcome(unchanged, getattr(known, "unchanged", None))
+        outcomes.append((changed, after, before))
     for stage in (LAST, OWN):
         for changed, after, before in outcomes:
             now = before if stage == LAST else after
@@ -134,6 +136,25 @@ def ranked_methods(results: Results) -> tuple[list[Ranked], str]:
     )
     num_pairs = sum(n == len(ranked) for n in measured.values())
     return ranked, _headline(ranked, samples, num_pairs)
+
+
+def beside(results: Results) -> dict[str, dict[str, float]]:
+    """Returns what stands beside the mean AUC: column -> method -> mean.
+
+    All are shares of the queries with a match, over the pairs that all methods
+    have: those whose best place is right; those whose best place is wrong, but
+    within two radii; those with a right pose.
+    """
+    rows = results.where({STAGE: OWN})
+    r1, far, matched, pose = (
+        {one.method: one.value for one in ranking(some.rows)[0]}
+        for some in (
+            rows.where(metric=name)
+            for name in ("r1", "too_far", "with_match", "pose_success")
+        )
+    )
+    far = {name: far[name] / max(matched[name], 1.0) for name in far}
+    return {"R@1": r1, "only too far": far, "right pose": pose}
 
 
 def _headline(

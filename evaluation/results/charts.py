@@ -61,6 +61,7 @@ _METRICS = {
     "kept": "kept share",
     "tcr_sym": "TCR_sym",
     "miou": "mean IoU",
+    "visible_change_added": "visible change less the baseline's",
     "query_ms": "time of a query [ms]",
 }
 # Told apart by all kinds of colour vision, and light enough for letters.

@@ -75,7 +75,8 @@ class _Table:
 class Compared(NamedTuple):
     """Two methods by name, and the mean AUC of the first less the second.
 
-    The p-value is corrected, by Holm's method, for the number of differences.
+    The p-value is corrected, by Holm's method, for all differences of the
+    comparison.
     """
 
     first: str

@@ -2,7 +2,7 @@
 
 from collections import defaultdict
 from collections.abc import Callable, Iterable, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 from pathlib import Path
 
@@ -175,7 +175,9 @@ class Study:
             drives |= {database.name: database, query.name: query}
             roles[database.name].add("places")
             roles[query.name].add("queries")
-        explained = {one.name for pair in pairs.values() for one in pair}
+        explained = {
+            one.name for pair in (pairs | controls).values() for one in pair
+        }
         jobs = [
             Job(
                 f"survey {name}",
@@ -269,7 +271,8 @@ class Study:
         """Returns the job of a pair.
 
         If it explains, it also finds why best places are wrong, and repeats
-        what is compared with published numbers.
+        what is compared with published numbers. Of a control, whose faults
+        nobody asks for, it finds only how much matches show of the queries.
         """
         database, query = pair
         surveys = [self._files.survey(one.name) for one in pair]
@@ -290,19 +293,18 @@ class Study:
             for run in self._runs(city, pair)
             if explains or not run.repeats
         ]
-        if explains:
-            own = [self._result(pair, one.key) for one in self.methods]
-            evidence = MakePart(
-                self._evidence(pair),
-                explain_faults,
-                (
-                    tuple(one.scans for one in surveys),
-                    self.methods,
-                    tuple(own),
-                    self.protocol,
-                ),
-            )
-            steps.insert(len(own), evidence)
+        asked = self.methods if explains else self.methods[:1]
+        evidence = MakePart(
+            self._evidence(pair),
+            explain_faults,
+            (
+                tuple(one.scans for one in surveys),
+                asked,
+                tuple(self._result(pair, one.key) for one in asked),
+                self.protocol,
+            ),
+        )
+        steps.insert(len(self.methods), evidence)
         cost = _RECOGNITION_COST * (1 + len(steps))
         step = Steps(steps[0].output, tuple(steps))
         return Job(name, step, _survey_names(pair), cost)
@@ -341,6 +343,9 @@ class Study:
                         beside = control and self._result(control, run.queries)
                         report.pairs.append((result, beside and beside.read()))
             evidence = self._evidence(pair).read()
+            before = control and self._evidence(control).read()
+            if before is not None:
+                evidence = replace(evidence, unchanged=before.overlaps)
             if evidence is not None:
                 report.evidence[pair[0].name, pair[1].name] = evidence
             names = {one.name for one in (*pair, *(control or ()))}

@@ -73,6 +73,51 @@ def test_a_class_that_the_truth_lacks_is_left_out_of_the_mean(tmp_path):
     assert found["miou"] == pytest.approx((found["iou_kept"] + 2.0) / 3.0)
 
 
+def test_each_mean_leaves_out_what_its_own_part_lacks(tmp_path):
+    """Classes, distances and what does not move each lack labels of their own.
+
+    Of the points, cars (10) have none gone, houses (40) none new.
+    """
+    pair, truth = clouds(tmp_path)
+    _, guess = clouds(tmp_path / "other", seed=8)
+    cars = np.arange(400) < 150
+    truth.A[cars & (truth.A == Label.GONE)] = Label.KEPT
+    truth.B[~cars & (truth.B == Label.NEW)] = Label.KEPT
+    classes = np.where(cars, 10, 40).astype(np.uint16)
+    poses = np.tile(np.eye(4), (1, 1, 1))
+    poses[0, :3, 3] = 4.5, 4.5, 30.0
+    pair = Pair(*(replace(s, classes=classes, X_WS=poses) for s in pair))
+    found = score(pair, truth, guess, {})
+
+    def mean_iou(parts):
+        ious = []
+        for labels in ((1,), (2,), (3,), (0, 4)):
+            true, called = (
+                np.concatenate(
+                    [np.isin(one[k], labels)[parts[k]] for k in (0, 1)]
+                )
+                for one in (truth, guess)
+            )
+            if true.any():
+                ious.append((true & called).sum() / (true | called).sum())
+        return np.mean(ious), len(ious)
+
+    far = [np.linalg.norm(s.points - [4.5, 4.5, 30.0], axis=1) for s in pair]
+    number = 0
+    for part, rows in (
+        (found, [~cars | cars] * 2),
+        (found["without_vehicles_and_people"], [~cars] * 2),
+        (found["by_class"]["10"], [cars] * 2),
+        (found["by_class"]["40"], [~cars] * 2),
+        (found["by_distance"]["20-40"], [(d >= 20) & (d < 40) for d in far]),
+    ):
+        mean, classes_there = mean_iou(rows)
+        assert part["miou"] == pytest.approx(mean)
+        number += classes_there
+    # All four, or three.
+    assert number == 4 + 3 + 3 + 3 + 4
+
+
 def test_all_kept_scores_what_counting_says(tmp_path):
     pair, truth = clouds(tmp_path)
     all_kept = np.full(400, Label.KEPT, np.uint8)

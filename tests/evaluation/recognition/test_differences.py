@@ -1,6 +1,7 @@
 """Differences between methods, by paired bootstrap over blocks."""
 
 from dataclasses import replace
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -13,6 +14,7 @@ from evaluation.recognition.metrics import (
     route_blocks,
 )
 from evaluation.recognition.query_outcomes import judge
+from evaluation.report.result_tables import method_differences
 
 
 def outcomes_of(scores, is_right, blocks=None):
@@ -121,3 +123,30 @@ def test_holm_by_hand():
     np.testing.assert_allclose(found, [0.06, np.nan, 0.04, 0.06, 0.6])
     assert holm(np.array([0.5, 0.9])).tolist() == [1.0, 1.0]
     assert len(holm(np.array([]))) == 0
+
+
+def test_the_family_of_a_difference_is_its_pair_of_drives():
+    """A report of more pairs says the same of each."""
+    rng = np.random.default_rng(2)
+    results = []
+    for city in ("old", "new"):
+        for method in ("btc", "ring++", "solid"):
+            (outcomes, _) = equal_methods(rng, 12)
+            outcome = SimpleNamespace(outcomes=outcomes)
+            pair = (city, "01", "02")
+            results.append(
+                SimpleNamespace(pair=pair, method=method, outcome=outcome)
+            )
+    both = method_differences(results)
+    assert [one.result.pair[0] for one in both] == ["old"] * 3 + ["new"] * 3
+    assert both[:3] == method_differences(results[:3])
+    assert both[3:] == method_differences(results[3:])
+    raw = [one.difference.p_value for one in both[:3]]
+    # Holm's method by hand, for three tests.
+    low, middle, high = sorted(raw)
+    expected = {low: min(3 * low, 1.0)}
+    expected[middle] = min(max(2 * middle, expected[low]), 1.0)
+    expected[high] = max(high, expected[middle])
+    found = [one.p_value for one in both[:3]]
+    assert found == pytest.approx([expected[one] for one in raw])
+    assert method_differences(results[:1]) == []

@@ -1,15 +1,19 @@
 import base64
+from dataclasses import replace
 import itertools
+import math
 from math import nan
 import re
 
 from helpers.small_page import make_content
+import numpy as np
 import pytest
 
 from evaluation.recognition.fault_kinds import FAULT_KINDS
 from evaluation.report.page import route_picture, write_page
 from evaluation.report.page_data import browser_data
-from evaluation.report.rows import ranked_methods
+from evaluation.report.result_tables import recognition_table
+from evaluation.report.rows import beside, ranked_methods
 from evaluation.results.table import LAST, OWN, STAGE, Results, Row
 
 PAIR = ("metropolis", "01", "04")
@@ -51,11 +55,17 @@ def test_links_lead_to_sections(text):
 def test_the_ranking_comes_first(text):
     section = text[text.index('<section id="summary">') :]
     section = section[: section.index("</section>")]
-    rows = re.findall(r'<th scope="row">(.*?)</th>\s*<td>([\d.]+)', section)
-    # By hand: on the pair that both have, RING++ is right on three of five
-    # queries, and Scan Context++ on two.
-    assert [name for name, _ in rows] == ["RING++", "Scan Context++"]
-    (_, first), (_, second) = rows
+    cell = r"(?:<small>.*?</small>)?</td>\s*<td>([\d.–]+)"
+    rows = re.findall(
+        rf'<th scope="row">(.*?)</th>\s*<td>([\d.]+){3 * cell}</td>', section
+    )
+    # By hand: on the pair that both have, RING++ is right on three of four
+    # queries with a match, and Scan Context++ on two. Neither has poses.
+    assert [(name, *beside) for name, _, *beside in rows] == [
+        ("RING++", "0.750", "0.000", "–"),
+        ("Scan Context++", "0.500", "0.000", "–"),
+    ]
+    (_, first, *_), (_, second, *_) = rows
     assert (
         f"RING++ ranks first of 2 methods, with a mean AUC of {first} over one"
         f" pair; Scan Context++ follows with {second}."
@@ -120,6 +130,71 @@ def test_a_headline_is_true(aucs, words):
     )
     _, headline = ranked_methods(Results.of(rows))
     assert words in headline
+
+
+def test_answers_that_are_only_too_far_stand_beside_the_ranking():
+    """Two pairs: 3 of 10 and 9 of 30 wrong answers are within two radii."""
+    values = {
+        "auc": (0.4, 0.6),
+        "r1": (0.5, 0.7),
+        "too_far": (3.0, 9.0),
+        "with_match": (10.0, 30.0),
+        "pose_success": (0.8, 1.0),
+    }
+    rows = [
+        Row(
+            experiment="stages",
+            map="town",
+            database="a",
+            query=str(pair),
+            seed=1,
+            factors={STAGE: stage},
+            task="pose" if metric == "pose_success" else "place",
+            method="btc",
+            gate=False,
+            protocol="fair",
+            metric=metric,
+            # Without the change all is well.
+            value=both[pair] if stage == OWN else 100.0,
+        )
+        for metric, both in values.items()
+        for pair in (0, 1)
+        for stage in (LAST, OWN)
+    ]
+    assert beside(Results.of(rows)) == {
+        "R@1": {"btc": pytest.approx(0.6)},
+        "only too far": {"btc": pytest.approx(0.3)},
+        "right pose": {"btc": pytest.approx(0.9)},
+    }
+
+
+def test_visible_change_stands_beside_that_of_the_control(tmp_path):
+    """Half of 0.4 is parallax; a query without a match does not count."""
+    content = make_content(tmp_path)
+    (pair,) = content.evidence
+    known = replace(
+        content.evidence[pair],
+        overlaps=np.array([0.5, 0.7, 0.6, 0.6, nan]),
+        unchanged=np.array([0.8, 0.8, 0.8, 0.8, nan]),
+    )
+    content = replace(content, evidence={pair: known})
+    found = {
+        (row[STAGE], row.metric): row.value
+        for row in content.results.where(method="scan-context++").rows
+        if row.metric.startswith("visible_change")
+    }
+    assert found == {
+        (LAST, "visible_change"): pytest.approx(0.2),
+        (LAST, "visible_change_added"): 0.0,
+        (OWN, "visible_change"): pytest.approx(0.4),
+        (OWN, "visible_change_added"): pytest.approx(0.2),
+    }
+    table = recognition_table(content.recognitions, (), evidence={pair: known})
+    shown = table.rows[0][table.header.index("visible change")]
+    assert (shown.value, shown.printed) == pytest.approx((0.4, 0.2))
+    # Other queries are no baseline.
+    other = replace(known, unchanged=np.array([0.8]))
+    assert math.isnan(other.visible_change_added)
 
 
 def test_survival_comes_next(text):

@@ -179,6 +179,19 @@ def test_change_beside_the_paper(report):
     assert float(change["visible change"]) == pytest.approx(1 - shares.mean())
     assert float(change["visible change"]) > 0.0
     assert (real["visible change"], real["queries"]) == ("", "")
+    # Nor does the control's best match show all.
+    seen = {
+        (row["both.stage"], row["metric"]): float(row["value"])
+        for row in read_csv(report / "results.csv")
+        if row["metric"].startswith("visible_change")
+    }
+    assert 0.0 < seen["last", "visible_change"] < 1 - shares.mean()
+    added = float(change["less the control's"])
+    assert added == pytest.approx(seen["own", "visible_change_added"])
+    assert added == pytest.approx(
+        1 - shares.mean() - seen["last", "visible_change"], abs=0.05
+    )
+    assert change["share left"] == f"{100 * added / (1 - shares.mean()):.0f} %"
     assert float(real["paper"]) == 0.1819
     assert real["TCR_sym"] == ""
     shown = f"{float(change['TCR_sym']):.4f}"
