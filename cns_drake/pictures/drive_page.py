@@ -7,7 +7,6 @@ from collections.abc import Iterator, Mapping, Sequence, Set
 import contextlib
 from dataclasses import dataclass, field, replace
 from importlib import resources
-import io
 import logging
 from pathlib import Path
 from types import MappingProxyType
@@ -21,6 +20,7 @@ from pydrake.systems.framework import Context, EventStatus, LeafSystem
 from pydrake.systems.sensors import ImageRgba8U
 
 from cns_drake.base.files import write_text
+from cns_drake.base.jpeg_images import to_jpeg
 from cns_drake.pictures import meshcat_drawing as drawing
 from cns_drake.pictures.city_parts import Part, compare_parts, read_parts
 from cns_drake.pictures.static_page import make_static_page
@@ -533,10 +533,7 @@ class MeshcatRecorder(LeafSystem):
 
             pixels = self._images[name].Eval(context).data[:, :, :3]
             picture = Image.fromarray(np.ascontiguousarray(pixels))
-            picture.thumbnail((_IMAGE_SIDE, _IMAGE_SIDE))
-            jpeg = io.BytesIO()
-            picture.save(jpeg, "JPEG", quality=75)
-            images.append((frame, jpeg.getvalue()))
+            images.append((frame, to_jpeg(picture, longest=_IMAGE_SIDE)))
             if len(images) > _MAX_IMAGES:
                 del images[1::2]
                 self._cameras[name] *= 2

@@ -194,7 +194,8 @@ class RayCastingScene:
 
         Rays meet a plane from both sides, like any other surface.
         """
-        limits = rays.max_ranges_of(np.arange(len(rays.d_Sset)))
+        repeats = len(rays.d_Sset) // max(len(rays.max_ranges), 1)
+        limits = np.tile(rays.max_ranges, repeats)
         met = np.full(len(limits), -1, np.int32)
         for row, group in self._planes.items():
             times = _AT_ONCE if group.motion is None else rays.times
@@ -267,22 +268,30 @@ def _meet_plane(
     NumPy takes as long as all other geometry. Ray i takes pose i mod (K,) of
     the (K, 3, 4) X_OLs.
     """
-    # Indices are counted along, since remainders take long.
+    counts = len(rays.p_OSset), len(rays.R_OSset), len(X_OLs)
     origin = turn = pose = -1
+    height, normal_S = 0.0, np.empty(3)
     for ray in range(len(rays.d_Sset)):
-        origin = origin + 1 if origin + 1 < len(rays.p_OSset) else 0
-        turn = turn + 1 if turn + 1 < len(rays.R_OSset) else 0
-        pose = pose + 1 if pose + 1 < len(X_OLs) else 0
-        R, X, d = rays.R_OSset[turn], X_OLs[pose], rays.d_Sset[ray]
-        height = along = 0.0
+        if ray == 0 or max(counts) > 1:
+            # Indices are counted along, since remainders take long.
+            origin = origin + 1 if origin + 1 < counts[0] else 0
+            turn = turn + 1 if turn + 1 < counts[1] else 0
+            pose = pose + 1 if pose + 1 < counts[2] else 0
+            R, X, height = rays.R_OSset[turn], X_OLs[pose], 0.0
+            for i in range(3):
+                height += X[i, 2] * (X[i, 3] - rays.p_OSset[origin, i])
+                normal_S[i] = (
+                    R[0, i] * X[0, 2] + R[1, i] * X[1, 2] + R[2, i] * X[2, 2]
+                )
+        along = 0.0
         for i in range(3):
-            d_O = R[i, 0] * d[0] + R[i, 1] * d[1] + R[i, 2] * d[2]
-            height += X[i, 2] * (X[i, 3] - rays.p_OSset[origin, i])
-            along += X[i, 2] * d_O
-        # A ray along the plane does not meet it.
-        distance = height / along if along != 0.0 else -1.0
+            along += normal_S[i] * rays.d_Sset[ray, i]
+        # A ray along the plane does not meet it, nor one that leads away.
+        if along == 0.0 or height * along < 0.0:
+            continue
+        distance = height / along
         is_first = met[ray] < 0 and distance == limits[ray]
-        if distance >= 0.0 and (distance < limits[ray] or is_first):
+        if distance < limits[ray] or is_first:
             limits[ray], met[ray] = distance, row
 
 

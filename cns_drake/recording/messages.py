@@ -5,7 +5,6 @@ happens here. Quaternions leave in ROS order (x, y, z, w)."""
 
 from collections.abc import Sequence
 import functools
-import io
 import struct
 from typing import Any
 
@@ -16,6 +15,7 @@ from pydrake.systems.sensors import CameraInfo
 
 from cns_drake.base.drives import ros_types
 from cns_drake.base.drives.point_layouts import point_field_datatype
+from cns_drake.base.jpeg_images import to_jpeg
 
 MAP_FRAME = "map"
 BASE_FRAME = "base_link"
@@ -30,7 +30,6 @@ EXACT_COVARIANCE = _EXACT * np.eye(6).ravel()
 # nanoseconds of a stamp, and no part of a text.
 _MARK = 0x3A17C0DE
 IMAGE = "sensor_msgs/msg/Image"
-COMPRESSED_IMAGE = "sensor_msgs/msg/CompressedImage"
 # At 90 of 100, colours are right to a few levels.
 _JPEG_QUALITY = 90
 CAMERA_INFO = "sensor_msgs/msg/CameraInfo"
@@ -231,14 +230,13 @@ def make_compressed_image(
     # Slow to import, and few recordings have cameras.
     from PIL import Image
 
-    stream = io.BytesIO()
     picture = Image.fromarray(np.ascontiguousarray(pixels))
-    picture.save(stream, "JPEG", quality=_JPEG_QUALITY)
+    jpeg = to_jpeg(picture, _JPEG_QUALITY)
     return ros_types.make_message(
-        COMPRESSED_IMAGE,
+        ros_types.COMPRESSED_IMAGE,
         header=make_header(frame_id, stamp_ns),
         format="jpeg",
-        data=np.frombuffer(stream.getvalue(), np.uint8),
+        data=np.frombuffer(jpeg, np.uint8),
     )
 
 

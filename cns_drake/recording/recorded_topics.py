@@ -6,12 +6,7 @@ from pydrake.math import RigidTransform
 
 from cns_drake.base.drives import ros_types
 from cns_drake.recording import messages
-from cns_drake.recording.messages import (
-    CAMERA_INFO,
-    COMPRESSED_IMAGE,
-    ENCODINGS,
-    IMAGE,
-)
+from cns_drake.recording.messages import CAMERA_INFO, ENCODINGS, IMAGE
 from cns_drake.recording.rosbag2_metadata import Topic
 
 TF_STATIC_TOPIC = Topic("/tf_static", ros_types.TF, latched=True)
@@ -99,7 +94,10 @@ def camera_topic(camera_name: str, kind: str) -> Topic:
 
     The kind is `image`, `depth`, `label` or `camera_info`.
     """
-    message_type = {"image": COMPRESSED_IMAGE, "camera_info": CAMERA_INFO}
+    message_type = {
+        "image": ros_types.COMPRESSED_IMAGE,
+        "camera_info": CAMERA_INFO,
+    }
     return Topic(f"/{camera_name}/{kind}", message_type.get(kind, IMAGE))
 
 

@@ -283,6 +283,7 @@ def write_page(path: Path, report: Report) -> None:
         fault_kinds=FAULT_KINDS,
         style=_read_asset("page.css"),
         script=Markup("\n").join(map(_read_asset, _SCRIPTS)),
+        image_step=data["imageStep"] if data else 1,
         data=_to_script(data),
     )
     write_text(path, text)

@@ -1,7 +1,7 @@
 """Drives and pairs, in the form that the page's script reads."""
 
 import base64
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 import io
 from pathlib import Path
@@ -10,7 +10,10 @@ import zlib
 
 from matplotlib import image
 import numpy as np
+from PIL import Image
 
+from cns_drake.base.drives.drive import Drive
+from cns_drake.base.jpeg_images import to_jpeg
 from evaluation.drives.sampling import sample_frames
 from evaluation.maps.thumbnails import CELL, HEIGHT_STEP, MAX_POINTS
 from evaluation.recognition.fault_kinds import PairEvidence, fault_kinds
@@ -24,6 +27,8 @@ from evaluation.results.table_forms import in_table_order, title
 # Points in all scans of a page. At some 3 bytes each they leave room for the
 # figures within 25 MB.
 _POINTS_OF_A_PAGE = 5_000_000
+# The same for images of cameras [bytes], and pixels of their longer side.
+_IMAGES_OF_A_PAGE, _IMAGE_SIDE = 6_000_000, 320
 # Number of best places that are kept for each query.
 _NUM_BEST = 5
 # Between the points of a drawn route [m].
@@ -55,6 +60,35 @@ class Illustration:
 
 
 @dataclass(frozen=True)
+class CameraImages:
+    """What a camera saw at K frames of a drive.
+
+    Attributes:
+        stamps_ns: (K,) stamps of the frames.
+        times_ns: (M,) times of images, increasing.
+        files: M images as JPEG.
+    """
+
+    stamps_ns: np.ndarray
+    times_ns: np.ndarray
+    files: list[bytes]
+
+    def to_data(self, step: int) -> dict:
+        """Returns every `step`-th image, and the nearest of them to frames."""
+        times_ns = self.times_ns[::step]
+        nearest = _nearest(times_ns, self.stamps_ns)
+        later = 1e-9 * (times_ns[nearest] - self.stamps_ns)
+        return {
+            "files": [
+                base64.b64encode(one).decode("ascii")
+                for one in self.files[::step]
+            ],
+            "nearest": nearest.tolist(),
+            "later": np.round(later, 2).tolist(),
+        }
+
+
+@dataclass(frozen=True)
 class PageDrive:
     """A drive as the page shows it.
 
@@ -65,6 +99,7 @@ class PageDrive:
         thumbnails: K reduced scans (see `evaluation.maps.thumbnails`).
         view: the map from above, as a WebP file.
         extent: left, right, bottom and top of the view [m].
+        images: what the drive's camera saw at the frames, if it has one.
     """
 
     name: str
@@ -74,6 +109,7 @@ class PageDrive:
     thumbnails: list[np.ndarray]
     view: bytes
     extent: tuple[float, float, float, float]
+    images: CameraImages | None = None
 
 
 def make_drive(
@@ -82,6 +118,7 @@ def make_drive(
     X_WS: np.ndarray,
     frames: Sequence[int],
     thumbnails: list[np.ndarray],
+    images: CameraImages | None = None,
 ) -> PageDrive:
     """Returns a drive as the page shows it.
 
@@ -91,6 +128,7 @@ def make_drive(
         X_WS: (N, 4, 4) poses of the LiDAR at all frames.
         frames: numbers of the K frames that are places or queries.
         thumbnails: K reduced scans, one for each of these frames.
+        images: what the drive's camera saw at these frames, if it has one.
     """
     positions = X_WS[:, :3, 3]
     stream = io.BytesIO()
@@ -106,7 +144,40 @@ def make_drive(
         thumbnails=thumbnails,
         view=stream.getvalue(),
         extent=view.extent,
+        images=images,
     )
+
+
+def camera_images(
+    drive: Drive, stamps_ns: np.ndarray, on_note: Callable[[str], None]
+) -> CameraImages | None:
+    """Returns a drive's camera images that are nearest in time to frames.
+
+    A note tells how many could not be decoded.
+
+    Raises:
+        InputError: if the drive cannot be read.
+    """
+    times_ns, shown, faults = drive.image_stamps_ns, {}, 0
+    if len(times_ns) == 0:
+        return None
+    for number in np.unique(_nearest(times_ns, stamps_ns)):
+        data = drive.image(number)
+        try:
+            with Image.open(io.BytesIO(data)) as picture:
+                shown[number] = to_jpeg(picture, longest=_IMAGE_SIDE)
+        except Exception:  # Decoders of damaged files raise any.
+            faults += 1
+    if faults:
+        on_note(f"{drive.name}: {faults} camera images cannot be decoded")
+    if not shown:
+        return None
+    return CameraImages(stamps_ns, times_ns[list(shown)], [*shown.values()])
+
+
+def _nearest(times_ns: np.ndarray, wanted_ns: np.ndarray) -> np.ndarray:
+    """Returns the number of the time that is nearest to each wanted one."""
+    return np.searchsorted((times_ns[1:] + times_ns[:-1]) // 2, wanted_ns)
 
 
 def browser_data(
@@ -139,13 +210,22 @@ def browser_data(
     }
     num_scans = sum(len(drives[name].frames) for name in used)
     num_points = min(MAX_POINTS, _POINTS_OF_A_PAGE // max(num_scans, 1))
+    images = {name: one for name in used if (one := drives[name].images)}
+    num_bytes = sum(len(one) for some in images.values() for one in some.files)
+    image_step = 1 + num_bytes // _IMAGES_OF_A_PAGE
     return {
         "radius": recognitions[0].protocol.radius,
         "cell": CELL,
         "heightStep": HEIGHT_STEP,
+        "imageStep": image_step,
         "drives": {
             name: _drive_data(drives[name], num_points)
-            | {"page": pages.get(name)}
+            | {
+                "page": pages.get(name),
+                "images": images[name].to_data(image_step)
+                if name in images
+                else None,
+            }
             for name in sorted(used)
         },
         "pairs": [

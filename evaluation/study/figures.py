@@ -7,11 +7,20 @@ from cns_drake.base.jobs.step import Reporter
 from evaluation.change.drive_change import ChangeResult, Surveyed, compare
 from evaluation.recognition.metrics import MODES
 from evaluation.report import figures
-from evaluation.report.page_data import Illustration, PageDrive, make_drive
+from evaluation.report.page_data import (
+    Illustration,
+    PageDrive,
+    camera_images,
+    make_drive,
+)
 from evaluation.results.drawing import PIXELS
 from evaluation.study.collection import City, RecordingInfo
 from evaluation.study.parts import Part
-from evaluation.study.surveys import SurveyedDrive
+from evaluation.study.surveys import (
+    DriveSource,
+    RecordedDrive,
+    SurveyedDrive,
+)
 
 # Format of pictures on the page.
 _PAGE_KIND = PIXELS[-1]
@@ -20,23 +29,28 @@ _PAGE_KIND = PIXELS[-1]
 def draw_city(
     reporter: Reporter,
     map_name: str,
-    stages: tuple[tuple[str, Part, Part], ...],
+    stages: tuple[tuple[str, Part, Part, DriveSource], ...],
     stem: Path,
 ) -> dict[str, PageDrive]:
     """Draws the routes of a city; returns its drives for the page, by name.
 
-    Each stage has a name, and the `SurveyedDrive` and the cloud of its drive.
+    Each stage has a name, and of its drive the `SurveyedDrive`, the cloud, and
+    the source, of which the camera is shown if it is recorded.
     """
     names, views, routes, drives = [], [], [], {}
-    for done, (name, surveyed, fine) in enumerate(stages):
+    for done, (name, surveyed, fine, source) in enumerate(stages):
         reporter.progress(done, len(stages) + 1)
         drive = surveyed.read()
         view = figures.top_view(fine.read(), drive.positions)
         names.append(name)
         views.append(view)
         routes.append(drive.positions)
+        images = None
+        if isinstance(source, RecordedDrive):
+            stamps_ns = drive.stamps_ns[drive.frames]
+            images = camera_images(source(), stamps_ns, reporter.note)
         drives[drive.name] = make_drive(
-            drive.name, view, drive.X_WS, drive.frames, drive.thumbnails
+            drive.name, view, drive.X_WS, drive.frames, drive.thumbnails, images
         )
     reporter.progress(len(stages), len(stages) + 1)
     make_folder(stem.parent)

@@ -221,14 +221,17 @@ class Study:
 
     def _drawing_job(self, city: City) -> Job:
         stages = city.stages.values()
-        surveys = [(one.stage, self._files.survey(one.name)) for one in stages]
+        surveys = [(one, self._files.survey(one.name)) for one in stages]
         stem = self._files.figures / figures.routes_stem(city)
         step = MakePart(
             self._files.part("pages", city.name),
             figures.draw_city,
             (
                 city.name,
-                tuple((stage, one.drive, one.fine) for stage, one in surveys),
+                tuple(
+                    (drive.stage, one.drive, one.fine, drive.source)
+                    for drive, one in surveys
+                ),
                 stem,
             ),
             figures.figure_files(stem),

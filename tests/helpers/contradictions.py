@@ -89,6 +89,23 @@ def write_messages(messages: list[RecordedMessage], attachments: list) -> bytes:
     return stream.getvalue()
 
 
+def add_images(path: Path, topic: str, images: dict[int, bytes]) -> None:
+    """Adds camera images to a recording: time [ns] -> file."""
+    messages, attachments = read_messages(path.read_bytes())
+    kind = "sensor_msgs/msg/CompressedImage"
+    header = messages[-1].body.header
+    messages += [
+        RecordedMessage(
+            topic,
+            kind,
+            TYPES.types[kind](header, "", np.frombuffer(data, np.uint8)),
+            time_ns,
+        )
+        for time_ns, data in images.items()
+    ]
+    path.write_bytes(write_messages(messages, attachments))
+
+
 def _some(
     messages: list[RecordedMessage], topic: str, rng, later: bool = False
 ) -> int:

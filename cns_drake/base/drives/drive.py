@@ -165,6 +165,19 @@ class Drive(abc.ABC):
         return None
 
     @property
+    def image_stamps_ns(self) -> np.ndarray:
+        """(M,) int64 time of each image of the first camera [ns]."""
+        return np.zeros(0, np.int64)
+
+    def image(self, index: int) -> bytes:
+        """Returns image `index` of the first camera: a file, such as a JPEG.
+
+        Raises:
+            InputError: if the image cannot be read.
+        """
+        raise IndexError(f"image {index} of {len(self.image_stamps_ns)}")
+
+    @property
     def datum(self) -> str | None:
         """Name of the survey grid (datum) in which W lies, if any.
 

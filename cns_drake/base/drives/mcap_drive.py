@@ -36,7 +36,8 @@ class McapDrive(Drive):
 
     Without `/lidar/points` the only topic of point clouds takes its place;
     of several LiDARs, `lidar` chooses one. The topic /imu/data is optional, and
-    so is /<lidar>/labels with `label` and `instance` of the same points.
+    so is /<lidar>/labels with `label` and `instance` of the same points. Images
+    are those of the first topic of compressed ones.
     Scan i is the i-th message of that topic by log time. Its pose is
     that of the `/odometry` message with exactly the same stamp, composed
     with the sensor's place on the vehicle from `/tf_static`; nothing is
@@ -81,6 +82,16 @@ class McapDrive(Drive):
         for topic, message_type in self._message_types.items():
             self._check_topic(topic, message_type)
         self._all_scans = self._file.locate(self._lidar_topic)
+        # `image_transport` adds compressedDepth to the names of depth images.
+        self._camera_topics = [
+            topic
+            for topic, kinds in self._file.topics.items()
+            if kinds == [f"{ros_types.COMPRESSED_IMAGE} in cdr"]
+            and not topic.endswith("/compressedDepth")
+        ]
+        self._message_types.update(
+            dict.fromkeys(self._camera_topics, ros_types.COMPRESSED_IMAGE)
+        )
 
     def __len__(self) -> int:
         return len(self._scans)
@@ -236,6 +247,24 @@ class McapDrive(Drive):
             rows[position] = mcap_messages.imu_row(message)
         self._check_agreement(_IMU_TOPIC, rows)
         return rows
+
+    @property
+    def image_stamps_ns(self) -> np.ndarray:
+        """(M,) int64 time of each image of the first camera [ns].
+
+        It is the log time, set to the clock of the stamps.
+        """
+        if not self._camera_topics:
+            return super().image_stamps_ns
+        images = self._file.locate(self._camera_topics[0])
+        start_ns = int(self._scans["log_time_ns"][0])
+        times_ns = images["log_time_ns"].astype(np.int64) - start_ns
+        return self.stamps_ns[0] + times_ns
+
+    def image(self, index: int) -> bytes:
+        topic = self._camera_topics[0]
+        place = self._file.locate(topic)[index]
+        return self._message(topic, place).data.tobytes()
 
     @cached_property
     def _scans(self) -> np.ndarray:

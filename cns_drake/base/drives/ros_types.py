@@ -18,6 +18,7 @@ POINT_CLOUD = "sensor_msgs/msg/PointCloud2"
 IMU = "sensor_msgs/msg/Imu"
 ODOMETRY = "nav_msgs/msg/Odometry"
 TF = "tf2_msgs/msg/TFMessage"
+COMPRESSED_IMAGE = "sensor_msgs/msg/CompressedImage"
 DETECTIONS_3D = "vision_msgs/msg/Detection3DArray"
 SCENE_UPDATE = "foxglove_msgs/msg/SceneUpdate"
 

@@ -39,11 +39,22 @@ function showCaption(id, what, name, index) {
   const caption = byId(id + "-caption"), drive = data.drives[name];
   caption.textContent = index === undefined
     ? "No candidate" : `${what}: ${name}, frame ${drive.frames[index]} `;
+  showImage(byId(id + "-image"), caption, drive.images, index);
   if (drive.page && index !== undefined) {
     const link = element("a", "look around in 3-D");
     link.href = drive.page;
     caption.append(link);
   }
+}
+
+/** Shows the camera image nearest in time to a scan, if the drive has any. */
+function showImage(image, caption, images, index) {
+  image.hidden = !images || index === undefined;
+  if (image.hidden) return;
+  image.src = "data:image/jpeg;base64," + images.files[images.nearest[index]];
+  const later = images.later[index];
+  if (later) caption.append(
+    `(image ${Math.abs(later)} s ${later > 0 ? "later" : "earlier"}) `);
 }
 
 /** Fills a list whose rows can be chosen; the choice keeps the focus. */

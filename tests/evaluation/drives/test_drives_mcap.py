@@ -2,7 +2,11 @@ import builtins
 import struct
 import tracemalloc
 
-from helpers.contradictions import read_messages, write_messages
+from helpers.contradictions import (
+    add_images,
+    read_messages,
+    write_messages,
+)
 from helpers.drive_files import (
     PERIOD_NS,
     T0_NS,
@@ -150,6 +154,30 @@ def test_a_clock_that_was_set_back_is_noted(tmp_path, back_ns, is_noted):
     np.testing.assert_array_equal(drive.scan(6), scans[6])
     topics = {note.split(": ")[1] for note in drive.notes}
     assert topics == ({"/lidar/points", "/odometry"} if is_noted else set())
+
+
+def test_images_are_those_of_the_first_camera(tmp_path):
+    """Log times may be of another clock than stamps."""
+    path, _, _ = record(tmp_path / "s")
+    assert len(open_drive(path).image_stamps_ns) == 0
+    messages, attachments = read_messages(path.read_bytes())
+    ahead = [one.copy(log_time=one.log_time + 10**15) for one in messages]
+    path.write_bytes(write_messages(ahead, attachments))
+    log_ns = T0_NS + 10**15
+    for topic, start in (
+        ("/depth/compressedDepth", 5),
+        ("/front/image", 7),
+        ("/left/image", 9),
+    ):
+        times = [log_ns + start, log_ns - 2, log_ns + 2 * PERIOD_NS]
+        add_images(path, topic, {t: f"{topic} {t}".encode() for t in times})
+    drive = open_drive(path)
+    np.testing.assert_array_equal(
+        drive.image_stamps_ns, [T0_NS - 2, T0_NS + 7, T0_NS + 2 * PERIOD_NS]
+    )
+    assert [drive.image(k) for k in range(3)] == [
+        f"/front/image {log_ns + t}".encode() for t in (-2, 7, 2 * PERIOD_NS)
+    ]
 
 
 def test_scenario_and_structures(tmp_path):

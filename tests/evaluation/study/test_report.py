@@ -1,9 +1,14 @@
+import base64
 import csv
+import io
+import json
 
 from helpers import dataset_folders, studies
-from helpers.drive_files import make_scan, write_recording, yaw_pose
+from helpers.contradictions import add_images
+from helpers.drive_files import T0_NS, make_scan, write_recording, yaw_pose
 from helpers.small_towns import drive
 import numpy as np
+from PIL import Image
 import pytest
 
 from cns_drake.base.errors import InputError
@@ -53,6 +58,13 @@ def recordings(tmp_path_factory):
     drive(folder / "metropolis_01", "01", "a")
     drive(folder / "metropolis_04", "04", "b")
     drive(folder / "metropolis_04_control", "04", "a")
+    stream = io.BytesIO()
+    Image.new("RGB", (640, 480)).save(stream, "JPEG")
+    add_images(
+        folder / "metropolis_04" / "metropolis_04_0.mcap",
+        "/front/image",
+        {T0_NS: stream.getvalue()},
+    )
     (folder / "notes.txt").write_text("no recording")
     return folder
 
@@ -274,6 +286,17 @@ def test_figures_for_print_and_page(report):
     text = (report / "report.md").read_text()
     for stem in stems:
         assert f"](figures/{stem}.png)" in text
+
+
+def test_what_a_camera_saw(report):
+    page = (report / "report.html").read_text()
+    start = page.index(">", page.index('id="data"')) + 1
+    data = json.loads(page[start : page.index("</script>", start)])
+    assert data["drives"]["metropolis_01"]["images"] is None
+    images = data["drives"]["metropolis_04"]["images"]
+    assert set(images["nearest"]) == {0}
+    picture = base64.b64decode(images["files"][0])
+    assert Image.open(io.BytesIO(picture)).size == (320, 240)
 
 
 def test_differences_of_every_two_methods(report):
