@@ -8,6 +8,7 @@ import contextlib
 from dataclasses import dataclass, field, replace
 from importlib import resources
 import logging
+import math
 from pathlib import Path
 from types import MappingProxyType
 
@@ -61,6 +62,8 @@ _MAX_SAMPLES = 400
 _PLOT_WIDTH, _PLOT_HEIGHT = 400.0, 20.0
 # Least range of a plot: a smaller one would magnify noise.
 _LEAST_RANGE = {"km/h": 10.0, "m/s²": 2.0, "deg/s": 10.0}
+# Times on the scale may be so far apart [s].
+_TIME_STEPS = (1, 2, 5, 10, 15, 30, 60, 120, 300, 600, 900, 1800)
 # Together they keep the page of any drive below 25 MB.
 _MAX_SCANS = 160
 _MAX_POINTS_PER_SCAN = 3000
@@ -83,6 +86,7 @@ class DriveRecord:
         speeds: forward speed of the vehicle [m/s].
         specific_forces_I: specific force in the IMU's frame I [m/s^2].
         angular_velocities_I: likewise w_WI_I [rad/s].
+        num_points: numbers of points of scans as measured.
         limbs: leading frame F -> the poses in F of all frames that move with it
             as one, with F itself.
         names: leading frame -> its name in the page.
@@ -96,6 +100,7 @@ class DriveRecord:
     speeds: list[float] = field(default_factory=list)
     specific_forces_I: list[np.ndarray] = field(default_factory=list)
     angular_velocities_I: list[np.ndarray] = field(default_factory=list)
+    num_points: list[int] = field(default_factory=list)
     limbs: dict[FrameId, dict[FrameId, RigidTransform]] = field(
         default_factory=dict
     )
@@ -129,8 +134,7 @@ def make_drive_page(
 ) -> str:
     """Returns a page with the city, the drive and its scans.
 
-    The button "Layers" shows Meshcat's controls, which switch the layers of the
-    page:
+    The page has switches for its layers:
 
     - `/city/<class>`: the structures of the stage in their own colours,
     - `/vehicle/<body>`, `/moving/<body>`: the moving bodies,
@@ -143,10 +147,11 @@ def make_drive_page(
     - `/stage_difference/lower/<class>`: parts of the other stage above their
       height here, translucent orange, off when the page opens.
 
-    A panel has the title and a legend, others what cameras see. Buttons play
-    the drive, let the camera follow the car, switch points off, and show the
-    change: additional parts are then violet. Below the time line are plots of
-    speed, IMU and stage.
+    A panel has the title, the stage and the switches, which are the legend as
+    well: the camera can follow the car, layers can be hidden, and the change be
+    shown, with additional parts in violet. Other panels show what cameras see.
+    Below the time line are plots of speed and IMU. On a phone, the panels are
+    one sheet, folded when the page opens.
     """
     with _quiet():
         meshcat = geometry.Meshcat(MeshcatParams(host="127.0.0.1", port=0))
@@ -177,7 +182,8 @@ def make_panel(
 
     p_WBset = np.array([X_WB.translation() for X_WB in drive.X_WBs])
     length = np.linalg.norm(np.diff(p_WBset, axis=0), axis=1).sum()
-    minutes, seconds = divmod(int((len(p_WBset) - 1) * drive.period), 60)
+    duration = (len(p_WBset) - 1) * drive.period
+    minutes, seconds = divmod(int(duration), 60)
     lowest, highest = drawing.POINT_HEIGHTS
     environment = Environment(
         autoescape=True,
@@ -198,7 +204,10 @@ def make_panel(
             for name, words in _CHANGES.items()
             if name in changes
         },
+        shown_points=_shown_points(drive),
         plots=motion_plots(drive),
+        times=_time_scale(duration),
+        traffic=bool(drive.names),
         cameras={
             name: [
                 (f"{k * drive.period:.2f}", base64.b64encode(jpeg).decode())
@@ -216,15 +225,15 @@ class Plot:
     """A curve over the time of the drive, as the page's template draws it.
 
     The unit is a key of `_LEAST_RANGE`. `values` is what is said at some times,
-    evenly spread over the drive; `points` and `zero`, the curve and the height
-    of zero, are as SVG has them.
+    evenly spread over the drive; `points`, the curve, is as SVG has it. `ticks`
+    are the scale: what stands at which share of the height, from the top.
     """
 
     name: str
     unit: str
     values: str
     points: str
-    zero: str
+    ticks: Sequence[tuple[str, float]]
 
     @classmethod
     def of(cls, name: str, unit: str, values: np.ndarray) -> Plot:
@@ -240,14 +249,48 @@ class Plot:
         high += missing
         x = np.linspace(0.0, _PLOT_WIDTH, count)
         y = _PLOT_HEIGHT * (high - values) / (high - low)
-        zero = _PLOT_HEIGHT * high / (high - low)
         return cls(
             name,
             unit,
             ",".join(f"{value:.1f}" for value in values),
             " ".join(f"{a:.1f},{b:.1f}" for a, b in zip(x, y, strict=True)),
-            f"{zero:.1f}",
+            _scale(low, high),
         )
+
+
+def _scale(low: float, high: float) -> list[tuple[str, float]]:
+    """Returns zero and a round value on either side, if in a range around it.
+
+    With them come their shares of the height, from the top.
+    """
+    reach = max(-low, high)
+    power = 10.0 ** math.floor(math.log10(reach))
+    step = max(k * power for k in (1, 2, 5) if k * power <= reach)
+    return [
+        (f"{value:g}", (high - value) / (high - low))
+        for value in (-step, 0.0, step)
+        if low <= value <= high
+    ]
+
+
+def _time_scale(duration: float) -> list[tuple[str, float]]:
+    """Returns round times of a drive, at most seven, and their shares of it."""
+    step = next((s for s in _TIME_STEPS if duration <= 6 * s), 3600)
+    return [
+        (f"{t // 60}:{t % 60:02d}", t / max(duration, 1.0))
+        for t in range(0, int(duration) + 1, step)
+    ]
+
+
+def _shown_points(drive: DriveRecord) -> str:
+    """Returns a sentence on the part of the points that a page shows."""
+    if not drive.num_points:
+        return ""
+    most = max(len(p_WRset) for _, p_WRset in drive.scans)
+    return (
+        f"Shown: {len(drive.scans)} of {len(drive.X_WBs)} scans, up to "
+        f"{most:,} of {max(drive.num_points):,} points"
+    )
 
 
 def motion_plots(drive: DriveRecord) -> list[Plot]:
@@ -546,6 +589,7 @@ class MeshcatRecorder(LeafSystem):
             ]
         )
         frame = len(self.drive.X_WBs) - 1
+        self.drive.num_points.append(len(p_WRset))
         self.drive.scans.append((frame, _thinned(p_WRset)))
         if len(self.drive.scans) > _MAX_SCANS:
             del self.drive.scans[1::2]

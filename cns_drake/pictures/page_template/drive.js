@@ -77,7 +77,6 @@ function setFollowing(on) {
     followed = carPose();
     const fromCar = (x, y) => new MeshCat.THREE.Vector3(x, y, 0)
       .applyAxisAngle(UP, followed.heading).add(followed.position);
-    // The car stands above the bar, which covers the lower part of the screen.
     look(fromCar(-18, 7), fromCar(2, 0));
   } else {
     followed = null;
@@ -97,12 +96,35 @@ function setChanged(on) {
   viewer.set_dirty();
 }
 
+// Parts that the other stage lacks belong to the city as well.
+function setCity(on) {
+  for (const path of [["city"], ["stage_difference", "additional"]]) {
+    show(...path)(on);
+  }
+}
+
 function connectSwitch(id, set) {
-  byId(id)?.addEventListener("click", (event) => {
-    const on = event.target.ariaPressed !== "true";
-    event.target.ariaPressed = on;
-    set(on);
+  byId(id)?.addEventListener("change", ({target}) => {
+    set(target.checked);
+    centre();
   });
+}
+
+// The middle of the picture is that of the part above the bar or the sheet.
+function centre() {
+  const top = byId("bar").getBoundingClientRect().top;
+  const sheet = byId("sheet").getBoundingClientRect();
+  const covered = innerHeight - (sheet.height ? sheet.top : top);
+  viewer.camera.setViewOffset(
+    innerWidth, innerHeight, 0, covered / 2, innerWidth, innerHeight);
+  viewer.set_dirty();
+}
+
+function fold(on) {
+  document.body.classList.toggle("folded", on);
+  byId("fold").textContent = on ? "More" : "Less";
+  byId("fold").ariaExpanded = !on;
+  centre();
 }
 
 function setTime(time) {
@@ -120,7 +142,7 @@ function showTime() {
     `${minutes(animator.time)} / ${minutes(animator.duration)}`;
   byId("play").textContent = animator.playing ? "Pause" : "Play";
   const share = animator.time / animator.duration || 0;
-  byId("now").style.left = `${100 * share}%`;
+  if (byId("now")) byId("now").style.left = `${100 * share}%`;
   for (const plot of plots) {
     const value = plot.values[Math.round(share * (plot.values.length - 1))];
     plot.output.value = `${value} ${plot.output.dataset.unit}`;
@@ -166,10 +188,23 @@ commands.then(() => {
   connectSwitch("follow", setFollowing);
   connectSwitch("change", setChanged);
   connectSwitch("points", show("scans"));
-  connectSwitch("layers", (on) => {
-    document.body.classList.toggle("layers", on);
-    if (on) viewer.gui.open();
+  connectSwitch("route", show("route"));
+  connectSwitch("moving", show("moving"));
+  connectSwitch("city", setCity);
+  connectSwitch("images", (on) => {
+    byId("cameras").hidden = !on;
   });
+  byId("fold").addEventListener("click", () => {
+    fold(!document.body.classList.contains("folded"));
+  });
+  addEventListener("resize", centre);
+  // A control that has the focus uses the key itself.
+  addEventListener("keydown", (event) => {
+    if (event.key !== " " || event.target !== document.body) return;
+    event.preventDefault();
+    byId("play").click();
+  });
+  fold(innerWidth <= 640);
   // On a narrow screen the city fits from farther away.
   const {camera, controls} = viewer;
   const farther = Math.max(1, 1.2 / camera.aspect);

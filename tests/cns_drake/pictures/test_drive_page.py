@@ -101,9 +101,9 @@ def test_page_has_title_length_and_legend(page):
     assert "<h1>a &lt; b</h1>" in text
     # A quarter of a circle of 20 m, in 20 steps of half a second.
     assert "<p>0.03 km in 0 min 10 s</p>" in text
+    for line in ("LiDAR points, 0 to 25 m high", "Route, from start to end"):
+        assert f">{line}</label>" in text
     for line in (
-        "LiDAR points, 0 to 25 m high",
-        "route, from start to end",
         "not here, but in stage &lt;02&gt;",
         "higher in stage &lt;02&gt;",
         "not in stage &lt;02&gt;, or lower there",
@@ -167,13 +167,17 @@ def browser(tmp_path_factory):
 
 @pytest.fixture(scope="module", params=SCREENS.values(), ids=SCREENS)
 def opened(browser, page, request):
-    """The page, standing still."""
+    """The page, standing still, with its sheet unfolded."""
     browser.open(page.as_uri(), *request.param)
     # Nobody looks at the picture, which software draws pixel by pixel.
     browser.evaluate("viewer.renderer.setPixelRatio(0.1)")
     browser.wait_for('!document.getElementById("loading")')
     browser.evaluate("viewer.animator.pause()")
     browser.evaluate("viewer.controls.saveState()")
+    is_folded = browser.evaluate('document.body.className === "folded"')
+    assert is_folded is (request.param == SCREENS["phone"])
+    if is_folded:
+        click(browser, "fold")
     return browser
 
 
@@ -360,12 +364,62 @@ class TestInChromium:
         assert abs(x) < 1e-6
         assert y > 0.02
 
-    def test_controls_of_meshcat_are_hidden_until_wanted(self, reader):
-        for is_on in (False, True, False):
-            seen = reader.evaluate("viewer.gui.domElement.checkVisibility()")
-            assert seen is is_on
-            click(reader, "layers")
-        click(reader, "layers")
+    def test_controls_of_meshcat_are_hidden(self, reader):
+        seen = reader.evaluate("viewer.gui.domElement.checkVisibility()")
+        assert seen is False
+
+    def test_panels_fold_and_leave_the_city(self, reader):
+        def heights():
+            return reader.evaluate(
+                """["about", "plots", "course"].map(
+                  (id) => document.getElementById(id).clientHeight)"""
+            )
+
+        assert all(heights())
+        click(reader, "fold")
+        about, plots, course = heights()
+        assert about == plots == 0
+        assert course > 0
+        top = "document.getElementById('bar').getBoundingClientRect().top"
+        assert reader.evaluate(f"{top} / innerHeight") > 0.8
+        expanded = "document.getElementById('fold').ariaExpanded"
+        assert reader.evaluate(expanded) == "false"
+        click(reader, "fold")
+        assert reader.evaluate(expanded) == "true"
+        assert all(heights())
+
+    def test_keys_play_and_move_in_time(self, reader):
+        reader.evaluate("document.activeElement.blur()")
+        reader.evaluate("viewer.animator.mixer.timeScale = 0.01")
+        for is_playing in (True, False):
+            reader.press(" ")
+            assert reader.evaluate("viewer.animator.playing") is is_playing
+        reader.evaluate("viewer.animator.mixer.timeScale = 1.0")
+        go_to(reader, 4.0)
+        reader.evaluate("document.getElementById('time').focus()")
+        reader.press("ArrowRight")
+        assert 4.0 < reader.evaluate("viewer.animator.time") < 10.0
+        reader.evaluate("document.getElementById('points').focus()")
+        for is_on in (False, True):
+            reader.press(" ")
+            assert is_visible(reader, "scans") is is_on
+        assert reader.evaluate("viewer.animator.playing") is False
+
+    @pytest.mark.parametrize(
+        ("name", "layers"),
+        [
+            ("points", [["scans"]]),
+            ("route", [["route"]]),
+            ("city", [["city"], ["stage_difference", "additional"]]),
+        ],
+    )
+    def test_layers_can_be_hidden(self, reader, name, layers):
+        for is_on in (True, False, True):
+            assert [is_visible(reader, *layer) for layer in layers] == [
+                is_on
+            ] * len(layers)
+            click(reader, name)
+        click(reader, name)
 
     def test_drive_plays(self, reader):
         # Even a slow machine presses the button again before the end.
@@ -377,8 +431,3 @@ class TestInChromium:
         label = reader.evaluate('document.getElementById("play").textContent')
         assert label == "Play"
         assert reader.evaluate("viewer.animator.playing") is False
-
-    def test_points_can_be_hidden(self, reader):
-        for is_on in (True, False, True, False):
-            assert is_visible(reader, "scans") is is_on
-            click(reader, "points")

@@ -26,10 +26,50 @@ def test_curve_goes_from_left_to_right_and_up():
     assert plot.values == "0.0,20.0,10.0"
 
 
+def test_curve_has_a_scale():
+    plot = Plot.of("Speed", "km/h", np.array([0, 20, 10]))
+    assert plot.ticks == [("0", 1.0), ("20", 0.0)]
+
+
 def test_curve_of_both_signs_has_its_zero_line():
     plot = Plot.of("IMU, left", "m/s²", np.array([-3.0, 0.0, 1.0]))
     np.testing.assert_allclose(points(plot)[:, 1], [20.0, 5.0, 0.0])
-    assert plot.zero == "5.0"
+    assert ("0", 0.25) in plot.ticks
+
+
+@pytest.mark.parametrize("scale", [0.0, 0.3, 4.0, 17.0, 220.0, 9999.0])
+@pytest.mark.parametrize("sign", [1, -1])
+def test_scale_has_at_least_two_round_values(scale, sign):
+    for unit in ("km/h", "m/s²", "deg/s"):
+        ticks = Plot.of("a", unit, np.array([0.0, sign * scale])).ticks
+        assert 2 <= len(ticks) <= 3
+        assert all(0.0 <= share <= 1.0 for _, share in ticks)
+
+
+def test_times_have_a_scale():
+    def scale(frames):
+        html = make_panel("a", record(frames), set(), ShownStages())
+        times = html.partition('id="times"')[2].partition("</div>")[0]
+        return re.findall(r'left: ([\d.]+)%">([\d:]+)<', times)
+
+    # 0.5 s a frame: 3 minutes, and half a second.
+    found = [(float(share), text) for share, text in scale(361)]
+    assert found == [
+        (pytest.approx(100 * k / 6), f"{k // 2}:{30 * (k % 2):02d}")
+        for k in range(7)
+    ]
+    assert scale(2) == [("0.0", "0:00")]
+    # An hour and a minute.
+    assert [text for _, text in scale(7321)][1::3] == ["15:00", "60:00"]
+
+
+def test_page_says_which_points_it_shows():
+    assert 'id="shown"' not in make_panel("a", record(2), set(), ShownStages())
+    drive = record(40)
+    drive.scans.extend([(0, np.zeros((5, 3))), (30, np.zeros((3000, 3)))])
+    drive.num_points.extend([5, 61234])
+    html = make_panel("a", drive, set(), ShownStages())
+    assert ">Shown: 2 of 40 scans, up to 3,000 of 61,234 points<" in html
 
 
 @pytest.mark.parametrize("value", [0.0, 1e-9, -1e-9])

@@ -397,6 +397,7 @@ def test_dense_scans_are_thinned_evenly(folder, monkeypatch):
     at_the_place = np.linalg.norm(p_SR - [[2.0], [0.0], [0.0]], axis=0) < 1e-6
     assert at_the_place.sum() == 1
     assert 300 < len(p_WR) < 1000
+    assert recorder.drive.num_points == [len(X_BSs) * 30_000]
 
 
 def test_one_frame_makes_a_page(folder, tmp_path):
