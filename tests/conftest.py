@@ -114,6 +114,11 @@ def pytest_xdist_auto_num_workers(config):
 
 def pytest_addoption(parser):
     parser.addoption(
+        "--night",
+        action="store_true",
+        help="run what takes too long beside the other tests as well",
+    )
+    parser.addoption(
         "--fuzz",
         type=int,
         default=300,
@@ -124,11 +129,16 @@ def pytest_addoption(parser):
     )
 
 
-def pytest_collection_modifyitems(items):
+def pytest_collection_modifyitems(config, items):
     """Puts the longest files first, then those with slow tests.
 
-    None of them is then left for one process at the end.
+    None of them is then left for one process at the end. Tests for the night
+    are left out in the day.
     """
+    if not config.option.night:
+        late = [item for item in items if item.get_closest_marker("night")]
+        config.hook.pytest_deselected(items=late)
+        items[:] = [item for item in items if item not in set(late)]
     for item in items:
         recorded = "short_recording" in item.fixturenames
         if recorded or hasattr(item.module, "simulate"):

@@ -6,6 +6,7 @@ import json
 import re
 
 from helpers import documents
+from helpers.small_map import write_town
 import matplotlib as mpl
 import numpy as np
 from PIL import Image
@@ -84,8 +85,13 @@ def test_a_lidar_in_my_diagram():
 
 @pytest.mark.slow
 def test_what_survives(tmp_path):
+    """On a map of boxes, which loads at once."""
+    town = write_town(tmp_path / "town", {"04": "metropolis_04"}, 16)
+    drive = town / "sequence_04.yaml"
+    drive.write_text(drive.read_text().replace("columns: 16", "columns: 512"))
     values = run(
         "what_survives.ipynb",
+        ('"metropolis_04"', repr(str(drive))),
         ("FRAMES = 600", "FRAMES = 16"),
         ("tempfile.mkdtemp()", repr(str(tmp_path))),
         (

@@ -18,6 +18,9 @@ from helpers.document_recipes import NOT_RUN, RECIPES
 # Studies take most of their time for the methods, one after the other.
 _METHODS = "scan-context++ solid"
 
+# A program with its first word: what a recipe shows the use of.
+_USE = re.compile(r"\bcns-(?:drake|eval) [a-z-]+|\bpython \S+\.py")
+
 # A machine that runs other tests as well may answer late.
 _PATIENT = {"DASK_DISTRIBUTED__COMM__TIMEOUTS__CONNECT": "300s"}
 
@@ -29,6 +32,29 @@ def claims(piece: documents.Piece) -> list[str]:
     return [
         name for name, start in starts.items() if piece.text.startswith(start)
     ]
+
+
+def daily() -> set[str]:
+    """Returns the names of the recipes that each run of the tests follows.
+
+    They hold the first use of each command, in the order of the recipes, and
+    what uses no command. A server alone shows nothing.
+    """
+    texts = {
+        name: piece.text
+        for page in documents.pages()
+        for piece in documents.pieces(page)
+        for name in claims(piece)
+    }
+    used: set[str] = set()
+    found = set()
+    for name, recipe in RECIPES.items():
+        runs = recipe.file is None or recipe.command is not None
+        uses = set(_USE.findall(f"{texts[name]} {recipe.command}" * runs))
+        if recipe.ready is None and not (uses and uses <= used):
+            found.add(name)
+            used |= uses
+    return found
 
 
 class Workplace:

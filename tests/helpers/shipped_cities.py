@@ -7,16 +7,20 @@ import hashlib
 import os
 from pathlib import Path
 import pickle
+from xml.etree import ElementTree
 
 import numpy as np
-from pydrake.geometry import Role, SceneGraph
+from pydrake.geometry import SceneGraph
 from pydrake.multibody.parsing import Parser
 from pydrake.multibody.plant import MultibodyPlant
+import pytest
 
 from cns_drake.base.jobs.fingerprint import code_digest, fingerprint
+from cns_drake.city.generation import generate
 from cns_drake.city.generation.city_structures import City, make_city
 from cns_drake.city.geometry.structures import Structure, part_triangles
 from cns_drake.city.ground.streets import GROUND_TAG
+from cns_drake.city.growth.stage_structures import GrowingCity
 from cns_drake.roads.network import RoadNetwork, load_road_network
 from cns_drake.scenarios.shipped import worlds_folder
 
@@ -51,9 +55,56 @@ def world_of(name: str) -> Path:
     return worlds_folder() / name
 
 
-@cache
+@dataclass(frozen=True)
+class Drawn:
+    """What the generator makes of the inputs of a map.
+
+    Attributes:
+        city: the whole city.
+        structures: all there ever are, in the order of instance ids.
+        standing: stage -> structures; what stays has the same model.
+        texts: relative path -> text of a file.
+    """
+
+    city: City
+    structures: list[Structure]
+    standing: dict[str, list[Structure]]
+    texts: dict[str, str]
+
+
+class _Kept(GrowingCity):
+    """A city whose stages are kept; to lower its buildings takes long."""
+
+    def __init__(self, *arguments):
+        super().__init__(*arguments)
+        self.standing = {}
+        _grown.append(self)
+
+    def at(self, stage):
+        self.standing[stage] = super().at(stage)
+        return self.standing[stage]
+
+
+_grown: list[_Kept] = []
+
+
+def _draw(name: str) -> Drawn:
+    whole = make_city(world_of(name))
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(generate, "GrowingCity", _Kept)
+        texts = generate.render_city(world_of(name), whole)
+    growing = _grown.pop()
+    return Drawn(whole, growing.structures, growing.standing, texts)
+
+
 def city(name: str) -> City:
-    """Returns the generated city; the first process makes it.
+    """Returns the generated city."""
+    return drawn(name).city
+
+
+@cache
+def drawn(name: str) -> Drawn:
+    """Returns what is generated; the first process makes it.
 
     It is kept until the code or the files change that it is made of.
     """
@@ -61,7 +112,7 @@ def city(name: str) -> City:
         path.name: hashlib.sha256(path.read_bytes()).hexdigest()
         for path in sorted(world_of(name).glob("*.yaml"))
     }
-    inputs["code"] = code_digest(make_city.__module__)
+    inputs["code"] = code_digest(generate.__name__)
     folder = Path(os.environ["CNS_DRAKE_TEST_CITIES"])
     file = folder / f"{name}_{fingerprint(inputs)}.pickle"
     for other in folder.glob(f"{name}_*.pickle"):
@@ -71,7 +122,7 @@ def city(name: str) -> City:
     with file.open("a+b") as stream:
         fcntl.flock(stream, fcntl.LOCK_EX)
         if file.stat().st_size == 0:
-            pickle.dump(make_city(world_of(name)), stream)
+            pickle.dump(_draw(name), stream)
         stream.seek(0)
         return pickle.load(stream)
 
@@ -119,19 +170,13 @@ def parse_strictly(sdf: Path) -> SceneGraph:
 
 
 @cache
-def visuals(sdf: Path) -> dict[str, tuple]:
+def visuals(sdf: Path) -> dict[str, bytes]:
     """Returns visual name -> pose, shape and colour, as comparable text."""
-    inspector = parse_strictly(sdf).model_inspector()
-    result = {}
-    for geometry_id in inspector.GetAllGeometryIds(Role.kPerception):
-        name = inspector.GetName(geometry_id).rpartition("::")[2]
-        properties = inspector.GetPerceptionProperties(geometry_id)
-        result[name] = (
-            str(inspector.GetPoseInFrame(geometry_id).GetAsMatrix34().tolist()),
-            str(inspector.GetShape(geometry_id)),
-            str(properties.GetProperty("phong", "diffuse")),
-        )
-    return result
+    root = ElementTree.parse(sdf).getroot()
+    found = list(root.iter("visual"))
+    texts = {one.attrib["name"]: ElementTree.tostring(one) for one in found}
+    assert len(texts) == len(found)
+    return texts
 
 
 def structure_of(visual: str) -> str:

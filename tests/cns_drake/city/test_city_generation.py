@@ -12,6 +12,7 @@ from helpers.city_checks import (
 from helpers.shipped_cities import (
     PLANS,
     city,
+    drawn,
     network_of,
     parse_strictly,
     stage_files,
@@ -24,11 +25,9 @@ import pytest
 import yaml
 
 from cns_drake.base.map_folder import STRUCTURES_NAME
-from cns_drake.city.generation import generate
 from cns_drake.city.geometry.structures import part_mesh
 from cns_drake.city.ground.streets import GROUND_TAG
 from cns_drake.city.growth.lowering import cut_at
-from cns_drake.city.growth.stage_structures import GrowingCity
 from cns_drake.city.plan.stages import load_stages
 from cns_drake.scene.semantics import CLASS_IDS
 
@@ -60,38 +59,10 @@ def stages(name):
     )
 
 
-class Kept(GrowingCity):
-    """A city whose stages are kept; to lower its buildings takes long."""
-
-    def __init__(self, *arguments):
-        super().__init__(*arguments)
-        self.standing = {}
-
-    def at(self, stage):
-        self.standing[stage] = super().at(stage)
-        return self.standing[stage]
-
-
 @pytest.fixture(scope="module")
-def rendered(name):
-    """The texts of the files, and the city that they are made of."""
-    cities = []
-
-    def grow(*arguments):
-        cities.append(Kept(*arguments))
-        return cities[-1]
-
-    with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(generate, "GrowingCity", grow)
-        texts = generate.render_city(world_of(name), city(name))
-    (growing,) = cities
-    return texts, growing
-
-
-@pytest.fixture(scope="module")
-def standing(rendered):
+def standing(name):
     """Stage -> its structures."""
-    return rendered[1].standing
+    return drawn(name).standing
 
 
 def lot_of(structure: str) -> str:
@@ -99,8 +70,8 @@ def lot_of(structure: str) -> str:
     return structure.partition("_lot_")[0] if "_lot_" in structure else ""
 
 
-def test_generating_anew_gives_the_committed_bytes(name, rendered):
-    new, old = rendered[0], files(world_of(name))
+def test_generating_anew_gives_the_committed_bytes(name):
+    new, old = drawn(name).texts, files(world_of(name))
     assert sorted(new) == sorted(old)
     changed = [name for name in new if new[name].encode() != old[name]]
     assert changed == []
@@ -196,10 +167,10 @@ def test_the_ground_is_there_at_all_stages(name, stages):
     assert not ground & (stages.absent("01") | stages.heights("01").keys())
 
 
-def test_the_table_names_every_structure_once(name, rendered):
+def test_the_table_names_every_structure_once(name):
     with (world_of(name) / STRUCTURES_NAME).open(newline="") as file:
         rows = list(csv.DictReader(file))
-    structures = rendered[1].structures
+    structures = drawn(name).structures
     assert [int(row["instance"]) for row in rows] == list(
         range(1, len(structures) + 1)
     )
@@ -239,12 +210,23 @@ def test_budgets(name):
         p.name: _count_triangles(p) for p in (world / "meshes").iterdir()
     }
     for path in stage_files(name):
-        inspector = parse_strictly(path).model_inspector()
-        count = len(inspector.GetAllGeometryIds(Role.kPerception))
-        assert 1000 < count < 7000
+        assert 1000 < len(visuals(path)) < 7000
         uris = ElementTree.parse(path).iter("uri")
         names = [uri.text.removeprefix("meshes/") for uri in uris]
         assert sum(triangles[name] for name in names) <= 1_500_000
+
+
+@pytest.mark.parametrize(
+    "stages",
+    [slice(-1, None), pytest.param(slice(0, -1), marks=pytest.mark.night)],
+)
+def test_drake_finds_each_visual(name, stages):
+    """All stages are written alike; Drake takes a second for each."""
+    for path in stage_files(name)[stages]:
+        inspector = parse_strictly(path).model_inspector()
+        ids = inspector.GetAllGeometryIds(Role.kPerception)
+        names = [inspector.GetName(one).rpartition("::")[2] for one in ids]
+        assert sorted(names) == sorted(visuals(path))
 
 
 def _count_triangles(path) -> int:

@@ -9,14 +9,12 @@ from helpers.city_checks import (
     check_things_stand_on_the_ground,
     is_ground,
 )
-from helpers.shipped_cities import PLANS, city, network_of, world_of
+from helpers.shipped_cities import PLANS, city, drawn, network_of
 import numpy as np
 import pytest
 import shapely
 from shapely.affinity import affine_transform
 
-from cns_drake.city.growth.stage_structures import GrowingCity
-from cns_drake.city.plan.stages import load_stages
 from cns_drake.scene.semantics import CLASS_IDS
 
 pytestmark = pytest.mark.slow
@@ -79,12 +77,8 @@ def test_nothing_low_reaches_far_out_of_its_footprint(standing, network):
 
 
 def test_things_of_all_stages_stand_on_the_ground(name):
-    whole = city(name)
-    names = [structure.name for structure in whole.structures]
-    stages = load_stages(world_of(name) / "stages.yaml", names)
-    growing = GrowingCity(whole.structures, stages, whole.cars)
     # What is the same at several stages is checked once.
-    found = {id(s): s for stage in stages.stages for s in growing.at(stage)}
+    found = {id(s): s for part in drawn(name).standing.values() for s in part}
     check_things_stand_on_the_ground(list(found.values()))
 
 

@@ -124,6 +124,7 @@ def test_without_another_stage_nothing_is_said_of_change(tmp_path):
 
 
 @pytest.mark.slow
+@pytest.mark.night
 def test_page_of_a_shipped_drive_is_small():
     """With as many scans and points as a page shows, hard to compress."""
     scenario = load_scenario("downtown_01")  # It has the largest page.

@@ -53,7 +53,14 @@ def messages(folder):
     return found
 
 
-def test_messages_are_those_of_another_processor(scenario, tmp_path):
+# Numba keeps code for each kind of processor apart, and compiles all anew.
+ANY = {"NUMBA_CPU_NAME": "generic"}
+
+
+@pytest.mark.parametrize(
+    "loops", [{}, pytest.param(ANY, marks=pytest.mark.night)]
+)
+def test_messages_are_those_of_another_processor(scenario, tmp_path, loops):
     file = write_scenario(scenario, tmp_path)
     extensions = np.show_config(mode="dicts")["SIMD Extensions"]["found"]
     environment = os.environ | {
@@ -61,8 +68,7 @@ def test_messages_are_those_of_another_processor(scenario, tmp_path):
         "NPY_DISABLE_CPU_FEATURES": " ".join(extensions),
         # The oldest kind of processor that has matrix products of its own.
         "OPENBLAS_CORETYPE": "Prescott",
-        # Numba keeps code for each kind of processor apart.
-        "NUMBA_CPU_NAME": "generic",
+        **loops,
     }
     command = [sys.executable, "-m", "cns_drake", "simulate", str(file)]
     subprocess.run(

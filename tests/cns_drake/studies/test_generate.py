@@ -5,7 +5,9 @@ import os
 from pathlib import Path
 import signal
 
+from helpers import studies
 from helpers.bag_recordings import contents
+from helpers.eval_program import run_program
 from helpers.generation import Generation
 from helpers.small_city import write_small_city
 from helpers.tiny_drive import (
@@ -19,11 +21,13 @@ import numpy as np
 import pytest
 import yaml
 
+from cns_drake.__main__ import main
 from cns_drake.base.errors import InputError
 from cns_drake.base.jobs.cluster import Cluster
 from cns_drake.city.generation.generate import generate_city
 from cns_drake.scenarios.scenario_files import load_scenario
 from cns_drake.simulation.simulation import simulate
+from cns_drake.studies import recording, redrawing
 from cns_drake.studies.recording import is_recorded, record_all
 from evaluation.change.drive_change import compare, survey
 from evaluation.drives import open_drive
@@ -168,29 +172,38 @@ def town(tmp_path_factory):
     return folder
 
 
-def test_families_on_other_cities_share_them(town, tmp_path):
+def test_families_on_other_cities_share_them(
+    town, tmp_path, monkeypatch, capsys
+):
     output = tmp_path / "output"
+    done = []
+    for module in (recording, redrawing):
+        monkeypatch.setattr(
+            module,
+            "run_jobs",
+            lambda jobs, cluster: done.extend(studies.do(jobs)),
+        )
 
     def generate(stage, **values):
         family = tmp_path / f"family_{stage}.yaml"
         base = {"base": str(town / f"sequence_{stage}.yaml")}
         family.write_text(yaml.safe_dump(base | values))
-        run = Generation([], output, "--vary", family, "--jobs", "2")
-        status, results = run.end()
-        assert status == 0, run.lines
-        return [Path(result) for result in results], "".join(run.lines)
+        words = ("generate", "--vary", family, "--output", output)
+        status, out, err = run_program(capsys, "cns-drake", main, *words)
+        assert status == 0, err
+        return [Path(result) for result in out.splitlines()]
 
-    databases, printed = generate("01", city_seeds=[7], missing=[0.0, 0.6])
+    databases = generate("01", city_seeds=[7], missing=[0.0, 0.6])
     names = [path.name for path in databases]
     assert names == ["town_01_c7_m000_s0", "town_01_c7_m600_s0"]
-    assert "city town_c7: done" in printed
+    assert done == ["city town_c7", *names]
     stage = output / "cities" / "town_c7" / "stage_02.sdf"
     drawn = stage.stat()
 
-    (other, query), printed = generate("02", city_seeds=[8, 7])
+    done.clear()
+    other, query = generate("02", city_seeds=[8, 7])
     assert query == output / "town_02_c7_m000_s0"
-    assert "city town_c8: done" in printed
-    assert "city town_c7" not in printed
+    assert done == ["city town_c8", other.name, query.name]
     assert stage.stat() == drawn
 
     # Each city is another place.

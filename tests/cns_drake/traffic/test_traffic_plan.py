@@ -116,10 +116,14 @@ def meetings(traffic, path, times):
 
 
 @pytest.mark.slow
-def test_no_boxes_overlap_for_ten_minutes():
-    traffic = plan("downtown_03", 100, 600.0)
+@pytest.mark.parametrize(
+    "minutes", [2, pytest.param(10, marks=pytest.mark.night)]
+)
+def test_no_boxes_overlap_for_minutes(minutes):
+    traffic = plan("downtown_03", 100, 60.0 * minutes)
     assert len(traffic.kinds) == traffic.walkers.values.shape[1] == 100
-    assert meetings(traffic, ego("downtown_03"), np.arange(0, 600, 0.7)) == 0
+    times = np.arange(0.0, 60.0 * minutes, 0.7)
+    assert meetings(traffic, ego("downtown_03"), times) == 0
 
 
 @pytest.fixture(scope="module")
