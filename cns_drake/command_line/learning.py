@@ -36,6 +36,8 @@ def train(
     steps: Annotated[int | None, typer.Option(min=1)] = None,
     seed: Annotated[int, typer.Option(min=0, max=10_000)] = 1,
     without: list[Part] | None = None,
+    drawn_streets: Annotated[bool, typer.Option("--drawn-streets")] = False,
+    graded: Annotated[bool, typer.Option("--graded")] = False,
     jobs: Jobs = None,
     scheduler: Scheduler = None,
 ) -> None:
@@ -57,6 +59,10 @@ def train(
         seed: Seed of all random draws.
         without: Kind of variation to leave out: change between drives,
             calibrated returns, or the driver's wandering; may be repeated.
+        drawn_streets: Draw the streets at random as well, instead of taking
+            those of the shipped maps.
+        graded: Rank the places of a query by their exact overlap, instead of
+            calling those within 7.5 m right. It takes about half as long again.
     """
     with uninterrupted():
         from cns_drake.base.jobs.cluster import choose_cluster
@@ -69,6 +75,7 @@ def train(
     if steps is not None:
         fields["steps"] = steps
     fields |= {one.value: False for one in without or ()}
+    fields |= {"drawn_streets": drawn_streets, "graded": graded}
     plan = TrainingPlan.of_minutes(minutes, **fields)
     command = shlex.join(["cns-drake", *sys.argv[1:]])
     picture = make_weights(plan, output, command, cluster, terminal.track)

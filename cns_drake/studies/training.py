@@ -2,8 +2,9 @@
 
 A batch asks scans of one drive for places of another drive through the same
 city. Scores are those of the method. The loss is the cross entropy between a
-softmax over all places of the batch and weights that fall with the distance:
-the right place ranks first, and those a little too far behind it.
+softmax over all places of the batch and weights of the right places. These
+weights grow with the exact overlap of two scans, or fall with their distance:
+the best place ranks first, and lesser ones behind it.
 """
 
 from collections.abc import Callable, Mapping, Sequence
@@ -13,6 +14,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+from scipy.linalg import block_diag
 
 from cns_drake.base.errors import InputError
 from cns_drake.base.files import check_writable, completing, make_folder
@@ -22,7 +24,11 @@ from cns_drake.base.jobs.running import Job, run_jobs
 from cns_drake.base.progress import Track, silent
 from cns_drake.base.terminal import resumable
 from cns_drake.base.version import __version__
-from cns_drake.studies.training_drives import DrawnCity, scan_city
+from cns_drake.studies.training_drives import (
+    DRAWN_STREETS,
+    DrawnCity,
+    scan_city,
+)
 from evaluation.methods.learned import (
     FEATURES,
     FREQUENCIES,
@@ -46,6 +52,9 @@ _RIGHT, _WRONG = 7.5, 11.0
 _ALONG = 35.0
 # The weights of right places fall with distance by this deviation [m].
 _DEVIATION = 4.0
+# Least overlap with the best place of a query that counts. Right places have at
+# least this part of its overlap; weights grow with this power of that part.
+_SHARED, _NEAR_BEST, _POWER = 0.2, 0.9, 16
 _TEMPERATURE = 0.05
 # Parts of the images with a hidden sector, of which angles [deg], and with
 # lost pixels, and how many of these.
@@ -68,21 +77,26 @@ class TrainingScans:
         xy: (N, 2) places of the sensors [m].
         cities: (N,) number of the city.
         drives: (N,) number of the drive in its city.
+        overlaps: (N, N) share of each scan that the place of each other sees;
+            without it, distance says which places are right.
     """
 
     images: np.ndarray
     xy: np.ndarray
     cities: np.ndarray
     drives: np.ndarray
+    overlaps: np.ndarray | None = None
 
     @classmethod
     def of(cls, parts: Sequence["TrainingScans"]) -> "TrainingScans":
         """Joins scans of several cities, which are numbered in order."""
+        overlaps = [part.overlaps for part in parts]
         return cls(
             np.concatenate([part.images for part in parts]),
             np.concatenate([part.xy for part in parts]),
             np.repeat(np.arange(len(parts)), [len(p.xy) for p in parts]),
             np.concatenate([part.drives for part in parts]),
+            None if overlaps[0] is None else block_diag(*overlaps),
         )
 
 
@@ -153,9 +167,15 @@ class Sampler:
             scans.xy[queries][:, None] - scans.xy[places], axis=2
         )
         same = scans.cities[queries][:, None] == scans.cities[places]
-        right = same & (distance <= _RIGHT)
-        weights = np.exp(-0.5 * (distance / _DEVIATION) ** 2) * right
-        counts = right | ~same | (distance >= _WRONG)
+        if scans.overlaps is None:
+            right = same & (distance <= _RIGHT)
+            weights = np.exp(-0.5 * (distance / _DEVIATION) ** 2) * right
+            counts = right | ~same | (distance >= _WRONG)
+        else:
+            shared = scans.overlaps[np.ix_(queries, places)].astype(float)
+            part = shared / shared.max(axis=1, keepdims=True)
+            weights = np.where(part >= _NEAR_BEST, part**_POWER, 0.0)
+            counts = np.ones_like(same)
         images = scans.images[[*queries, *places]]
         _augment(images, rng)
         return Batch(
@@ -178,8 +198,13 @@ class Sampler:
         places: list[int] = []
         for query in rng.permutation(near)[:_QUERIES].tolist():
             away = np.linalg.norm(xy[asked_of] - xy[query], axis=1)
-            right = asked_of[away <= _RIGHT]
-            along = asked_of[(away >= _WRONG) & (away <= _ALONG)]
+            is_right, is_wrong = away <= _RIGHT, away >= _WRONG
+            if self._scans.overlaps is not None:
+                shared = self._scans.overlaps[query, asked_of].astype(float)
+                is_right = shared >= max(_SHARED, _NEAR_BEST * shared.max())
+                is_wrong = ~is_right
+            right = asked_of[is_right]
+            along = asked_of[is_wrong & (away <= _ALONG)]
             if len(right) and len(along):
                 queries.append(query)
                 places += [int(rng.choice(right)), int(rng.choice(along))]
@@ -427,7 +452,8 @@ class TrainingPlan:
 
     With `change`, drives see different stages and passing changes; with
     `returns`, some have calibrated returns and weather; with `driver`, drivers
-    wander and change lanes.
+    wander and change lanes. With `drawn_streets`, cities have streets of no
+    map; with `graded`, the exact overlap says which places are right.
     """
 
     cities: int
@@ -436,6 +462,8 @@ class TrainingPlan:
     change: bool = True
     returns: bool = True
     driver: bool = True
+    drawn_streets: bool = False
+    graded: bool = False
 
     @classmethod
     def of_minutes(cls, minutes: float, **fields: Any) -> "TrainingPlan":
@@ -448,12 +476,15 @@ class TrainingPlan:
         """Returns the cities."""
         return [
             DrawnCity(
-                MAPS[number % len(MAPS)],
+                DRAWN_STREETS
+                if self.drawn_streets
+                else MAPS[number % len(MAPS)],
                 self.seed,
                 number,
                 change=self.change,
                 returns=self.returns,
                 driver=self.driver,
+                graded=self.graded,
             )
             for number in range(self.cities)
         ]
@@ -502,7 +533,11 @@ def make_weights(
     scans = TrainingScans.of(
         [
             TrainingScans(
-                one["images"], one["xy"], one["drives"], one["drives"]
+                one["images"],
+                one["xy"],
+                one["drives"],
+                one["drives"],
+                one.get("overlaps"),
             )
             for one in (part.read() for part in parts)
         ]

@@ -1,8 +1,9 @@
 """Drives for training: cities, stages and effects, all drawn at random.
 
-A city keeps the streets of a map; everything else is drawn anew, and so are two
-younger stages. Several drives follow one route, with what comes between two
-visits: other stages, other effects, another LiDAR, another driver.
+A city keeps the streets of a map, or has streets drawn at random as well;
+everything else is drawn anew, and so are two younger stages. Several drives
+follow one route, with what comes between two visits: other stages, other
+effects, another LiDAR, another driver.
 """
 
 from collections.abc import Sequence
@@ -20,14 +21,17 @@ from cns_drake.base.jobs.step import Reporter
 from cns_drake.base.map_folder import STAGES_NAME, MapFolder
 from cns_drake.city.generation.city_structures import City, make_city
 from cns_drake.city.generation.generate import generate_city
+from cns_drake.city.generation.starter import start_city
 from cns_drake.roads.network import load_road_network
 from cns_drake.roads.route import draw_route
 from cns_drake.scenarios.scenario import Scenario
 from cns_drake.scenarios.scenario_files import load_scenario
 from cns_drake.scenarios.shipped import shipped_maps
+from cns_drake.sensors.lidar.patterns import BeamCoverage
 from cns_drake.simulation.simulated_drive import SimulatedDrive
 from cns_drake.studies.comparisons import moved
-from cns_drake.studies.redrawing import redrawn_inputs
+from cns_drake.studies.exact_overlap import VisibleSurfaces
+from cns_drake.studies.redrawing import redrawn_inputs, to_yaml, turned
 from evaluation.drives.sampling import gather, sample_frames
 from evaluation.methods.learned import polar_image
 
@@ -41,11 +45,23 @@ _LENGTH, _SPACING = 1600.0, 6.0
 _MAX_RANGE = 100.0
 _STAGES = ("01", "02", "03")
 _PRESETS = ("os1-64", "hdl-64e", "os1-32", "vlp-16", "os1-128")
+# Stands for a map in cities whose streets are drawn.
+DRAWN_STREETS = "drawn"
+# The map whose first drive has the car and the LiDAR of all drives there.
+_CAR_OF = "riverside"
+# Scans farther apart are taken to share nothing [m]. So many points of a scan
+# say how much of it another place sees.
+_FARTHEST_OVERLAP = 50.0
+_OVERLAP_POINTS = 1000
 
 
 @dataclass(frozen=True)
 class DrawnCity:
-    """A city with its drives, as a seed draws them."""
+    """A city with its drives, as a seed draws them.
+
+    `map_name` is the shipped map with its streets, or `DRAWN_STREETS`. With
+    `graded`, the overlap of each scan with the places of others is found.
+    """
 
     map_name: str
     seed: int
@@ -54,6 +70,7 @@ class DrawnCity:
     change: bool = True
     returns: bool = True
     driver: bool = True
+    graded: bool = False
 
     @property
     def city_seed(self) -> int:
@@ -66,11 +83,16 @@ class DrawnCity:
         Raises:
             InputError: it cannot be made or written.
         """
-        source = shipped_maps()[self.map_name]
-        inputs = redrawn_inputs(source, _STAGES[-1], self.city_seed)
         with draft_folder(folder, replaces=True) as draft:
-            for name, content in inputs.items():
-                (draft / name).write_bytes(content)
+            if self.map_name == DRAWN_STREETS:
+                roads = to_yaml("streets", draw_streets(self._rng(-1)))
+                MapFolder(draft).roads.write_bytes(roads)
+                start_city(draft, self.city_seed)
+            else:
+                source = shipped_maps()[self.map_name]
+                inputs = redrawn_inputs(source, _STAGES[-1], self.city_seed)
+                for name, content in inputs.items():
+                    (draft / name).write_bytes(content)
             stages = draw_stages(make_city(draft), self._rng(0))
             text = yaml.safe_dump({"stages": stages}, sort_keys=False)
             (draft / STAGES_NAME).write_text(text, encoding="utf-8")
@@ -79,7 +101,8 @@ class DrawnCity:
     def drives(self, folder: Path) -> list[Scenario]:
         """Returns the drives through the city."""
         rng = self._rng(1)
-        source = MapFolder(shipped_maps()[self.map_name])
+        drawn = self.map_name == DRAWN_STREETS
+        source = MapFolder(shipped_maps()[_CAR_OF if drawn else self.map_name])
         base = load_scenario(source.recordable_drives()[0])
         network = load_road_network(MapFolder(folder).roads)
         base = base.replaced(
@@ -122,7 +145,7 @@ class DrawnCity:
         return moved(drive, 0.0, aside, 0.0).with_fields(fields, drive.name)
 
     def _rng(self, purpose: int) -> np.random.Generator:
-        return np.random.default_rng([self.seed, self.number, purpose])
+        return np.random.default_rng([self.seed, self.number, purpose % 2**32])
 
 
 def scan_city(
@@ -132,9 +155,11 @@ def scan_city(
 
     Returns:
         `images` (N, RINGS, SECTORS, CHANNELS) uint8, `xy` (N, 2) places of the
-        sensors [m], and `drives` (N,) number of the drive.
+        sensors [m], `drives` (N,) number of the drive, and of a graded city
+        `overlaps` (N, N) float16, see `_overlaps`.
     """
     images, xy, numbers = [], [], []
+    taken: list[_Taken] = []
     try:
         drawn.write(folder)
         for number, scenario in enumerate(drawn.drives(folder)):
@@ -151,13 +176,116 @@ def scan_city(
                 images.append(polar_image(points, height))
                 xy.append(drive.X_WS[frame, :2, 3])
                 numbers.append(number)
+                taken.append(_Taken(drive, int(frame), _few(points)))
+        found = {"overlaps": _overlaps(taken, reporter)} if drawn.graded else {}
     finally:
         shutil.rmtree(folder, ignore_errors=True)
     return {
         "images": np.stack(images),
         "xy": np.stack(xy),
         "drives": np.array(numbers),
+        **found,
     }
+
+
+@dataclass(frozen=True)
+class _Taken:
+    """A scan of a drive, with some of its points in the LiDAR's frame."""
+
+    drive: SimulatedDrive
+    frame: int
+    points: np.ndarray
+
+
+def _few(points: np.ndarray) -> np.ndarray:
+    return points[:: max(1, len(points) // _OVERLAP_POINTS)].astype(float)
+
+
+def _overlaps(scans: Sequence[_Taken], reporter: Reporter) -> np.ndarray:
+    """Returns the share of each scan that the place of each other one sees.
+
+    Rays decide (`exact_overlap`). Of two scans of one drive, and of those over
+    50 m apart, the share is 0.
+
+    Returns:
+        (N, N) float16: a row for each scan, a column for each place.
+    """
+    result = np.zeros((len(scans), len(scans)), np.float16)
+    X_WSs = np.stack([one.drive.X_WS[one.frame] for one in scans])
+    places = reporter.track(enumerate(scans), "overlaps", len(scans))
+    for column, place in places:
+        drive = place.drive
+        seen = VisibleSurfaces(
+            *drive.look(place.frame),
+            drive.pattern,
+            BeamCoverage(drive.pattern.beams(place.frame).d_Sset),
+            _MAX_RANGE,
+        )
+        X_PW = np.linalg.inv(X_WSs[column])
+        apart = np.linalg.norm(X_WSs[:, :2, 3] - X_WSs[column, :2, 3], axis=1)
+        for row in np.flatnonzero(apart <= _FARTHEST_OVERLAP).tolist():
+            if scans[row].drive is not drive:
+                X_PS = X_PW @ X_WSs[row]
+                p_P = scans[row].points @ X_PS[:3, :3].T + X_PS[:3, 3]
+                result[row, column] = seen.share_of(p_P)
+    return result
+
+
+def draw_streets(rng: np.random.Generator) -> dict[str, Any]:
+    """Returns the content of a `roads.yaml` that no map has.
+
+    Streets run along the lines of a bent grid with random spacings, as a whole
+    turned at random. Some cross streets are missing, some bend.
+    """
+    columns, rows = rng.integers(3, 6), rng.integers(3, 5)
+    x = np.cumsum(rng.uniform(70.0, 170.0, columns))
+    y = np.cumsum(rng.uniform(60.0, 140.0, rows))
+    places = np.stack(np.meshgrid(x, y, indexing="ij"), axis=-1)
+    places += rng.uniform(-14.0, 14.0, places.shape)
+    kerb = [round(float(k), 1) for k in rng.uniform(5.0, 9.0, (columns * rows))]
+    junctions = {
+        f"j{i}{k}": {
+            "position": places[i, k].round(2).tolist(),
+            "kerb_radius": kerb.pop(),
+        }
+        for i in range(columns)
+        for k in range(rows)
+    }
+    roads: dict[str, Any] = {}
+    wide = {("x", int(rng.integers(rows))), ("y", int(rng.integers(columns)))}
+
+    def add(axis: str, line: int, i: int, k: int, to: tuple[int, int]) -> None:
+        start, end = places[i, k], places[to]
+        road: dict[str, Any] = {"start": f"j{i}{k}", "end": f"j{to[0]}{to[1]}"}
+        if (axis, line) in wide:
+            road["lanes"] = [2, 2]
+        elif rng.random() < 0.5:
+            road["parking"] = 2.2
+        if rng.random() < 0.3:
+            along = end - start
+            aside = np.array([-along[1], along[0]]) / np.linalg.norm(along)
+            bend = (start + end) / 2.0 + aside * rng.uniform(-16.0, 16.0)
+            road["via"] = [[*bend.round(2).tolist(), 30.0]]
+        roads[f"{axis}{line}_{i}{k}"] = road
+
+    for k in range(rows):
+        for i in range(columns - 1):
+            add("x", k, i, k, (i + 1, k))
+    for i in range(columns):
+        is_inside = 0 < i < columns - 1
+        for k in range(rows - 1):
+            # Every junction still has two streets.
+            if not (is_inside and rng.random() < 0.3):
+                add("y", i, i, k, (i, k + 1))
+    defaults = {
+        "lanes": [1, 1],
+        "lane_width": round(float(rng.uniform(3.2, 4.2)), 1),
+        "sidewalk": round(float(rng.uniform(2.0, 5.0)), 1),
+        "kerb_height": 0.15,
+        "speed_limit": 12.0,
+    }
+    plan = {"defaults": defaults, "junctions": junctions, "roads": roads}
+    return turned(plan, float(rng.uniform(0.0, 90.0)))
 
 
 def draw_stages(city: City, rng: np.random.Generator) -> dict[str, dict]:

@@ -6,7 +6,10 @@ import numpy as np
 import pytest
 
 from cns_drake.base.errors import InputError
+from cns_drake.roads.network import load_road_network
+from cns_drake.roads.route import draw_route
 from cns_drake.studies import training
+from cns_drake.studies.redrawing import to_yaml
 from cns_drake.studies.training import (
     MAPS,
     Sampler,
@@ -16,6 +19,7 @@ from cns_drake.studies.training import (
     train,
     write_weights,
 )
+from cns_drake.studies.training_drives import draw_streets
 from evaluation.methods.learned import (
     CHANNELS,
     RINGS,
@@ -155,3 +159,34 @@ def test_plans_of_minutes():
     assert len({one.city_seed for one in drawn}) == 3
     assert all(one.city_seed > 100_000 and not one.change for one in drawn)
     assert TrainingPlan.of_minutes(10.0, cities=5).cities == 5
+
+
+def test_graded_batches_rank_by_overlap():
+    scans = toy_scans()
+    other = scans.drives[:, None] != scans.drives
+    same = scans.cities[:, None] == scans.cities
+    apart = np.linalg.norm(scans.xy[:, None] - scans.xy, axis=2)
+    # Those 20 m ahead share more than those beside, which a radius calls right.
+    shared = other * same * np.exp(-np.abs(apart - 20.1) / 100.0)
+    graded = TrainingScans(
+        scans.images, scans.xy, scans.cities, scans.drives, shared
+    )
+    batch = Sampler(graded, seed=4).batch(9)
+    assert batch.counts.all()
+    assert batch.weights.sum(axis=1) == pytest.approx(1.0, abs=1e-6)
+    number = np.arange(len(batch.weights))
+    assert (batch.weights[number, 2 * number] > 0.0).all()
+    best = batch.weights.max(axis=1)
+    assert (batch.weights[number, 2 * number + 1] < best).all()
+
+
+def test_drawn_streets_are_no_map_and_can_be_driven(tmp_path):
+    found = []
+    for number in range(5):
+        rng = np.random.default_rng([3, number])
+        roads = tmp_path / f"roads_{number}.yaml"
+        roads.write_bytes(to_yaml("streets", draw_streets(rng)))
+        network = load_road_network(roads)
+        assert len(draw_route(network, 1600.0, rng).root) > 3
+        found.append(roads.read_bytes())
+    assert len(set(found)) == 5
