@@ -215,8 +215,10 @@ def _overlaps(scans: Sequence[_Taken], reporter: Reporter) -> np.ndarray:
     places = reporter.track(enumerate(scans), "overlaps", len(scans))
     for column, place in places:
         drive = place.drive
+        scene, X_WP = drive.look(place.frame)
         seen = VisibleSurfaces(
-            *drive.look(place.frame),
+            scene,
+            X_WP,
             drive.pattern,
             BeamCoverage(drive.pattern.beams(place.frame).d_Sset),
             _MAX_RANGE,
