@@ -11,7 +11,7 @@ from evaluation.localisation.localise import RIGHT_TRANSLATION
 from evaluation.localisation.tracking import LOST
 from evaluation.recognition.metrics import MODES, PlaceRecognitionMetrics
 from evaluation.recognition.place_recognition import PlaceRecognition
-from evaluation.results.charts import styles, titled
+from evaluation.results.charts import styles
 from evaluation.results.drawing import plain, save
 from evaluation.results.table_forms import in_table_order, title
 
@@ -32,7 +32,7 @@ def draw_pr_curves(
             of_method = {r.method: r for r in results if r.pair == pair}
             for method in in_table_order(of_method):
                 metrics = of_method[method].by_mode[mode]
-                _draw_curve(axes, method, style_of[titled(method)], metrics)
+                _draw_curve(axes, method, style_of[title(method)], metrics)
             axes.set(xlim=(0.0, 1.0), ylim=(0.0, 1.02))
             # A phone shows one panel at a time.
             axes.tick_params(labelleft=True)

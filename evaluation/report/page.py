@@ -36,7 +36,7 @@ from evaluation.report.page_data import (
     browser_data,
 )
 from evaluation.report.reference import NO_REFERENCE, Reference
-from evaluation.results.charts import draw, styles, titled
+from evaluation.results.charts import draw, styles
 from evaluation.results.drawing import save
 from evaluation.results.table import RESULTS, STAGE, Results
 from evaluation.results.table_forms import (
@@ -449,7 +449,6 @@ def _environment() -> jinja2.Environment:
         "data_address": _data_address,
         "interval_text": rows.interval_text,
         "markdown": escape_markdown,
-        "label_title": titled,
         "method_title": title,
         "percent": rows.percent,
         "quoted": quote,

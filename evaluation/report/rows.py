@@ -22,7 +22,6 @@ from evaluation.recognition.place_outcome import (
 )
 from evaluation.recognition.place_recognition import PlaceRecognition
 from evaluation.results import table_forms as tables
-from evaluation.results.charts import titled
 from evaluation.results.summaries import Ranked, ranking
 from evaluation.results.table import LAST, OWN, STAGE, Results, Row
 
@@ -142,7 +141,9 @@ def _headline(
     if not ranked:
         return "No pair of drives has an AUC of every method to rank."
     over = f"{num_pairs} pairs of drives" if num_pairs > 1 else "one pair"
-    best, *others = [(titled(one.method), f"{one.value:.3f}") for one in ranked]
+    best, *others = [
+        (tables.title(one.method), f"{one.value:.3f}") for one in ranked
+    ]
     if not others:
         return f"{best[0]} has a mean AUC of {best[1]} over {over}."
     ties = [name for name, value in others if value == best[1]]

@@ -278,9 +278,10 @@ def ranked(
     ]
 
 
-def title(method: str) -> str:
-    """Returns a method's name as its authors write it."""
-    return _METHOD_TITLES.get(method, method)
+def title(label: str) -> str:
+    """Returns a method's name as its authors write it, with its settings."""
+    method, comma, settings = label.partition(",")
+    return f"{_METHOD_TITLES.get(method, method)}{comma}{settings}"
 
 
 def in_table_order(methods: Iterable[str]) -> list[str]:

@@ -338,8 +338,11 @@ class Study:
                 elif result is not None:
                     compared.append(result)
                     if pair[0] is not pair[1]:
-                        beside = control and self._result(control, run.queries)
-                        report.pairs.append((result, beside and beside.read()))
+                        unchanged = None
+                        if control is not None:
+                            beside = self._result(control, run.queries)
+                            unchanged = beside.read()
+                        report.pairs.append((result, unchanged))
             evidence = self._evidence(pair).read()
             if evidence is not None:
                 report.evidence[pair[0].name, pair[1].name] = evidence
