@@ -42,6 +42,7 @@ from evaluation.results.table import RESULTS, STAGE, Results
 from evaluation.results.table_forms import (
     MISSING,
     Table,
+    by_pair,
     escape_markdown,
     in_table_order,
     title,
@@ -277,7 +278,7 @@ def write_page(path: Path, report: Report) -> None:
             if has_section.get(name, True)
         },
         illustrations=illustrations,
-        survivals_by_pair=rows.by_pair(report.survivals),
+        survivals_by_pair=by_pair(report.survivals),
         drives_of_maps=drives_of_maps,
         other_forms=list(forms_of_table)[1:],
         fault_kinds=FAULT_KINDS,

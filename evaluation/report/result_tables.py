@@ -38,6 +38,8 @@ from evaluation.results.table_forms import (
     CAPTIONS,
     Columns,
     Table,
+    by_pair,
+    by_pair_and_method,
     in_table_order,
     keyed,
     protocol_columns,
@@ -127,17 +129,6 @@ def _visible_change(
     return (None, None) if known is None else known.visible_change
 
 
-def _by_pair_and_method(
-    results: Sequence[PlaceRecognition],
-) -> list[PlaceRecognition]:
-    """Returns results pair by pair, methods in the order of tables."""
-    pairs = list(dict.fromkeys(result.pair for result in results))
-    methods = in_table_order(result.method for result in results)
-    return sorted(
-        results, key=lambda r: (pairs.index(r.pair), methods.index(r.method))
-    )
-
-
 class _Counted(NamedTuple):
     """A result in a mode, with what is published of it."""
 
@@ -184,14 +175,14 @@ def recognition_table(
     methods = in_table_order(result.method for result in results)
     measures = _PUBLISHED if mode is None else _MEASURES
     tcr = symmetric_changes(changes)
-    by_pair: dict[tuple, dict[str, _Counted]] = {}
-    for one in results:
-        counted = _Counted.of(
-            one, mode or reference.mode(one.method), reference
-        )
-        by_pair.setdefault(one.pair, {})[one.method] = counted
     rows = []
-    for pair, of_method in by_pair.items():
+    for pair, some in by_pair(results).items():
+        of_method = {
+            one.method: _Counted.of(
+                one, mode or reference.mode(one.method), reference
+            )
+            for one in some
+        }
         found = [of_method.get(method) for method in methods]
         columns = [
             ranked(
@@ -201,8 +192,8 @@ def recognition_table(
             for name in measures.values()
         ]
         cells = [column[i] for i in range(len(methods)) for column in columns]
-        outcome = next(iter(of_method.values())).result
-        visible, _ = _visible_change(evidence, outcome.database, outcome.query)
+        drives = some[0].database, some[0].query
+        visible, _ = _visible_change(evidence, *drives)
         name = " → ".join(pair[1:])
         rows.append((pair[0], name, tcr.get(pair), visible, *cells))
     captions = {
@@ -292,7 +283,7 @@ def audit_table(
 def metric_numbers(results: Sequence[PlaceRecognition]) -> Table:
     """Returns the metrics of other publications, as `metrics.csv` has them."""
     return Table.of(
-        _by_pair_and_method(results),
+        by_pair_and_method(results),
         {
             **_KEYS,
             "auc_strict": lambda r: r.by_mode["all"].auc_strict,
@@ -332,7 +323,7 @@ def method_differences(
 ) -> list[MethodDifference]:
     """Returns the AUC difference of any two methods on each pair (mode all)."""
     both, found = [], []
-    for one, other in itertools.combinations(_by_pair_and_method(results), 2):
+    for one, other in itertools.combinations(by_pair_and_method(results), 2):
         if one.pair == other.pair:
             both.append((one, other))
             found.append(auc_difference(one.outcomes, other.outcomes))
@@ -401,7 +392,7 @@ def pose_table(results: Sequence[PlaceRecognition]) -> Table:
         "recall at full precision",
     ]
     return Table.of(
-        _by_pair_and_method(results),
+        by_pair_and_method(results),
         {**_SHOWN, **dict(zip(names, _POSE_ERRORS.values(), strict=True))},
         CAPTIONS["poses"],
     )
@@ -485,7 +476,7 @@ def fault_numbers(
 def _count_faults(
     results: Sequence[PlaceRecognition], evidence: Evidence
 ) -> Iterator[_Faults]:
-    for result in _by_pair_and_method(results):
+    for result in by_pair_and_method(results):
         known = evidence.get((result.database, result.query))
         if known is None:
             continue

@@ -202,25 +202,9 @@ def survivals(rows: Iterable[Row], stages: Mapping[str, str]) -> list[Survival]:
             pair = row.map, stages[row.database], stages[row.query]
             sides = found.setdefault((pair, row.method), ({}, {}))
             sides[row[STAGE] == OWN][row.metric] = row
-    pairs = list(dict.fromkeys(pair for pair, _ in found))
-    methods = tables.in_table_order(method for _, method in found)
-    return sorted(
-        (
-            Survival(pair, method, before, after)
-            for (pair, method), (before, after) in found.items()
-        ),
-        key=lambda s: (pairs.index(s.pair), methods.index(s.method)),
+    return tables.by_pair_and_method(
+        [Survival(*key, *sides) for key, sides in found.items()]
     )
-
-
-def by_pair(
-    survivals: Iterable[Survival],
-) -> dict[tuple[str, str, str], list[Survival]]:
-    """Returns (map, database, query) -> what each method keeps."""
-    groups: dict[tuple[str, str, str], list[Survival]] = {}
-    for one in survivals:
-        groups.setdefault(one.pair, []).append(one)
-    return groups
 
 
 def percent(share: float) -> str:
@@ -306,9 +290,9 @@ def _shown(
 
 def survival_summary(survivals: Sequence[Survival]) -> str:
     """Returns one or two sentences on the share of AUC that methods keep."""
-    groups = by_pair(survivals)
+    groups = tables.by_pair(survivals)
     known = [one for one in survivals if one.before]
-    without = len(groups) - len(by_pair(known))
+    without = len(groups) - len(tables.by_pair(known))
     shares: dict[str, list[float]] = {}
     for one in known:
         if not math.isnan(share := one.number("after", "kept")):

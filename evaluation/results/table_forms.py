@@ -293,6 +293,24 @@ def in_table_order(methods: Iterable[str]) -> list[str]:
     )
 
 
+def by_pair(items: Iterable[Any]) -> dict[Any, list[Any]]:
+    """Returns the pair of items -> these."""
+    groups: dict[Any, list[Any]] = {}
+    for one in items:
+        groups.setdefault(one.pair, []).append(one)
+    return groups
+
+
+def by_pair_and_method(items: Sequence[Any]) -> list[Any]:
+    """Returns items pair by pair, their methods in the order of tables."""
+    pairs = list(dict.fromkeys(one.pair for one in items))
+    methods = in_table_order(one.method for one in items)
+    return sorted(
+        items,
+        key=lambda one: (pairs.index(one.pair), methods.index(one.method)),
+    )
+
+
 def to_text(value: object) -> str:
     """Returns a value as tables show it."""
     if _is_missing(value):
