@@ -7,9 +7,9 @@ from cns_drake.base.jobs.running import Job
 from cns_drake.base.jobs.step import Reporter
 from cns_drake.base.map_folder import MapFolder
 from cns_drake.pictures import stage_pictures
-from cns_drake.scenarios.provenance import digest_file
+from cns_drake.scenarios.provenance import digest_file, digest_inputs
+from cns_drake.scenarios.scenario import Scenario
 from cns_drake.scenarios.scenario_files import load_scenario
-from cns_drake.simulation.simulated_drive import DriveSimulation
 from evaluation.study.parts import MakePart, Part
 
 # Expected time to draw a stage [s].
@@ -26,6 +26,17 @@ class _ReadFile:
         return [self.path.name, digest_file(self.path)]
 
 
+@dataclass(frozen=True)
+class _ShownDrive:
+    """A drive that counts with the files that its scenario names."""
+
+    scenario: Scenario
+
+    def identity(self) -> list[object]:
+        values = self.scenario.model_dump(mode="json")
+        return [values, digest_inputs(self.scenario)]
+
+
 def plan_pictures(folder: Path, pictures: Path) -> list[Job]:
     """Returns the jobs that draw a map.
 
@@ -37,8 +48,7 @@ def plan_pictures(folder: Path, pictures: Path) -> list[Job]:
     # Workers may run elsewhere.
     source, pictures = MapFolder(folder.resolve()), pictures.absolute()
     drives = tuple(
-        DriveSimulation(load_scenario(file))
-        for file in source.recordable_drives()
+        _ShownDrive(load_scenario(file)) for file in source.recordable_drives()
     )
     drawn: dict[str, tuple] = {"drives": (picture_drives, drives)}
     if source.views.is_file():
@@ -65,7 +75,7 @@ def plan_pictures(folder: Path, pictures: Path) -> list[Job]:
 
 
 def picture_drives(
-    reporter: Reporter, drives: tuple[DriveSimulation, ...], picture: Path
+    reporter: Reporter, drives: tuple[_ShownDrive, ...], picture: Path
 ) -> None:
     """Draws the drives of a map from above."""
     del reporter
