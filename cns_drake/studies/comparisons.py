@@ -217,7 +217,8 @@ class PairOfDrives:
         for side, changes in fields.items():
             left = dict(changes)
             try:
-                self._check_stage(side, left.get("stage"))
+                if (stage := left.get("stage")) is not None:
+                    self._stage(side, self._unchanged["database"], stage)
             except MissingError as error:
                 missing = error
                 del left["stage"]
@@ -233,10 +234,6 @@ class PairOfDrives:
         if missing:
             self.on_note(str(missing))
         return found
-
-    def _check_stage(self, side: str, stage: Any) -> None:
-        if stage is not None:
-            self._stage(side, self._unchanged["database"], stage)
 
     def _check_roads(self, traffic: Any) -> None:
         folder = map_folder(self.query)

@@ -75,7 +75,6 @@ from evaluation.results.table import (
 from evaluation.study.chosen_methods import MethodChoice, choose_methods
 from evaluation.study.collection import (
     City,
-    RecordingInfo,
     find_recordings,
     group_cities,
 )
@@ -183,14 +182,14 @@ class Study:
     on_note: Callable[[str], None] = lambda text: None
 
     def __post_init__(self) -> None:
-        self._tasks = []
+        self._tasks: dict[str, Task] = {}
         for name, settings in self.experiment.tasks.items():
             if name not in TASKS:
                 raise InputError(
                     f"{self.source}: tasks: no task {name!r} (there are:"
                     f" {', '.join(TASKS)}){did_you_mean(name, TASKS)}"
                 )
-            self._tasks.append(TASKS[name](settings, self.source))
+            self._tasks[name] = TASKS[name](settings, self.source)
         try:
             self._variants = self._choose_methods()
         except InputError as error:
@@ -379,14 +378,13 @@ class Study:
                         self.on_note,
                     )
                 ]
-            if any(task.asks for task in self._tasks):
+            if any(task.asks for task in self._tasks.values()):
                 for one in found:
                     planned.expect(one.pair)
-            for task in self._tasks:
+            for name, task in self._tasks.items():
                 for one in found:
                     if task.asks or not one.pair.is_as_before:
-                        part = task.measure(one.pair, planned)
-                        one.parts[task.name] = part
+                        one.parts[name] = task.measure(one.pair, planned)
             jobs |= planned.jobs
             notes |= planned.notes
             measured += found
@@ -503,7 +501,9 @@ class Study:
                         f" in the stage of {pair[1].name}"
                     )
                     continue
-                database, query = map(_recording, sources)
+                database, query = (
+                    NamedDrive(r.name, r.source) for r in sources
+                )
                 protocol = self._protocol_of(condition)
                 yield _Measured(
                     city.name,
@@ -571,36 +571,30 @@ class Study:
         for one in measured:
             before = baselines.get(_place(one), {})
             base = before.get(one.seed) or next(iter(before.values()), {})
-            for task in self._measuring(one):
-                found = one.parts[task.name].read()
-                for number in task.numbers(found, base.get(task.name)):
-                    yield Row.of(
-                        number,
-                        **self._key(one, task.name, number.method, number.gate),
-                    )
+            for name, part in one.parts.items():
+                task = self._tasks[name]
+                for number in task.numbers(part.read(), base.get(name)):
+                    key = self._key(one, name, number.method, number.gate)
+                    yield Row.of(number, **key)
 
     def _answers(self, measured: Iterable[_Measured]) -> Iterator[Answers]:
         """Yields the answers to all queries."""
         for one in measured:
-            for task in self._measuring(one):
-                for given in task.answers(one.parts[task.name].read()):
+            for name, part in one.parts.items():
+                for method, gate, columns in self._tasks[name].answers(
+                    part.read()
+                ):
                     yield Answers(
-                        **self._key(one, task.name, given.method, given.gate),
+                        **self._key(one, name, method, gate),
                         columns={
-                            name: np.array(
+                            column: np.array(
                                 [-1 if v is None else v for v in some]
                             )
                             if isinstance(some, list)
                             else np.asarray(some)
-                            for name, some in given.columns.items()
+                            for column, some in columns.items()
                         },
                     )
-
-    def _measuring(self, one: _Measured) -> Iterator[Task]:
-        """Yields the tasks that a pair was measured for."""
-        for task in self._tasks:
-            if task.name in one.parts:
-                yield task
 
     def _key(
         self, one: _Measured, task: str, method: str, gate: bool
@@ -627,10 +621,6 @@ class Study:
     def _protocol_of(self, condition: Condition) -> RetrievalProtocol:
         fields = condition.changes.get("protocol", {})
         return base_protocol(fields, self.source)
-
-
-def _recording(info: RecordingInfo) -> NamedDrive:
-    return NamedDrive(info.name, info.source)
 
 
 def _base_name(database: Scenario) -> str:

@@ -222,7 +222,7 @@ class Measuring:
         scans = [scan for part in parts for scan in part.scans]
         worlds = [part.world for part in parts for _ in part.scans]
         known = list(dict.fromkeys(part.world for part in parts))
-        numbers = [known.index(part.world) for part in parts]
+        of_world = [known.index(part.world) for part in parts]
         is_known = np.ones((len(drive), len(scans)), bool)
         np.fill_diagonal(is_known, False)
         shown = [_REAL.query_scan(drive, k) for k in range(len(drive))]
@@ -232,7 +232,7 @@ class Measuring:
         ):
             own = parts[0].described[k]
             places = joined_scans(
-                [part.described[k].places for part in parts], numbers
+                [part.described[k].places for part in parts], of_world
             )
             both = compare_with_gates(
                 method,

@@ -11,28 +11,28 @@ from evaluation.localisation.localise import RIGHT_TRANSLATION
 from evaluation.localisation.tracking import LOST
 from evaluation.recognition.metrics import MODES, PlaceRecognitionMetrics
 from evaluation.recognition.place_recognition import PlaceRecognition
-from evaluation.results.charts import styles, titled
+from evaluation.results.charts import styles
 from evaluation.results.drawing import plain, save
-from evaluation.results.table_forms import in_table_order, title
+from evaluation.results.table_forms import by_pair, in_table_order, title
 
 
 def draw_pr_curves(
     map_name: str, results: Sequence[PlaceRecognition], stem: Path
 ) -> None:
     """Draws precision over recall, a row a pair and a column a mode."""
-    pairs = list(dict.fromkeys(result.pair for result in results))
+    pairs = by_pair(results)
     style_of = styles(in_table_order(result.method for result in results))
     size = (9.2, 0.3 + 2.7 * len(pairs))
     figure = Figure(figsize=size, layout="constrained")
     grid = figure.subplots(
         len(pairs), len(MODES), sharex=True, sharey=True, squeeze=False
     )
-    for row, pair in zip(grid, pairs, strict=True):
+    for row, (pair, some) in zip(grid, pairs.items(), strict=True):
+        of_method = {one.method: one for one in some}
         for axes, mode in zip(row, MODES, strict=True):
-            of_method = {r.method: r for r in results if r.pair == pair}
             for method in in_table_order(of_method):
                 metrics = of_method[method].by_mode[mode]
-                _draw_curve(axes, method, style_of[titled(method)], metrics)
+                _draw_curve(axes, method, style_of[title(method)], metrics)
             axes.set(xlim=(0.0, 1.0), ylim=(0.0, 1.02))
             # A phone shows one panel at a time.
             axes.tick_params(labelleft=True)

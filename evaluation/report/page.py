@@ -36,12 +36,13 @@ from evaluation.report.page_data import (
     browser_data,
 )
 from evaluation.report.reference import NO_REFERENCE, Reference
-from evaluation.results.charts import draw, styles, titled
+from evaluation.results.charts import draw, styles
 from evaluation.results.drawing import save
 from evaluation.results.table import RESULTS, STAGE, Results
 from evaluation.results.table_forms import (
     MISSING,
     Table,
+    by_pair,
     escape_markdown,
     in_table_order,
     title,
@@ -277,7 +278,7 @@ def write_page(path: Path, report: Report) -> None:
             if has_section.get(name, True)
         },
         illustrations=illustrations,
-        survivals_by_pair=rows.by_pair(report.survivals),
+        survivals_by_pair=by_pair(report.survivals),
         drives_of_maps=drives_of_maps,
         other_forms=list(forms_of_table)[1:],
         fault_kinds=FAULT_KINDS,
@@ -451,7 +452,6 @@ def _environment() -> jinja2.Environment:
         "data_address": _data_address,
         "interval_text": rows.interval_text,
         "markdown": escape_markdown,
-        "label_title": titled,
         "method_title": title,
         "percent": rows.percent,
         "quoted": quote,

@@ -22,7 +22,7 @@ from evaluation.recognition.place_recognition import PlaceRecognition
 from evaluation.recognition.scoring import ranking
 from evaluation.report.figures import Picture
 from evaluation.results.drawing import Legend
-from evaluation.results.table_forms import in_table_order, title
+from evaluation.results.table_forms import by_pair, in_table_order, title
 
 # Points in all scans of a page. At some 3 bytes each they leave room for the
 # figures within 25 MB.
@@ -200,9 +200,6 @@ def browser_data(
         evidence: names of database and query -> why queries went wrong; some
             may be absent.
     """
-    pairs: dict[tuple, list[PlaceRecognition]] = {}
-    for result in recognitions:
-        pairs.setdefault(result.pair, []).append(result)
     used = {
         name
         for result in recognitions
@@ -230,7 +227,7 @@ def browser_data(
         },
         "pairs": [
             _pair_data(pair, results, drives, changes.get(pair), evidence)
-            for pair, results in pairs.items()
+            for pair, results in by_pair(recognitions).items()
         ],
     }
 

@@ -40,6 +40,8 @@ from evaluation.results.table_forms import (
     Cell,
     Columns,
     Table,
+    by_pair,
+    by_pair_and_method,
     in_table_order,
     keyed,
     protocol_columns,
@@ -147,17 +149,6 @@ class _Visible(NamedTuple):
         return cls(all_of_it, queries, added, left)
 
 
-def _by_pair_and_method(
-    results: Sequence[PlaceRecognition],
-) -> list[PlaceRecognition]:
-    """Returns results pair by pair, methods in the order of tables."""
-    pairs = list(dict.fromkeys(result.pair for result in results))
-    methods = in_table_order(result.method for result in results)
-    return sorted(
-        results, key=lambda r: (pairs.index(r.pair), methods.index(r.method))
-    )
-
-
 class _Counted(NamedTuple):
     """A result in a mode, with what is published of it."""
 
@@ -204,14 +195,14 @@ def recognition_table(
     methods = in_table_order(result.method for result in results)
     measures = _PUBLISHED if mode is None else _MEASURES
     tcr = symmetric_changes(changes)
-    by_pair: dict[tuple, dict[str, _Counted]] = {}
-    for one in results:
-        counted = _Counted.of(
-            one, mode or reference.mode(one.method), reference
-        )
-        by_pair.setdefault(one.pair, {})[one.method] = counted
     rows = []
-    for pair, of_method in by_pair.items():
+    for pair, some in by_pair(results).items():
+        of_method = {
+            one.method: _Counted.of(
+                one, mode or reference.mode(one.method), reference
+            )
+            for one in some
+        }
         found = [of_method.get(method) for method in methods]
         columns = [
             ranked(
@@ -221,8 +212,8 @@ def recognition_table(
             for name in measures.values()
         ]
         cells = [column[i] for i in range(len(methods)) for column in columns]
-        outcome = next(iter(of_method.values())).result
-        visible = _Visible.of(evidence, outcome.database, outcome.query)
+        drives = some[0].database, some[0].query
+        visible = _Visible.of(evidence, *drives)
         shown = tcr.get(pair), Cell(visible.all, visible.added)
         rows.append((pair[0], " → ".join(pair[1:]), *shown, *cells))
     captions = {
@@ -313,7 +304,7 @@ def audit_table(
 def metric_numbers(results: Sequence[PlaceRecognition]) -> Table:
     """Returns the metrics of other publications, as `metrics.csv` has them."""
     return Table.of(
-        _by_pair_and_method(results),
+        by_pair_and_method(results),
         {
             **_KEYS,
             "auc_strict": lambda r: r.by_mode["all"].auc_strict,
@@ -354,9 +345,7 @@ def method_differences(
 ) -> list[MethodDifference]:
     """Returns the AUC difference of any two methods on each pair (mode all)."""
     found: list[MethodDifference] = []
-    for _, some in itertools.groupby(
-        _by_pair_and_method(results), attrgetter("pair")
-    ):
+    for some in by_pair(by_pair_and_method(results)).values():
         both = list(itertools.combinations(some, 2))
         differences = [
             auc_difference(*(one.outcomes for one in two)) for two in both
@@ -429,7 +418,7 @@ def pose_table(results: Sequence[PlaceRecognition]) -> Table:
         "recall at full precision",
     ]
     return Table.of(
-        _by_pair_and_method(results),
+        by_pair_and_method(results),
         {**_SHOWN, **dict(zip(names, _POSE_ERRORS.values(), strict=True))},
         CAPTIONS["poses"],
     )
@@ -513,7 +502,7 @@ def fault_numbers(
 def _count_faults(
     results: Sequence[PlaceRecognition], evidence: Evidence
 ) -> Iterator[_Faults]:
-    for result in _by_pair_and_method(results):
+    for result in by_pair_and_method(results):
         known = evidence.get((result.database, result.query))
         if known is None:
             continue

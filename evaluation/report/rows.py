@@ -22,7 +22,6 @@ from evaluation.recognition.place_outcome import (
 )
 from evaluation.recognition.place_recognition import PlaceRecognition
 from evaluation.results import table_forms as tables
-from evaluation.results.charts import titled
 from evaluation.results.summaries import Ranked, ranking
 from evaluation.results.table import LAST, OWN, STAGE, Results, Row
 
@@ -163,7 +162,9 @@ def _headline(
     if not ranked:
         return "No pair of drives has an AUC of every method to rank."
     over = f"{num_pairs} pairs of drives" if num_pairs > 1 else "one pair"
-    best, *others = [(titled(one.method), f"{one.value:.3f}") for one in ranked]
+    best, *others = [
+        (tables.title(one.method), f"{one.value:.3f}") for one in ranked
+    ]
     if not others:
         return f"{best[0]} has a mean AUC of {best[1]} over {over}."
     ties = [name for name, value in others if value == best[1]]
@@ -222,25 +223,9 @@ def survivals(rows: Iterable[Row], stages: Mapping[str, str]) -> list[Survival]:
             pair = row.map, stages[row.database], stages[row.query]
             sides = found.setdefault((pair, row.method), ({}, {}))
             sides[row[STAGE] == OWN][row.metric] = row
-    pairs = list(dict.fromkeys(pair for pair, _ in found))
-    methods = tables.in_table_order(method for _, method in found)
-    return sorted(
-        (
-            Survival(pair, method, before, after)
-            for (pair, method), (before, after) in found.items()
-        ),
-        key=lambda s: (pairs.index(s.pair), methods.index(s.method)),
+    return tables.by_pair_and_method(
+        [Survival(*key, *sides) for key, sides in found.items()]
     )
-
-
-def by_pair(
-    survivals: Iterable[Survival],
-) -> dict[tuple[str, str, str], list[Survival]]:
-    """Returns (map, database, query) -> what each method keeps."""
-    groups: dict[tuple[str, str, str], list[Survival]] = {}
-    for one in survivals:
-        groups.setdefault(one.pair, []).append(one)
-    return groups
 
 
 def percent(share: float) -> str:
@@ -326,9 +311,9 @@ def _shown(
 
 def survival_summary(survivals: Sequence[Survival]) -> str:
     """Returns one or two sentences on the share of AUC that methods keep."""
-    groups = by_pair(survivals)
+    groups = tables.by_pair(survivals)
     known = [one for one in survivals if one.before]
-    without = len(groups) - len(by_pair(known))
+    without = len(groups) - len(tables.by_pair(known))
     shares: dict[str, list[float]] = {}
     for one in known:
         if not math.isnan(share := one.number("after", "kept")):

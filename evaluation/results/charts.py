@@ -210,16 +210,10 @@ def styles(labels: Sequence[str]) -> dict[str, tuple[str, str, str]]:
     """Returns title -> colour, line style and marker of each method."""
     others = [name for name in labels if name not in METHOD_STYLES]
     return {
-        titled(name): METHOD_STYLES.get(name)
+        title(name): METHOD_STYLES.get(name)
         or _OTHERS[others.index(name) % len(_OTHERS)]
         for name in labels
     }
-
-
-def titled(label: str) -> str:
-    """Returns a method's name as its authors write it, with its settings."""
-    method, comma, settings = label.partition(",")
-    return f"{title(method)}{comma}{settings}"
 
 
 def words(name: str) -> str:
@@ -234,7 +228,7 @@ def _dumbbell(chart: _Chart) -> tuple[str, Figure]:
         raise InputError(f"charts: dumbbell: {over}: the table has one value")
     before, after = values[0], values[-1]
     found = {
-        (titled(one.key[0]), *one.key[1:]): one.value
+        (title(one.key[0]), *one.key[1:]): one.value
         for one in means(chart.rows, "label", *_PAIR, over)
     }
     ends_of = [
@@ -312,7 +306,7 @@ def _lines(chart: _Chart) -> tuple[str, Figure]:
     at = sorted({_number(row, over) for row in chart.rows})
     for axes, rows in zip(panels, chart.panes.values(), strict=True):
         for label, (colour, style, marker) in chart.styles.items():
-            some = [row for row in rows if titled(row.label) == label]
+            some = [row for row in rows if title(row.label) == label]
             points = sorted(means(some, over), key=lambda one: one.key)
             x = [one.key[0] for one in points]
             y, low, high = (
@@ -368,7 +362,7 @@ def _matrix(chart: _Chart) -> tuple[str, Figure]:
     for axes, rows in zip(panels, chart.panes.values(), strict=True):
         cells: dict[tuple[int, int], list[tuple[Any, float]]] = {}
         for mean in means(rows, "label", over, strips or over):
-            x = names.index(titled(mean.key[0]))
+            x = names.index(title(mean.key[0]))
             cell = cells.setdefault((x, values.index(mean.key[1])), [])
             cell.append((mean.key[2], mean.value))
         for (x, y), some in cells.items():
@@ -436,7 +430,7 @@ def _scatter(chart: _Chart) -> tuple[str, Figure]:
     axes = figure.subplots()
     for label, (colour, style, marker) in chart.styles.items():
         known = sorted(
-            (at, row.value) for row, at in points if titled(row.label) == label
+            (at, row.value) for row, at in points if title(row.label) == label
         )
         if not known:
             continue
@@ -457,7 +451,7 @@ def _scatter(chart: _Chart) -> tuple[str, Figure]:
         + list(chart.rows)
     )
     found = {
-        titled(one.method): (-one.value, f"{-one.value:+.2f}")
+        title(one.method): (-one.value, f"{-one.value:+.2f}")
         for one in correlations(selected, x_name, y_name)
     }
     message = f"{words(y_name)} over {words(x_name)}"

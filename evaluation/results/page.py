@@ -21,6 +21,7 @@ from evaluation.results.drawing import save
 from evaluation.results.summaries import Summary, means, summarised
 from evaluation.results.table import KEYS, SETTINGS, QueryRows, Results
 from evaluation.results.table_forms import in_table_order
+from evaluation.results.table_forms import title as title_of
 
 _TASKS = {
     "place": "Place recognition",
@@ -169,7 +170,7 @@ def _summary(results: Results, task: str) -> dict[str, Any]:
     ]
     lines = [
         {
-            "name": (drawing.titled(name) or "–")
+            "name": (title_of(name) or "–")
             + (", with the gate" if gate else ""),
             "cells": [found.get((name, gate, *one)) for one in columns],
         }

@@ -95,9 +95,24 @@ class Summary(NamedTuple):
     n: int | None = None
 
     @classmethod
-    def of(cls, what: str, key: Key, *numbers: float) -> Summary:
-        """Returns value, low and high end of what a method has on a map."""
-        return cls(what, key.map, key.task, key.label, key.gate, *numbers)
+    def of(
+        cls,
+        what: str,
+        key: Key,
+        value: float,
+        low: float = math.nan,
+        high: float = math.nan,
+    ) -> Summary:
+        """Returns the summary of what a method has on a map.
+
+        Args:
+            what: what the number is.
+            key: has the map, the task, the method and the gate.
+            value: the number itself.
+            low, high: its interval or range.
+        """
+        of_method = key.map, key.task, key.label, key.gate
+        return cls(what, *of_method, value, low, high)
 
 
 def excesses(queries: QueryRows) -> list[Summary]:

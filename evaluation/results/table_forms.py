@@ -278,9 +278,10 @@ def ranked(
     ]
 
 
-def title(method: str) -> str:
-    """Returns a method's name as its authors write it."""
-    return _METHOD_TITLES.get(method, method)
+def title(label: str) -> str:
+    """Returns a method's name as its authors write it, with its settings."""
+    method, comma, settings = label.partition(",")
+    return f"{_METHOD_TITLES.get(method, method)}{comma}{settings}"
 
 
 def in_table_order(methods: Iterable[str]) -> list[str]:
@@ -289,6 +290,24 @@ def in_table_order(methods: Iterable[str]) -> list[str]:
     return sorted(
         set(methods),
         key=lambda m: (known.index(m) if m in known else len(known), m),
+    )
+
+
+def by_pair(items: Iterable[Any]) -> dict[Any, list[Any]]:
+    """Returns the pair of items -> these."""
+    groups: dict[Any, list[Any]] = {}
+    for one in items:
+        groups.setdefault(one.pair, []).append(one)
+    return groups
+
+
+def by_pair_and_method(items: Sequence[Any]) -> list[Any]:
+    """Returns items pair by pair, their methods in the order of tables."""
+    pairs = list(dict.fromkeys(one.pair for one in items))
+    methods = in_table_order(one.method for one in items)
+    return sorted(
+        items,
+        key=lambda one: (pairs.index(one.pair), methods.index(one.method)),
     )
 
 

@@ -80,16 +80,18 @@ def compare_stages(
     """
     del reporter
     read: list[SurveyedDrive] = [part.read() for part in drives]
-    report = compare(
-        *(Surveyed(d.name, d.coarse, d.positions, d.placed) for d in read)
+    earlier, later, *controls = (
+        Surveyed(one.name, one.coarse, one.positions, one.placed)
+        for one in read
     )
+    control = controls[0] if controls else None
+    report = compare(earlier, later, control)
     result = ChangeResult(map_name, stages, report)
     make_folder(stems[0].parent)
-    earlier, later, *_ = read
     figures.draw_change(
         result,
         (clouds[0].read(), clouds[1].read()),
-        (earlier.coarse.merged(), later.coarse.merged()),
+        (earlier.voxels.merged(), later.voxels.merged()),
         stems,
     )
     return result

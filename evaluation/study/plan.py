@@ -343,8 +343,11 @@ class Study:
                 elif result is not None:
                     compared.append(result)
                     if pair[0] is not pair[1]:
-                        beside = control and self._result(control, run.queries)
-                        report.pairs.append((result, beside and beside.read()))
+                        unchanged = None
+                        if control is not None:
+                            beside = self._result(control, run.queries)
+                            unchanged = beside.read()
+                        report.pairs.append((result, unchanged))
             evidence = self._evidence(pair).read()
             before = control and self._evidence(control).read()
             if before is not None:

@@ -13,7 +13,7 @@ from cns_drake.base.errors import InputError
 from cns_drake.base.files import read_bytes
 from cns_drake.base.jobs.step import Reporter
 from cns_drake.studies.tasks.task import (
-    Answers,
+    Answered,
     Jobs,
     Pair,
     Task,
@@ -115,10 +115,9 @@ class LocaliseTask(Task):
             for name, value in values.items():
                 yield Number(method, False, name, value, n=len(rows))
 
-    def answers(self, found: Any) -> Iterator[Answers]:
+    def answers(self, found: Any) -> Iterator[Answered]:
         for method, rows in self._runs(found):
-            columns = localise.Localisation(rows).columns()
-            yield Answers(method, False, columns)
+            yield method, False, localise.Localisation(rows).columns()
 
 
 def measure_localisation(

@@ -6,7 +6,7 @@ from collections.abc import Iterator, Sequence
 from typing import Any
 
 from cns_drake.base.jobs.step import Reporter
-from cns_drake.studies.tasks.task import Answers, Jobs, Pair, Task
+from cns_drake.studies.tasks.task import Answered, Jobs, Pair, Task
 from evaluation.recognition.costs import cpu_ms, query_ms
 from evaluation.recognition.place_outcome import (
     Number,
@@ -50,9 +50,9 @@ class PlaceTask(Task):
         for now in found:
             yield from place_numbers(now, _same(before, now))
 
-    def answers(self, found: Outcomes) -> Iterator[Answers]:
+    def answers(self, found: Outcomes) -> Iterator[Answered]:
         for now in found:
-            yield Answers(now.method, now.is_gated, now.columns())
+            yield now.method, now.is_gated, now.columns()
 
 
 class PoseTask(PlaceTask):
@@ -66,7 +66,7 @@ class PoseTask(PlaceTask):
         for now in found:
             yield from pose_numbers(now, _same(before, now))
 
-    def answers(self, found: Outcomes) -> Iterator[Answers]:
+    def answers(self, found: Outcomes) -> Iterator[Answered]:
         # Those of `place` have the errors of poses.
         yield from ()
 

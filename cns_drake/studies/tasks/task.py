@@ -6,7 +6,7 @@ import abc
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any, ClassVar, NamedTuple
+from typing import Any, ClassVar, TypeAlias
 
 import numpy as np
 
@@ -25,12 +25,11 @@ from evaluation.study.surveys import DriveSource, Survey
 _DESCRIPTION_COST = 30.0
 
 
-class Answers(NamedTuple):
-    """The answers of a method to Q queries: column -> Q values."""
-
-    method: str
-    gate: bool
-    columns: Mapping[str, Sequence[Any] | np.ndarray]
+# A method, whether its gate was used, and its answers to Q queries: column -> Q
+# values.
+Answered: TypeAlias = (
+    "tuple[str, bool, Mapping[str, Sequence[Any] | np.ndarray]]"
+)
 
 
 @dataclass(frozen=True)
@@ -231,7 +230,7 @@ class Task(abc.ABC):
             before: outcome in the baseline condition; None without a baseline.
         """
 
-    def answers(self, found: Any) -> Iterable[Answers]:
+    def answers(self, found: Any) -> Iterable[Answered]:
         """Yields the answers to each query; by default none."""
         return ()
 

@@ -71,8 +71,8 @@ def test_numbers_of_a_pair(found):
         rows["translation_error"] = 0.1
     kept = [n for n in task.numbers(worse, better) if n.metric == "kept"]
     assert [n.value for n in kept] == [0.5] * 4
-    (one, *_) = task.answers(worse)
-    assert [*one.columns["correct"]] == [True] * 4 + [False] * 4
+    ((_, _, columns), *_) = task.answers(worse)
+    assert [*columns["correct"]] == [True] * 4 + [False] * 4
 
 
 def test_one_start_needs_no_name(found):
