@@ -318,11 +318,22 @@ def _commands_page() -> str:
 
 def _option(parameter: Any) -> str:
     """Returns the names of a parameter and what stands for its value."""
-    metavar = parameter.metavar or parameter.type.name.upper()
+    metavar = parameter.metavar or kind_of(parameter).upper()
     if parameter.param_type_name == "argument":
         return f"`{metavar}`"
     names = " / ".join([*parameter.opts, *parameter.secondary_opts])
     return f"`{names}`" if parameter.is_flag else f"`{names} {metavar}`"
+
+
+def kind_of(parameter: Any) -> str:
+    """Returns what typer calls a parameter's type, such as `int range`."""
+    if hasattr(parameter, "type"):
+        return parameter.type.name
+    # Since typer 0.29.
+    if parameter.type_descriptor.choices:
+        return "choice"
+    name = parameter.bare_type().lower().removeprefix("list[").rstrip("]")
+    return name if parameter.min is None else f"{name} range"
 
 
 def _option_default(parameter: Any) -> str:

@@ -80,12 +80,13 @@ class Command(TyperCommand):
 
     def invoke(self, ctx: Any) -> Any:
         """Runs the command, after checking that its numbers are finite."""
-        # Others are checked where they are used.
+        # Others are checked where they are used. Until typer 0.28 the limits of
+        # an option were those of its type.
         check_finite(
             {
                 str(one.name): ctx.params[str(one.name)]
                 for one in self.params
-                if getattr(one.type, "min", None) is not None
+                if getattr(getattr(one, "type", one), "min", None) is not None
             }
         )
         return super().invoke(ctx)

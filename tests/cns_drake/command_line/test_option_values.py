@@ -5,6 +5,7 @@ import pytest
 import typer
 
 from cns_drake.command_line import cli as simulator
+from docs.reference_pages import kind_of
 from evaluation.command_line import cli as evaluation
 
 PROGRAMS = {"cns-drake": simulator, "cns-eval": evaluation}
@@ -16,13 +17,15 @@ def commands():
         group = typer.main.get_command(program.app)
         for command in group.commands.values():
             for one in command.params:
-                if one.type.name in ("float", "float range"):
+                if kind_of(one) in ("float", "float range"):
                     yield name, command, one
 
 
 def usual(one):
     """Returns the words of a required argument or option."""
-    word = one.type.choices[0] if one.type.name == "choice" else "0"
+    kind = getattr(one, "type", None) or one.type_descriptor
+    choices = getattr(kind, "choices", None) or ["0"]
+    word = str(getattr(choices[0], "value", choices[0]))
     words = [word] * max(one.nargs, 1)
     return words if one.param_type_name == "argument" else [one.opts[0], *words]
 
@@ -58,5 +61,5 @@ def test_it_is_a_finite_number(
     assert err.startswith(f"{program}: error: ")
     assert err.count("\n") == 1
     # Others are checked with the files that they belong to.
-    assert option.opts[0] in err or option.type.name != "float range"
+    assert option.opts[0] in err or kind_of(option) != "float range"
     assert not list(tmp_path.iterdir())
