@@ -28,11 +28,11 @@ PRESENT = [
     if page.name != "CHANGELOG.md"
     for piece in documents.inline(page)
 ]
-# Options of tools of other projects.
+# Options of tools of other projects, and one of the tests.
 FOREIGN_OPTIONS = {
     *("--nthreads", "--nworkers", "--config"),
     *("--tls-ca-file", "--tls-cert", "--tls-key"),
-    "--topic",
+    *("--topic", "--night"),
 }
 
 

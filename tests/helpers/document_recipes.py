@@ -958,6 +958,8 @@ NOT_RUN = {
     " the notebooks",
     ".venv/bin/python -m pytest tests/": "tests in a test; `.ci/run` runs all"
     " of them",
+    ".venv/bin/python -m pytest --night": "takes as long; the workflow runs "
+    "all of them",
     ".venv/bin/python -m pytest -m unit": "the quick tests in one of "
     "them; `.ci/run` runs all",
     "ros2 bag": "needs ROS 2; test_mcap_recorder and others read "

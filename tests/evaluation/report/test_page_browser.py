@@ -94,8 +94,13 @@ def on_map(browser, content, x, y):
     return size[0] / 2.0 + offset[0], size[1] / 2.0 - offset[1]
 
 
-@pytest.mark.parametrize("scheme", ["light", "dark"])
-@pytest.mark.parametrize("size", [(320, 600), PHONE, (820, 1180), DESKTOP])
+@pytest.mark.parametrize(
+    ("size", "scheme"),
+    [
+        *(((320, 600), "light"), (PHONE, "dark")),
+        *(((820, 1180), "light"), (DESKTOP, "dark")),
+    ],
+)
 def test_page_fits_its_screen(browser, address, size, scheme):
     browser.open(address, *size, scheme)
     shown(browser, 0, 1, 0, 0)

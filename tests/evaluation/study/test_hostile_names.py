@@ -18,6 +18,7 @@ MAP = "..|[x](y)_$"
 
 
 @pytest.mark.slow
+@pytest.mark.usefixtures("unrendered_figures")
 def test_a_report_stays_in_its_folder(tmp_path):
     recordings = tmp_path / "deep" / "er" / "recordings"
     for name, stage in (("a", "01"), ("b", STAGE), ("c", "/evil")):

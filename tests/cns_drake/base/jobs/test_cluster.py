@@ -39,6 +39,7 @@ def scenarios(tmp_path_factory):
         long_scenario(folder, "second"),
         # The drive is shorter.
         tiny_scenario(folder, name="endless", frames=10**6),
+        tiny_scenario(folder, name="short", frames=3),
     ]
 
 
@@ -48,6 +49,7 @@ def files(scenarios, tmp_path_factory):
     return [write_scenario(scenario, folder) for scenario in scenarios]
 
 
+@pytest.mark.night
 def test_a_worker_that_is_killed_costs_nothing(
     dask, scenarios, files, tmp_path
 ):
@@ -73,18 +75,19 @@ def test_a_job_that_cannot_be_done_and_the_address_in_the_environment(
 ):
     dask.add_workers(1)
     output = tmp_path / "output"
-    run = Generation(
-        [files[2], files[0]], output, DASK_SCHEDULER_ADDRESS=dask.address
-    )
+    run = Generation(files[2:], output, DASK_SCHEDULER_ADDRESS=dask.address)
     status, results = run.end()
     assert (status, results) == (1, []), run.lines
     assert run.lines[-1].startswith("cns-drake: error: endless: ")
     assert "frames: 1000000 is too many" in run.lines[-1]
     assert not [line for line in run.lines if "Traceback" in line]
-    assert (output / "first" / "metadata.yaml").is_file()
+    assert (output / "short" / "metadata.yaml").is_file()
 
 
-@pytest.mark.parametrize("number", [signal.SIGKILL, signal.SIGINT])
+@pytest.mark.parametrize(
+    "number",
+    [signal.SIGKILL, pytest.param(signal.SIGINT, marks=pytest.mark.night)],
+)
 def test_jobs_end_with_the_client_that_wanted_them(dask, tmp_path, number):
     dask.add_workers(1)
     pipe = tmp_path / "pipe"
