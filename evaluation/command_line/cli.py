@@ -374,8 +374,9 @@ def compare(
     RESULTS are files like results.csv, or folders that hold one. Their methods
     are ranked together with the shipped ones, by the mean over the conditions
     that all tables share, with 95 % intervals. Differences between methods get
-    p-values if a queries.csv lies next to each table. Kendall's tau measures
-    how similarly two tables rank the methods.
+    p-values if a queries.csv lies next to each table, corrected (Holm) for all
+    differences that are printed. Kendall's tau measures how similarly two
+    tables rank the methods.
 
     Args:
         tables: Tables of results, or folders with a results.csv.

@@ -9,7 +9,6 @@ from collections import Counter
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, fields, replace
 import itertools
-import math
 from operator import attrgetter
 from types import MappingProxyType
 from typing import Any, NamedTuple
@@ -32,6 +31,7 @@ from evaluation.recognition.metrics import (
     auc_difference,
     holm,
 )
+from evaluation.recognition.place_outcome import kept_share
 from evaluation.recognition.place_recognition import RADII, PlaceRecognition
 from evaluation.recognition.protocol import PROTOCOL_COLUMNS, check_one_protocol
 from evaluation.report.reference import NO_REFERENCE, Published, Reference
@@ -88,8 +88,8 @@ def change_table(
 ) -> Table:
     """Returns Table I: the change between the drives of each pair."""
 
-    def visible(one: ChangeResult) -> _Visible:
-        return _Visible.of(evidence, one.report.source, one.report.target)
+    def visible(one: ChangeResult) -> tuple[float | None, ...]:
+        return _visible_change(evidence, one.report.source, one.report.target)
 
     table = Table.of(
         results,
@@ -108,10 +108,10 @@ def change_table(
             ),
             "voxels in hulls": lambda r: r.report.change.num_in_hull,
             "unchanged": lambda r: r.report.change.num_unchanged,
-            "visible change": lambda r: visible(r).all,
-            "less the control's": lambda r: visible(r).added,
-            "share left": lambda r: visible(r).left,
-            "queries": lambda r: visible(r).queries,
+            "visible change": lambda r: visible(r)[0],
+            "less the control's": lambda r: visible(r)[2],
+            "share left": lambda r: visible(r)[3],
+            "queries": lambda r: visible(r)[1],
             "least of the grids": lambda r: r.report.spread[0],
             "greatest": lambda r: r.report.spread[1],
         },
@@ -125,28 +125,19 @@ def change_table(
     return replace(table, rows=table.rows + further)
 
 
-class _Visible(NamedTuple):
-    """The mean visible change of a pair, and of how many queries.
+def _visible_change(
+    evidence: Evidence, database: str, query: str
+) -> tuple[float | None, ...]:
+    """Returns the mean visible change of a pair, and of how many queries.
 
     And what is left of it less that of the control, also as a share.
     """
-
-    all: float | None = None
-    queries: int | None = None
-    added: float | None = None
-    left: str | None = None
-
-    @classmethod
-    def of(cls, evidence: Evidence, database: str, query: str) -> _Visible:
-        known = evidence.get((database, query))
-        if known is None:
-            return cls()
-        all_of_it, queries = known.visible_change
-        added = known.visible_change_added
-        if math.isnan(added) or not all_of_it > 0.0:
-            return cls(all_of_it, queries)
-        left = f"{100.0 * added / all_of_it:.0f} %"
-        return cls(all_of_it, queries, added, left)
+    known = evidence.get((database, query))
+    if known is None:
+        return (None,) * 4
+    whole, queries = known.visible_change
+    added = known.visible_change_added
+    return whole, queries, added, float(kept_share(added, whole))
 
 
 class _Counted(NamedTuple):
@@ -213,8 +204,8 @@ def recognition_table(
         ]
         cells = [column[i] for i in range(len(methods)) for column in columns]
         drives = some[0].database, some[0].query
-        visible = _Visible.of(evidence, *drives)
-        shown = tcr.get(pair), Cell(visible.all, visible.added)
+        whole, _, added, _ = _visible_change(evidence, *drives)
+        shown = tcr.get(pair), Cell(whole, added)
         rows.append((pair[0], " → ".join(pair[1:]), *shown, *cells))
     captions = {
         None: f", {reference.counting}",
