@@ -29,7 +29,7 @@ from cns_drake.motion.trajectory import Trajectory
 from cns_drake.pictures.meshcat_drawing import height_rgb
 from cns_drake.scenarios.planning import plan_drive
 from cns_drake.scenarios.scenario import Scenario
-from cns_drake.scenarios.scenario_files import check_files, map_folder
+from cns_drake.scenarios.scenario_files import map_folder
 from cns_drake.sensors.camera.camera import optical_pose
 from cns_drake.sensors.camera.camera_scene import check_renderer
 from cns_drake.sensors.camera.config import CameraSection
@@ -118,35 +118,35 @@ def make_film(
         InputError: the drive cannot be run, or the film not be written.
     """
     check_film(path, size)
-    check_files(scenario)
-    width, height = size
     views = {
-        name: view.replaced(width=width, height=height)
+        name: view.replaced(width=size[0], height=size[1])
         for name, view in _VIEWS.items()
     }
     scenario = scenario.replaced(cameras=views)
-    stages: list[str | None] = [scenario.stage]
-    if scenario.stage is not None:
-        stages = list(map_folder(scenario).stages())
+    stages = (
+        [scenario.stage]
+        if scenario.stage is None
+        else list(map_folder(scenario).stages())
+    )
     of_view = max(1, round(seconds * RATE / len(stages) / len(views)))
     times = _times(plan_drive(scenario), of_view, start)
     total = of_view * len(stages) * len(views)
     with tempfile.TemporaryDirectory() as folder:
         for k, stage in enumerate(stages):
 
-            def on_message(
-                kind: str, *values: Any, done: int = total // len(stages) * k
-            ) -> None:
+            def on_message(kind: str, *values: Any, k: int = k) -> None:
                 if kind == "progress":
-                    on_frame(done + values[0], total)
+                    on_frame(len(views) * (k * of_view + values[0]), total)
                 elif kind == "note":
                     on_note(*values)
 
-            first = range(k * of_view, total, of_view * len(stages))
-            own = scenario.replaced(stage=stage)
-            step = FilmStage(own, times, Path(folder), tuple(first))
-            # A diagram's memory is freed with its process only.
-            try:
+            step = FilmStage(
+                scenario.replaced(stage=stage),
+                times,
+                Path(folder),
+                tuple(range(k * of_view, total, of_view * len(stages))),
+            )
+            try:  # A diagram's memory is freed with its process only.
                 run_process(pickle.dumps(step), on_message, lambda: True)
             except (JobError, ProcessDiedError) as error:
                 raise InputError(str(error)) from None
@@ -179,8 +179,14 @@ class FilmStage(Step):
 
     def run(self, reporter: Reporter) -> None:
         scenario = self.scenario
+        title = (
+            scenario.name
+            if scenario.stage is None
+            else f"{map_folder(scenario).name.capitalize()}, stage "
+            f"{scenario.stage}"
+        )
         if not scenario.traffic.is_off:
-            reporter.note(f"stage {scenario.stage}: planning the traffic")
+            reporter.note(f"{title}: planning the traffic")
         world, traffic, trajectory = loaded_drive.load_stage_and_traffic(
             scenario, plan_drive(scenario)
         )
@@ -194,27 +200,23 @@ class FilmStage(Step):
             cameras_see_vehicle=True,
         )
         context = diagram.CreateDefaultContext()
-        title, done = scenario.name, 0
-        if scenario.stage is not None:
-            name = map_folder(scenario).name.capitalize()
-            title = f"{name}, stage {scenario.stage}"
         for k, time in enumerate(self.times):
             context.SetTime(time)
             points = np.concatenate(
                 [_scan(diagram, context, name) for name in scenario.lidars]
             )
-            for name, first in zip(scenario.cameras, self.first, strict=True):
-                camera = scenario.cameras[name]
+            for (name, camera), first in zip(
+                scenario.cameras.items(), self.first, strict=True
+            ):
                 pixels = _picture(diagram, context, name, camera, points)
                 _titled(pixels, title).save(
                     self.folder / f"{first + k:06d}.png", compress_level=1
                 )
-                done += 1
-                reporter.progress(done, len(self.times) * len(self.first))
+            reporter.progress(k + 1, len(self.times))
 
 
 def _times(
-    trajectory: Trajectory, count: int, start: float | None
+    trajectory: Trajectory, number: int, start: float | None
 ) -> np.ndarray:
     """Returns the (N,) times of a shot [s].
 
@@ -222,19 +224,15 @@ def _times(
         InputError: the start is not within the drive.
     """
     end = trajectory.duration
+    moments = np.arange(number) / RATE
     if start is None:
-        starts = np.arange(0.0, max(end - count / RATE, _PLACES), _PLACES)
-        R_WBs, p_WBs = trajectory.poses(
-            np.minimum(starts[:, None] + np.arange(count) / RATE, end).ravel()
-        )
-        ahead = np.array(R_WBs)[:, :, 0].reshape(-1, count, 3)
-        places = np.reshape(p_WBs, (-1, count, 3))
-        way = np.linalg.norm(places[:, -1] - places[:, 0], axis=1)
-        bend = np.linalg.norm(ahead - ahead[:, :1], axis=2).max(axis=1)
-        start = float(starts[np.argmax(way - 100.0 * bend)])
+        starts = np.arange(0.0, max(end - moments[-1], _PLACES), _PLACES)
+        ends = np.minimum(starts + moments[-1], end)
+        way = trajectory.positions(ends) - trajectory.positions(starts)
+        start = float(starts[np.argmax(np.linalg.norm(way, axis=1))])
     elif start > end:
         raise InputError(f"--start: {start:g} s: the drive takes {end:.1f} s")
-    return np.minimum(start + np.arange(count) / RATE, end)
+    return np.minimum(start + moments, end)
 
 
 def _picture(
@@ -246,12 +244,19 @@ def _picture(
 ) -> np.ndarray:
     """Returns what a camera sees, with the points (N, 3) in the world."""
     eye = diagram.GetSubsystemByName(f"{name}-colours")
-    own = eye.GetMyContextFromRoot(context)
-    depth = eye.depth_image_32F_output_port().Eval(own).data[:, :, 0]
+    depth = eye.depth_image_32F_output_port().Eval(
+        eye.GetMyContextFromRoot(context)
+    )
     X_WB = RigidTransform(diagram.GetOutputPort("odometry").Eval(context).X_WB)
     image = diagram.GetOutputPort(f"{name}_image").Eval(context)
     pixels = image.data[:, :, :3].copy()
-    _draw_points(pixels, depth, X_WB @ optical_pose(camera), camera, p_WQset)
+    _draw_points(
+        pixels,
+        depth.data[:, :, 0],
+        X_WB @ optical_pose(camera),
+        camera,
+        p_WQset,
+    )
     return pixels
 
 
@@ -259,8 +264,7 @@ def _scan(diagram: Diagram, context: Context, name: str) -> np.ndarray:
     """Returns the (N, 3) points of a LiDAR's scan in the world [m]."""
     scan = diagram.GetOutputPort(f"{name}_scan").Eval(context)
     lidar = diagram.GetSubsystemByName(name)
-    own = lidar.GetMyContextFromRoot(context)
-    X_WS = lidar.GetOutputPort("X_WS").Eval(own)
+    X_WS = lidar.GetOutputPort("X_WS").Eval(lidar.GetMyContextFromRoot(context))
     return (X_WS @ np.stack([scan["x"], scan["y"], scan["z"]])).T
 
 
@@ -274,19 +278,12 @@ def _draw_points(
     """Draws the points that a camera sees, coloured by height."""
     K = CameraInfo(camera.width, camera.height, camera.fov_y).intrinsic_matrix()
     x, y, z = K @ (X_WC.inverse() @ p_WQset.T)
-    ahead = z > 0.1
-    x, y, z, heights = (a[ahead] for a in (x, y, z, p_WQset[:, 2]))
-    column, row = np.floor([x / z, y / z]).astype(int)
-    inside = (column >= 0) & (column < camera.width)
-    inside &= (row >= 0) & (row < camera.height)
-    column, row, z, heights = (a[inside] for a in (column, row, z, heights))
-    seen = z < depth[row, column] + _BEHIND
-    rgb = np.round(255 * height_rgb(heights[seen]))
-    size = max(1, round(camera.height / 360))
-    for down, right in np.ndindex(size, size):
-        rows = np.minimum(row[seen] + down, camera.height - 1)
-        columns = np.minimum(column[seen] + right, camera.width - 1)
-        pixels[rows, columns] = rgb
+    column, row = np.floor([x, y] / np.maximum(z, 0.1)).astype(int)
+    seen = (z > 0.1) & (column >= 0) & (row >= 0)
+    seen &= (column < camera.width) & (row < camera.height)
+    seen[seen] = z[seen] < depth[row[seen], column[seen]] + _BEHIND
+    rgb = np.round(255 * height_rgb(p_WQset[seen, 2]))
+    pixels[row[seen], column[seen]] = rgb
 
 
 def _titled(pixels: np.ndarray, title: str) -> Image.Image:
@@ -318,9 +315,11 @@ def _write(path: Path, files: Sequence[Path]) -> None:
                 method=4,
             )
             return
-        words = ["ffmpeg", "-y", "-loglevel", "error", "-framerate", str(RATE)]
-        words += ["-i", str(files[0].parent / "%06d.png"), "-f", "mp4"]
-        words += ["-pix_fmt", "yuv420p", "-movflags", "+faststart", str(part)]
+        words = [
+            *("ffmpeg", "-y", "-loglevel", "error", "-framerate", str(RATE)),
+            *("-i", str(files[0].parent / "%06d.png"), "-f", "mp4"),
+            *("-pix_fmt", "yuv420p", "-movflags", "+faststart", str(part)),
+        ]
         done = subprocess.run(words, capture_output=True, check=False)
         if done.returncode:
             fault = " ".join(done.stderr.decode(errors="replace").split())
