@@ -16,6 +16,7 @@ from cns_drake.command_line.maps import age, city, import_city, list_drives
 _EXAMPLES: dict[Callable[..., None], tuple[str, ...]] = {
     list_drives: ("list",),
     simulating.simulate: ("simulate metropolis_01 --output drives",),
+    simulating.film: ("film metropolis_01 --output metropolis.webp",),
     simulating.scan: (
         "scan worlds/metropolis/stage_01.sdf \\",
         "    --pose 0 0 1.6 0 0 1.57 --output scan.pcd",
@@ -60,7 +61,7 @@ app = terminal.make_program(
     groups={
         "Make cities": ("import", "age", "city"),
         "Drive through them": (
-            *("list", "simulate", "scan", "generate", "repair"),
+            *("list", "simulate", "film", "scan", "generate", "repair"),
         ),
         "Study what change costs": (
             *("study", "reproduce", "train", "map-truth"),

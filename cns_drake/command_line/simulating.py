@@ -12,7 +12,11 @@ import typer
 from cns_drake.base import commands
 from cns_drake.base.errors import InputError
 from cns_drake.base.interrupts import uninterrupted
-from cns_drake.base.progress_bars import count_progress, show_progress
+from cns_drake.base.progress_bars import (
+    count_progress,
+    print_note,
+    show_progress,
+)
 from cns_drake.base.terminal import next_command, note
 from cns_drake.command_line import options
 
@@ -196,6 +200,71 @@ def _switches(texts: Iterable[str]) -> dict[str, str]:
                 )
             found[name] = value
     return found
+
+
+def film(
+    scenario: Annotated[str, typer.Argument(metavar="NAME|SCENARIO.yaml")],
+    output: Annotated[
+        Path | None, typer.Option(metavar="FILE.webp|.mp4")
+    ] = None,
+    seconds: Annotated[
+        float, typer.Option(min=1.0, max=60.0, metavar="S")
+    ] = 20.0,
+    size: Annotated[str, typer.Option(metavar="WxH")] = "640x360",
+    start: Annotated[float | None, typer.Option(min=0.0, metavar="S")] = None,
+    traffic: Annotated[
+        int | None, typer.Option(min=0, max=2000, metavar="N")
+    ] = None,
+) -> None:
+    """Film a drive through all stages of its city.
+
+    The film shows the same place from behind the car in each stage in turn,
+    then from above, with the points of the LiDAR.
+
+    Args:
+        scenario: Name of a shipped drive, or a scenario file of your own.
+        output: File of the film; its name ends in .webp, or in .mp4, which
+            needs ffmpeg. By default NAME.webp.
+        seconds: Length of the film [s].
+        size: Width and height of the film in pixels.
+        start: Time of the drive at which each shot begins [s]; by default where
+            the way ahead is straightest.
+        traffic: Number of moving vehicles, and also of walkers; by default the
+            scenario's, or else 60 if the streets have room.
+    """
+    with uninterrupted():
+        from cns_drake.scenarios.scenario_files import load_scenario
+        from cns_drake.simulation.film import make_film, with_some_traffic
+
+    drive = load_scenario(scenario)
+    path = output or Path(f"{drive.name}.webp")
+    match = re.fullmatch(r"(\d{1,4})x(\d{1,4})", size)
+    width, height = map(int, match.groups()) if match else (0, 0)
+    if not (32 <= width <= 1920 and 32 <= height <= 1920):
+        raise InputError(
+            f"--size: '{size}' is not of the form WxH with 32 to 1920 pixels, "
+            "such as 640x360"
+        )
+    if traffic is None:
+        drive = with_some_traffic(drive)
+    else:
+        drive = drive.with_traffic(traffic)
+    with show_progress() as progress:
+        task = progress.add_task(drive.name, total=None, note="loading")
+        number = make_film(
+            drive,
+            path,
+            seconds=seconds,
+            size=(width, height),
+            start=start,
+            on_frame=count_progress(
+                progress, task, "images", after="writing the film"
+            ),
+            on_note=lambda text: print_note(progress, text),
+        )
+    print(f"{path}: {number} images")
+    words = ("--output", "drives", "--recording", "drive.html")
+    next_command("cns-drake", "simulate", scenario, *words)
 
 
 def scan(

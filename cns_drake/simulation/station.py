@@ -49,6 +49,7 @@ def make_station(
     bag: BagWriter | BackgroundWriter | None = None,
     page: MeshcatRecorder | None = None,
     num_threads: int = 1,
+    cameras_see_vehicle: bool = False,
 ) -> Diagram:
     """Makes the Diagram of a scenario.
 
@@ -77,6 +78,7 @@ def make_station(
         bag: open recording with the scenario's topics, if any.
         page: recorder of a web page of the same world, if any.
         num_threads: number of threads that cast the rays of a LiDAR.
+        cameras_see_vehicle: whether cameras see their own vehicle.
 
     Raises:
         InputError: the scenario's files cannot be used.
@@ -206,6 +208,7 @@ def make_station(
             scene_graph,
             world,
             any(one.depth or one.label for one in scenario.cameras.values()),
+            cameras_see_vehicle,
         )
         scene.connect(builder, poses.get_output_port())
         frame = plant.GetBodyFrameIdOrThrow(base.index())
@@ -254,7 +257,7 @@ def make_station(
 
 
 def _copy_for_cameras(
-    scene_graph: SceneGraph, world: World, classes: bool
+    scene_graph: SceneGraph, world: World, classes: bool, with_vehicle: bool
 ) -> CameraScene:
     """Returns what cameras on the vehicle see."""
     plant, inspector = world.plant, scene_graph.model_inspector()
@@ -267,7 +270,7 @@ def _copy_for_cameras(
         return plant.GetBodyFromFrameId(frame).EvalPoseInWorld(context)
 
     base = plant.GetBodyByName("base_link", world.vehicle)
-    bodies = plant.GetBodyIndices(world.vehicle)
+    bodies = () if with_vehicle else plant.GetBodyIndices(world.vehicle)
     return CameraScene(
         scene_graph,
         world.structures,

@@ -45,4 +45,4 @@ def test_pictures_are_shown():
 
 def test_moving_picture_is_small():
     picture = documents.ROOT / "docs/pictures/drive.webp"
-    assert picture.stat().st_size < 5e6
+    assert picture.stat().st_size < 3e6

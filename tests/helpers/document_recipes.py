@@ -272,6 +272,27 @@ RECIPES = {
         ),
         after=("own city",),
     ),
+    "help: film": Recipe(
+        "cns-drake film metropolis_01 --output metropolis.webp",
+        changes=(
+            ("metropolis_01", "town/sequence_01.yaml --traffic 0"),
+            ("metropolis.webp", "town.webp --seconds 1 --size 64x36"),
+        ),
+        after=("own city",),
+        prints=("town.webp: 8 images",),
+        makes=("town.webp",),
+    ),
+    "films": Recipe(
+        ".venv/bin/cns-drake film metropolis_01 --output film.webp",
+        changes=(
+            ("metropolis_01", "town/sequence_01.yaml --size 64x36"),
+            ("film.webp", "film.webp --seconds 1 --traffic 0"),
+            ("28.5 --seconds 8", "1 --seconds 1 --traffic 2"),
+            ("docs/pictures/drive.webp", "drive.webp"),
+        ),
+        after=("own city",),
+        makes=("film.webp", "drive.webp"),
+    ),
     "help: generate": Recipe(
         "cns-drake generate metropolis_01 metropolis_04",
         changes=(

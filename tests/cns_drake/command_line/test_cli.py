@@ -192,6 +192,17 @@ def test_diagram_script_has_options():
         (["simulate", "{files}/drive.yaml", "--lidar", "x"], "--lidar: .*'x'"),
         (["simulate", "{files}/drive.yaml", "--frames", "0"], "--frames"),
         (["simulate", "{files}/drive.yaml", "--bogus"], "--bogus"),
+        (["film", "atlantis_01"], "unknown drive 'atlantis_01'"),
+        (["film", "{files}/drive.yaml", "--size", "64"], "--size: '64'"),
+        (["film", "{files}/drive.yaml", "--size", "31x64"], "--size: '31x64'"),
+        (["film", "{files}/drive.yaml", "--size", "64x1921"], "--size: "),
+        (["film", "{files}/drive.yaml", "--seconds", "0"], "--seconds"),
+        (["film", "{files}/drive.yaml", "--seconds", "nan"], "--seconds: nan"),
+        (["film", "{files}/drive.yaml", "--start", "-1"], "--start"),
+        (
+            ["film", "{files}/drive.yaml", "--start", "1e6"],
+            "--start: 1e.06 s: ",
+        ),
         (["scan", "{files}/gone.sdf", *POSE], "gone.sdf: .*gone.obj"),
         (["scan", "{files}/torn.sdf", *POSE], "torn.sdf: "),
         (
@@ -238,24 +249,26 @@ def test_diagram_script_has_options():
 )
 def test_faults_are_one_line(files, tmp_path, capfd, arguments, fault):
     output = tmp_path / "output"
-    if arguments[0] == "scan":
-        output = tmp_path / "scan.bin"
+    if arguments[0] in ("film", "scan"):
+        output = tmp_path / {"film": "a.webp", "scan": "a.bin"}[arguments[0]]
     arguments = [a.format(files=files) for a in arguments]
     result = run_here(capfd, *arguments, "--output", output)
     assert_one_line(result, fault)
     assert not output.exists()
 
 
-@pytest.mark.parametrize("command", ["simulate", "scan", "generate"])
+@pytest.mark.parametrize("command", ["simulate", "film", "scan", "generate"])
 def test_output_that_cannot_be_written(files, capfd, command):
     arguments = {
         "simulate": ["simulate", files / "drive.yaml"],
+        "film": ["film", files / "drive.yaml"],
         "scan": ["scan", files / "good.sdf", *POSE],
         "generate": ["generate", files / "drive.yaml"],
     }[command]
-    output = files / "file" / "below.bin"
+    ending = ".webp" if command == "film" else ".bin"
+    output = files / "file" / f"below{ending}"
     result = run_here(capfd, *arguments, "--output", output)
-    assert_one_line(result, "file")
+    assert_one_line(result, r"file(/[\w./]+)?: \w+")
 
 
 @pytest.mark.parametrize(

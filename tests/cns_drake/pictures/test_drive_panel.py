@@ -3,6 +3,7 @@
 import re
 
 import numpy as np
+from pydrake.geometry import FrameId
 from pydrake.math import RigidTransform
 import pytest
 
@@ -127,6 +128,23 @@ def test_stage_is_marked_among_all():
     shown = ShownStages(stage="01", stages=("01",))
     html = make_panel("a", record(2), set(), shown)
     assert 'class="stages"' not in html
+
+
+def test_layers_that_are_there_have_switches():
+    def switches(drive, changes=frozenset()):
+        html = make_panel("a", drive, changes, ShownStages())
+        return set(re.findall(r'<input id="(\w+)" type="checkbox"', html))
+
+    always = {"follow", "points", "route", "city"}
+    assert switches(record(2)) == always
+    drive = record(2)
+    drive.names[FrameId.get_new_id()] = "traffic_car_001"
+    drive.images["front"] = [(0, b"jpeg")]
+    assert switches(drive, {"absent"}) == always | {
+        "moving",
+        "images",
+        "change",
+    }
 
 
 def test_nothing_without_frames():

@@ -1,0 +1,326 @@
+"""A film of a drive through all stages of its city."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+import pickle
+import shutil
+import subprocess
+import tempfile
+from typing import Any
+
+import numpy as np
+from PIL import Image, ImageDraw, ImageFont
+from pydrake.math import RigidTransform
+from pydrake.systems.framework import Context, Diagram
+from pydrake.systems.sensors import CameraInfo
+
+from cns_drake.base.errors import InputError
+from cns_drake.base.files import check_writable, completing
+from cns_drake.base.jobs.processes import (
+    JobError,
+    ProcessDiedError,
+    run_process,
+)
+from cns_drake.base.jobs.step import Reporter, Step
+from cns_drake.motion.trajectory import Trajectory
+from cns_drake.pictures.meshcat_drawing import height_rgb
+from cns_drake.scenarios.planning import plan_drive
+from cns_drake.scenarios.scenario import Scenario
+from cns_drake.scenarios.scenario_files import map_folder
+from cns_drake.sensors.camera.camera import optical_pose
+from cns_drake.sensors.camera.camera_scene import check_renderer
+from cns_drake.sensors.camera.config import CameraSection
+from cns_drake.simulation import loaded_drive
+from cns_drake.simulation.station import make_station
+from cns_drake.traffic.vehicles import room_for_vehicles
+from cns_drake.traffic.walkers import room_for_walkers
+
+# Images a second.
+RATE = 10
+# Behind the car and above it, in its frame; both look ahead and down.
+_VIEWS = {
+    "film_street": CameraSection(xyz=(-9.0, 0.0, 3.6), rpy=(0.0, 0.12, 0.0)),
+    "film_above": CameraSection(xyz=(-28.0, 0.0, 40.0), rpy=(0.0, 0.8, 0.0)),
+}
+# A point this far behind what a camera sees is still drawn [m].
+_BEHIND = 0.4
+# Where a shot may begin, every so often [s].
+_PLACES = 0.5
+_QUALITY = 50
+_TRAFFIC = 60
+
+
+def with_some_traffic(scenario: Scenario) -> Scenario:
+    """Returns a scenario with traffic, if its streets have room for it."""
+    folder = map_folder(scenario)
+    is_possible = folder.roads.is_file() or folder.lanes.is_file()
+    if scenario.map is None or not is_possible or not scenario.traffic.is_off:
+        return scenario
+    graph, walkways, _ = loaded_drive.load_ways(folder)
+    room = min(room_for_vehicles(graph), room_for_walkers(walkways))
+    return scenario if room < _TRAFFIC else scenario.with_traffic(_TRAFFIC)
+
+
+def check_film(path: Path, size: tuple[int, int]) -> None:
+    """Checks, before a long run, that a film can be written.
+
+    Raises:
+        InputError: it cannot.
+    """
+    if path.suffix not in (".webp", ".mp4"):
+        raise InputError(f"{path}: the name of a film ends in .webp or .mp4")
+    if path.suffix == ".mp4":
+        if shutil.which("ffmpeg") is None:
+            raise InputError(
+                f"{path}: there is no ffmpeg, which writes .mp4; take .webp"
+            )
+        if any(side % 2 for side in size):
+            raise InputError(
+                f"{path}: the sides of an .mp4 are even numbers of pixels, not "
+                f"{size[0]}x{size[1]}"
+            )
+    check_writable(path)
+    check_renderer()
+
+
+def make_film(
+    scenario: Scenario,
+    path: Path,
+    *,
+    seconds: float = 20.0,
+    size: tuple[int, int] = (640, 360),
+    start: float | None = None,
+    on_frame: Callable[[int, int], None] = lambda done, total: None,
+    on_note: Callable[[str], None] = lambda text: None,
+) -> int:
+    """Films a drive, and what its LiDARs measure, in all stages of its city.
+
+    The film shows the same place from behind the car in each stage, then from
+    above.
+
+    Args:
+        scenario: the drive.
+        path: file to write, .webp or .mp4.
+        seconds: length of the film [s].
+        size: width and height of its images [pixels].
+        start: time of the drive at which each shot begins [s]; by default
+            where the way ahead is straightest.
+        on_frame: called with the progress.
+        on_note: called with notes for the user.
+
+    Returns:
+        The number of images.
+
+    Raises:
+        InputError: the drive cannot be run, or the film not be written.
+    """
+    check_film(path, size)
+    views = {
+        name: view.replaced(width=size[0], height=size[1])
+        for name, view in _VIEWS.items()
+    }
+    scenario = scenario.replaced(cameras=views)
+    stages = (
+        [scenario.stage]
+        if scenario.stage is None
+        else list(map_folder(scenario).stages())
+    )
+    of_view = max(1, round(seconds * RATE / len(stages) / len(views)))
+    times = _times(plan_drive(scenario), of_view, start)
+    total = of_view * len(stages) * len(views)
+    with tempfile.TemporaryDirectory() as folder:
+        for k, stage in enumerate(stages):
+
+            def on_message(kind: str, *values: Any, k: int = k) -> None:
+                if kind == "progress":
+                    on_frame(len(views) * (k * of_view + values[0]), total)
+                elif kind == "note":
+                    on_note(*values)
+
+            step = FilmStage(
+                scenario.replaced(stage=stage),
+                times,
+                Path(folder),
+                tuple(range(k * of_view, total, of_view * len(stages))),
+            )
+            try:  # A diagram's memory is freed with its process only.
+                run_process(pickle.dumps(step), on_message, lambda: True)
+            except (JobError, ProcessDiedError) as error:
+                raise InputError(str(error)) from None
+        _write(path, sorted(Path(folder).iterdir()))
+    return total
+
+
+@dataclass(frozen=True)
+class FilmStage(Step):
+    """Takes the images of one stage, as `<number>.png`.
+
+    Attributes:
+        scenario: the drive in that stage, with the cameras of the film.
+        times: when images are taken [s].
+        folder: where they are written.
+        first: number of each camera's first image in the film.
+    """
+
+    scenario: Scenario
+    times: np.ndarray
+    folder: Path
+    first: tuple[int, ...]
+
+    @property
+    def output(self) -> None:
+        return None
+
+    def is_done(self) -> bool:
+        return False
+
+    def run(self, reporter: Reporter) -> None:
+        scenario = self.scenario
+        title = (
+            scenario.name
+            if scenario.stage is None
+            else f"{map_folder(scenario).name.capitalize()}, stage "
+            f"{scenario.stage}"
+        )
+        if not scenario.traffic.is_off:
+            reporter.note(f"{title}: planning the traffic")
+        world, traffic, trajectory = loaded_drive.load_stage_and_traffic(
+            scenario, plan_drive(scenario)
+        )
+        for text in world.notes:
+            reporter.note(text)
+        diagram = make_station(
+            scenario,
+            world=world,
+            trajectory=trajectory,
+            traffic=traffic,
+            cameras_see_vehicle=True,
+        )
+        context = diagram.CreateDefaultContext()
+        for k, time in enumerate(self.times):
+            context.SetTime(time)
+            points = np.concatenate(
+                [_scan(diagram, context, name) for name in scenario.lidars]
+            )
+            for (name, camera), first in zip(
+                scenario.cameras.items(), self.first, strict=True
+            ):
+                pixels = _picture(diagram, context, name, camera, points)
+                _titled(pixels, title).save(
+                    self.folder / f"{first + k:06d}.png", compress_level=1
+                )
+            reporter.progress(k + 1, len(self.times))
+
+
+def _times(
+    trajectory: Trajectory, number: int, start: float | None
+) -> np.ndarray:
+    """Returns the (N,) times of a shot [s].
+
+    Raises:
+        InputError: the start is not within the drive.
+    """
+    end = trajectory.duration
+    moments = np.arange(number) / RATE
+    if start is None:
+        starts = np.arange(0.0, max(end - moments[-1], _PLACES), _PLACES)
+        ends = np.minimum(starts + moments[-1], end)
+        way = trajectory.positions(ends) - trajectory.positions(starts)
+        start = float(starts[np.argmax(np.linalg.norm(way, axis=1))])
+    elif start > end:
+        raise InputError(f"--start: {start:g} s: the drive takes {end:.1f} s")
+    return np.minimum(start + moments, end)
+
+
+def _picture(
+    diagram: Diagram,
+    context: Context,
+    name: str,
+    camera: CameraSection,
+    p_WQset: np.ndarray,
+) -> np.ndarray:
+    """Returns what a camera sees, with the points (N, 3) in the world."""
+    eye = diagram.GetSubsystemByName(f"{name}-colours")
+    depth = eye.depth_image_32F_output_port().Eval(
+        eye.GetMyContextFromRoot(context)
+    )
+    X_WB = RigidTransform(diagram.GetOutputPort("odometry").Eval(context).X_WB)
+    image = diagram.GetOutputPort(f"{name}_image").Eval(context)
+    pixels = image.data[:, :, :3].copy()
+    _draw_points(
+        pixels,
+        depth.data[:, :, 0],
+        X_WB @ optical_pose(camera),
+        camera,
+        p_WQset,
+    )
+    return pixels
+
+
+def _scan(diagram: Diagram, context: Context, name: str) -> np.ndarray:
+    """Returns the (N, 3) points of a LiDAR's scan in the world [m]."""
+    scan = diagram.GetOutputPort(f"{name}_scan").Eval(context)
+    lidar = diagram.GetSubsystemByName(name)
+    X_WS = lidar.GetOutputPort("X_WS").Eval(lidar.GetMyContextFromRoot(context))
+    return (X_WS @ np.stack([scan["x"], scan["y"], scan["z"]])).T
+
+
+def _draw_points(
+    pixels: np.ndarray,
+    depth: np.ndarray,
+    X_WC: RigidTransform,
+    camera: CameraSection,
+    p_WQset: np.ndarray,
+) -> None:
+    """Draws the points that a camera sees, coloured by height."""
+    K = CameraInfo(camera.width, camera.height, camera.fov_y).intrinsic_matrix()
+    x, y, z = K @ (X_WC.inverse() @ p_WQset.T)
+    column, row = np.floor([x, y] / np.maximum(z, 0.1)).astype(int)
+    seen = (z > 0.1) & (column >= 0) & (row >= 0)
+    seen &= (column < camera.width) & (row < camera.height)
+    seen[seen] = z[seen] < depth[row[seen], column[seen]] + _BEHIND
+    rgb = np.round(255 * height_rgb(p_WQset[seen, 2]))
+    pixels[row[seen], column[seen]] = rgb
+
+
+def _titled(pixels: np.ndarray, title: str) -> Image.Image:
+    image = Image.fromarray(pixels)
+    size = max(image.height // 16, 8)
+    ImageDraw.Draw(image).text(
+        (size // 2, size // 3),
+        title,
+        "white",
+        ImageFont.load_default(size=size),
+        stroke_width=max(size // 12, 1),
+        stroke_fill="#303030",
+    )
+    return image
+
+
+def _write(path: Path, files: Sequence[Path]) -> None:
+    """Writes a film of images, which gets its name when it is complete."""
+    with completing(path) as part:
+        if path.suffix == ".webp":
+            first, *others = map(Image.open, files)
+            first.save(
+                part,
+                "WEBP",
+                save_all=True,
+                append_images=others,
+                duration=1000 // RATE,
+                quality=_QUALITY,
+                method=4,
+            )
+            return
+        words = [
+            *("ffmpeg", "-y", "-loglevel", "error", "-framerate", str(RATE)),
+            *("-i", str(files[0].parent / "%06d.png"), "-f", "mp4"),
+            *("-pix_fmt", "yuv420p", "-movflags", "+faststart", str(part)),
+        ]
+        done = subprocess.run(words, capture_output=True, check=False)
+        if done.returncode:
+            fault = " ".join(done.stderr.decode(errors="replace").split())
+            raise InputError(f"{path}: ffmpeg: {fault}")
