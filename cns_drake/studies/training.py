@@ -531,17 +531,19 @@ def _draw_curve(curve: np.ndarray, path: Path) -> None:
     """Draws the loss, and the share of right best places, over the steps."""
     from matplotlib.figure import Figure
 
+    from evaluation.results.drawing import INK, PALE
+
     size = max(1, len(curve) // 40)
     kept = curve[: len(curve) // size * size].reshape(-1, size, 2).mean(axis=1)
     steps = (np.arange(len(kept)) + 0.5) * size
     figure = Figure(figsize=(6.0, 3.2), layout="constrained")
     axes = figure.subplots()
-    axes.plot(steps, kept[:, 0], color="#0072B2")
+    axes.plot(steps, kept[:, 0], color=INK)
     axes.set(xlabel="step", ylabel="loss", ylim=(0.0, None))
-    axes.yaxis.label.set_color("#0072B2")
+    axes.yaxis.label.set_color(INK)
     other = axes.twinx()
-    other.plot(steps, kept[:, 1], color="#D55E00", linestyle="--")
+    other.plot(steps, kept[:, 1], color=PALE, linestyle="--")
     other.set(ylabel="right best places in a batch", ylim=(0.0, 1.0))
-    other.yaxis.label.set_color("#D55E00")
+    other.yaxis.label.set_color(PALE)
     with completing(path) as part:
         figure.savefig(part, format="png", dpi=130)

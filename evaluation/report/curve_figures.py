@@ -17,7 +17,7 @@ from evaluation.report.page import Report
 from evaluation.report.page_data import Illustration, Section
 from evaluation.report.rows import STAGE
 from evaluation.results.charts import draw, styles, titled
-from evaluation.results.drawing import plain, save
+from evaluation.results.drawing import INK, PALE, plain, save
 from evaluation.results.table import Results
 from evaluation.results.table_forms import in_table_order, title
 
@@ -147,9 +147,9 @@ def draw_track(rows: np.ndarray, stem: Path) -> None:
     for stretch in np.unique(rows["stretch"]):
         some = rows[rows["stretch"] == stretch]
         error = np.maximum(some["translation_error"], 1e-4)
-        top.plot(some["way"], error, "-", color="#0072B2", linewidth=1.0)
+        top.plot(some["way"], error, "-", color=INK, linewidth=1.0)
         bottom.fill_between(
-            some["way"], some["unmapped"], color="#E69F00", linewidth=0.0
+            some["way"], some["unmapped"], color=PALE, linewidth=0.0
         )
     for level, style in ((RIGHT_TRANSLATION, "--"), (LOST, ":")):
         top.axhline(level, color="0.4", linestyle=style, linewidth=0.8)
