@@ -142,7 +142,7 @@ def draw_track(rows: np.ndarray, stem: Path) -> None:
 
     The rows are of the type `TRACKED`.
     """
-    figure = Figure(figsize=(9.0, 4.2), layout="constrained")
+    figure = Figure(figsize=(6.4, 4.2), layout="constrained")
     top, bottom = figure.subplots(2, 1, sharex=True, height_ratios=(2, 1))
     for stretch in np.unique(rows["stretch"]):
         some = rows[rows["stretch"] == stretch]
