@@ -32,7 +32,7 @@ _CAMERA_HEIGHT = 1200.0
 # Red at the start and blue at the end, as in the paper.
 _COLOURS = "turbo_r"
 _POINTS = 400
-_COLUMNS = 4
+_COLUMNS = 2
 _PANEL_INCHES = 4.0
 
 

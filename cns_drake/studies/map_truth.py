@@ -62,6 +62,7 @@ from evaluation.map_update.sessions import (
     write_session,
 )
 from evaluation.map_update.structures import StructureChange, write_structures
+from evaluation.results.drawing import GONE, NEW
 
 # A surface this near to a point is its own [m].
 NEAR = 0.1
@@ -98,8 +99,8 @@ _RGB = {
     Label.UNOBSERVED: (178, 182, 190),
     Label.NEWLY_SEEN: (120, 170, 230),
     Label.KEPT: (90, 96, 104),
-    Label.GONE: (214, 48, 49),
-    Label.NEW: (0, 150, 80),
+    Label.GONE: GONE,
+    Label.NEW: NEW,
 }
 _WORDS = {
     Label.UNOBSERVED: "unobserved: B's drive did not look there",

@@ -12,7 +12,7 @@ from evaluation.localisation.tracking import LOST
 from evaluation.recognition.metrics import MODES, PlaceRecognitionMetrics
 from evaluation.recognition.place_recognition import PlaceRecognition
 from evaluation.results.charts import styles
-from evaluation.results.drawing import plain, save
+from evaluation.results.drawing import INK, PALE, plain, save
 from evaluation.results.table_forms import by_pair, in_table_order, title
 
 
@@ -84,14 +84,14 @@ def draw_track(rows: np.ndarray, stem: Path) -> None:
 
     The rows are of the type `TRACKED`.
     """
-    figure = Figure(figsize=(9.0, 4.2), layout="constrained")
+    figure = Figure(figsize=(6.4, 4.2), layout="constrained")
     top, bottom = figure.subplots(2, 1, sharex=True, height_ratios=(2, 1))
     for stretch in np.unique(rows["stretch"]):
         some = rows[rows["stretch"] == stretch]
         error = np.maximum(some["translation_error"], 1e-4)
-        top.plot(some["way"], error, "-", color="#0072B2", linewidth=1.0)
+        top.plot(some["way"], error, "-", color=INK, linewidth=1.0)
         bottom.fill_between(
-            some["way"], some["unmapped"], color="#E69F00", linewidth=0.0
+            some["way"], some["unmapped"], color=PALE, linewidth=0.0
         )
     for level, style in ((RIGHT_TRANSLATION, "--"), (LOST, ":")):
         top.axhline(level, color="0.4", linestyle=style, linewidth=0.8)

@@ -20,6 +20,11 @@ METHOD_STYLES = {
     "learned": ("#56B4E9", "--", "P"),
 }
 
+# What belongs to no method.
+INK, PALE = "#1C2430", "#7A8594"
+# Points that are in the older of two maps alone, and in the newer one alone.
+GONE, NEW = (214, 48, 49), (38, 96, 214)
+
 # Colours (red, green, blue) and what they mean.
 Legend = tuple[tuple[tuple[int, int, int], str], ...]
 

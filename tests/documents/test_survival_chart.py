@@ -9,7 +9,8 @@ import numpy as np
 import pytest
 import scipy.stats
 
-from docs import survival_chart
+from docs import draw
+from evaluation.results.table_forms import title
 
 PAGE = """# Results
 
@@ -63,24 +64,24 @@ def test_numbers_are_those_of_the_table():
 
 def test_the_chart_shows_the_shares_of_the_table(tmp_path):
     methods, pairs, values = read_table(documents.read("docs/results.md").text)
-    shipped = survival_chart.kept_shares("stages")
-    fresh = survival_chart.kept_shares("fresh")
-    keys = {name: key for key, name in survival_chart.NAMES.items()}
+    shipped = draw.kept_shares("stages")
+    fresh = draw.kept_shares("fresh")
+    keys = {title(key).lower(): key for key in shipped}
     rows = [p for p, pair in enumerate(pairs) if "fresh" not in pair]
     for m, name in enumerate(methods):
-        shown = sorted(shipped[keys[name]])
+        shown = sorted(shipped[keys[name.lower()]])
         # Cells are rounded to a per cent.
         np.testing.assert_allclose(
             shown, sorted(values[rows, m, 1]), atol=0.00501
         )
-        assert len(fresh[keys[name]]) == 40
-    title = survival_chart.draw(shipped, fresh, tmp_path / "chart.png")
+        assert len(fresh[keys[name.lower()]]) == 40
+    finding = draw.survival(tmp_path / "chart.png")
     assert (tmp_path / "chart.png").stat().st_size > 1000
     survivors = sum(
         min(np.median(shipped[key]), np.median(fresh[key])) >= 0.95
         for key in shipped
     )
-    assert (survivors, title.split()[0]) == (2, "Two")
+    assert (survivors, finding.split()[0]) == (2, "Two")
 
 
 def test_the_page_has_all_pairs_and_methods():

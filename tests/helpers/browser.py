@@ -7,6 +7,7 @@ may be narrower than 500 pixels.
 
 from __future__ import annotations
 
+import base64
 from contextlib import contextmanager
 import fcntl
 import json
@@ -134,6 +135,11 @@ class Browser:
             "new Promise((resolve) => { const look = () =>"
             f" ({condition}) ? resolve() : setTimeout(look, 10); look(); }})"
         )
+
+    def picture(self) -> bytes:
+        """Returns the screen as PNG."""
+        answer = self._send("Page.captureScreenshot", format="png")
+        return base64.b64decode(answer["data"])
 
     def press(self, key: str) -> None:
         for kind in ("keyDown", "keyUp"):

@@ -958,9 +958,8 @@ RECIPES = {
 NOT_RUN = {
     ".venv/bin/python docs/reference_pages.py": "writes into this project; "
     "test_fields compares the pages with what is there",
-    "python docs/weather_pictures.py": "renders shipped cities, for minutes",
-    "python docs/street_pictures.py": "renders twelve streets, for minutes",
-    "python docs/noise_figures.py": "runs many drives, for minutes",
+    ".venv/bin/python docs/draw.py": "writes into this project; test_pictures "
+    "compares the pictures with their data",
     "mkdocs serve": "a server, which does not end; test_site builds the site",
     "python3 -m venv .venv\n": "installs from the network; test_wheel installs "
     "the same",

@@ -250,7 +250,8 @@ def look_of(
         return "hedge"
     if "wood" in name:
         return "bark"
-    if semantic_class != "building":
+    # Snow is the whitest of all, and hides what lies below.
+    if semantic_class != "building" and min(rgb) < 0.925:
         return _OF_CLASSES.get(semantic_class, "plaster")
     if "glass" in name or (red < green < blue < 0.4):
         return "panes"

@@ -82,6 +82,9 @@ def test_the_sky_is_brighter_below_and_brightest_at_the_sun():
         ("m::sign_1/plate", "traffic-sign", (0.15, 0.32, 0.65), "way"),
         ("m::light_1/signal_2", "pole", (0.1, 0.1, 0.1), "signals"),
         ("thing", "unlabeled", (0.5, 0.5, 0.5), "plaster"),
+        # Snow on a lawn, and a white car.
+        ("m::lawn_1/top", "terrain", (0.93, 0.95, 0.97), "plaster"),
+        ("m::car_1/body", "car", (0.92, 0.92, 0.92), "paint"),
     ],
 )
 def test_looks_are_chosen_by_name_class_and_colour(
