@@ -1,9 +1,12 @@
 """What differs between the supported releases of Drake, in one place."""
 
+import re
 from typing import Any
 
 from pydrake.systems.framework import DiagramBuilder
 from pydrake.systems.lcm import LcmBuses
+
+from cns_drake.base.version import installed_versions
 
 
 def find_bus(
@@ -22,3 +25,12 @@ def find_bus(
     if builder.HasSubsystemNamed(name):
         return builder.GetSubsystemByName(name)
     return found
+
+
+def takes_screen_colours() -> bool:
+    """Returns whether the renderer takes colours of vertices for a screen's.
+
+    Up to 1.53 it takes them for linear. A Drake that is no package is newer.
+    """
+    version = installed_versions(["drake"]).get("drake", "1.54")
+    return tuple(map(int, re.findall(r"\d+", version)[:2])) >= (1, 54)

@@ -39,6 +39,7 @@ from pydrake.systems.framework import Context, DiagramBuilder, LeafSystem
 from pydrake.systems.sensors import CameraInfo, ImageRgba8U
 
 from cns_drake.base.errors import InputError
+from cns_drake.scene.drake_releases import takes_screen_colours
 from cns_drake.scene.perception_geometry import read_perception_geometry
 from cns_drake.scene.structure_table import StructureTable
 from cns_drake.scene.surfaces import (
@@ -306,6 +307,8 @@ def _as_mesh(
             tiles = texture_places(corners, normals) / LOOKS[look].size
             tiles -= np.floor(tiles.min(axis=1, keepdims=True))
         light = np.minimum(rgb**GAMMA * white, 1.0)
+        if takes_screen_colours():
+            light = light ** (1.0 / GAMMA)
         arrays += [tiles.reshape(-1, 2), np.repeat(light, 3, axis=0)]
         kinds += ["VEC2", "VEC3"]
         attributes |= {"TEXCOORD_0": 2, "COLOR_0": 3}

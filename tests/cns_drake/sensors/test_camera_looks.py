@@ -4,9 +4,12 @@ import io
 
 import numpy as np
 from PIL import Image
+from pydrake import geometry
+from pydrake.math import RigidTransform, RotationMatrix
+from pydrake.systems.sensors import CameraInfo, ImageRgba8U
 import pytest
 
-from cns_drake.sensors.camera import looks
+from cns_drake.sensors.camera import camera_scene, looks
 
 
 @pytest.mark.parametrize("name", looks.LOOKS)
@@ -22,6 +25,53 @@ def test_a_texture_keeps_the_colour_of_its_surface(name):
         assert light.mean() == pytest.approx(1.0, abs=0.02)
     # Leaves alone have gaps.
     assert (pixels[:, :, 3].min() == 0.0) == (name == "leaves")
+
+
+def test_grey_is_twice_as_bright_as_half_of_it():
+    """On a screen, in the same light; with each release of Drake."""
+    lamp = geometry.LightParameter(type="directional", frame="camera")
+    size = 64, 48
+    camera = geometry.ColorRenderCamera(
+        geometry.RenderCameraCore(
+            "",
+            CameraInfo(*size, 1.0),
+            geometry.ClippingRange(0.1, 100.0),
+            RigidTransform(),
+        )
+    )
+    corners = 50.0 * np.array(
+        [
+            [[-1, -1, 0], [1, -1, 0], [1, 1, 0]],
+            [[-1, -1, 0], [1, 1, 0], [-1, 1, 0]],
+        ]
+    )
+    brightness = []
+    for grey in (0.3, 0.6):
+        engine = geometry.MakeRenderEngineVtk(
+            geometry.RenderEngineVtkParams(lights=[lamp])
+        )
+        mesh = camera_scene._as_mesh(
+            corners,
+            np.zeros(3),
+            np.full((2, 3), grey),
+            "asphalt",
+            np.zeros(2, int),
+            np.array([[0.0, 0.0, 1.0]]),
+        )
+        engine.RegisterVisual(
+            geometry.GeometryId.get_new_id(),
+            mesh,
+            geometry.PerceptionProperties(),
+            RigidTransform(),
+            False,
+        )
+        engine.UpdateViewpoint(
+            RigidTransform(RotationMatrix.MakeXRotation(np.pi), [0, 0, 9.0])
+        )
+        image = ImageRgba8U(*size)
+        engine.RenderColorImage(camera, image)
+        brightness.append(image.data[:, :, :3].mean())
+    assert brightness[1] / brightness[0] == pytest.approx(2.0, rel=0.08)
 
 
 def test_the_same_seed_gives_the_same_texture():
