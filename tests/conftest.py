@@ -36,7 +36,6 @@ os.fsync = os.fstat
 _LONGEST = (
     "test_recipes.py",
     "test_city_generation.py",
-    "test_processors.py",
 )
 
 

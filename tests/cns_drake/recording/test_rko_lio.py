@@ -18,7 +18,7 @@ from cns_drake.scenarios.scenario import RideConfig
 from cns_drake.scenarios.scenario_files import load_scenario
 from cns_drake.simulation.simulation import simulate
 
-pytestmark = pytest.mark.slow
+pytestmark = [pytest.mark.slow, pytest.mark.night]
 
 # The first eight seconds of the drive, a start from rest.
 SECONDS = 8
