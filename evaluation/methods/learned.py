@@ -15,6 +15,7 @@ from functools import lru_cache
 import hashlib
 import math
 from pathlib import Path
+from typing import Literal
 
 import numpy as np
 from pydantic import computed_field
@@ -50,8 +51,10 @@ FREQUENCIES = TURNS // 2
 HEADINGS = 2 * TURNS
 # Parts of the sectors with a return, least and greatest in training.
 SEEN = "seen"
-# The weights of the package.
+# The weights of the package: trained by the radius of a match on streets of the
+# shipped cities, and graded by exact overlap on streets of no map.
 SHIPPED = Path(__file__).with_name("learned_weights.npz")
+GRADED = SHIPPED.with_name("learned_graded_weights.npz")
 _MOST_BYTES = 5_000_000
 
 
@@ -107,18 +110,28 @@ class LearnedConfig(MethodConfig):
 
     Attributes:
         weights: file of weights from `cns-drake train`; by default the shipped
-            weights.
+            weights of the variant.
+        variant: `radius`, whose training called places within 7.5 m right, on
+            streets of the shipped cities; or `graded`, whose training ranked
+            places by exact overlap, on streets of no map.
     """
 
     weights: Path | None = None
+    variant: Literal["radius", "graded"] = "radius"
+
+    @property
+    def path(self) -> Path:
+        """The file of the weights."""
+        return (
+            self.weights or {"radius": SHIPPED, "graded": GRADED}[self.variant]
+        )
 
     @computed_field  # type: ignore[prop-decorator]
     @property
     def digest(self) -> str:
         """Digest of the weights, since two files can have the same name."""
-        path = self.weights or SHIPPED
-        load_weights(path)
-        return hashlib.sha256(path.read_bytes()).hexdigest()[:16]
+        load_weights(self.path)
+        return hashlib.sha256(self.path.read_bytes()).hexdigest()[:16]
 
 
 @dataclass(frozen=True)
@@ -156,8 +169,7 @@ class Learned(Method[LearnedScan, LearnedDatabase]):
 
     def __init__(self, config: MethodConfig | None = None):
         super().__init__(config)
-        path = self.config.weights or SHIPPED
-        self._weights = load_weights(path)
+        self._weights = load_weights(self.config.path)
         self._warned = False
 
     def describe(self, points: np.ndarray) -> LearnedScan:
