@@ -1,8 +1,10 @@
 """The benchmarks run; for a moment each, on as little as they take."""
 
+import json
 from pathlib import Path
+import subprocess
+import sys
 
-from helpers.forking import ForkingPython
 from helpers.small_map import write_town
 import pytest
 
@@ -50,10 +52,11 @@ BY_HAND = {
 SHARED = {"processes.py", "stages.py"}
 # It compiles all loops anew, to see how long that takes.
 BY_NIGHT = {"start.py"}
-# Their own new processes are forks, too, which import nothing anew. Functions
-# are found by name, as new interpreters find them.
-FORKS = """
-import multiprocessing, pickle
+# A process that imports what benchmarks need, and forks for each one. Their own
+# new processes are forks, too: they import nothing anew. Functions are found by
+# name, as new interpreters find them.
+FORKING = """
+import gc, importlib, json, multiprocessing, os, pickle, runpy, sys
 
 class Fork(multiprocessing.get_context("fork").Process):
     def start(self):
@@ -63,6 +66,21 @@ class Fork(multiprocessing.get_context("fork").Process):
 fork = multiprocessing.get_context("fork")
 fork.Process = Fork
 multiprocessing.get_context = {"spawn": fork}.get
+folder, *modules = sys.argv[1:]
+sys.path.insert(0, folder)
+for module in modules:
+    importlib.import_module(module)
+gc.freeze()
+for line in sys.stdin:
+    *outputs, words = json.loads(line)
+    if os.fork() == 0:
+        for number, output in enumerate(outputs, start=1):
+            with open(output, "w") as printed:
+                os.dup2(printed.fileno(), number)
+        sys.argv = words
+        runpy.run_path(words[0], run_name="__main__")
+        sys.exit()
+    print(os.waitstatus_to_exitcode(os.wait()[1]), flush=True)
 """
 # They import most of the rest.
 IMPORTED = (
@@ -86,18 +104,24 @@ def drive(tmp_path_factory):
 
 
 @pytest.fixture(scope="module")
-def forking(tmp_path_factory):
-    folder = tmp_path_factory.mktemp("forking")
-    python = ForkingPython(folder, IMPORTED, FORKS, [FOLDER])
-    yield python
-    python.close()
+def forking():
+    with subprocess.Popen(
+        [sys.executable, "-c", FORKING, FOLDER, *IMPORTED],
+        stdin=subprocess.PIPE,
+        stdout=subprocess.PIPE,
+        text=True,
+    ) as process:
+        yield process
 
 
 def run(forking, folder, *words):
     """Runs a program with its arguments; returns what it prints."""
-    done = forking.run(words, folder)
-    assert done.returncode == 0, done.stderr
-    return done.stdout
+    printed, errors = folder / "printed", folder / "errors"
+    line = json.dumps([str(printed), str(errors), [str(one) for one in words]])
+    print(line, file=forking.stdin, flush=True)
+    status = forking.stdout.readline()
+    assert status == "0\n", errors.read_text()
+    return printed.read_text()
 
 
 @pytest.mark.slow

@@ -1,8 +1,10 @@
 """A user's own `evaluation` neither breaks anything nor is broken."""
 
+import os
 from pathlib import Path
+import subprocess
+import sys
 
-from helpers.forking import ForkingPython
 import pytest
 
 pytestmark = pytest.mark.slow
@@ -50,50 +52,24 @@ def folder(request, tmp_path):
     return tmp_path
 
 
-@pytest.fixture(scope="module")
-def python(tmp_path_factory):
-    """A process with all that the packages import, and without themselves."""
-    leave = """
-for name in [*sys.modules]:
-    if name.partition(".")[0] in ("cns_drake", "evaluation"):
-        del sys.modules[name]
-"""
-    python = ForkingPython(
-        tmp_path_factory.mktemp("forking"),
-        ["cns_drake.simulation.simulation", "cns_drake.studies.reproduction"],
-        leave,
-        [ROOT],
+def run(folder, *command, path=()):
+    """Runs Python there; `path` comes before this project."""
+    return subprocess.run(
+        [sys.executable, *command],
+        cwd=folder,
+        env={**os.environ, "PYTHONPATH": os.pathsep.join([*path, str(ROOT)])},
+        capture_output=True,
+        text=True,
     )
-    yield python
-    python.close()
 
 
-@pytest.fixture
-def run(python):
-    def run(folder, *command, path=()):
-        """Runs Python there, which puts the folder of a script first.
-
-        `path` comes before this project.
-        """
-        first = folder
-        if command[0] != "-m":
-            first = (folder / command[0]).parent
-        return python.run(command, folder, [str(first), *path])
-
-    return run
+def run_script(folder, text):
+    """Runs a script that lies there; Python puts its folder first."""
+    (folder / "script.py").write_text(text)
+    return run(folder, "script.py")
 
 
-@pytest.fixture
-def run_script(run):
-    def run_script(folder, text):
-        """Runs a script that lies there."""
-        (folder / "script.py").write_text(text)
-        return run(folder, "script.py")
-
-    return run_script
-
-
-def test_the_simulator_never_loads_an_evaluation(folder, run_script):
+def test_the_simulator_never_loads_an_evaluation(folder):
     done = run_script(
         folder, f"{LIBRARY}assert 'evaluation' not in sys.modules"
     )
@@ -101,7 +77,7 @@ def test_the_simulator_never_loads_an_evaluation(folder, run_script):
 
 
 @pytest.mark.parametrize("folder", ["package"], indirect=True)
-def test_the_user_keeps_theirs(folder, run_script):
+def test_the_user_keeps_theirs(folder):
     done = run_script(folder, THEIRS + LIBRARY + THEIRS)
     assert (done.stdout, done.returncode) == ("works\n", 0), done.stderr
 
@@ -109,9 +85,7 @@ def test_the_user_keeps_theirs(folder, run_script):
 @pytest.mark.parametrize(
     "folder", ["package", "failing", "module"], indirect=True
 )
-def test_a_study_from_python_names_what_hides_its_evaluation(
-    folder, run_script
-):
+def test_a_study_from_python_names_what_hides_its_evaluation(folder):
     done = run_script(folder, STUDY)
     (line,) = done.stdout.splitlines()
     assert line.startswith(f"{folder}/evaluation"), done.stderr
@@ -119,19 +93,19 @@ def test_a_study_from_python_names_what_hides_its_evaluation(
 
 
 @pytest.mark.parametrize("folder", ["folder"], indirect=True)
-def test_a_folder_without_a_package_hides_nothing(folder, run_script):
+def test_a_folder_without_a_package_hides_nothing(folder):
     done = run_script(folder, STUDY)
     assert (done.stdout, done.returncode) == ("", 0), done.stderr
 
 
 @pytest.mark.parametrize("path", [(), (".",)])
-def test_a_program_leaves_out_the_current_folder(folder, path, run):
+def test_a_program_leaves_out_the_current_folder(folder, path):
     done = run(folder, "-m", "cns_drake", "list", path=path)
     assert done.returncode == 0, done.stderr
     assert "metropolis_04" in done.stdout
 
 
-def test_diagram_script(folder, run):
+def test_diagram_script(folder):
     done = run(folder, ROOT / "diagrams/downtown_01.py", "--help")
     assert done.returncode == 0, done.stderr
     assert "Downtown, stage 01" in done.stdout
@@ -140,9 +114,7 @@ def test_diagram_script(folder, run):
 @pytest.mark.parametrize(
     "folder", ["package", "failing", "module"], indirect=True
 )
-def test_a_program_names_what_hides_its_evaluation(
-    folder, tmp_path_factory, run
-):
+def test_a_program_names_what_hides_its_evaluation(folder, tmp_path_factory):
     elsewhere = tmp_path_factory.mktemp("elsewhere")
     done = run(elsewhere, "-m", "cns_drake", "list", path=[str(folder)])
     assert (done.stdout, done.returncode) == ("", 2)
