@@ -388,14 +388,9 @@ def street(path: Path, rows: Sequence[dict[str, Any]]) -> None:
 
 
 def growth(path: Path, city: str) -> None:
-    """Draws all stages of a city from the air."""
+    """Draws all stages of a city from the air, two in a row."""
     folder = MapFolder(shipped_maps()[city])
     view = load_views(folder.views)["aerial"]
-    stages_from_the_air(path, folder, view)
-
-
-def stages_from_the_air(path: Path, folder: MapFolder, view: View) -> None:
-    """Draws all stages of a map, two in a row."""
     pictures = [
         _named(StageScene(file).photograph(view, *_TILE), f"stage {stage}")
         for stage, file in folder.stages().items()
@@ -430,13 +425,6 @@ def towns(path: Path, files: Sequence[str], options: str = "") -> None:
             view = air_view(SimpleNamespace(trajectory=plan_drive(drive)))
             pictures.append(scene.photograph(view, *_TILE))
     _tile([pictures], path)
-
-
-def years_from_the_air(path: Path, file: str, options: str, view: dict) -> None:
-    """Draws the stages of an imported file."""
-    with tempfile.TemporaryDirectory() as draft:
-        folder = _imported(file, options, draft)
-        stages_from_the_air(path, folder, View(**view))
 
 
 def quarter(path: Path, file: str, time: float, options: str = "") -> None:
@@ -474,7 +462,7 @@ def quarter(path: Path, file: str, time: float, options: str = "") -> None:
 
 
 def _imported(file: str, options: str, draft: str) -> MapFolder:
-    folder = Path(draft) / Path(file).stem.lower()
+    folder = Path(draft) / Path(file).name.partition(".")[0].lower()
     command = [sys.executable, "-m", "cns_drake", "import", file]
     command += [*options.split(), "--output", str(folder)]
     subprocess.run(command, check=True)
