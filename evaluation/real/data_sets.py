@@ -178,9 +178,13 @@ def open_data_sets(folder: Path, on_note: OnNote) -> list[RealScans]:
     """
     if not folder.is_dir():
         raise InputError(f"{folder}: no such folder")
+    known = {one.folder for one in DATA_SETS}
+    scans = [sorted((folder / one.folder).glob(one.scans)) for one in DATA_SETS]
+    if not any(scans):
+        names = ", ".join(sorted(known))
+        raise InputError(f"{folder}: no data set that is known ({names})")
     found = []
-    for one in DATA_SETS:
-        files = sorted((folder / one.folder).glob(one.scans))
+    for one, files in zip(DATA_SETS, scans, strict=True):
         if not files:
             on_note(f"{one.folder}/{one.scans}: not there, skipped")
             continue
@@ -192,10 +196,6 @@ def open_data_sets(folder: Path, on_note: OnNote) -> list[RealScans]:
                 f"{folder / one.folder}: other scans than known, still used"
             )
         found.append(RealScans(one, _open(folder / one.folder, one, files)))
-    known = {one.folder for one in DATA_SETS}
-    if not found:
-        names = ", ".join(sorted(known))
-        raise InputError(f"{folder}: no data set that is known ({names})")
     for path in sorted(folder.iterdir()):
         if path.is_dir() and path.name not in known:
             on_note(f"{path}: not known, left out")

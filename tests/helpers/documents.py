@@ -104,7 +104,7 @@ def inline(page: Page) -> list[Piece]:
 
 def pieces(page: Page) -> list[Piece]:
     """Returns the blocks and the commands in sentences and tables."""
-    return fenced(page) + [
+    return [piece for piece in fenced(page) if piece.language != "math"] + [
         piece for piece in inline(page) if _is_command(piece)
     ]
 
