@@ -21,6 +21,9 @@ from cns_drake.base.progress_bars import (
 # A job that takes less than this share of its cost was done before, and is no
 # measure of the pace.
 _REAL_SHARE = 0.05
+# The first scans of a run also load programs and cities. Work that should take
+# less than this [s], or than a tenth of all, is no measure of the pace either.
+_LEAST_MEASURED = 1.0
 
 
 @dataclass
@@ -97,7 +100,7 @@ class TimeLeft:
         ]
         if not left:
             return 0.0
-        if expected == 0.0:
+        if expected < min(_LEAST_MEASURED, 0.1 * sum(w.cost for w in works)):
             return None
         # As many jobs run side by side as before, and the longest job bounds
         # the time.

@@ -22,6 +22,16 @@ def test_nothing_is_estimated_before_it_is_measured():
     assert left.seconds() == pytest.approx(2.0 * 30.0)
 
 
+@pytest.mark.parametrize(("share", "is_known"), [(0.099, False), (0.101, True)])
+def test_the_first_scans_are_no_measure(share, is_known):
+    # They take long, since they load the program: 20 s for a part of 10 s.
+    left = TimeLeft({"a": 10.0, "b": 100.0})
+    left.start("a", now=0.0)
+    left.progress("a", 0.0, now=0.0)
+    left.progress("a", share, now=20.0)
+    assert (left.seconds() is not None) == is_known
+
+
 def test_the_longest_one_that_runs_ends_no_earlier():
     left = TimeLeft({"a": 50.0, "b": 10.0})
     left.start("a", now=0.0)
