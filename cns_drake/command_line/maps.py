@@ -192,8 +192,9 @@ def import_city(
             ones are left out to save memory. By default no limit.
         drive_on: Side of the street on which cars drive; by default as the file
             says, or else right.
-        grow: Share of the buildings, drawn at random, that are missing or lower
-            in an additional first stage. By default 0.3 without --years.
+        grow: Adds a first stage in which this share of the buildings, drawn at
+            random, is missing or lower. By default 0.3, and no such stage with
+            --years, with --plain or from OpenDRIVE.
         plain: Use only what the file contains; draw nothing at random.
     """
     # The years that follow the first of --years come as arguments.

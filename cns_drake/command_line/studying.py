@@ -83,12 +83,11 @@ def study(
 ) -> None:
     """Measure what a change costs each method.
 
-    An experiment is a file that says what differs between two drives, the one
-    that makes the database and the one that queries it, which tasks to measure
-    and with which methods. The drives are simulated but not recorded. Writes
-    results.csv (one number per row), queries.csv (one query per row) and a
-    page, index.html. To resume after an interruption, run the same command
-    again.
+    An experiment is a file that says what differs between two drives, the
+    database and the query, and which tasks and methods to measure. The drives
+    are simulated but not recorded. Writes results.csv (one number per row),
+    queries.csv (one query per row) and a page, index.html. To resume after an
+    interruption, run the same command again.
 
     Args:
         name: Name of a shipped experiment, or an experiment file of your own.

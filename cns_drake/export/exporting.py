@@ -43,15 +43,15 @@ def export_drive(
     """Exports a recording.
 
     Args:
-        output: the folder of drives; new, empty, or one that this function
-            has written drives of the same format to.
+        output: the folder of drives: a new or empty folder, or one to which
+            this function has already written drives of the same format.
         lidar: name of the LiDAR to export, if the recording has several.
         absent_in: another stage of the recording's map; points of structures
             that are absent there get the labels of `MarkedDrive`.
         sequence: number of the drive in KITTI's layout; by default the digits
             at the end of its name.
         on_note: takes notes on how the recording was read and written.
-        on_frame: takes how many frames of how many are written.
+        on_frame: takes the number of written frames and of all frames.
 
     Returns:
         The folder of the drive.

@@ -30,10 +30,15 @@ Member = tuple[int, RigidTransform, surfaces.Surface]
 
 
 class Motion(NamedTuple):
-    """A frame F that keeps its velocities for a turn, in the frame O.
+    """The motion of a frame F in the frame O during one turn of a LiDAR.
 
-    w [rad/s] is its angular velocity, v [m/s] that of its origin. The turn
-    takes `duration`, and begins `start` after the time of the pose of F [s].
+    F keeps its velocities during the turn.
+
+    Attributes:
+        w: angular velocity of F [rad/s].
+        v: velocity of the origin of F [m/s].
+        duration: time that the turn takes [s].
+        start: time from the given pose of F to the start of the turn [s].
     """
 
     w: np.ndarray

@@ -32,9 +32,12 @@ class FileWatch:
         self._states: dict[str, tuple[int, ...]] = {}
 
     def take_down(self, path: str) -> os.stat_result | None:
-        """Returns the present status of a file; None if it does not exist.
+        """Notes the status of a file, to which `changed` compares it.
 
-        Only the first status of each file counts.
+        If called again for the same file, the first status is kept.
+
+        Returns:
+            The present status; None if the file does not exist.
         """
         status = _status(path)
         self._states.setdefault(path, _state(status))

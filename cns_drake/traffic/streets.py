@@ -282,9 +282,13 @@ class EgoBox(NamedTuple):
 def make_streets(
     graph: LaneGraph, box: EgoBox, xy: np.ndarray, yaw: np.ndarray
 ) -> Streets:
-    """Returns the arrays of a graph, and of the ego car at K steps.
+    """Returns the arrays of a graph of lanes, and of the ego car at K steps.
 
-    Its frame is at (K, 2) places [m] with (K,) headings [rad].
+    Args:
+        graph: the lanes.
+        box: the ego car's box.
+        xy: (K, 2) positions of the ego car's frame [m].
+        yaw: (K,) its headings [rad].
     """
     pieces = graph.pieces
     rows = np.zeros(len(pieces), PIECE)

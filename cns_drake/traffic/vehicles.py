@@ -284,7 +284,10 @@ def _places(
 
 @compiled
 def find_occupants(traffic: Traffic, k: int) -> None:
-    """Finds which vehicle is where, at the k-th time step."""
+    """Enters each vehicle in the lists of the pieces of lanes that it is on.
+
+    The lists begin in `traffic.head` and describe the k-th time step.
+    """
     streets, cars = traffic.streets, traffic.cars
     pieces = streets.pieces
     traffic.head[:] = -1

@@ -33,10 +33,11 @@ def map_update(
 ) -> None:
     """Score labels of what changed between two maps.
 
+    Scores the labels of --labels-a and --labels-b, or else those of a baseline.
     DIR is a folder that cns-drake map-truth wrote, or one with the same files
-    for real drives: A/map.ply, A/truth.npy, B/map.ply and B/truth.npy; a
-    baseline also needs scans and poses. Points with the truth 255 are ignored.
-    Scores either labels from files or those of a baseline.
+    for real drives: A/map.ply, A/truth.npy, B/map.ply and B/truth.npy. A
+    baseline also needs scans and poses. Points whose true label is 255 are
+    ignored.
 
     Args:
         folder: Folder with the maps and their true labels.

@@ -102,10 +102,12 @@ def mean_visible_change(overlaps: np.ndarray) -> tuple[float, int]:
     matches does not show.
 
     Args:
-        overlaps: (Q,) see `PairEvidence`; queries without one do not count.
+        overlaps: (Q,) `PairEvidence.overlaps`; NaN for queries that have no
+            match, which do not count.
 
     Returns:
-        NaN and 0 if none has one.
+        The mean and the number of queries with a match; NaN and 0 if there are
+        none.
     """
     known = overlaps[~np.isnan(overlaps)]
     if len(known) == 0:

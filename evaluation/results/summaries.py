@@ -116,11 +116,15 @@ class Summary(NamedTuple):
 
 
 def excesses(queries: QueryRows) -> list[Summary]:
-    """Returns what two causes of failure cost together, for all pairs.
+    """Returns how much more two causes cost together than expected.
 
-    It is what both cost beyond the product of what each leaves, as a share of
-    the baseline's AUC. A pair is a cause whose name joins two by "+", each of
-    which is also there alone (at its strongest level). Seeds are joined.
+    Let a and b be the shares of the baseline's AUC that each cause leaves by
+    itself, and ab the share that both leave together. The excess is a * b - ab:
+    without an interaction, the shares would multiply.
+
+    There is an excess for each cause whose name joins those of two causes by
+    "+", if both were also measured by themselves (at their strongest level).
+    AUCs are means over the seeds.
     """
     conditions: dict[tuple, list[Answers]] = {}
     levels: dict[object, Any] = {}

@@ -104,9 +104,13 @@ class City:
     def recognition_pairs(self, *, with_itself: bool = False) -> list[Pair]:
         """Returns pairs of database and query.
 
-        Every earlier stage is a database for the last one. The last one is a
-        database too if the reference has such a pair, and each stage its own
-        for loop closure (`with_itself`).
+        Every earlier stage is a database for queries from the last stage. If
+        the reference has the reversed pair, too, the last stage is a database
+        for queries from the earlier one.
+
+        Args:
+            with_itself: whether to add a pair of each stage with itself, for
+                loop closure.
         """
         pairs = []
         for earlier, last in self.change_pairs():

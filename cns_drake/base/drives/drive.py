@@ -51,7 +51,8 @@ class ImuSamples(NamedTuple):
     """Samples of an IMU that follow each other at an even rate.
 
     Attributes:
-        first: number of the first one; that at time zero is 0.
+        first: number of the first sample, counted from time zero, which has
+            the number 0.
         quat_xyzw: (N, 4) R_WI.
         angular_velocity: (N, 3) w_WI, expressed in I [rad/s].
         specific_force: (N, 3) expressed in I [m/s^2].

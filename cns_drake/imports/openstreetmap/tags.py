@@ -304,7 +304,13 @@ def area_kind(tags: Mapping[str, str]) -> tuple[str, str] | None:
 
 
 class LaneLayout(NamedTuple):
-    """Lanes along the line of a street, and against it, of a width [m]."""
+    """The lanes of a street.
+
+    Attributes:
+        forward: number of lanes in the direction of the street's line.
+        backward: number of lanes in the opposite direction.
+        width: width of each lane [m].
+    """
 
     forward: int
     backward: int

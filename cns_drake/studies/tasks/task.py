@@ -46,10 +46,12 @@ class Pair:
 
     Attributes:
         name: a name that no other pair has.
-        way: the drive along the query's way through the city of the database;
-            the database itself if its route is another.
-        is_as_before: whether the two drives are those of a pair without the
-            condition, which changes how queries are asked, or adds places.
+        way: the drive whose map is compared with the query's for TCR_sym: it
+            follows the query's route through the city of the database. If the
+            database has a route of its own, it is the database itself.
+        is_as_before: whether the condition leaves both drives as they are, and
+            only changes how queries are asked, or adds places. Tasks that ask
+            no queries then measure nothing new.
     """
 
     name: str
