@@ -132,10 +132,9 @@ def test_the_family_of_a_difference_is_its_pair_of_drives():
     for city in ("old", "new"):
         for method in ("btc", "ring++", "solid"):
             (outcomes, _) = equal_methods(rng, 12)
-            outcome = SimpleNamespace(outcomes=outcomes)
             pair = (city, "01", "02")
             results.append(
-                SimpleNamespace(pair=pair, method=method, outcome=outcome)
+                SimpleNamespace(pair=pair, method=method, outcomes=outcomes)
             )
     both = method_differences(results)
     assert [one.result.pair[0] for one in both] == ["old"] * 3 + ["new"] * 3
