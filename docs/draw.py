@@ -184,6 +184,73 @@ def kept_shares(table: str) -> dict[str, list[float]]:
     }
 
 
+def assumptions(path: Path) -> None:
+    """Draws what BTC keeps after 40 years, by where new furniture stands."""
+    head, *rows = _table("docs/ageing.md", "## After how many years")
+    colour, _, marker = METHOD_STYLES["btc"]
+    figure = Figure(figsize=(_WIDTH, 6.6), layout="constrained")
+    axes = figure.subplots()
+    ticks: dict[float, str] = {}
+    y = 0.0
+    for place, *cells in rows:
+        axes.text(1.0, y, place, va="center", fontweight="bold")
+        for column, cell in zip(head[1:], cells, strict=True):
+            city, _, age = column.partition(", ")
+            if age == "40" and "(" in cell:
+                y += 1.0
+                mean, *ends = map(int, re.findall(r"\d+", cell))
+                axes.plot(ends, [y, y], color=colour, lw=3, alpha=0.4)
+                axes.plot(mean, y, marker, color=colour, ms=8)
+                ticks[y] = city
+        y += 1.4
+    axes.set_yticks(list(ticks), ticks.values())
+    axes.set(xlim=(0.0, 122.0), ylim=(y - 0.7, -0.7))
+    axes.axvline(100.0, color=PALE, zorder=0)
+    axes.set_xlabel("AUC that BTC keeps in a map 40 years old [%]")
+    axes.set_title(f"{head[0]}:", loc="left")
+    _plain(axes)
+    _head(
+        figure,
+        "How long BTC's map lasts depends\n"
+        "on where new street furniture stands",
+    )
+    figure.savefig(path, dpi=_DPI)
+
+
+def ranking(path: Path) -> None:
+    """Draws the means of AUC strict over the radius of a match."""
+    head, *rows = _table("docs/notes/ranking.md", "\nAUC strict:\n")
+    figure = Figure(figsize=(_WIDTH, 5.2), layout="constrained")
+    panels = figure.subplots(1, 2, sharey=True)
+    for axes, gate in zip(panels, ("without", "with"), strict=True):
+        shown = [row for row in rows if row[0] == gate]
+        radii = [float(row[1].removesuffix("m")) for row in shown]
+        for k, name in enumerate(head[2:8], 2):
+            key = name.lower().replace(" ", "-")
+            colour, style, marker = METHOD_STYLES[key]
+            means = [float(row[k].strip("*")[:4]) for row in shown]
+            axes.plot(
+                radii, means, style, color=colour, marker=marker,
+                label=title(key),
+            )  # fmt: skip
+        axes.set_xticks(radii, [f"{radius:g}" for radius in radii])
+        axes.set_ylim(0.0, 1.04)
+        axes.set_title(f"{gate} the gate", loc="left")
+        axes.set_xlabel("radius of a match [m]")
+        _plain(axes, "both")
+    panels[0].set_ylabel("AUC strict")
+    _head(
+        figure,
+        "Layered overlap is best with the gate;\n"
+        "without it, the radius decides",
+    )
+    figure.legend(
+        *axes.get_legend_handles_labels(), loc="outside lower center",
+        ncols=3, frameon=False,
+    )  # fmt: skip
+    figure.savefig(path, dpi=_DPI)
+
+
 def years(path: Path) -> None:
     """Draws the table of what the age of a map costs."""
     cells = re.findall(
@@ -217,7 +284,7 @@ def years(path: Path) -> None:
     for axes in grid[1]:
         axes.set_xlabel("age of the map [years]")
     figure.supylabel("AUC kept [%]", fontsize=13)
-    _head(figure, "Only BTC fails as a map grows old")
+    _head(figure, "BTC fails in each city as its map grows old")
     handles, labels = grid[0, 0].get_legend_handles_labels()
     figure.legend(
         handles[::-1], labels[::-1], loc="outside lower center", ncols=4,
@@ -604,6 +671,14 @@ def screenshot(
 
 
 # Common parts.
+
+
+def _table(page: str, after: str) -> list[list[str]]:
+    """Returns the cells of the first table after some words of a page."""
+    text = (ROOT / page).read_text().partition(after)[2]
+    lines = text[text.index("\n|") :].lstrip().partition("\n\n")[0].split("\n")
+    del lines[1]
+    return [re.split(r" *\| *", line)[1:-1] for line in lines]
 
 
 def _head(figure: Figure, finding: str) -> None:

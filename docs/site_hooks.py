@@ -80,12 +80,12 @@ def on_page_markdown(markdown: str, page: Page, files: Files, **_: Any) -> str:
 
 
 def on_page_content(html: str, **_: Any) -> str:
-    """Keeps names and options in inline code from breaking at hyphens."""
+    """Keeps lines from breaking in names, in options and before %."""
     return _INLINE_CODE.sub(
         lambda code: _WITH_HYPHEN.sub(
             r'<span class="whole">\g<0></span>', code[0]
         ),
-        html,
+        re.sub(r"(?<=\d) %", "&nbsp;%", html),
     )
 
 

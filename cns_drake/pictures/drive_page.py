@@ -172,7 +172,7 @@ def make_drive_page(
 def make_panel(
     title: str, drive: DriveRecord, changes: Set[str], shown: ShownStages
 ) -> str:
-    """Returns the HTML of the page's title, legend, plots and buttons.
+    """Returns the HTML of the page's title, switches, legend and plots.
 
     The legend is that of `CHANGE_RGB`.
     """
@@ -252,7 +252,8 @@ class Plot:
         return cls(
             name,
             unit,
-            ",".join(f"{value:.1f}" for value in values),
+            # Zero has no sign.
+            ",".join(f"{value:.1f}" for value in values.round(1) + 0.0),
             " ".join(f"{a:.1f},{b:.1f}" for a, b in zip(x, y, strict=True)),
             _scale(low, high),
         )

@@ -141,7 +141,7 @@ def test_the_tutorial_names_the_colours_that_its_page_shows():
     assert change.lower
     assert change.absent == change.additional == []
     (said,) = re.findall(
-        r"Press \*What\s+changed\*: ([^.,]+)[.,]",
+        r"Tick \*What\s+changed\*: ([^.,]+)[.,]",
         documents.read("docs/tutorial.md").text,
     )
     assert " ".join(said.split()) == "what is higher in stage 02 turns orange"

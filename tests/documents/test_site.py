@@ -85,6 +85,12 @@ def test_every_page_is_in_it(site):
         assert (site / html).exists(), page.name
 
 
+def test_a_share_stays_on_one_line(site):
+    html = (site / "results.html").read_text()
+    assert "97&nbsp;%</td>" in html
+    assert not re.search(r"\d %</td>", html)
+
+
 def test_every_public_name_is_explained(site):
     explained, examples = set(), 0
     pages = sorted((site / "api").rglob("*.html"))

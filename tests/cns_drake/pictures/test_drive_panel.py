@@ -75,8 +75,10 @@ def test_page_says_which_points_it_shows():
 
 @pytest.mark.parametrize("value", [0.0, 1e-9, -1e-9])
 def test_noise_is_not_stretched(value):
-    y = points(Plot.of("IMU, turn", "deg/s", np.array([0.0, value])))[:, 1]
+    plot = Plot.of("IMU, turn", "deg/s", np.array([0.0, value]))
+    y = points(plot)[:, 1]
     assert abs(y[0] - y[1]) < 0.1
+    assert plot.values == "0.0,0.0"
 
 
 def test_long_drive_has_few_samples_from_first_to_last():
