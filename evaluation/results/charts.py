@@ -183,10 +183,11 @@ def draw(
                 options["label"] = plain(one)
                 handles.append(Line2D([], [], color=colour, **options))
             columns = max(1, width // _LEGEND_COLUMN)
-            rows = math.ceil(len(handles) / columns)
-            figure.set_figheight(figure.get_figheight() + rows * _ROW * _PX)
-            place = "outside lower center"
-            figure.legend(handles=handles, loc=place, ncols=columns)
+            lines = math.ceil(len(handles) / columns)
+            figure.set_figheight(figure.get_figheight() + lines * _ROW * _PX)
+            figure.legend(
+                handles=handles, loc="outside lower center", ncols=columns
+            )
     return Drawn(message, figure, legend)
 
 
