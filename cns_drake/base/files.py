@@ -99,6 +99,22 @@ def draft_folder(folder: Path, *, replaces: bool = False) -> Iterator[Path]:
         shutil.rmtree(part, ignore_errors=True)
 
 
+def remove_folder(folder: Path) -> None:
+    """Removes a folder, which loses its name first.
+
+    If the process is killed meanwhile, no half of it has the name.
+
+    Raises:
+        InputError: if it cannot be removed.
+    """
+    part = part_path(folder)
+    with user_errors(folder):
+        # A run that was killed may have left one behind.
+        shutil.rmtree(part, ignore_errors=True)
+        os.replace(folder, part)
+        shutil.rmtree(part)
+
+
 def check_new_folder(folder: Path) -> None:
     """Raises an error if a folder to write exists and is not empty.
 

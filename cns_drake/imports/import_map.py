@@ -156,7 +156,10 @@ def _check(source: Path, output: Path, options: ImportOptions) -> None:
             ("--grow", options.grow is not None, "which has two stages"),
         ):
             if value:
-                raise InputError(f"{option}: {source} is a road network, {why}")
+                raise InputError(
+                    f"{option}: {source} is a road network, {why}; leave the"
+                    " option out"
+                )
     if options.grow is not None and options.years:
         raise InputError(
             "--grow: --years define the stages already; give one of them"

@@ -138,6 +138,14 @@ class MadeMap(Section):
             raise ValueError("give either age (a map) or import (a file)")
         if (self.age is None) != (self.years is None):
             raise ValueError("years: they belong to age")
+        for name in ("sha256", "grow", "plain"):
+            if self.age is not None and name in self.model_fields_set:
+                raise ValueError(f"{name}: it belongs to import; leave it out")
+        if self.grow is not None and str(self.import_file).endswith(".xodr"):
+            raise ValueError(
+                "grow: a road network (.xodr) has two stages anyway; leave it"
+                " out"
+            )
         return self
 
 
@@ -187,7 +195,8 @@ class Experiment(Section):
         frozen: table of the fingerprints that the drives of each level must
             have, so that shipped worlds stay the same.
         charts: charts on the page of the experiment.
-        quick: fields that replace those above if `--quick` is given.
+        quick: fields that replace those above if `--quick` is given: `tasks`,
+            `methods` and lists as a whole, other mappings field by field.
     """
 
     name: Annotated[str, Field(pattern=r"^[A-Za-z0-9][\w.-]*$")]
@@ -293,10 +302,12 @@ def load_experiment(
     if quick:
         if not isinstance(values.get("quick"), dict):
             raise InputError(f"{path}: quick: no fields of a smaller one")
-        values = merged(values, values["quick"])
+        values = _chosen_anew(values, values["quick"])
     for one in overrides:
         if isinstance(one, str):
-            values = merged(values, _override(one))
+            is_nested = "." in one.partition("=")[0]
+            change = merged if is_nested else _chosen_anew
+            values = change(values, _override(one))
         else:
             values = values | dict([one])
     experiment = validated(Experiment, values, path)
@@ -336,6 +347,12 @@ def merged(values: Any, changes: Any) -> Any:
         **values,
         **{n: merged(values.get(n), one) for n, one in changes.items()},
     }
+
+
+def _chosen_anew(values: Changes, changes: Changes) -> dict[str, Any]:
+    """Returns `merged` fields, in which new tasks or methods stand alone."""
+    chosen = {n: changes[n] for n in ("tasks", "methods") if n in changes}
+    return {**merged(values, changes), **chosen}
 
 
 @dataclass(frozen=True)

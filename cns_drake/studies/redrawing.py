@@ -16,7 +16,6 @@ from fnmatch import fnmatchcase
 import math
 import os
 from pathlib import Path
-import shutil
 from typing import Any
 
 import yaml
@@ -103,8 +102,7 @@ class MakeMap(Step):
     def run(self, reporter: Reporter) -> None:
         made_of = self.sources()
         if is_older := self.check():
-            with files.user_errors(self.folder):
-                shutil.rmtree(self.folder)
+            files.remove_folder(self.folder)
         self.make(
             lambda draft: Part(draft / _PART).write(made_of, None), reporter
         )

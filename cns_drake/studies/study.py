@@ -472,6 +472,7 @@ class Study:
         asked_how = {
             "compared": compared.fingerprint(),
             **compared.protocol.to_json(),
+            "radius": None,  # Queries are scored once for all radii.
         }
         name = f"{database.name} {asked.name} {fingerprint(asked_how)[:8]}"
         return Pair(
@@ -505,6 +506,7 @@ class Study:
                     NamedDrive(r.name, r.source) for r in sources
                 )
                 protocol = self._protocol_of(condition)
+                no_radius: dict[str, Any] = {"radius": None}
                 yield _Measured(
                     city.name,
                     (pair[0].name, pair[1].name),
@@ -513,7 +515,7 @@ class Study:
                     self.experiment.seeds[0],
                     Pair(
                         f"{database.name} {query.name}"
-                        f" {fingerprint(protocol.to_json())[:8]}",
+                        f" {fingerprint(protocol.to_json() | no_radius)[:8]}",
                         *(database, query, database),
                         protocol,
                     ),
@@ -566,23 +568,23 @@ class Study:
         baselines: dict[tuple, dict[int, dict[str, Any]]] = {}
         for one in measured:
             if one.condition.is_baseline:
-                values = {name: part.read() for name, part in one.parts.items()}
+                values = {name: self._found(one, name) for name in one.parts}
                 baselines.setdefault(_place(one), {})[one.seed] = values
         for one in measured:
             before = baselines.get(_place(one), {})
             base = before.get(one.seed) or next(iter(before.values()), {})
-            for name, part in one.parts.items():
-                task = self._tasks[name]
-                for number in task.numbers(part.read(), base.get(name)):
+            for name in one.parts:
+                found = self._found(one, name)
+                for number in self._tasks[name].numbers(found, base.get(name)):
                     key = self._key(one, name, number.method, number.gate)
                     yield Row.of(number, **key)
 
     def _answers(self, measured: Iterable[_Measured]) -> Iterator[Answers]:
         """Yields the answers to all queries."""
         for one in measured:
-            for name, part in one.parts.items():
+            for name in one.parts:
                 for method, gate, columns in self._tasks[name].answers(
-                    part.read()
+                    self._found(one, name)
                 ):
                     yield Answers(
                         **self._key(one, name, method, gate),
@@ -595,6 +597,9 @@ class Study:
                             for column, some in columns.items()
                         },
                     )
+
+    def _found(self, one: _Measured, task: str) -> Any:
+        return self._tasks[task].found(one.parts[task], one.pair)
 
     def _key(
         self, one: _Measured, task: str, method: str, gate: bool

@@ -201,18 +201,20 @@ def compare_with_gates(
         descriptor = queries.descriptors[row]
         offsets = queries.p_WSs[row] - places.p_WSs
         distances[row] = np.linalg.norm(offsets, axis=1)
+        radii = [one for one in gate_radii if one is not None]
+        by_gate = iter(gated(method, descriptor, indexed, ungated, radii))
+        poses: dict[int, np.ndarray | None] = {}
         for radius, kept, error in zip(gate_radii, scores, errors, strict=True):
-            found = ungated
-            if radius is not None:
-                found = gated(method, descriptor, indexed, ungated, radius)
+            found = ungated if radius is None else next(by_gate)
             kept[row] = found
             if np.isnan(found).all():
                 continue
             best = int(ranking(found)[0])
-            X_PQ = checked_pose(
-                method, method.relative_pose(descriptor, indexed, best)
-            )
-            if X_PQ is not None:
+            if best not in poses:
+                poses[best] = checked_pose(
+                    method, method.relative_pose(descriptor, indexed, best)
+                )
+            if (X_PQ := poses[best]) is not None:
                 error.translation[row], error.rotation_deg[row] = pose_error(
                     X_PQ, places.X_WS[best], queries.X_WS[row]
                 )

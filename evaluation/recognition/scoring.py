@@ -50,9 +50,15 @@ def gate_weight(
 
 
 def gated(
-    method: Method, query: Any, database: Any, scores: np.ndarray, radius: float
-) -> np.ndarray:
-    """Returns scores (D,) after the gate; NaN for rejected places.
+    method: Method,
+    query: Any,
+    database: Any,
+    scores: np.ndarray,
+    radii: Sequence[float],
+) -> list[np.ndarray]:
+    """Returns scores (D,) after the gate of each radius.
+
+    They are NaN for rejected places.
 
     Places after the best `NUM_GATED` are no candidates. A place whose pose the
     method does not estimate keeps its score. If the method estimates no pose at
@@ -66,7 +72,7 @@ def gated(
         query: its description of the query.
         database: its database of the D places.
         scores: (D,) of the method; NaN for a place that is no candidate.
-        radius: radius of a match [m].
+        radii: radii of a match [m].
 
     Raises:
         InputError: if the method returns something other than poses.
@@ -74,8 +80,8 @@ def gated(
     num_candidates = int((~np.isnan(scores)).sum())
     order = ranking(scores)
     best = order[: min(NUM_GATED, num_candidates)]
-    if len(best) == 0:
-        return scores
+    if len(best) == 0 or not radii:
+        return [scores for _ in radii]
     found = method.relative_poses(query, database, best.tolist())
     if len(found) != len(best):
         raise InputError(
@@ -84,15 +90,18 @@ def gated(
         )
     poses = [checked_pose(method, X_PQ) for X_PQ in found]
     if all(X_PQ is None for X_PQ in poses):
-        return scores
+        return [scores for _ in radii]
     distance = np.array(
         [0.0 if X is None else np.linalg.norm(X[:3, 3]) for X in poses]
     )
-    weight = gate_weight(distance, radius)
-    values = scores[best] - (1.0 - weight) * np.abs(scores[best])
-    result = np.full(len(scores), np.nan)
-    result[best] = np.where(weight > 0.0, values, np.nan)
-    return result
+    results = []
+    for radius in radii:
+        weight = gate_weight(distance, radius)
+        values = scores[best] - (1.0 - weight) * np.abs(scores[best])
+        result = np.full(len(scores), np.nan)
+        result[best] = np.where(weight > 0.0, values, np.nan)
+        results.append(result)
+    return results
 
 
 def score_places(
@@ -148,7 +157,7 @@ def score_places(
         scores = _reranked(method, scores, query_cloud, place_clouds)
     if gate_radius is None:
         return scores
-    return gated(method, queries[-1], database, scores, gate_radius)
+    return gated(method, queries[-1], database, scores, [gate_radius])[0]
 
 
 def _reranked(

@@ -45,6 +45,8 @@ _PX = 1.0 / 96.0
 _FONT = 10.0
 _ROW = 22.0
 _BELOW = 220.0
+# Width for a name in a legend [px].
+_LEGEND_COLUMN = 220
 # Styles of methods that are not shipped; the first are those of reports.
 _OTHERS = (
     ("#000000", "-.", "X"),
@@ -180,7 +182,12 @@ def draw(
                 options: dict = {"linestyle": style, "marker": marker}
                 options["label"] = plain(one)
                 handles.append(Line2D([], [], color=colour, **options))
-            figure.legend(handles=handles, loc="outside lower center", ncols=3)
+            columns = max(1, width // _LEGEND_COLUMN)
+            lines = math.ceil(len(handles) / columns)
+            figure.set_figheight(figure.get_figheight() + lines * _ROW * _PX)
+            figure.legend(
+                handles=handles, loc="outside lower center", ncols=columns
+            )
     return Drawn(message, figure, legend)
 
 
@@ -323,7 +330,8 @@ def _lines(chart: _Chart) -> tuple[str, Figure]:
         else:
             axes.set_ylim(bottom=0.0)
         axes.grid(alpha=0.3)
-    figure.supxlabel(plain(words(over)), fontsize=_FONT)
+        # A label of the whole figure would lie below its legend.
+        axes.set_xlabel(plain(words(over)))
     figure.supylabel(plain(words(chart.metric)), fontsize=_FONT)
     found = {
         n: (float(np.mean(v)), f"{np.mean(v):.2f}") for n, v in last.items()

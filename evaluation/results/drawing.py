@@ -51,10 +51,9 @@ def plain(text: str) -> str:
 def save(figure: Figure, stem: Path, kinds: Sequence[str] = LINES) -> None:
     """Writes a figure for print and, last, for the page.
 
-    Equal figures give equal bytes: no time of creation, no random ids. The
-    page's has no legend of the whole figure: the page writes it below, in
-    letters that can be read on a phone. The stem is without ending, and the
-    formats are `LINES` or `PIXELS`.
+    Equal figures give equal bytes: no time of creation, no random ids. SVG and
+    WebP have no legend of the whole figure: the page writes it below, in
+    letters that can be read on a phone. The stem is without ending.
 
     Raises:
         InputError: if a file cannot be written.
@@ -66,7 +65,7 @@ def save(figure: Figure, stem: Path, kinds: Sequence[str] = LINES) -> None:
     for kind in kinds:
         path = stem.with_name(f"{stem.name}.{kind}")
         for legend in figure.legends:
-            legend.set_visible(kind != kinds[-1])
+            legend.set_visible(kind not in ("svg", "webp"))
         options: dict = {"dpi": _DPI}
         if kind in ("pdf", "svg"):
             dated = "CreationDate" if kind == "pdf" else "Date"

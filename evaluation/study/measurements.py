@@ -145,8 +145,11 @@ def measure_places(
     num_distractors: int,
     methods: tuple[MethodChoice, ...],
     protocol: RetrievalProtocol,
+    radii: tuple[float, ...],
 ) -> list[PlaceOutcome]:
-    """Returns two outcomes of each method, without the gate and with it.
+    """Returns two outcomes of each method by each radius of a match.
+
+    One is without the gate and one with it; queries are scored only once.
 
     A method that would take over an hour for all queries has no outcome.
 
@@ -158,7 +161,9 @@ def measure_places(
             method.
         num_distractors: number of their places that are added to the database.
         methods: the methods.
-        protocol: the protocol of the comparison.
+        protocol: the protocol of the comparison; its own radius does not
+            matter.
+        radii: radii of a match [m].
     """
     place_scans, places = _describe(
         database, "places", methods, protocol, reporter
@@ -166,7 +171,7 @@ def measure_places(
     query_scans, queries = _describe(
         query, "queries", methods, protocol, reporter
     )
-    overlaps = None
+    overlaps: dict[float, np.ndarray] = {}
     outcomes = []
     for k, choice in enumerate(
         reporter.track(methods, "comparing", len(methods))
@@ -179,29 +184,31 @@ def measure_places(
         ):
             reporter.note(f"{choice.name}: it would take over an hour")
             continue
-        both = compare_with_gates(
-            method, searched, asked, protocol, [None, protocol.radius]
+        plain, *by_gate = compare_with_gates(
+            method, searched, asked, protocol, [None, *radii]
         )
-        if overlaps is None:
-            overlaps = best_overlaps(
-                place_scans,
-                mapped.places.X_WS,
-                query_scans,
-                asked.queries.X_WS,
-                both[0].matches[:, : len(place_scans)],
-            )
-        outcomes += [
-            PlaceOutcome.of(
-                choice.key,
-                is_gated,
-                one,
-                (asked.queries.stamps_ns, asked.queries.p_WSs),
-                drives,
-                overlaps,
-                protocol.radius,
-            )
-            for is_gated, one in zip((False, True), both, strict=True)
-        ]
+        for radius, one in zip(radii, by_gate, strict=True):
+            matches = (plain.distances <= radius) & plain.is_known
+            if radius not in overlaps:
+                overlaps[radius] = best_overlaps(
+                    place_scans,
+                    mapped.places.X_WS,
+                    query_scans,
+                    asked.queries.X_WS,
+                    matches[:, : len(place_scans)],
+                )
+            outcomes += [
+                PlaceOutcome.of(
+                    choice.key,
+                    is_gated,
+                    replace(found, matches=matches),
+                    (asked.queries.stamps_ns, asked.queries.p_WSs),
+                    drives,
+                    overlaps[radius],
+                    radius,
+                )
+                for is_gated, found in ((False, plain), (True, one))
+            ]
     return outcomes
 
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
+from dataclasses import replace
 from typing import Any
 
 from cns_drake.base.jobs.step import Reporter
@@ -33,16 +34,22 @@ class PlaceTask(Task):
 
     def measure(self, pair: Pair, jobs: Jobs) -> Part:
         needs: list[str] = []
+        radii = tuple(sorted(jobs.radii[pair.name]))
         arguments = (
             jobs.described(pair.database, "places", pair.protocol, needs),
             jobs.described(pair.query, "queries", pair.protocol, needs),
             jobs.elsewhere(pair, needs),
             pair.distractors,
             jobs.methods,
-            pair.protocol,
+            replace(pair.protocol, radius=radii[0]),
+            radii,
         )
         part = jobs.files.part("place", pair.name)
         return jobs.add(part, measure_places, arguments, needs, _COST)
+
+    def found(self, part: Part, pair: Pair) -> Outcomes:
+        radius = pair.protocol.radius
+        return [one for one in part.read() if one.radius == radius]
 
     def numbers(
         self, found: Outcomes, before: Outcomes | None

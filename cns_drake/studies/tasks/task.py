@@ -45,7 +45,8 @@ class Pair:
     """A database and a query that are measured.
 
     Attributes:
-        name: a name that no other pair has.
+        name: a name that no other pair has, except with another radius of a
+            match.
         way: the drive whose map is compared with the query's for TCR_sym: it
             follows the query's route through the city of the database. If the
             database has a route of its own, it is the database itself.
@@ -79,6 +80,7 @@ class Jobs:
         methods: the methods that are run.
         distractors: described drives elsewhere, the first to be added first.
         notes: what is left out, in words.
+        radii: name of a pair -> radii of a match [m].
     """
 
     files: StudyFiles
@@ -86,11 +88,13 @@ class Jobs:
     distractors: Sequence[NamedDrive] = ()
     jobs: dict[str, Job] = field(default_factory=dict)
     notes: dict[str, None] = field(default_factory=dict)
+    radii: dict[str, set[float]] = field(default_factory=dict)
     # Description -> names of the pairs that need it.
     _uses: dict[str, set[str]] = field(default_factory=dict)
 
     def expect(self, pair: Pair) -> None:
-        """Notes that a pair will need descriptions of its drives."""
+        """Notes that a pair will need its radius and described drives."""
+        self.radii.setdefault(pair.name, set()).add(pair.protocol.radius)
         for drive, role in pair.roles:
             name = _description_name(drive, role, pair.protocol)
             self._uses.setdefault(name, set()).add(pair.name)
@@ -222,6 +226,10 @@ class Task(abc.ABC):
     @abc.abstractmethod
     def measure(self, pair: Pair, jobs: Jobs) -> Part:
         """Adds the jobs that measure a pair; returns the parts they write."""
+
+    def found(self, part: Part, pair: Pair) -> Any:
+        """Returns what the part of a pair holds of it."""
+        return part.read()
 
     @abc.abstractmethod
     def numbers(self, found: Any, before: Any | None) -> Iterable[Number]:

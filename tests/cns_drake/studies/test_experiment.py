@@ -273,6 +273,24 @@ def test_a_smaller_experiment(read):
         read("about: all of it\n", quick=True)
 
 
+@pytest.mark.parametrize("few", ["{place: {}}", "[place]", "place"])
+def test_a_smaller_experiment_leaves_tasks_and_methods_out(read, few):
+    text = f"""
+    tasks: {{place: {{}}, change: {{spacing: 5.0}}}}
+    methods: {{solid: {{ranges: 20}}, btc: {{}}}}
+    quick:
+      tasks: {few}
+      methods: {{solid: {{}}}}
+    """
+    found = read(text, quick=True)
+    assert (found.tasks, found.methods) == ({"place": {}}, {"solid": {}})
+    assert list(read(text).tasks) == ["place", "change"]
+    # So do overrides; one of a single setting keeps the others.
+    assert read(text, f"tasks={few}").tasks == {"place": {}}
+    found = read(text, "tasks.change.spacing=9.0")
+    assert found.tasks == {"place": {}, "change": {"spacing": 9.0}}
+
+
 def test_protocols():
     assert base_protocol({}, "") == FAIR_PROTOCOL
     assert base_protocol({"base": "paper"}, "") == PAPER_PROTOCOL
@@ -345,6 +363,17 @@ FAULTS = [
     ("seeds: [1.5]", "seeds.0: "),
     ("seeds: [.nan]", "seeds.0: "),
     ("seeds: one", "seeds.0: "),
+    (
+        "maps: [{name: a, import: a.xodr, seed: 1, grow: 0.3}]",
+        r"maps\.0: .*grow: a road network \(\.xodr\) .*; leave it out",
+    ),
+    *(
+        (
+            f"maps: [{{name: a, age: town, years: 5, seed: 1, {given}}}]",
+            f"maps.0: .*{given.split(':')[0]}: it belongs to import",
+        )
+        for given in ("grow: 0.0", "plain: true", "sha256: a")
+    ),
     ("tasks: []", "tasks: "),
     ("tasks: [place, place]", "tasks: 'place' is there twice"),
     ("tasks: {place: 3}", "tasks.place: "),

@@ -1,12 +1,17 @@
 """Maps that an experiment makes: what is made, once, of which file."""
 
+import contextlib
+from dataclasses import dataclass
+from functools import partial
 import hashlib
+import os
 
 from helpers import studies
 from helpers.small_city import write_small_city
 import pytest
 
 from cns_drake.ageing.rates import DEFAULT_RATES
+from cns_drake.base import files
 from cns_drake.base.errors import InputError
 from cns_drake.base.jobs.cluster import Cluster
 from cns_drake.base.jobs.step import Reporter
@@ -17,7 +22,7 @@ from cns_drake.scenarios.shipped import shipped_maps
 from cns_drake.studies import redrawing
 from cns_drake.studies.experiment import Experiment, MadeMap, load_experiment
 from cns_drake.studies.made_maps import AgeCity, MadeMaps, made_map_step
-from cns_drake.studies.redrawing import RedrawCity
+from cns_drake.studies.redrawing import MakeMap, RedrawCity
 
 DRIVE = """
 map: .
@@ -156,6 +161,65 @@ def test_an_older_city_is_made_once_and_anew_when_its_inputs_change(
     finally:
         stages.write_bytes(text)
     assert other.is_done()
+
+
+class Killed(BaseException):
+    """What ends a killed process."""
+
+
+@dataclass(frozen=True)
+class MakeFiles(MakeMap):
+    """Makes a map of three files, which hold its version."""
+
+    version: int
+
+    def make(self, finish, reporter):
+        with files.draft_folder(self.folder) as draft:
+            for name in ("city.yaml", "roads.yaml", "stage_01.sdf"):
+                (draft / name).write_text(str(self.version))
+            finish(draft)
+
+    def sources(self):
+        return {"version": self.version}
+
+    def is_whole(self):
+        texts = [path.read_text() for path in self.folder.glob("*.[ys]*")]
+        return texts == [str(self.version)] * 3
+
+
+def act_or_die(left, act, *args, **options):
+    """Acts as often as is left; a dead process does not even clean up."""
+    left[0] -= 1
+    if left[0] < 0:
+        raise Killed
+    return act(*args, **options)
+
+
+def test_a_killed_study_leaves_no_half_of_a_map(tmp_path, monkeypatch):
+    old, new = (MakeFiles(tmp_path / "map", version) for version in (1, 2))
+    survived = False
+    moment = 0
+    while not survived:
+        if not old.is_done():
+            old.run(Reporter())
+        left = [moment]
+        with monkeypatch.context() as patched:
+            for name in ("mkdir", "open", "replace", "rmdir", "unlink"):
+                act = getattr(os, name)
+                patched.setattr(os, name, partial(act_or_die, left, act))
+            with contextlib.suppress(Killed):
+                new.run(Reporter())
+                survived = True
+        there = new.folder.exists()
+        assert not there or (old.is_done() and old.is_whole()) or new.is_done()
+        # The same command goes on, and so does the one before.
+        for step in (new, old):
+            if not step.is_done():
+                step.run(Reporter())
+            assert step.is_done()
+            assert step.is_whole()
+        moment += 1
+    assert moment > 10
 
 
 def test_no_folder_of_others_is_replaced(town, tmp_path):

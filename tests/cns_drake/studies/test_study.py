@@ -297,6 +297,33 @@ def test_protocols_are_factors(town, tmp_path, jobs_done):
         assert own["kept"] == pytest.approx(own["auc"] / last["auc"], abs=1e-6)
 
 
+def test_queries_are_scored_once_for_all_radii(town, tmp_path, jobs_done):
+    """The numbers are those of a study of each radius alone."""
+    fields = {"tasks": ["place", "pose", "cost"], "methods": ["ring++"]}
+
+    def found(radii, folder):
+        protocol = {"base": "fair", "radius": radii}
+        wanted = experiment(town, **fields, protocol=protocol)
+        rows = measure(wanted, tmp_path / folder).rows
+        answers = (tmp_path / folder / "queries.csv").read_text().splitlines()
+        return [row for row in rows if row.task != "cost"], answers
+
+    both, answers = found([2.0, 9.0], "both")
+    assert sum(name.startswith("place ") for name in jobs_done[0]) == 1
+    for radius in (2.0, 9.0):
+        alone, own_answers = found(radius, f"{radius}")
+        assert {row.gate for row in alone} == {False, True}
+        of_radius = [row for row in both if row["protocol.radius"] == radius]
+        assert [
+            (row.task, row.gate, row.metric, repr(row.value), repr(row.low))
+            for row in of_radius
+        ] == [
+            (row.task, row.gate, row.metric, repr(row.value), repr(row.low))
+            for row in alone
+        ]
+        assert len(answers) - 1 == 2 * (len(own_answers) - 1)
+
+
 def test_descriptions_are_shared(town, tmp_path):
     """A drive that several pairs need is described once, and kept."""
     jobs, measured = planned(

@@ -48,7 +48,7 @@ class Far(Method):
 
 
 def after(scores, distances):
-    return gated(Far(), None, distances, np.array(scores, float), RADIUS)
+    return gated(Far(), None, distances, np.array(scores, float), [RADIUS])[0]
 
 
 def test_the_ramp():
@@ -119,7 +119,7 @@ def test_what_is_no_pose_is_refused(pose):
             return pose
 
     with pytest.raises(InputError, match="far: relative_pose returned"):
-        gated(Wrong(), None, [1.0], np.array([0.5]), RADIUS)
+        gated(Wrong(), None, [1.0], np.array([0.5]), [RADIUS])
 
 
 def test_too_few_poses_are_refused():
@@ -130,7 +130,7 @@ def test_too_few_poses_are_refused():
     with pytest.raises(
         InputError, match="relative_poses returned 1 poses of 2"
     ):
-        gated(Few(), None, [1.0, 1.0], np.array([0.5, 0.5]), RADIUS)
+        gated(Few(), None, [1.0, 1.0], np.array([0.5, 0.5]), [RADIUS])
 
 
 class Line(Method):

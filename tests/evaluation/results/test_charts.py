@@ -325,6 +325,43 @@ class _Page(HTMLParser):
             self.tables[-1][-1][-1] += data.strip()
 
 
+@pytest.mark.parametrize("width", [358, 480, 900])
+@pytest.mark.parametrize(
+    "keys",
+    [
+        {"kind": "lines", "over": YEARS, "metric": "auc"},
+        {"kind": "scatter", "x": YEARS, "y": "auc"},
+    ],
+)
+def test_a_legend_covers_nothing(keys, width):
+    names = [*PARTS, "btc", "learned", "a-method-with-a-long-name"]
+    rows = [
+        row(0.5, {YEARS: year}, name, town=town)
+        for name in names
+        for year in (0, 10)
+        for town in ("a", "b", "c")
+    ]
+    figure = charts.draw(keys, Results.of(rows), width, alone=True).figure
+    FigureCanvasAgg(figure).draw()
+    (legend,) = figure.legends
+    box = legend.get_window_extent()
+    assert 0.0 <= box.x0 < box.x1 <= figure.bbox.x1
+    for axes in figure.axes:
+        if axes.axison:
+            assert axes.get_xlabel() == "years"
+            assert axes.get_tightbbox().y0 >= box.y1
+            assert axes.get_window_extent().height > 100.0
+
+
+def test_a_picture_for_print_has_its_legend(tmp_path):
+    from evaluation.results.drawing import save
+
+    keys = {"kind": "lines", "over": YEARS, "metric": "auc"}
+    figure = charts.draw(keys, aged(), alone=True).figure
+    save(figure, tmp_path / "chart", ("pdf", "png"))
+    assert figure.legends[0].get_visible()
+
+
 def test_a_page_stands_alone(tmp_path):
     chart = {"kind": "lines", "over": YEARS, "metric": "auc"}
     told = []

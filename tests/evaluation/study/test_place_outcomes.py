@@ -83,6 +83,7 @@ def pair(folder, part, **changes):
         "num_distractors": 0,
         "methods": METHODS,
         "protocol": PROTOCOL,
+        "radii": (PROTOCOL.radius,),
     }
     arguments = tuple((values | changes).values())
     return MakePart(Part(part), measure_places, arguments)
