@@ -109,8 +109,12 @@ class RayCastingScene:
     ) -> None:
         """Moves the geometry of the frames that are not anchored.
 
-        Known poses replace calls of `calc_X_WF`; rays can meet geometry only in
-        the ball `seen`.
+        Args:
+            calc_X_WF: returns the pose of a frame.
+            motions: motions of frames that move during the turn.
+            known: poses to use instead of calls of `calc_X_WF`.
+            seen: ball outside of which no ray reaches, so that geometry there
+                need not move.
         """
         placed = self._moving.place(calc_X_WF, motions, known, seen)
         if len(placed.rows):

@@ -214,7 +214,7 @@ class TrafficConfig(Section):
 
 
 class TransientConfig(Section):
-    """Temporary changes of a city, on which its stages say nothing.
+    """Temporary changes to a city, such as snow, that no stage contains.
 
     The effect of each switch depends on the seed and on the names of
     structures, but not on the other switches, except for `roadsides`.

@@ -153,13 +153,13 @@ class MadeMaps:
     def aged(
         self, drive: Scenario, years: int, rates: Any, seed: int
     ) -> tuple[str, str]:
-        """Returns the map folder of a drive's aged city, and its stage."""
+        """Returns where a drive's city is aged: map folder and stage."""
         key = self._key(drive, rates, seed)
         number = sorted(self._ages[key]).index(years)
         return str(self._aged_folder(*key)), f"{number + 2:02d}"
 
     def redrawn(self, drive: Scenario, seed: int) -> tuple[str, str]:
-        """Returns the map folder of a drive's redrawn city, and its stage."""
+        """Returns where a drive's city is drawn anew: map folder and stage."""
         source = map_folder(drive).path.resolve()
         return str(self.folder / f"{source.name}_c{seed}"), _STAGE
 

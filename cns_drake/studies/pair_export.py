@@ -241,7 +241,13 @@ def compare_runs(
 
 @dataclass(frozen=True)
 class Run:
-    """An exported drive: clouds below the set's folder, poses (N, 4, 4)."""
+    """An exported drive.
+
+    Attributes:
+        folder: folder of its clouds, relative to that of the data set.
+        X_WS: (N, 4, 4) poses of the LiDAR.
+        city: number of the city.
+    """
 
     folder: str
     X_WS: np.ndarray

@@ -197,14 +197,15 @@ class Number(NamedTuple):
 def place_numbers(
     now: PlaceOutcome, before: PlaceOutcome | None
 ) -> Iterator[Number]:
-    """Yields the results of a method, next to those of the baseline.
+    """Yields the results of a method in a condition, for the table.
 
-    Intervals are by bootstrap over blocks of the route; a sample has the same
-    ones in the baseline.
+    Intervals are by bootstrap over blocks of the route. Each bootstrap sample
+    draws the same blocks in the condition and in the baseline.
 
     Args:
-        now: its outcome in a condition.
-        before: its outcome in the baseline, for what is kept, lost and found.
+        now: outcome of the method in the condition.
+        before: outcome of the method in the baseline, from which `kept`, `lost`
+            and `found` follow; None to leave these out.
     """
     outcomes = now.outcomes
     values = _areas(outcomes)

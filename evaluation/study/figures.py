@@ -72,11 +72,11 @@ def compare_stages(
         reporter: reports progress.
         map_name: name of the map.
         stages: the earlier stage, and the later one.
-        drives: the earlier, the later and maybe a control, each a
-            `SurveyedDrive` of one world.
-        clouds: those of the earlier and the later drive.
-        stems: paths of the figures without ending: what changed, and the sets
-            of the TCR.
+        drives: the earlier drive, the later one, and optionally a control.
+            Each is a `SurveyedDrive`; all are of one world.
+        clouds: clouds of the earlier and the later drive.
+        stems: paths of the two figures, without ending. The first figure shows
+            what changed, the second one the sets from which TCR is computed.
     """
     del reporter
     read: list[SurveyedDrive] = [part.read() for part in drives]
