@@ -55,10 +55,13 @@ class RecordedCamera(NamedTuple):
 class RecordedSensor(NamedTuple):
     """A further sensor of a recording, with a port of its name.
 
-    X_BC is the pose of its frame C, which has the sensor's name unless another
-    one is given, in the vehicle's frame B. The port's value, the frame's name
-    and the time [ns] make a message. The example has the type of a value that
-    is no Python object.
+    Attributes:
+        topic: topic of its messages.
+        X_BC: pose of the sensor's frame C in the vehicle's frame B.
+        make_message: returns a message, given the value of the port, the name
+            of the frame C and the time [ns].
+        frame: name of the frame C; by default that of the sensor.
+        example: a value of the port's type, if that is no Python object.
     """
 
     topic: Topic

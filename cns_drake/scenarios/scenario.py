@@ -448,7 +448,7 @@ class Scenario(Section):
 
     @property
     def further_sensors(self) -> dict[str, SensorConfig]:
-        """Field's name -> sensor, for all but LiDARs, IMU and odometry."""
+        """Field -> sensor, for all sensors but LiDARs, IMU and odometry."""
         return {n: one for n, one in self if isinstance(one, SensorConfig)}
 
     def with_returns(
