@@ -160,8 +160,8 @@ class TrafficMotion(LeafSystem):
     `geometry_pose` is for the SceneGraph with which the bodies are
     registered. `frame_poses` is abstract, `KnownPoses`: the same poses X_WL
     as one array over all limbs. `body_spatial_velocities` is abstract, a list
-    over all limbs of V_WL, expressed in the world: with
-    them, a LiDAR finds where a limb is at any time during its turn.
+    over all limbs of V_WL, expressed in the world. From them, a LiDAR computes
+    where a limb is later in its turn.
     `moving_instances` is abstract, the (N,) instance ids of bodies faster than
     `MOVING_SPEED`; `objects` the `RecordedObjects`. All depend only on time.
     """
