@@ -23,8 +23,10 @@ _SMOOTHING_SLACK = 0.2
 class SpeedProfile(NamedTuple):
     """The fastest drive along a path, from rest to rest.
 
-    It has the (N,) speeds [m/s] at even places u [m], and the bound of the
-    acceleration [m/s^2].
+    Attributes:
+        u: (N,) evenly spaced places on the path [m].
+        speed: (N,) speeds at these places [m/s].
+        acceleration: bound on the acceleration [m/s^2].
     """
 
     u: np.ndarray
@@ -35,8 +37,8 @@ class SpeedProfile(NamedTuple):
 def make_time_scaling(positions: np.ndarray) -> BsplineTrajectory:
     """Returns the path parameter u(t) through places of a drive, smoothed.
 
-    The (N,) places [m] are those at each `KNOT_PERIOD`, at rest for REACH of
-    them at both ends.
+    The (N,) places [m] are those of the drive at multiples of `KNOT_PERIOD`. At
+    both ends, the drive must be at rest for REACH periods.
     """
     return path_geometry.make_uniform_spline(positions[:, None], KNOT_PERIOD)
 

@@ -107,13 +107,16 @@ class McapRecorder(LeafSystem):
 
     A port that is not connected is not recorded.
 
-    Tick i is at i * period of its schedule. A periodic publish event from time
-    zero on, or a forced publish at a tick's time, writes the messages that are
-    due from the present inputs. A port `imu_samples` needs no event of its
-    own: the next event writes its samples of several ticks. A simulation that
-    starts before time zero gives a warning. The inputs must be wired straight
-    to continuous outputs: a publish sees the state before any update at the
-    same time, and a hold in front would make every message one period old.
+    Messages are due at ticks; tick i is at the time i * period of the schedule.
+    At a tick, a periodic publish event (from time zero on) or a forced publish
+    writes all messages that are due, from the present inputs. A port
+    `imu_samples` needs no event of its own: the next event writes its samples
+    of several ticks. A simulation that starts before time zero causes a
+    warning.
+
+    Connect the inputs directly to continuous outputs. A publish event sees the
+    state before any update at the same time, so with a hold in between every
+    message would be one period old.
 
     Example:
         from cns_drake import McapRecorder

@@ -161,7 +161,7 @@ def map_folder(scenario: Scenario) -> MapFolder:
 
 
 def world_file(scenario: Scenario) -> Path:
-    """Returns the SDF file of a scenario's stage, or its world itself."""
+    """Returns the SDF file of a scenario's stage or world."""
     if scenario.world is not None:
         return Path(scenario.world)
     return map_folder(scenario).stage(str(scenario.stage))

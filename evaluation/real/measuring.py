@@ -71,8 +71,8 @@ class Measuring:
     """Measures data sets, one after the other.
 
     Attributes:
-        rows: what was found.
-        answers: likewise, by query.
+        rows: the results.
+        answers: the results for each query.
     """
 
     def __init__(self, names: Sequence[str], track: Track, on_note: OnNote):
