@@ -46,12 +46,13 @@ class RayHits:
 class RayCastingScene:
     """A bounding volume hierarchy over geometry.
 
-    Geometry on frames that never move is merged, in world coordinates; the
-    geometry of every other frame is an instance that `set_frame_poses`
-    places; half spaces are planes in closed form. Coordinates are kept
-    relative to a point O in the middle of the merged geometry, so that float32
-    resolves 1e-5 m within 200 m of it, for any origin of the world; if the
-    sensor is over 1 km from there, O is near the sensor.
+    Geometry on frames that never move is merged, in world coordinates. The
+    geometry of every other frame is an instance, which `set_frame_poses`
+    places. Half spaces are planes in closed form.
+
+    Coordinates are relative to a point O in the middle of the merged geometry,
+    so that float32 resolves 1e-5 m within 200 m of it, for any origin of the
+    world. If the sensor is more than 1 km from there, O is near the sensor.
     """
 
     def __init__(
