@@ -199,11 +199,11 @@ def make_imported(
         kind: kind of object, as the file calls it.
         surfaces: part of its surface -> triangles (M, 3, 3) [m]; empty parts
             are left out, and not all are empty.
-        colours: part -> its colour; without one it has that of the class.
+        colours: part -> its colour. Other parts have the colour of the class.
         year: year in which it was built; None if unknown.
         until: year until which it stands; None if unknown.
         tags: tags of the object in its file.
-        lod: its level of detail.
+        lod: level of detail of the object.
     """
     filled = {part: some for part, some in surfaces.items() if len(some)}
     triangles = np.concatenate(list(filled.values()))

@@ -108,8 +108,8 @@ class ImportCity(MakeMap):
 class MadeMaps:
     """The maps that the conditions of an experiment need, in one folder.
 
-    They are asked for first, and made by `make`: a city that ages has a stage
-    for each of its years.
+    Ask for all maps first; `make` then makes them together, so that an aged
+    city is one map with a stage for each of the years.
     """
 
     folder: Path
@@ -257,10 +257,11 @@ def distracting_drives(
 ) -> list[Scenario]:
     """Returns drives through other cities that distract a method.
 
-    They have about the wanted number of places. These are the shipped drives of
-    other maps, each through its own stage; then those of this map, along the
-    same streets between other buildings, if it is shipped; then the drives of
-    other maps through the other stages; then through those cities drawn anew.
+    Together, the drives have about the wanted number of places. The first ones
+    are the shipped drives of other maps, each through its own stage. If the
+    query's map is shipped, drives along its streets between other buildings
+    follow. Then come the drives of other maps through their other stages, and
+    at last the same drives through those cities drawn anew.
 
     Args:
         query: the drive whose LiDARs measure all of them, and whose city is

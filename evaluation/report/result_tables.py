@@ -169,7 +169,7 @@ def recognition_table(
 ) -> Table:
     """Returns Table II: a row for each pair, some columns for each method.
 
-    F1 is only in the form that is compared with the reference.
+    Only the table that is compared with the reference contains F1.
 
     Args:
         results: results of one protocol.
