@@ -52,8 +52,8 @@ _STRIPE, _STRIPE_LENGTH, _STRIPE_HEIGHT = 0.5, 3.0, 0.01
 class Bridges:
     """Ids of ways for cars and people above or below the ground.
 
-    Bridges over another street, or a railway, and all others, at the level of
-    the ground beside them; and tunnels.
+    There are three kinds: bridges over another street or a railway; all other
+    bridges, which are at the level of the ground beside them; and tunnels.
     """
 
     over_streets: AbstractSet[str] = frozenset()
