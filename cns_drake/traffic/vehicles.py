@@ -181,8 +181,8 @@ def place_vehicles(
     """Puts vehicles of N kinds into lanes, away from the ego car's first place.
 
     Returns:
-        Records `VEHICLE`, and the numbers of the kinds for whose vehicles a
-        place was found.
+        Records `VEHICLE` of the vehicles for which a place was found, and the
+        numbers of their kinds.
     """
     free = np.flatnonzero(~streets.pieces["is_way"])
     lengths = streets.pieces["length"]

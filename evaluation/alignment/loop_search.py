@@ -81,7 +81,7 @@ def loop_errors(
     """Returns how much poses disagree with loops.
 
     Args:
-        loops: M of them.
+        loops: the M loops.
         X_WL: poses (L, 4, 4) of the target's keyframes.
         X_WK: poses (K, 4, 4) of the source's keyframes.
 

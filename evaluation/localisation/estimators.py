@@ -146,7 +146,7 @@ class LocalisationMap:
         return self.surface.points[within_range(offsets, distance)]
 
     def distances(self, points_W: np.ndarray) -> np.ndarray:
-        """Returns the distance (N,) of each point to the nearest one [m]."""
+        """Returns each point's distance (N,) to the nearest map point [m]."""
         _, squares = self.surface.tree.batch_nearest_neighbor_search(points_W)
         return np.sqrt(np.asarray(squares))
 

@@ -115,8 +115,8 @@ class Measuring:
 
         Args:
             folder: see `open_data_sets`.
-            simulated: folder of recordings, which add places, and from which
-                the judge tells.
+            simulated: folder of recordings. They add places, and the judge
+                tells real scans from theirs.
 
         Raises:
             InputError: no data set is there, or one cannot be read.

@@ -203,9 +203,9 @@ class Assembly:
         return pick(self.rng, choices)
 
     def some_of(self, words: str, low: int, high: int) -> list[str]:
-        """Returns the first words of a text, a random number of them.
+        """Returns a random number of words from the beginning of a text.
 
-        The number is from `low` to below `high`.
+        The number of words is from `low` to below `high`.
         """
         return words.split()[: self.whole(low, high)]
 

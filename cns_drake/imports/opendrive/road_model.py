@@ -405,8 +405,8 @@ class ImportedRoad:
 class RoadMap:
     """All roads of a file, in its order.
 
-    The reference system is as the file names it, and the origin that of the
-    world in its coordinates [m].
+    The reference system has the name that the file gives it. The origin is that
+    of the world, in coordinates of this system [m].
     """
 
     roads: tuple[ImportedRoad, ...]

@@ -308,8 +308,8 @@ def sky(d_W: np.ndarray) -> np.ndarray:
 def texture_places(corners: np.ndarray, normals: np.ndarray) -> np.ndarray:
     """Returns texture coordinates (N, 3, 2) [m] of corners (N, 3, 3).
 
-    The (N, 3) normals are of unit length. Rows of a texture are heights on
-    walls.
+    The (N, 3) normals are of unit length. On walls, the rows of a texture are
+    horizontal.
     """
     across = np.round(np.stack([-normals[:, 1], normals[:, 0]], axis=1), 3)
     length = np.linalg.norm(across, axis=1, keepdims=True)

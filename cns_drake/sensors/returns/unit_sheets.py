@@ -96,8 +96,8 @@ class UnitSheet:
             deviation of a range at any SNR [m].
         divergence_deg: full angle of the beam at 1 / e^2 of its peak [deg].
         pulse_ns: width of a pulse at half of its peak [ns].
-        retro_from: the intensity at which retro-reflectors begin; diffuse
-            targets have 0 to this for reflectivities of 0 to 1.
+        retro_from: least intensity of retro-reflectors. Diffuse targets with
+            reflectivities from 0 to 1 have intensities from 0 to this.
         unknown: fields that the sheet does not state.
         source: where the numbers are from.
         angle_error_deg: standard deviation of a laser's elevation and azimuth
