@@ -81,7 +81,7 @@ class Imported:
 class Thing:
     """A small thing of a file, such as a bench, at a place [m].
 
-    Its source is the name of its element in the file, and its kind a key of
+    `source` is the name of its element in the file. `kind` is a key of
     `cns_drake.city.placement.objects.OBJECTS`. It may have a heading [rad].
     """
 

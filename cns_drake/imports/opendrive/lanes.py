@@ -69,7 +69,7 @@ def lane_class(kind: str) -> str | None:
 def is_raised(kind: str, height: float) -> bool:
     """Returns whether a lane is a kerb above the road, not part of it.
 
-    Its inner edge stands at a height above the road in the file [m].
+    The height of its inner edge above the road is that in the file [m].
     """
     has_kerb = height >= _LEAST_KERB
     return kind in _RAISED or (

@@ -405,7 +405,7 @@ def sea(
 ) -> Iterator[Imported]:
     """Yields the sea on the right of coasts, if there is any.
 
-    Limits (2, 2) are the least x and y, and greatest, of the city [m].
+    Limits (2, 2) are the least and the greatest x and y of the city [m].
     """
     if not coasts:
         return
