@@ -48,10 +48,11 @@ _GROWTH, _LEAST_TREE = 0.4, 2.0
 
 @dataclass(frozen=True)
 class AgedMap:
-    """What ageing a map made.
+    """The stages that ageing a map made, and what happened in between.
 
-    It has the year and number of structures of each stage, where year 0 is
-    today, the number of each event, and places (N, 3) of changed buildings [m].
+    It has the year of each stage, where year 0 is today, and its number of
+    structures; how often each event occurred; and the places (N, 3) of changed
+    buildings [m].
     """
 
     years: Mapping[str, int]
@@ -79,8 +80,8 @@ def age_map(
         years: ascending years from today, at most 200; years before today
             need buildings with years (column `built` of `structures.csv`).
         seed: the seed of all draws, not negative.
-        rates: event -> rate a year, see `read_rates`.
-        output: the folder to write; it must not be there.
+        rates: event -> rate per year, see `read_rates`.
+        output: the folder to write, which must not exist yet.
         progress: takes one line at a time.
         finish: completes the folder before it gets its name.
 
@@ -250,7 +251,8 @@ class _Writing:
     def table(self, new: Mapping[str, Structure]) -> None:
         """Writes the table of structures: today's, then the others.
 
-        Those of a shorter history have the same instance ids in a longer one.
+        The structures of a shorter history have the same instance ids in a
+        longer one.
         """
         world = self._world
         rows: list[Mapping[str, object]] = [*world.rows.values()]

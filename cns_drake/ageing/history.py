@@ -136,8 +136,9 @@ class _Tree:
 class City:
     """A city at the end of a year.
 
-    `standing` has name -> structure, None for one that is as today; `new` has
-    those that are not of today, in the order of their coming.
+    `standing` maps names to structures; the value is None for a structure that
+    is as today. `new` contains the structures that do not stand today, in the
+    order in which they were built.
     """
 
     def __init__(

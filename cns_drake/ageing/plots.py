@@ -153,12 +153,12 @@ def new_building(
     """Draws another building for a plot; None if none fits.
 
     Args:
-        plot: where it stands.
+        plot: plot on which the building stands.
         height: height of the building, about [m].
-        banned: the archetype that it does not have.
+        banned: archetype that the building must not have.
         neighbours: footprints of its neighbours in W.
         rng: draws the building.
-        ending: ending of its name, after the archetype.
+        ending: end of the building's name, after the archetype.
     """
     x0, y0, x1, y1 = plot.room().bounds
     names = [name for name in _BUILT_TODAY if name != banned]

@@ -27,9 +27,9 @@ def read_rates(path: Path | None, factor: float = 1.0) -> dict[str, float]:
     """Returns event -> rate a year.
 
     Args:
-        path: a YAML file of event: rate, from 0 to 1, and moved: metres; all
-            others keep theirs.
-        factor: for all rates.
+        path: a YAML file with rates from 0 to 1 by event, and with `moved` in
+            metres. Events that it does not name keep their default rates.
+        factor: factor by which all rates are multiplied.
 
     Raises:
         InputError: the file cannot be read; it names an unknown event, or a
@@ -93,8 +93,8 @@ def check_years(years: Iterable[int]) -> tuple[int, ...]:
 class Tally:
     """Counts how often events met the things of a city.
 
-    For each event: its rate a year, its expected and true number, and the
-    things at risk, summed over the years.
+    For each event these are its rate per year, its expected number, its true
+    number, and the number of things at risk, summed over the years.
     """
 
     rates: Mapping[str, float]

@@ -63,8 +63,8 @@ Options = Mapping[str, tuple[Any, Any]]
 class Command(TyperCommand):
     """A command whose docstring explains its options to the user.
 
-    The section `Args` of the docstring has the help of options and arguments;
-    those without an entry have one already.
+    The section `Args` of the docstring contains the help of options and
+    arguments. An option without an entry already has a help of its own.
     """
 
     def __init__(self, *args: Any, help: str, params: list, **settings: Any):
@@ -98,9 +98,9 @@ def with_options(
     """Returns a decorator that gives a command a group of options.
 
     Args:
-        keyword: the command's parameter that gets them as one value.
+        keyword: parameter of the command that gets the options as one value.
         options: the options.
-        make: makes that value of the options' values.
+        make: function that makes this value from the values of the options.
     """
     added = [
         inspect.Parameter(

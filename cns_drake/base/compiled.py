@@ -25,8 +25,9 @@ def compiled(function: _Function) -> _Function:
     folder recompiles all of them. One of several processes side by side
     compiles a function, and the others wait for it.
 
-    An array is best written number by number: where it is assigned to a part
-    of another one, numba compiles a message about shapes, for seconds.
+    Write arrays number by number. Where an array is assigned to a part of
+    another one, numba also compiles a message about shapes, which takes
+    seconds.
     """
     # Numba reads the cache folder while it decorates, and only from here.
     before = numba.config.CACHE_DIR

@@ -71,7 +71,7 @@ def read_records(
 
     Returns:
         For each row the number of its line, and column -> cell. A column that
-        had another name in earlier versions has that of now.
+        had another name in earlier versions has its present name.
 
     Raises:
         InputError: as `read_rows`, a column is missing, or a row has not

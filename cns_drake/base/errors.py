@@ -60,7 +60,7 @@ class InputError(Exception):
 
 
 class FailedJobsError(InputError):
-    """Some jobs of many could not be done; the message names them all.
+    """Some of many jobs failed; the message names each of them.
 
     The exit status differs from InputError's, since all other jobs were done.
     """
@@ -70,7 +70,7 @@ class FailedJobsError(InputError):
 
 @contextlib.contextmanager
 def value_errors(place: object) -> Iterator[None]:
-    """Turns a ValueError into an InputError of one line, with its place.
+    """Turns a ValueError of the block into an InputError that names a place.
 
     Raises:
         InputError: if the block raises ValueError.
@@ -119,8 +119,9 @@ def describe_validation_error(
 ) -> str:
     """Returns one line for the first of the faults that pydantic found.
 
-    An unknown field comes first, a missing one last: its name may be misspelt.
-    With the model, the line suggests a name.
+    An unknown field is reported before all other faults, and a missing field
+    after them, since the unknown one may be its misspelt name. If the model is
+    given, the line suggests a name.
     """
     fault = min(error.errors(), key=_urgency)
     field = ".".join(str(part) for part in fault["loc"]) or "(top level)"
@@ -158,13 +159,13 @@ def nearest_field(
 ) -> str | None:
     """Returns the known field whose spelling is closest to an unknown one.
 
-    The place is the keys and indices that lead to the field, and its name.
+    The place lists the keys and indices that lead to the field, then its name.
     """
     return _nearest(place[-1], sorted(set(_fields_at(model, place[:-1]))))
 
 
 def did_you_mean(given: object, names: Iterable[str]) -> str:
-    """Returns the end of a message on an unknown name: one like it, or ""."""
+    """Returns a similar known name, as the end of a message; "" if none is."""
     near = _nearest(given, names)
     return f"; did you mean {near}?" if near else ""
 
@@ -196,7 +197,8 @@ def _fields_at(kind: Any, place: Sequence[str | int]) -> Iterator[str]:
 def shows_traceback() -> bool:
     """Returns whether `--traceback` was given on the command line.
 
-    The processes of jobs have the arguments of their parent.
+    It is the same in the processes of jobs, which have the arguments of their
+    parent.
     """
     return TRACEBACK_OPTION in sys.argv
 

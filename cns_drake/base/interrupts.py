@@ -19,8 +19,8 @@ _Handler = Callable[[int, FrameType | None], object]
 def interrupt_on_termination(once: bool = False) -> None:
     """Turns SIGTERM into an exception, so that open files are closed.
 
-    Later signals may interrupt the closing, unless it comes `once`: that is for
-    a process that another process can still kill.
+    Later signals may interrupt the closing, unless `once` is set. Set it only
+    in a process that another process can still kill.
     """
 
     def interrupt(signal_number: int, frame: FrameType | None) -> None:
@@ -74,10 +74,10 @@ def uninterrupted() -> Iterator[None]:
 def interrupts_wait() -> Iterator[Callable[[], None]]:
     """Delays interrupts until the next call of the yielded function.
 
-    Raised anywhere, an interrupt's exception can come up inside the conversion
-    of arguments for a C++ function, which takes it for a type that does not fit
-    and goes on with another error. A second interrupt takes effect at once;
-    later ones do not disturb the closing.
+    Otherwise, the exception of an interrupt can occur while the arguments of a
+    C++ function are converted. The conversion takes it for a wrong type, and
+    raises another error. A second interrupt takes effect at once; later ones do
+    not disturb the closing.
     """
     waiting: list[int] = []
     struck: list[int] = []

@@ -57,17 +57,17 @@ def make_program(
     renamed: Mapping[str, str] | None = None,
     groups: Mapping[str, Sequence[str]] | None = None,
 ) -> typer.Typer:
-    """Returns a program without commands, to which they are added.
+    """Returns an empty program, to which commands are added.
 
     It has `--version` and the options of shell completion, and shows its help
     when called without arguments.
 
     Args:
-        renamed: command of an earlier version -> what to call now, after the
-            program's name, or with the name of another program. Such a
-            command is bad usage, and says so.
-        groups: heading of the help -> its commands; by default all commands
-            stand under one.
+        renamed: command of an earlier version -> command to use now, without
+            the program's name, or with the name of another program. The old
+            command fails as bad usage, and names the new one.
+        groups: heading in the help -> commands under it; by default all
+            commands are under one heading.
     """
 
     class Program(TyperGroup):

@@ -187,7 +187,7 @@ def map_truth(
 
     Args:
         a: Older drive: a recording, a shipped drive or a scenario file.
-        b: Newer drive, likewise.
+        b: Newer drive: a recording, a shipped drive or a scenario file.
         output: Folder to write; it must not exist yet.
     """
     with uninterrupted():

@@ -21,7 +21,7 @@ Frames = Annotated[
         min=1,
         metavar="N",
         help="Number of frames to record, counted from the start of the drive; "
-        "by default 20 frames are a second.",
+        "by default a second has 20 frames.",
     ),
 ]
 LIDAR_OPTION = typer.Option(

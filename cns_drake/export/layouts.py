@@ -41,10 +41,10 @@ class Layout:
     Paths are relative to the folder of all drives.
 
     Attributes:
-        drive_folder: drive -> its folder.
+        drive_folder: drive -> folder of the drive.
         inner_files: drive -> path -> text of the files in that folder, relative
             to it, without the scans.
-        outer_files: likewise outside that folder.
+        outer_files: drive -> path -> text of the files outside that folder.
         scan_files: drive, frame number, stamp [ns] and scan -> its files: path
             in the drive's folder -> content. None for layouts without scans.
         shared_outer_files: whether all drives share the outer files, which must
@@ -99,8 +99,8 @@ def structure_files(drive: McapDrive) -> dict[str, str]:
 def unit_quaternions(drive: McapDrive) -> np.ndarray:
     """Returns the orientations of the odometry, (M, 4) of unit length.
 
-    Quaternions of a recording may have any length; readers of text need unit
-    length.
+    Quaternions of a recording may have any length, but programs that read text
+    files need unit length.
 
     Raises:
         InputError: if a quaternion has no direction, or a position is not

@@ -45,9 +45,9 @@ _DUTCH = ("oorspronkelijkbouwjaar", "bouwjaar")
 def year_of_date(text: str) -> int | None:
     """Returns the year of a date in text, None if it has none.
 
-    A period gives its middle, or an earlier or later year with "early" and
-    "late". A range (`1914..1918`) gives its end; `before 1910` and `~1855` give
-    the year they name.
+    For a period, the result is the year in its middle, or an earlier or later
+    year if the text says "early" or "late". For a range (`1914..1918`) it is
+    the last year. For `before 1910` and `~1855` it is the year they name.
     """
     text = text.strip().lower()[:255].split("..")[-1].strip()
     day = _DAY.fullmatch(text)
@@ -76,8 +76,9 @@ def construction_year(
 ) -> int | None:
     """Returns the year in which an object was built, if known.
 
-    The attribute holds the year; if None, the usual ones do. Values that are
-    not years, and years in the future, are counted as faults of the name.
+    The year is read from the attribute; if that is None, from the usual
+    attributes. Values that are not years, and years in the future, are counted
+    as faults of the object with this name.
     """
     faults = faults or ImportFaults()
     if attribute is not None:

@@ -224,8 +224,8 @@ class CityObject(NamedTuple):
 class CityFile:
     """The objects of a file by id, its system, and counts of faulty parts.
 
-    The order of the first two coordinates is open where the other one leads
-    into the system's area, too.
+    The order of the first two coordinates is uncertain if both orders lead into
+    the system's area.
     """
 
     objects: dict[str, CityObject] = field(default_factory=dict)

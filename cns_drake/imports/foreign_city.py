@@ -81,7 +81,7 @@ class Imported:
 class Thing:
     """A small thing of a file, such as a bench, at a place [m].
 
-    Its source is the name of its element in the file, and its kind a key of
+    `source` is the name of its element in the file. `kind` is a key of
     `cns_drake.city.placement.objects.OBJECTS`. It may have a heading [rad].
     """
 
@@ -199,11 +199,11 @@ def make_imported(
         kind: kind of object, as the file calls it.
         surfaces: part of its surface -> triangles (M, 3, 3) [m]; empty parts
             are left out, and not all are empty.
-        colours: part -> its colour; without one it has that of the class.
+        colours: part -> its colour. Other parts have the colour of the class.
         year: year in which it was built; None if unknown.
         until: year until which it stands; None if unknown.
         tags: tags of the object in its file.
-        lod: its level of detail.
+        lod: level of detail of the object.
     """
     filled = {part: some for part, some in surfaces.items() if len(some)}
     triangles = np.concatenate(list(filled.values()))

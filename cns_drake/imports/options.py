@@ -31,7 +31,7 @@ class ImportFaults:
         self._examples.setdefault(kind, _printable(example))
 
     def take_back(self, kind: str) -> None:
-        """Counts one fault of a kind less."""
+        """Reduces the count of a kind of fault by one."""
         kind = _printable(kind)
         self._counts[kind] -= 1
         if not self._counts[kind]:
@@ -58,16 +58,18 @@ class ImportOptions:
     """The options of an import.
 
     Attributes:
-        years: the stages' years, increasing; without any there is one stage.
-        year_attribute: the attribute with the year of construction; the usual
-            ones if None.
-        undated: the first stage of buildings without a year.
-        lod: level of detail; the highest of each object if None.
-        seed: seeds the draws of `grow`, and buildings along a file's roads.
+        years: years of the stages, increasing; without any there is one stage.
+        year_attribute: attribute with the year of construction; if None, the
+            usual attributes.
+        undated: first stage in which buildings without a year stand.
+        lod: level of detail; if None, the highest of each object.
+        seed: seed of the draws of `grow`, and of buildings along a file's
+            roads.
         along: waypoints of a drive, in place of the two proposed ones.
-        grow: share of the buildings that an added first stage lacks, or has
-            lower, at random; no such stage if None.
-        drive_on: side of the streets; if None, the file's, or else the right.
+        grow: share of the buildings that, drawn at random, are missing or lower
+            in an additional first stage; no such stage if None.
+        drive_on: side of the street on which traffic keeps; if None, the side
+            that the file gives, or else the right.
         within: greatest distance of structures from the drives [m]; no limit if
             None.
         dressed: whether looks that the file leaves open are drawn at random.

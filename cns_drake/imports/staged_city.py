@@ -82,9 +82,9 @@ def with_gone(
 ) -> list[Imported]:
     """Returns a city's former structures and those that stood with them.
 
-    Where a former and a present building have the same place, a present one
-    with a year was there already, and what it replaced was not; one without a
-    year came later.
+    If a former and a present building have the same place, the year of the
+    present one decides. If it has a year, it was there already, and the former
+    building was not. If it has none, it came later.
     """
     others = list(others)
     later = [one for one in others if one.kind.startswith("Building")]
@@ -112,10 +112,10 @@ def _shares(one: BaseGeometry, other: BaseGeometry) -> bool:
 
 @dataclass(frozen=True)
 class StagedCity:
-    """The structures of a city: those of each stage, and those of any.
+    """The structures of a city: those of each stage, and those of any stage.
 
-    Buildings have a year, dated, or none. If there is but one stage, that of
-    today, `gone` are the buildings that stand no more.
+    Buildings are counted by whether they have a year. If there is only one
+    stage, that of today, `gone` are the buildings that no longer stand.
     """
 
     standing: dict[str, list[Imported]]
@@ -322,12 +322,14 @@ def grow(
 ) -> tuple[StagedCity, dict[str, Any]]:
     """Returns a city with an additional first stage, and the changes.
 
-    The draws depend on the names of buildings, so that the rest of a file does
-    not change them. What is gone by the only stage stands at the first, and
-    what has its place today does not. At first, a `part` of its buildings is
-    missing or lower. The changes are the names of buildings that are `missing`,
-    the `part_of_height` of lower ones, and, if any stood there, those of the
-    file that are `gone_since`.
+    In the first stage, a `part` of the buildings is missing or lower. The draws
+    depend on the names of buildings, so that the rest of a file does not change
+    them. Structures that are gone by the only stage stand in the first one, and
+    structures that have their place today do not.
+
+    The changes are the names of the buildings that are `missing`, the
+    `part_of_height` of lower buildings, and, if there are any, the buildings of
+    the file that are `gone_since`.
     """
     (last,) = city.standing.values()
     buildings = [one for one in last if one.kind.startswith("Building")]

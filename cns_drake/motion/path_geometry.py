@@ -28,12 +28,14 @@ def make_uniform_spline(
 ) -> BsplineTrajectory:
     """Returns the spline with one control point for each knot.
 
-    Such a spline never leaves the convex hull of ORDER neighbouring control
-    points, its derivatives never that of their difference quotients, and it
-    reproduces a straight line: bounds on the control points are bounds on the
-    curve. It starts at 0 and has its i-th knot at i * spacing. Beyond both ends
-    the (N, D) control points, N > REACH, are mirrored in the last one, so that
-    the curve ends in it.
+    Bounds on the control points are also bounds on the curve: the spline never
+    leaves the convex hull of ORDER neighbouring control points, and its
+    derivatives never leave that of their difference quotients. A straight line
+    is reproduced.
+
+    The parameter starts at 0, and the i-th knot is at i * spacing. At each end
+    the (N, D) control points, N > REACH, are mirrored in the outermost one, so
+    that the curve ends in it.
     """
     points = np.asarray(control_points, dtype=float)
     points = np.concatenate(

@@ -23,8 +23,10 @@ _SMOOTHING_SLACK = 0.2
 class SpeedProfile(NamedTuple):
     """The fastest drive along a path, from rest to rest.
 
-    It has the (N,) speeds [m/s] at even places u [m], and the bound of the
-    acceleration [m/s^2].
+    Attributes:
+        u: (N,) evenly spaced places on the path [m].
+        speed: (N,) speeds at these places [m/s].
+        acceleration: bound on the acceleration [m/s^2].
     """
 
     u: np.ndarray
@@ -35,8 +37,8 @@ class SpeedProfile(NamedTuple):
 def make_time_scaling(positions: np.ndarray) -> BsplineTrajectory:
     """Returns the path parameter u(t) through places of a drive, smoothed.
 
-    The (N,) places [m] are those at each `KNOT_PERIOD`, at rest for REACH of
-    them at both ends.
+    The (N,) places [m] are those of the drive at multiples of `KNOT_PERIOD`. At
+    both ends, the drive must be at rest for REACH periods.
     """
     return path_geometry.make_uniform_spline(positions[:, None], KNOT_PERIOD)
 
@@ -46,15 +48,19 @@ def find_speed_profile(
 ) -> SpeedProfile:
     """Returns the fastest drive under (N,) limits at control points [m/s].
 
-    It is found with stepwise constant acceleration (a forward and a backward
-    pass over v^2). Its positions at even times are then the control points of a
-    quintic B-spline: its u' is a weighted mean of the drive's speed, and its
-    u'' of the acceleration, over at most REACH + 1 knot periods before and
-    after. Bounds of acceleration therefore carry over as they are, and bounds
-    of speed if the drive observes each of them that much earlier and later;
-    `_early_and_late` sees to that. Path parameter and arc length differ by less
-    than a percent; |p'| <= 1 makes speed bounds of u' bounds of the speed, and
-    the rest is taken off the acceleration bound.
+    The drive has stepwise constant acceleration. It is found by a forward and a
+    backward pass over v^2.
+
+    The positions of the drive at even times then become the control points of a
+    quintic B-spline u(t). At each time, u' is a weighted mean of the drive's
+    speed, and u'' one of its acceleration, over at most REACH + 1 knot periods
+    before and after. A bound on the drive's acceleration is therefore a bound
+    on u'', too. A bound on its speed is one on u' only if the drive observes it
+    for that long before and after, which `_early_and_late` ensures.
+
+    The path parameter u and the arc length differ by less than a percent. Since
+    |p'| <= 1, a bound on u' is also a bound on the speed. For the acceleration,
+    the term by which they differ is subtracted from the bound.
     """
     u = np.linspace(0.0, path.end, max(2, int(np.ceil(path.end / _STEP)) + 1))
     jet = path.evaluate(u)

@@ -116,15 +116,17 @@ def load_car_masses(vehicle: Path) -> CarMasses:
 class Suspension:
     """The linear full-car model of vehicle dynamics.
 
-    The body heaves, rolls and pitches, each wheel moves up and down between
-    its spring and its tyre. The coordinates are heave of the body, upwards, its
-    roll and pitch about x and y of B (right side down, nose down), and the
+    The body heaves, rolls and pitches. Each wheel moves up and down between its
+    spring and its tyre. The coordinates are the heave of the body, upwards; its
+    roll and pitch about x and y of B (right side down, nose down); and the
     heights of the wheels. All are relative to rest on a level road. The body
     turns about the point on the ground below its centre of mass: the source of
     the shipped rates has its roll axis at ground level. The model has no
     anti-dive or anti-squat geometry.
 
-    With stretch g q of a spring of rate k, K is the sum of k g' g; so for C.
+    If g q is the stretch of a spring of rate k at the coordinates q, the
+    stiffness matrix K is the sum of k g' g over all springs. The damping matrix
+    C is the same sum over all dampers.
     """
 
     def __init__(self, masses: CarMasses, rates: SuspensionRates):

@@ -67,9 +67,9 @@ NUM_COORDINATES = 3
 class RideMoments(NamedTuple):
     """Heave, roll and pitch at N times, (N, 3), and their derivatives by time.
 
-    Heave is that of the body, upwards [m]; roll and pitch are about x and y of
-    the vehicle [rad]. `pivot` is x of the point on the ground about which it
-    turns [m].
+    Heave is the upward motion of the body [m]. Roll and pitch are about x and y
+    of the vehicle [rad]. `pivot` is the x coordinate of the point on the ground
+    about which the body turns [m].
     """
 
     q: np.ndarray
@@ -81,10 +81,10 @@ class RideMoments(NamedTuple):
 class BodyRide:
     """The motion X_FB(t) of a body B against the frame F of its path.
 
-    At rest on a level road B is F. Its heave, roll and pitch are polynomials of
-    degree 5 between even times, where values and two derivatives are given. The
-    accelerations have no jumps. The body turns about a point on the ground, by
-    its pitch and then by its roll.
+    At rest on a level road, B is F. At evenly spaced times, the values and two
+    derivatives of heave, roll and pitch are given. Between these times they are
+    polynomials of degree 5, so that accelerations have no jumps. The body turns
+    about a point on the ground, by its pitch and then by its roll.
     """
 
     def __init__(
@@ -176,9 +176,9 @@ _UP = np.array([[0.0, 0.0, 1.0]])
 class Moments(NamedTuple):
     """The path at N times; all motion is computed from it.
 
-    It has (N,) path parameters u, their rates [1/s] and accelerations [1/s^2],
-    and the path there. `ride` is the motion of the body against the path; None
-    if it is rigid.
+    It consists of the (N,) path parameters u, their rates [1/s] and
+    accelerations [1/s^2], and the path at these parameters. `ride` is the
+    motion of the body against the path; None if the vehicle is rigid.
     """
 
     u: np.ndarray

@@ -45,12 +45,12 @@ class JointMotion(NamedTuple):
 class WheelMotion:
     """Steering, rolling and travel of one wheel that does not slip.
 
-    The wheel's centre is at p_BC = (x, y, r) in the vehicle frame, r its
-    radius. With path speed s, turn rate m about the vehicle's z and steering
-    angle d (all per path parameter), the ground below the wheel passes with
-    (s - m y, m x): tan(d) = m x / (s - m y), so a wheel on the rear axle
-    (x = 0) needs no steering, and it rolls by the length of that vector
-    divided by r.
+    The wheel's centre is at p_BC = (x, y, r) in the vehicle frame, where r is
+    its radius. Let s be the path speed, m the turn rate about the vehicle's z,
+    and d the steering angle (all per path parameter). The ground below the
+    wheel then passes with the velocity (s - m y, m x). Therefore
+    tan(d) = m x / (s - m y), so a wheel on the rear axle (x = 0) needs no
+    steering. The wheel rolls by the length of that vector divided by r.
 
     While a ride moves the body, the wheel stays on the drawn ground: it travels
     up in the body by as much as the body comes down there. That is exact for
@@ -136,8 +136,9 @@ class _State(NamedTuple):
 class VehicleMotion(LeafSystem):
     """A system that moves a vehicle along a trajectory, wheels included.
 
-    It has the kinematic output ports of a MultibodyPlant, and can feed sensors
-    and a SceneGraph in its place: a plant has no port for prescribed motion.
+    It has the kinematic output ports of a MultibodyPlant. It can feed sensors
+    and a SceneGraph in place of a plant, which has no port for prescribed
+    motion.
     The vehicle's floating base B follows the trajectory; each revolute joint
     about B's y rolls, each about B's z steers, so that no wheel slips; each
     prismatic joint along B's z keeps its wheel on the ground. All other joints
@@ -302,7 +303,10 @@ class VehicleMotion(LeafSystem):
 
 
 class Sweep(NamedTuple):
-    """Poses of a frame P in the world at N times; (N, 3, 3) and (N, 3) [m]."""
+    """Poses of a frame P in the world at N times.
+
+    They are (N, 3, 3) rotations and (N, 3) positions [m].
+    """
 
     R_WPset: np.ndarray
     p_WPset: np.ndarray

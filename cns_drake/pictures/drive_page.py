@@ -80,13 +80,13 @@ class DriveRecord:
 
     Attributes:
         period: time between frames [s].
-        X_WFs: for each moving geometry frame F, its poses.
+        X_WFs: moving geometry frame F -> its poses.
         scans: frame index and (N, 3) positions in the world [m] of the
             scans to show.
         speeds: forward speed of the vehicle [m/s].
         specific_forces_I: specific force in the IMU's frame I [m/s^2].
-        angular_velocities_I: likewise w_WI_I [rad/s].
-        num_points: numbers of points of scans as measured.
+        angular_velocities_I: angular velocity w_WI_I [rad/s].
+        num_points: numbers of points in the scans as measured.
         limbs: leading frame F -> the poses in F of all frames that move with it
             as one, with F itself.
         names: leading frame -> its name in the page.
@@ -112,9 +112,9 @@ class DriveRecord:
 class ShownStages:
     """The stage of a drive among others, as its page shows it.
 
-    The page shows the difference to the other stage, if any. `stage` and
-    `stages` name the drive's stage and all of its map, if it is one of a map,
-    the earliest first.
+    The page shows the difference to the other stage, if any. If the drive is in
+    a stage of a map, `stage` names this stage, and `stages` names all stages of
+    the map, the earliest first.
     """
 
     other: World | None = None
@@ -147,9 +147,10 @@ def make_drive_page(
     - `/stage_difference/lower/<class>`: parts of the other stage above their
       height here, translucent orange, off when the page opens.
 
-    A panel has the title, the stage and the switches, which are the legend as
-    well: the camera can follow the car, layers can be hidden, and the change be
-    shown, with additional parts in violet. Other panels show what cameras see.
+    A panel has the title, the stage and the switches, which also serve as the
+    legend. With them, the camera follows the car, layers are hidden, and the
+    change is shown, with additional parts in violet. Other panels show what
+    cameras see.
     Below the time line are plots of speed and IMU. On a phone, the panels are
     one sheet, folded when the page opens.
     """

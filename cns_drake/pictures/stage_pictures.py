@@ -85,7 +85,7 @@ def draw_drives(scenarios: Mapping[str, Scenario], path: Path) -> None:
     """Draws drives side by side, from above, north up.
 
     Drives have titles. All panels show the same piece of the world, so that
-    they compare. The ending of the path chooses the format.
+    they can be compared. The ending of the path chooses the format.
 
     Raises:
         InputError: a drive cannot be planned, a world cannot be loaded, or the

@@ -58,10 +58,15 @@ def make_static_page(
 ) -> str:
     """Returns the scene as a self-contained page, without a server.
 
-    It is Drake's page with compressed commands: a city takes a third of the
-    space. Browsers of 2023 or later decompress them. The body is HTML before
-    the scene, visible while it loads. The script is a JavaScript module, run
-    when the page is ready; its `commands` is a promise of the scene.
+    It is Drake's page with compressed commands, in which a city takes a third
+    of the space. Browsers of 2023 or later decompress them.
+
+    Args:
+        meshcat: the server with the scene.
+        title: title of the page, plain text.
+        body: HTML that precedes the scene, and is visible while it loads.
+        script: JavaScript module that runs when the page is ready. In it,
+            `commands` is a promise of the scene.
     """
     html = meshcat.StaticHtml()
     first = _COMMAND.search(html)

@@ -271,7 +271,10 @@ def _meet_capsule(
     nearest = np.full(len(d), np.inf)
 
     def take(distance: np.ndarray, end: float) -> None:
-        """Takes distances at the half ball of an end, or between both (0)."""
+        """Takes the distances that lie on one part of the capsule.
+
+        `end` is -1 or 1 for the half ball at that end, 0 for the straight part.
+        """
         place = along + distance * d_along
         fits = np.abs(place) <= half
         if end:

@@ -104,9 +104,9 @@ def load() -> ctypes.CDLL:
 class PacketFunction(types.WrapperAddressProtocol):
     """A C function that casts a packet of rays, for compiled code.
 
-    It takes addresses: of the mask of lanes, the scene, the packet, and the
-    arguments. As an argument of a compiled function, it lets numba keep the
-    machine code on disk, which a ctypes function does not.
+    It takes the addresses of the mask of lanes, of the scene, of the packet and
+    of the arguments. Unlike a ctypes function, it can be an argument of a
+    compiled function whose machine code numba keeps on disk.
     """
 
     def __init__(self, function: object):

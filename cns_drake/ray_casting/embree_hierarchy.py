@@ -97,7 +97,7 @@ def merge_first(group: RayGroup) -> Iterator[Primitives]:
 def merge_second(group: RayGroup) -> Iterator[Primitives]:
     """Yields the primitives that only few rays need: fixed curved shapes.
 
-    `merge_first` has polyhedra about them.
+    `merge_first` yields polyhedra that contain these shapes.
     """
     if group.frame_id is None:
         yield from merge_curved(_numbered(group))

@@ -46,12 +46,13 @@ class RayHits:
 class RayCastingScene:
     """A bounding volume hierarchy over geometry.
 
-    Geometry on frames that never move is merged, in world coordinates; the
-    geometry of every other frame is an instance that `set_frame_poses`
-    places; half spaces are planes in closed form. Coordinates are kept
-    relative to a point O in the middle of the merged geometry, so that float32
-    resolves 1e-5 m within 200 m of it, for any origin of the world; if the
-    sensor is over 1 km from there, O is near the sensor.
+    Geometry on frames that never move is merged, in world coordinates. The
+    geometry of every other frame is an instance, which `set_frame_poses`
+    places. Half spaces are planes in closed form.
+
+    Coordinates are relative to a point O in the middle of the merged geometry,
+    so that float32 resolves 1e-5 m within 200 m of it, for any origin of the
+    world. If the sensor is more than 1 km from there, O is near the sensor.
     """
 
     def __init__(
@@ -109,8 +110,12 @@ class RayCastingScene:
     ) -> None:
         """Moves the geometry of the frames that are not anchored.
 
-        Known poses replace calls of `calc_X_WF`; rays can meet geometry only in
-        the ball `seen`.
+        Args:
+            calc_X_WF: returns the pose of a frame.
+            motions: motions of frames that move during the turn.
+            known: poses to use instead of calls of `calc_X_WF`.
+            seen: ball outside of which no ray reaches, so that geometry there
+                need not move.
         """
         placed = self._moving.place(calc_X_WF, motions, known, seen)
         if len(placed.rows):

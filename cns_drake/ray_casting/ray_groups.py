@@ -85,8 +85,8 @@ class RayGroup:
         X_OL: (3, 4) affine map from L to the scene's origin, at the start of
             a turn; it does not exist before `place`.
         motion: motion of F during the turn, None if it stays.
-        in_sight: whether rays can meet it; elsewhere `X_OL` and `motion` are
-            those of an earlier turn.
+        in_sight: whether rays can meet the group. If not, `X_OL` and `motion`
+            are those of an earlier turn.
     """
 
     frame_id: FrameId | None

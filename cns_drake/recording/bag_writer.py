@@ -192,9 +192,8 @@ class BagWriter:
     def interrupted(self) -> Iterator[RecordedMessage]:
         """Yields the messages that an interrupted run recorded.
 
-        They must be written before any other message, in this order and
-        while this iterator goes on, to be taken over; it ends where the file
-        is damaged.
+        To take them over, write each one as soon as it is yielded, before any
+        other message. The iterator ends where the file is damaged.
 
         Raises:
             InputError: if the file cannot be read.
@@ -444,12 +443,17 @@ def take_over_frames(
 ) -> int:
     """Copies the complete frames of an interrupted run to its successor.
 
-    A frame has all messages from one message on `frame_topic` until the next;
-    latched topics have one message, at tick 0. Nothing has been written yet to
-    the bag, which is open; the schedule is that of the other topics, by name.
+    A frame consists of all messages from one message on `frame_topic` until the
+    next. A latched topic has a single message, at tick 0.
+
+    Args:
+        bag: open bag of the new run, to which nothing has been written yet.
+        topics: topics of the recording.
+        schedule: schedule of the topics that are not latched, by their names.
+        frame_topic: name of the topic on which each frame begins.
 
     Returns:
-        The number of frames, from frame 0 on.
+        The number of copied frames, from frame 0 on.
     """
     frames = tick = 0
     frame: list[RecordedMessage] = []

@@ -55,10 +55,13 @@ class RecordedCamera(NamedTuple):
 class RecordedSensor(NamedTuple):
     """A further sensor of a recording, with a port of its name.
 
-    X_BC is the pose of its frame C, which has the sensor's name unless another
-    one is given, in the vehicle's frame B. The port's value, the frame's name
-    and the time [ns] make a message. The example has the type of a value that
-    is no Python object.
+    Attributes:
+        topic: topic of its messages.
+        X_BC: pose of the sensor's frame C in the vehicle's frame B.
+        make_message: returns a message, given the value of the port, the name
+            of the frame C and the time [ns].
+        frame: name of the frame C; by default that of the sensor.
+        example: a value of the port's type, if that is no Python object.
     """
 
     topic: Topic
@@ -104,13 +107,16 @@ class McapRecorder(LeafSystem):
 
     A port that is not connected is not recorded.
 
-    Tick i is at i * period of its schedule. A periodic publish event from time
-    zero on, or a forced publish at a tick's time, writes the messages that are
-    due from the present inputs. A port `imu_samples` needs no event of its
-    own: the next event writes its samples of several ticks. A simulation that
-    starts before time zero gives a warning. The inputs must be wired straight
-    to continuous outputs: a publish sees the state before any update at the
-    same time, and a hold in front would make every message one period old.
+    Messages are due at ticks; tick i is at the time i * period of the schedule.
+    At a tick, a periodic publish event (from time zero on) or a forced publish
+    writes all messages that are due, from the present inputs. A port
+    `imu_samples` needs no event of its own: the next event writes its samples
+    of several ticks. A simulation that starts before time zero causes a
+    warning.
+
+    Connect the inputs directly to continuous outputs. A publish event sees the
+    state before any update at the same time, so with a hold in between every
+    message would be one period old.
 
     Example:
         from cns_drake import McapRecorder

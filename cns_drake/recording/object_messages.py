@@ -31,7 +31,7 @@ _OPACITY = 0.45
 
 
 class RecordedObjects(NamedTuple):
-    """The vehicles and walkers that are there at a time: N of them.
+    """The N vehicles and walkers that are present at a time.
 
     Attributes:
         instance: (N,) uint16 ids in points and tables.
@@ -59,9 +59,10 @@ class RecordedObjects(NamedTuple):
 class BoxMessages:
     """Makes one message of all boxes at a time.
 
-    The message of the same objects is made once, with placeholders for its
-    float64 numbers and its stamp: to fill in those of a hundred boxes takes
-    less than a hundredth of the time that making their messages takes.
+    For each set of objects, a message is made only once, with placeholders for
+    its float64 numbers and its stamp. Later messages fill in these numbers,
+    which for a hundred boxes takes less than a hundredth of the time of making
+    the message.
     """
 
     def __init__(

@@ -35,8 +35,9 @@ BytesCallback = Callable[[int, int], None]
 class Repair:
     """The result of a repair: the new file, and the messages recovered.
 
-    From the earliest to the latest of them it is `seconds`. Faults are places
-    that could not be read, 0 if the file was whole; the first is in words.
+    `seconds` is the time between the earliest and the latest of these messages.
+    Faults are places that could not be read; their number is 0 if the file was
+    whole. The first fault is described in words.
     """
 
     output: Path

@@ -92,10 +92,10 @@ def junction_area(
 ) -> BaseGeometry:
     """Returns the area between the ends of a junction's roads.
 
-    The continuations of the roads to the junction's position are united, the
-    corners between them filled up to a kerb of the junction's radius, and
-    the roads themselves cut away. At a dead end a disc takes the place of
-    the other roads.
+    The roads are continued to the junction's position, and these continuations
+    are united. The corners between them are filled up to a kerb of the
+    junction's radius. The roads themselves are cut away. At a dead end, a disc
+    takes the place of the other roads.
     """
     stubs = [_stub(roads[arm.road], arm) for arm in junction.arms]
     parts = [

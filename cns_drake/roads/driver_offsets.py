@@ -61,8 +61,8 @@ def depart(
 ) -> LanePath:
     """Returns the path of a driver who wanders and changes lanes.
 
-    Where obstacles are near the line, seen from above, the car stays on it.
-    Elsewhere, it keeps 0.3 m from all of them, mirrors included.
+    Where obstacles are near the line, seen from above, the car stays on the
+    line. Elsewhere, it keeps 0.3 m from all obstacles, mirrors included.
 
     Args:
         path: the line, with points every `FINE_SPACING`.

@@ -91,9 +91,9 @@ def sample_lane_path(
     """Returns evenly spaced points along a polyline.
 
     Args:
-        points: (N, 3) its corners [m].
-        speed_limits: (N,) limit at each corner; on a segment the lower one
-            of its two holds [m/s].
+        points: (N, 3) corners of the polyline [m].
+        speed_limits: (N,) limit at each corner [m/s]. On a segment, the lower
+            limit of its two corners holds.
         spacing: the distance of the points, rounded so that it divides the
             length of the polyline [m].
         source: the beginning of an error's message.

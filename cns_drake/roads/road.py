@@ -69,7 +69,7 @@ class RoadEntry(RoadStyle):
         start_setback: distance from the position of the first junction to the
             begin of the road [m]; by default it follows from the kerb radius.
         end_setback: distance from the end of the road to the position of the
-            last junction [m]; likewise.
+            last junction [m]; by default it follows from the kerb radius.
     """
 
     start: str
@@ -102,7 +102,7 @@ class RoadsFile(_Model):
     """The file `roads.yaml`: common styles, junctions and roads.
 
     Attributes:
-        defaults: style of all roads, where they have none of their own.
+        defaults: style of all roads, for the fields that a road does not give.
         junctions: name -> junction. At least one.
         roads: name -> road. At least one.
     """
@@ -296,7 +296,7 @@ class Road:
     ) -> tuple[float, float, float, float]:
         """Returns x, y, z [m] and the driving heading at a lane's end.
 
-        That is its "entry", where traffic comes in, or its "exit".
+        The end is "entry", where traffic comes in, or "exit".
         """
         at_first = (direction == "forward") == (end == "entry")
         station = self.first_station if at_first else self.last_station

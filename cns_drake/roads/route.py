@@ -44,8 +44,9 @@ class RouteLeg(BaseModel):
             change from the first lane to the second.
         start: start of the drive, as a distance from where the leg enters the
             road [m]. Only in the first leg.
-        end: end of the drive, likewise [m]. In the last leg, or in a leg that
-            the next one leads back along: there the car turns round.
+        end: end of the drive, as such a distance [m]. Only in the last leg, or
+            in a leg along which the next one leads back: there the car turns
+            round.
     """
 
     model_config = ConfigDict(extra="forbid", frozen=True, strict=True)
@@ -357,7 +358,7 @@ def draw_route(
 ) -> Route:
     """Returns a random legal route that prefers new roads.
 
-    Its roads have a least length in total [m].
+    The total length of its roads is at least a given one [m].
 
     Raises:
         InputError: the network has no route of any length.

@@ -186,8 +186,8 @@ def outlines(
     Args:
         places: (..., 2) positions of their frames [m].
         ahead: (..., 2) unit vectors in which they head.
-        rear, front: x of their ends in their frames [m].
-        half_width: half of their width [m].
+        rear, front: x coordinates of the cars' ends in their frames [m].
+        half_width: half the width of the cars [m].
     """
     left = np.stack([-ahead[..., 1], ahead[..., 0]], axis=-1)
     corners = [

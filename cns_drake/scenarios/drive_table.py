@@ -25,10 +25,10 @@ class DriveRow:
     """A drive and its figures; `sequence` is its name.
 
     Attributes:
-        checksum: that of the files that the figures depend on.
+        checksum: checksum of the files on which the figures depend.
         length: length of the path [m].
-        duration: [s].
-        structures, triangles: in the stage.
+        duration: duration of the drive [s].
+        structures, triangles: their numbers in the stage.
     """
 
     sequence: str

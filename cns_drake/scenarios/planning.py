@@ -170,9 +170,12 @@ def count_frames(scenario: Scenario, trajectory: Trajectory) -> int:
 def shown_beside(scenario: Scenario) -> tuple[Scenario | None, str]:
     """Returns the stage with which a drive's page compares its own stage.
 
-    Its name comes second. It is the last stage, or the first one if the drive
-    is in the last. For a drive without some structures it is the same stage
-    with them.
+    This is the last stage, or the first one if the drive is in the last. If the
+    drive leaves out structures, it is the drive's own stage with them.
+
+    Returns:
+        The scenario in that stage, None if there is no other stage; and the
+        name of the stage.
     """
     if scenario.without:
         return scenario.replaced(without=()), "the whole city"

@@ -41,8 +41,8 @@ def digest_inputs(
 ) -> dict[str, str]:
     """Returns SHA-256 digests of the files that a scenario reads.
 
-    A world counts with the meshes and models that it names, and these with the
-    files they name.
+    The digest of a world includes the meshes and models that it names, and the
+    files that these name.
 
     Args:
         watch: notes the status of each file before it is read.
@@ -92,7 +92,8 @@ def combined_digest(inputs: dict[str, str]) -> str:
 def recording_fingerprint(scenario: Scenario, inputs: dict[str, str]) -> str:
     """Returns a hash of everything that determines a scenario's recording.
 
-    The folder of its files does not count, nor do settings of the drive's page.
+    It depends neither on the folder of the files nor on settings of the drive's
+    page.
     """
     places: dict[str, object] = {
         field: Path(place).name

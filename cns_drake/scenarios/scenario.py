@@ -214,7 +214,7 @@ class TrafficConfig(Section):
 
 
 class TransientConfig(Section):
-    """Temporary changes of a city, on which its stages say nothing.
+    """Temporary changes to a city, such as snow, that no stage contains.
 
     The effect of each switch depends on the seed and on the names of
     structures, but not on the other switches, except for `roadsides`.
@@ -448,7 +448,7 @@ class Scenario(Section):
 
     @property
     def further_sensors(self) -> dict[str, SensorConfig]:
-        """Field's name -> sensor, for all but LiDARs, IMU and odometry."""
+        """Field -> sensor, for all sensors but LiDARs, IMU and odometry."""
         return {n: one for n, one in self if isinstance(one, SensorConfig)}
 
     def with_returns(

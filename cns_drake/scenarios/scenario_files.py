@@ -161,7 +161,7 @@ def map_folder(scenario: Scenario) -> MapFolder:
 
 
 def world_file(scenario: Scenario) -> Path:
-    """Returns the SDF file of a scenario's stage, or its world itself."""
+    """Returns the SDF file of a scenario's stage or world."""
     if scenario.world is not None:
         return Path(scenario.world)
     return map_folder(scenario).stage(str(scenario.stage))
@@ -218,13 +218,13 @@ def check_files(scenario: Scenario, source: object = None) -> None:
 def describe_scenario(scenario: Scenario, folder: Path | None = None) -> dict:
     """Returns the fields of a scenario that are given, ready for JSON.
 
-    The folders of map, world and waypoints are no part of the drive; their
-    content has a digest (see `provenance`). The noise of an IMU is in a file of
-    a fixed name beside the scenario.
+    Where the map, the world and the waypoints lie is no part of the drive; a
+    digest identifies their content (see `provenance`). The noise of an IMU is
+    in a file with a fixed name next to the scenario.
 
     Args:
-        folder: paths of files are relative to it; without it, they are file
-            names only.
+        folder: folder to which paths of files are relative. Without it, paths
+            are reduced to the names of the files.
     """
     values = scenario.model_dump(mode="json", exclude_none=True)
     for fields, field in (

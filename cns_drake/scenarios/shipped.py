@@ -103,7 +103,7 @@ def unpacked(archive: Path) -> Path:
     that each release has its own. Processes may call this side by side.
 
     Args:
-        archive: a tar file, compressed in any way.
+        archive: a tar file, compressed by any method.
 
     Raises:
         InputError: if the cache cannot be written.

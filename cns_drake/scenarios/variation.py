@@ -124,12 +124,13 @@ class Family(Section):
 def load_family(path: Path, redraw: Redraw | None = None) -> list[Scenario]:
     """Reads a family's file and returns its members.
 
-    A member's name consists of base, seed of the city if that varies, missing
-    part in per mille, seed, and route and LiDAR if they vary.
+    The name of a member consists of the base, the seed of the city if it
+    varies, the missing part in per mille, the seed, and the route and the LiDAR
+    if they vary.
 
     Args:
-        redraw: draws cities; only a family with `city_seeds` needs it. It is
-            called last, when all else is checked.
+        redraw: function that draws cities, which only a family with
+            `city_seeds` needs. It is called last, after all checks.
 
     Raises:
         InputError: the file, or one that it names, cannot be used, the base has
@@ -229,8 +230,8 @@ def vary(
 def write_scenarios(scenarios: Sequence[Scenario], folder: Path) -> list[Path]:
     """Writes scenarios as `<folder>/<name>.yaml`.
 
-    A map beside the folder gets a relative path, so that both can be moved
-    together.
+    The path of a map that lies next to the folder is written as a relative one,
+    so that both can be moved together.
 
     Raises:
         InputError: if a file cannot be written.

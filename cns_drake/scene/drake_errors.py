@@ -21,8 +21,8 @@ PARSER_ERRORS = (
 def collected_errors() -> Iterator[list[str]]:
     """Collects errors that Drake would otherwise print to its log.
 
-    Warnings are passed on at the end, unless an exception was raised: next to
-    an error they would be a second line.
+    Warnings are passed on at the end, unless an exception was raised, since the
+    message of an error must be a single line.
     """
     errors: list[str] = []
     records: list[logging.LogRecord] = []

@@ -14,8 +14,8 @@ def find_bus(
 ) -> Any:
     """Returns the interface of an LCM bus, as `LcmBuses.Find` does.
 
-    The bindings of 1.58 return an unusable system there: whatever uses it ends
-    the process. The builder has the system itself.
+    The bindings of Drake 1.58 return an unusable system from `Find`: any use of
+    it ends the process. This function takes the system from the builder.
 
     Raises:
         RuntimeError: there is no such bus; the caller is named.
@@ -30,7 +30,8 @@ def find_bus(
 def takes_screen_colours() -> bool:
     """Returns whether the renderer takes colours of vertices for a screen's.
 
-    Up to 1.53 it takes them for linear. A Drake that is no package is newer.
+    Up to Drake 1.53 it takes them for linear ones. A Drake that is not
+    installed as a package counts as newer.
     """
     version = installed_versions(["drake"]).get("drake", "1.54")
     return tuple(map(int, re.findall(r"\d+", version)[:2])) >= (1, 54)

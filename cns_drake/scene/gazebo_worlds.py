@@ -251,7 +251,7 @@ class _Simplifier:
         return tuple(notes)
 
     def skip(self, what: str, count: int = 1, how: str = "ignored") -> None:
-        """Counts what is not shown as the file has it."""
+        """Counts an element that is not shown as the file describes it."""
         if count > 0:
             self._skipped[f"{what} {how}"] += count
 

@@ -14,12 +14,12 @@ OTHER_MOVING_ID = 259
 
 
 class Labels(NamedTuple):
-    """What points on each of G geometries have, (G,) uint16 each.
+    """Labels of points on each of G geometries.
 
     Attributes:
-        label: class.
-        moving_label: class while it moves.
-        instance: id of the structure.
+        label: (G,) uint16 class.
+        moving_label: (G,) uint16 class while the geometry moves.
+        instance: (G,) uint16 id of the structure.
     """
 
     label: np.ndarray
@@ -30,7 +30,7 @@ class Labels(NamedTuple):
 def number_structures(names: Sequence[str]) -> Labels:
     """Returns labels of structures without classes, by their names.
 
-    Instance ids follow the alphabet, from 1 on.
+    Instance ids are numbered from 1 on, in alphabetical order of the names.
 
     Raises:
         InputError: there are more structures than instance ids.

@@ -44,11 +44,11 @@ class PerceptionGeometry:
     """One geometry that rays can meet.
 
     Attributes:
-        geometry_id: its id in the SceneGraph.
+        geometry_id: id of the geometry in the SceneGraph.
         name: scoped name, `<model>::<visual>`.
         frame_id: the frame F on which it is fixed.
-        X_FG: its pose in F.
-        surface: its shape in G.
+        X_FG: pose of the geometry G in F.
+        surface: shape of the geometry, in G.
         rgb: diffuse colour; None if the model has none.
         reflectivity: the property ("lidar", "reflectivity"), 0 to 1; None
             without it.
@@ -282,17 +282,19 @@ _revisions = itertools.count(1)
 def geometry_revision_port(scene_graph: SceneGraph) -> OutputPort:
     """Returns a port whose value changes when geometry does, and only then.
 
-    SceneGraph's own `geometry_version` covers only perception geometry that a
-    render engine accepted, and comparing all geometries takes longer than a
-    scan. A Context holds the geometry as a parameter, which Drake's cache
-    tracks. A port that depends on this parameter alone is computed anew when
+    There are two other ways to notice changes. SceneGraph's own
+    `geometry_version` covers only perception geometry that a render engine
+    accepted. Comparing all geometries takes longer than a scan.
+
+    A Context holds the geometry as a parameter, which Drake's cache tracks. The
+    port depends on this parameter alone. It is therefore computed anew when
     geometry was added, removed, replaced, reshaped, renamed or given another
     role, in any way. The first call adds the port to the SceneGraph, and must
     come before a Diagram is built from it.
 
     Returns:
-        An abstract port; its value is an int that no other geometry, also of
-        another Context, has had in this process.
+        An abstract port. Its value is an int, which is different for any other
+        geometry in this process, also in another Context.
 
     Raises:
         RuntimeError: the SceneGraph is already part of a Diagram.

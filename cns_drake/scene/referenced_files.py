@@ -32,7 +32,7 @@ class FileWatch:
         self._states: dict[str, tuple[int, ...]] = {}
 
     def take_down(self, path: str) -> os.stat_result | None:
-        """Notes the status of a file, to which `changed` compares it.
+        """Notes the status of a file, for a later call of `changed`.
 
         If called again for the same file, the first status is kept.
 

@@ -20,9 +20,10 @@ class StructureEntry:
     """A structure as a LiDAR return refers to it.
 
     Its instance id is from 1 to 65535; 0 stands for no structure. Its class is
-    a key of `CLASS_IDS`. `reflectivity` is that of its surfaces near 900 nm, 0
-    to 1; None if it follows from class and colours. `causes` are reasons for
-    its differences to the stage's file: switches of a scenario's `transient`.
+    a key of `CLASS_IDS`. `reflectivity` is the reflectivity of its surfaces
+    near 900 nm, from 0 to 1; None if it follows from class and colours.
+    `causes` lists the switches of a scenario's `transient` by which the
+    structure differs from the stage's file.
     """
 
     instance: int
@@ -39,9 +40,9 @@ class StructureEntry:
 class StructureTable:
     """Structures by name.
 
-    Names that the table lacks get the free ids, in alphabetical order, and the
-    class `unlabeled`. A world without a table therefore still has distinct
-    structures.
+    Structures that the table does not name get the free ids, in alphabetical
+    order, and the class `unlabeled`. Structures can therefore be told apart
+    even in a world without a table.
     """
 
     def __init__(self, entries: Iterable[StructureEntry]):
@@ -93,7 +94,7 @@ class StructureTable:
 def load_structure_table(path: Path) -> StructureTable:
     """Reads a CSV file with columns `instance`, `name` and `class`.
 
-    A column `reflectivity` may be there; a cell of it may be empty.
+    The column `reflectivity` is optional, and its cells can be empty.
 
     Raises:
         InputError: the file lacks a column or a row is not usable.

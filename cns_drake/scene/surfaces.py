@@ -45,7 +45,7 @@ class CylinderSurface:
 
 @dataclass(frozen=True)
 class CapsuleSurface:
-    """A capsule centred on G; `length` is that of the cylindrical part."""
+    """A capsule centred on G; `length` is only that of its cylinder."""
 
     radius: float
     length: float
@@ -80,8 +80,7 @@ def merge_triangles(
 ) -> tuple[TriangleSurface, np.ndarray]:
     """Returns the triangles of many geometries in one frame T.
 
-    It also returns the owner of each triangle. Members have an index, a pose
-    X_TG and a surface each.
+    Each member consists of an index, a pose X_TG and a surface.
 
     Returns:
         The surface in T, and the (M,) int32 index of each of its triangles.

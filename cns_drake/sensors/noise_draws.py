@@ -9,8 +9,8 @@ def noise_generator(
     """Returns the random generator for one piece of a sensor's noise.
 
     A piece is a frame or a block, for example. The same arguments always give
-    the same numbers. Several sensors differ by their names; the number of a
-    purpose is at least 0.
+    the same numbers. Different names give different sensors different
+    numbers. The number of a purpose is at least 0.
     """
     # Keys are never negative: pieces before time zero have other streams.
     stream = purpose if index >= 0 else 2**32 - 1 - purpose

@@ -160,8 +160,8 @@ class FilmStage(Step):
 
     Attributes:
         scenario: the drive in that stage, with the cameras of the film.
-        times: when images are taken [s].
-        folder: where they are written.
+        times: times at which images are taken [s].
+        folder: folder to which they are written.
         first: number of each camera's first image in the film.
     """
 

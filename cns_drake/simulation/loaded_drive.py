@@ -47,11 +47,16 @@ _HALF_WIDTH = 1.3
 
 @dataclass(frozen=True)
 class LoadedDrive:
-    """A scenario with all inputs of its simulation; its `frames` is given.
+    """A scenario with all inputs of its simulation.
 
-    `inputs` has the digests of its files, and `fingerprint` is that of the
-    recording, for `fingerprint.txt`. Other moving objects are the traffic, if
-    any.
+    Attributes:
+        scenario: the scenario, whose field `frames` is always given.
+        inputs: file -> digest of its content.
+        fingerprint: fingerprint of the recording, for `fingerprint.txt`.
+        trajectory: motion of the vehicle.
+        world: stage with the vehicle.
+        num_frames: number of frames to record.
+        traffic: motion of all other vehicles and of walkers, if any.
     """
 
     scenario: Scenario

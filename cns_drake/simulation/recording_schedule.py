@@ -59,10 +59,10 @@ def first_points_topic(scenario: Scenario) -> str:
 def drive_schedule(scenario: Scenario) -> Schedule:
     """Returns the schedule of a scenario's topics.
 
-    If the scenario has a number of frames, LiDARs end with the last one. Topics
-    with a rate of their own, such as an IMU's, continue until that scan is
-    complete, so that their samples enclose every scan. So does `/tf` with
-    motion distortion, by which scans can be corrected.
+    If the scenario gives a number of frames, LiDARs end with the last frame.
+    Topics with a rate of their own, such as that of the IMU, continue until its
+    scan is complete, so that their samples enclose every scan. With motion
+    distortion this also holds for `/tf`, by which scans can be corrected.
 
     Raises:
         InputError: Kalibr's file cannot be used.

@@ -54,9 +54,9 @@ class DriveSimulation:
 class SimulatedDrive(Drive):
     """The scans of a scenario, as in its recording.
 
-    A scan is simulated on each access. Frames are a period [s] apart; X_BS is
-    the first LiDAR's pose in base_link. `structures` has the names of all
-    structures in the world.
+    A scan is simulated on each access. Frames are `period` apart [s]. X_BS is
+    the pose of the first LiDAR in base_link. `structures` contains the names of
+    all structures in the world.
     """
 
     def __init__(self, scenario: Scenario):

@@ -53,20 +53,22 @@ def make_station(
 ) -> Diagram:
     """Makes the Diagram of a scenario.
 
-    Systems: `scene_graph` holds the stage and the vehicle, `vehicle_motion`
-    prescribes the vehicle's pose, `geometry_pose` passes it on to the
-    SceneGraph; `traffic` moves other objects, and `frame_poses` has the poses
-    of all frames; a `Lidar` for each entry of
-    `scenario.lidars` under its name (with a `<lidar>_sweep` if it moves while
-    it turns), an accelerometer and a gyroscope (or `imu`, if the IMU has a rate
-    or errors of its own), and `odometry` measure; `mcap_recorder` and
-    `meshcat_recorder` record the measurements.
+    These systems move things: `scene_graph` holds the stage and the vehicle,
+    `vehicle_motion` prescribes the vehicle's pose, and `geometry_pose` passes
+    it on to the SceneGraph. `traffic` moves other objects, and `frame_poses`
+    has the poses of all frames.
 
-    Exported output ports: `<lidar>_scan`, `specific_force`,
-    `angular_velocity`, `odometry`, `geometry_query`; `imu_samples` of such
-    an IMU; with traffic `objects`; the port of each further sensor under its
-    name; and of each camera `<camera>_image`, `<camera>_depth` and
-    `<camera>_label`.
+    These systems measure: a `Lidar` for each entry of `scenario.lidars`, under
+    its name (with a `<lidar>_sweep` if it moves while it turns); an
+    accelerometer and a gyroscope, or `imu` if the IMU has a rate or errors of
+    its own; and `odometry`. `mcap_recorder` and `meshcat_recorder` record the
+    measurements.
+
+    The exported output ports are `<lidar>_scan`, `specific_force`,
+    `angular_velocity`, `odometry` and `geometry_query`. The system `imu` adds
+    `imu_samples`, and traffic adds `objects`. Each camera adds
+    `<camera>_image`, `<camera>_depth` and `<camera>_label`. Each further sensor
+    adds a port of its name.
 
     Args:
         scenario: the scenario to build.

@@ -70,9 +70,9 @@ class Compared:
     Attributes:
         database: the drive that makes the database.
         query: the drive that asks.
-        protocol: how it asks.
-        distractors: number of places elsewhere that join the database.
-        asked: what the condition changes of how the query asks.
+        protocol: protocol by which the query asks.
+        distractors: number of places elsewhere that are added to the database.
+        asked: fields of the protocol that the condition changes.
     """
 
     database: Scenario
@@ -109,7 +109,7 @@ class PairOfDrives:
         query: the drive that asks.
         same_route: whether the database has the query's route, beside it.
         source: file of the experiment, for errors.
-        age, redraw: make the maps of a condition.
+        age, redraw: functions that make the maps of a condition.
         on_note: takes notes on what was left out.
     """
 
@@ -466,8 +466,8 @@ class PairOfDrives:
 def control_drive(drive: Scenario, stage: str) -> Scenario:
     """Returns a drive on the same route through another stage.
 
-    It is a control: all change between it and that stage's own drive is due to
-    the routes, and not to the city. The driver is the same.
+    It serves as a control: between it and the own drive of that stage, only the
+    routes differ, and not the city. The driver is the same.
     """
     driver = drive.driver
     if driver.departs and driver.seed is None:
@@ -537,7 +537,7 @@ def check_frozen(
 
     Args:
         table: a file of the shipped worlds.
-        compared: (map, level) -> fingerprints of what is compared.
+        compared: (map, level) -> fingerprints of the compared drives.
 
     Raises:
         InputError: one is another.

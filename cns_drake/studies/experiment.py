@@ -362,9 +362,9 @@ class Condition:
     Attributes:
         factors: column of a table -> value.
         changes: side, or `protocol` -> nested fields.
-        causes: the cases that come together. Each has its fields at the wanted
-            level, then at lower ones, for maps that lack a level.
-        is_baseline: whether others are compared with this one.
+        causes: the cases that are combined. Each has its fields at the wanted
+            level, then at lower levels, for maps that lack a level.
+        is_baseline: whether other conditions are compared with this one.
     """
 
     factors: Changes
@@ -609,7 +609,7 @@ def base_protocol(
     Args:
         fields: field -> value; `base` is the protocol that has all others.
         source: file of the experiment, for errors.
-        place: where the fields are in it.
+        place: place of the fields in this file, for errors.
 
     Raises:
         InputError: a field is unknown or out of range.

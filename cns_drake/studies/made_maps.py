@@ -108,8 +108,8 @@ class ImportCity(MakeMap):
 class MadeMaps:
     """The maps that the conditions of an experiment need, in one folder.
 
-    They are asked for first, and made by `make`: a city that ages has a stage
-    for each of its years.
+    Ask for all maps first; `make` then makes them together, so that an aged
+    city is one map with a stage for each of the years.
     """
 
     folder: Path
@@ -153,13 +153,13 @@ class MadeMaps:
     def aged(
         self, drive: Scenario, years: int, rates: Any, seed: int
     ) -> tuple[str, str]:
-        """Returns the map folder of a drive's aged city, and its stage."""
+        """Returns where a drive's city is aged: map folder and stage."""
         key = self._key(drive, rates, seed)
         number = sorted(self._ages[key]).index(years)
         return str(self._aged_folder(*key)), f"{number + 2:02d}"
 
     def redrawn(self, drive: Scenario, seed: int) -> tuple[str, str]:
-        """Returns the map folder of a drive's redrawn city, and its stage."""
+        """Returns where a drive's city is drawn anew: map folder and stage."""
         source = map_folder(drive).path.resolve()
         return str(self.folder / f"{source.name}_c{seed}"), _STAGE
 
@@ -257,10 +257,11 @@ def distracting_drives(
 ) -> list[Scenario]:
     """Returns drives through other cities that distract a method.
 
-    They have about the wanted number of places. These are the shipped drives of
-    other maps, each through its own stage; then those of this map, along the
-    same streets between other buildings, if it is shipped; then the drives of
-    other maps through the other stages; then through those cities drawn anew.
+    Together, the drives have about the wanted number of places. The first ones
+    are the shipped drives of other maps, each through its own stage. If the
+    query's map is shipped, drives along its streets between other buildings
+    follow. Then come the drives of other maps through their other stages, and
+    at last the same drives through those cities drawn anew.
 
     Args:
         query: the drive whose LiDARs measure all of them, and whose city is

@@ -200,7 +200,7 @@ def write_truth(
             aged map has.
 
     Returns:
-        Side -> label -> number of points; what became of the structures.
+        Side -> label -> number of points; and what became of each structure.
 
     Raises:
         InputError: the drives are of different worlds, or the folder cannot be
@@ -308,7 +308,7 @@ class _Look:
     coverage: BeamCoverage
 
     def sees(self, points: np.ndarray) -> np.ndarray:
-        """Returns the rows of the observed ones of points (N, 3) in W."""
+        """Returns the rows of the points (N, 3) in W that are observed."""
         p_WS, R_WS = self.X_WS.translation(), self.X_WS.rotation().matrix()
         offsets = points - p_WS
         distances = np.sqrt(np.einsum("ij,ij->i", offsets, offsets))

@@ -63,7 +63,7 @@ class ExportOptions:
     """What is exported of each drive.
 
     Attributes:
-        format: the trainer's.
+        format: format of the program that trains.
         spacing: distance between two clouds, along the path [m].
         scans: consecutive scans that are merged into a cloud.
         max_range: points with a greater x, y or z are left out [m].
@@ -87,8 +87,8 @@ def write_overlap_table(
     Args:
         database: the drive of the places, in whose city rays are cast.
         query: the drive of the queries.
-        output: the folder; made if need be.
-        protocol: gives queries, places and range.
+        output: the folder, which is created if it does not exist.
+        protocol: protocol that determines queries, places and range.
         track: reports progress.
 
     Raises:
@@ -241,7 +241,13 @@ def compare_runs(
 
 @dataclass(frozen=True)
 class Run:
-    """An exported drive: clouds below the set's folder, poses (N, 4, 4)."""
+    """An exported drive.
+
+    Attributes:
+        folder: folder of its clouds, relative to that of the data set.
+        X_WS: (N, 4, 4) poses of the LiDAR.
+        city: number of the city.
+    """
 
     folder: str
     X_WS: np.ndarray

@@ -87,7 +87,7 @@ def redraw_cities(
 
 @dataclass(frozen=True)
 class MakeMap(Step):
-    """Makes the folder of a map, in place of an older one that it made."""
+    """Makes the folder of a map, and replaces an older one that it made."""
 
     folder: Path
 
@@ -367,8 +367,8 @@ def _turned_bounds(bounds: Sequence[float], turn_deg: float) -> list[float]:
 def kept_names(stages: Any, names: Sequence[str]) -> Any:
     """Returns a `stages.yaml` without the structures that a city lacks.
 
-    A draw has another number of houses in a row. Groups without any structure
-    are left out.
+    Rows in another draw have another number of houses. Groups without any
+    structure are left out.
     """
     if isinstance(stages, list):
         return [

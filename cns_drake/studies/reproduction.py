@@ -39,14 +39,15 @@ def reproduce_maps(
 ) -> Path:
     """Records the drives of maps, evaluates them and reports.
 
-    `<output>/<name>/` gets each recording, `<output>/pages/<name>.html` a
-    web page of each drive, `<output>/pictures` the routes of each
-    map from above and a street in its first and last stage,
-    `<output>/report` the tables and figures. Finished work is not repeated.
-    The path of the report's page is returned.
+    The recordings are in `<output>/<name>/`, and a web page of each drive is in
+    `<output>/pages/<name>.html`. `<output>/pictures` shows the routes of each
+    map from above, and a street in its first and last stage. `<output>/report`
+    contains the tables and figures. Finished work is not repeated. The function
+    returns the path of the report's page.
 
-    With `quick`, only the report is made, of the same frames: drives that are
-    not recorded yet are evaluated while they are simulated, and not recorded.
+    With `quick`, only the report is made, from the same frames. Drives that are
+    not recorded yet are then evaluated while they are simulated, and they are
+    not recorded.
 
     Args:
         maps: names or folders; all shipped ones if None.

@@ -150,9 +150,10 @@ def run_study(
         experiment: the experiment.
         output: folder of the results.
         cluster: does the work.
-        maps: maps in place of the experiment's.
+        maps: maps that replace those of the experiment.
         source: file of the experiment, for errors.
-        on_note: takes notes on what is left out, and how long it takes.
+        on_note: takes notes on what is left out, and on how long the study
+            takes.
 
     Returns:
         The path of the page.

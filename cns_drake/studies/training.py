@@ -77,8 +77,9 @@ class TrainingScans:
         xy: (N, 2) places of the sensors [m].
         cities: (N,) number of the city.
         drives: (N,) number of the drive in its city.
-        overlaps: (N, N) share of each scan that the place of each other sees;
-            without it, distance says which places are right.
+        overlaps: (N, N) share of each scan that is visible from the place of
+            each other scan. Without it, distance decides which places are
+            right.
     """
 
     images: np.ndarray
@@ -106,7 +107,7 @@ class Batch:
 
     Attributes:
         images: (Q + P, RINGS, SECTORS, CHANNELS) uint8, queries first.
-        weights: (Q, P) of right places, with sum 1 in each row.
+        weights: (Q, P) weights of right places, with sum 1 in each row.
         counts: (Q, P) whether a place takes part in the softmax.
     """
 
@@ -315,7 +316,7 @@ def train(
         steps: number of batches.
         seed: seed of all draws.
         state: file from which an interrupted training goes on.
-        digest: digest of the scans; a state of others is refused.
+        digest: digest of the scans; a state of other scans is refused.
         track: reports progress.
         on_step: takes the number of a step and the weights.
 
@@ -428,7 +429,8 @@ def write_weights(
 ) -> None:
     """Writes a file of weights, as the method `learned` reads it.
 
-    `seen` is the least and greatest part of sectors with a point in training.
+    `seen` is the least and the greatest share of sectors with a point that the
+    scans of the training have.
     """
     arrays: dict[str, Any] = {
         "version": np.int64(WEIGHTS_VERSION),
@@ -450,10 +452,11 @@ _CITIES_A_MINUTE, _STEPS_A_MINUTE = 0.3, 60
 class TrainingPlan:
     """What a training sees, and for how long.
 
-    With `change`, drives see different stages and passing changes; with
-    `returns`, some have calibrated returns and weather; with `driver`, drivers
-    wander and change lanes. With `drawn_streets`, cities have streets of no
-    map; with `graded`, the exact overlap says which places are right.
+    With `change`, drives see different stages and temporary changes. With
+    `returns`, some drives have calibrated returns and weather. With `driver`,
+    drivers wander and change lanes. With `drawn_streets`, the streets of the
+    cities are drawn at random. With `graded`, the exact overlap decides which
+    places are right.
     """
 
     cities: int

@@ -59,8 +59,9 @@ _OVERLAP_POINTS = 1000
 class DrawnCity:
     """A city with its drives, as a seed draws them.
 
-    `map_name` is the shipped map with its streets, or `DRAWN_STREETS`. With
-    `graded`, the overlap of each scan with the places of others is found.
+    `map_name` is the shipped map that has its streets, or `DRAWN_STREETS`. With
+    `graded`, the overlap of each scan with the places of the other scans is
+    computed.
     """
 
     map_name: str

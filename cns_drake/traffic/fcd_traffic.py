@@ -48,14 +48,14 @@ _CARS = tuple(kind for kind in KINDS if kind.semantic_class == "car")
 
 @dataclass(frozen=True)
 class TracedObject:
-    """A vehicle or a person of a trace, its type "" if it has none.
+    """A vehicle or a person of a trace; the type is "" if it has none.
 
     Attributes:
         steps: (M,) numbers of the times at which it is there, ascending.
-        xy: (M, 2) of a vehicle's front, or of a person's middle [m].
+        xy: (M, 2) position of a vehicle's front, or of a person's middle [m].
         yaw: (M,) heading, from x towards y [rad].
-        slope: (M,) of the road, upwards positive [rad].
-        z: (M,) heights in the trace [m]; NaN where it has none.
+        slope: (M,) slope of the road, upwards positive [rad].
+        z: (M,) heights in the trace [m]; NaN where it gives none.
     """
 
     name: str
@@ -219,9 +219,10 @@ def play_trace(
     simulation, are left out.
 
     Args:
-        trace: what SUMO wrote.
+        trace: the trace that SUMO wrote.
         path: file of the trace, for errors.
-        graph, walkways: of the map; they give heights.
+        graph, walkways: lanes and walkways of the map, from which heights
+            follow.
         seed: seed of the kinds of cars.
         duration: time of the last frame [s].
         end: time at which the ego car arrives [s].
@@ -318,9 +319,9 @@ class Heights:
     ) -> np.ndarray:
         """Returns the heights (M,) of a road user along places (M, 2) [m].
 
-        Where roads cross at two heights, it is on that of its height in the
-        trace; if it has none (NaN), on that on which it came, or of a lane in
-        its direction [rad].
+        Where roads cross at two heights, the height in the trace shows on which
+        road the road user is. If the trace gives none (NaN), it is the road on
+        which the road user came, or one with a lane in its direction [rad].
         """
         found = self.at(xy)
         count = min(_CANDIDATES, len(self._z))

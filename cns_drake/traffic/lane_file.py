@@ -67,7 +67,7 @@ class LaneFile(NamedTuple):
     """The content of a file of lanes.
 
     Structures that are `in_the_way`, such as parked cars, stand where vehicles
-    drive: a drive with traffic is without them.
+    drive. A drive with traffic leaves them out.
     """
 
     graph: LaneGraph

@@ -45,8 +45,8 @@ class Piece:
         after: numbers of the pieces that follow it.
         left, right: numbers of the lanes beside it, in the same direction;
             -1 for none.
-        junction: number of the junction of a way; for a lane, of the one it
-            leads to.
+        junction: number of the junction in which a way is, or to which a lane
+            leads.
         phase: signal phase in which a way is green; -1 without a signal.
     """
 
@@ -71,8 +71,8 @@ class Crossing:
     Attributes:
         line: (2, 3) from kerb to kerb, or from sidewalk to sidewalk [m].
         area: where walkers are on it [m].
-        marked: whether vehicles make way for walkers who wait; if not, it is
-            not at a road's end, and walkers begin in a gap.
+        marked: whether vehicles give way to walkers who wait. A crossing
+            without marks is not at a road's end, and walkers wait for a gap.
     """
 
     line: np.ndarray
@@ -93,12 +93,12 @@ class Walkway:
     """A strip between two places where others begin.
 
     Attributes:
-        points: (N, 3) its middle, evenly spaced [m].
+        points: (N, 3) points along its middle, evenly spaced [m].
         half_width: greatest distance of a walker from the middle [m].
         start, end: numbers of the places at its ends.
         crossing: number of the crossing that it leads over, -1 for none.
-        free: (N, 2) least and greatest offset to the right that things leave
-            free at each point [m]; None if that is the half width either way.
+        free: (N, 2) least and greatest offset to the right between which no
+            objects stand, at each point [m]; None if the whole width is free.
         narrow: (N,) bool, where walkers have to face along it; None for
             nowhere.
     """
@@ -232,11 +232,13 @@ def with_unmarked_crossings(
 ) -> tuple[LaneGraph, list[Walkway]]:
     """Adds places between crossings where walkers may cross narrow streets.
 
-    Each is as near to the middle of a lane as there is a walkway on both sides
-    and nothing stands in between, seen from above. A walkway has one at most.
+    Each place is as near to the middle of a lane as possible. On both sides
+    there must be a walkway, and nothing may stand in between, seen from above.
+    A walkway has one such place at most.
 
     Returns:
-        The graph with more crossings; the walkways, cut there, and more.
+        The graph with the additional crossings; and the walkways, which are cut
+        at these places, with additional ones over the crossings.
     """
     sides = [k for k, way in enumerate(walkways) if way.crossing < 0]
     lines = [LineString(walkways[k].points[:, :2]) for k in sides]
@@ -336,8 +338,8 @@ def with_unmarked_crossings(
 def resampled(points: np.ndarray, spacing: float = SPACING) -> np.ndarray:
     """Returns evenly spaced points (N, 3) along a polyline (M, 3) [m].
 
-    Their distance is at most a spacing [m]. Corners that coincide with the one
-    before are dropped.
+    Neighbouring points are at most `spacing` apart [m]. A corner that coincides
+    with the corner before it is dropped.
     """
     steps = np.linalg.norm(np.diff(points, axis=0), axis=1)
     points = points[np.append(True, steps > 1e-6)]

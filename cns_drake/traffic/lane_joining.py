@@ -35,10 +35,10 @@ def join_lanes(
 ) -> LaneGraph:
     """Returns the graph of lanes of a map, cut at its own places.
 
-    The second lane of a link follows the first. `right_of` is the number of a
-    lane -> that of the lane on its right, in the same direction; without it,
-    vehicles do not change lanes. The graph has no signals and crossings, and is
-    empty if vehicles cannot drive for ever anywhere.
+    The second lane of a link follows the first. `right_of` maps the number of a
+    lane to the number of the lane on its right, in the same direction. Without
+    it, vehicles do not change lanes. The graph has neither signals nor
+    crossings. It is empty if vehicles cannot drive for ever anywhere.
     """
     merged, after, beside = _merge(lanes, links, right_of or {})
     points = [resampled(lane.points) for lane in merged]

@@ -11,8 +11,9 @@ from cns_drake.base.compiled import compiled
 def boxes_overlap(a: Any, b: Any, half_a: Any, half_b: Any) -> bool:
     """Returns whether two rectangles overlap.
 
-    They overlap if they do along all their axes. Each has (3,) x, y of the
-    middle [m] and heading [rad], and (2,) half the length and the width [m].
+    Two rectangles overlap if their projections on all their axes overlap. Each
+    rectangle has (3,) x, y of its middle [m] and heading [rad], and (2,) half
+    its length and half its width [m].
     """
     dx, dy = b[0] - a[0], b[1] - a[1]
     square = (half_a[0] + half_b[0]) ** 2 + (half_a[1] + half_b[1]) ** 2

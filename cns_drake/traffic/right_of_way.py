@@ -74,7 +74,8 @@ _WALKERS_GAP = 6.0
 def grant_ways(traffic: Traffic, k: int) -> None:
     """Grants vehicles their ways through junctions, first come first served.
 
-    Crossings are granted as well. It is the k-th time step.
+    Walkers are granted crossings in the same way. The present time step is the
+    k-th.
     """
     streets, cars, crossings = traffic.streets, traffic.cars, traffic.crossings
     t, pieces, num_cars = k * STEP, streets.pieces, len(cars)

@@ -38,10 +38,10 @@ class Signals(NamedTuple):
     """The program of P pieces and C crossings.
 
     Attributes:
-        cycle: its duration [s].
-        green_from, green_for: (P + C,) where a cycle's green, or that for
-            walkers, begins and how long it lasts; the whole cycle without a
-            signal [s].
+        cycle: duration of a cycle [s].
+        green_from, green_for: (P + C,) time in the cycle at which green begins,
+            for vehicles or for walkers, and how long it lasts [s]. Without a
+            signal it lasts the whole cycle.
     """
 
     cycle: float

@@ -97,7 +97,11 @@ def bodies_at(plan: TrafficPlan, t: float) -> BodyStates:
 
 
 class LimbTable:
-    """The M limbs of N bodies in turn; `body` has the (M,) body numbers."""
+    """The M limbs of N bodies, one body after the other.
+
+    Attributes:
+        body: (M,) number of the body to which each limb belongs.
+    """
 
     def __init__(self, bodies: Sequence[tuple[Limb, ...]]):
         """Takes the limbs of each body."""
@@ -156,8 +160,8 @@ class TrafficMotion(LeafSystem):
     `geometry_pose` is for the SceneGraph with which the bodies are
     registered. `frame_poses` is abstract, `KnownPoses`: the same poses X_WL
     as one array over all limbs. `body_spatial_velocities` is abstract, a list
-    over all limbs of V_WL, expressed in the world: they take a limb to its
-    place a turn later, for a LiDAR that keeps turning meanwhile.
+    over all limbs of V_WL, expressed in the world. From them, a LiDAR computes
+    where a limb is later in its turn.
     `moving_instances` is abstract, the (N,) instance ids of bodies faster than
     `MOVING_SPEED`; `objects` the `RecordedObjects`. All depend only on time.
     """
@@ -291,7 +295,9 @@ def make_traffic(
     turn: float = 0.05,
     name: str = "traffic",
 ) -> TrafficMotion:
-    """Adds vehicles and walkers to a SceneGraph; returns the moving system.
+    """Adds vehicles and walkers to a SceneGraph.
+
+    Returns the system that moves them.
 
     Args:
         scene_graph: takes the geometry, on frames of a source of its own.
@@ -357,8 +363,12 @@ def connect_traffic(
 ) -> None:
     """Connects a LiDAR to traffic, so that it labels moving bodies as such.
 
-    Its port `frame_poses` may be connected already. If traffic goes on during
-    its turn, the LiDAR has the `moving_frames` of `traffic` as `moving_bodies`.
+    Args:
+        builder: builder of a diagram with both systems.
+        traffic: system that moves the traffic.
+        lidar: LiDAR, whose port `frame_poses` may be connected already.
+        goes_on: whether bodies keep moving during a turn of the LiDAR. Its
+            `moving_bodies` must then be the `moving_frames` of `traffic`.
     """
     for name in ("moving_instances", "frame_poses", "body_spatial_velocities"):
         if goes_on or name != "body_spatial_velocities":

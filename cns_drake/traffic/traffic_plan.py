@@ -343,10 +343,10 @@ EgoPath = Callable[[np.ndarray], tuple[np.ndarray, np.ndarray]]
 class Tracks:
     """N bodies with D coordinates each, known at evenly spaced times.
 
-    Between two of these times every coordinate is a cubic polynomial, whose
-    rate is continuous (Catmull and Rom's spline). Where a body's time begins or
-    ends, it is a parabola, and beyond the first and the last time of all a
-    straight line.
+    Between two of these times, every coordinate is a cubic polynomial with a
+    continuous rate (Catmull and Rom's spline). In the first and the last
+    interval of a body it is a parabola. Before the first and after the last
+    time of all bodies it is a straight line.
 
     Attributes:
         dt: distance of the times [s].
@@ -422,14 +422,14 @@ class TrafficPlan:
     """The planned motion of vehicles and walkers.
 
     Attributes:
-        kinds: N of them, one for each vehicle.
+        kinds: kind of each of the N vehicles.
         vehicles: x, y, z of the middle of each box on the ground [m], yaw and
             pitch [rad].
         walkers: x, y, z on the ground [m], yaw and phase of the gait [rad].
         left_out: number of wanted bodies left out because they would collide.
         positions: places of the ego car on its path at each `KNOT_PERIOD` [m],
             if it was one of the vehicles.
-        notes: for the user.
+        notes: notes for the user.
     """
 
     kinds: tuple[VehicleKind, ...]
@@ -488,7 +488,7 @@ def plan_traffic(
             others.
         ego: motion of the ego car; at its first place if it follows others.
         ego_box: size of the ego car.
-        drive: its path and speeds if it follows others, else None.
+        drive: path and speeds of the ego car if it follows others, else None.
     """
     # Traffic goes on after the drive, for a LiDAR that is turning then.
     num_steps = _FIRST + int(np.ceil(duration / STEP)) + 4
@@ -686,7 +686,8 @@ def _at_half_steps(values: np.ndarray) -> np.ndarray:
 def whom_to_leave_out(overlaps: np.ndarray, kept: int) -> list[int]:
     """Returns the bodies to remove until none overlap, the most involved first.
 
-    Which ones overlap is a symmetric (N, N) bool. The first ones are kept.
+    A symmetric matrix (N, N) bool says which bodies overlap. The first bodies
+    are kept.
     """
     overlaps = overlaps.copy()
     out: list[int] = []

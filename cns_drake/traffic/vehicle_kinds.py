@@ -25,7 +25,7 @@ class VehicleKind:
             rider included [m].
         axles: x of the rear and front axle from the middle of the box [m].
         speed_factor: speed on a free road, as a part of the limit.
-        top_speed: its greatest speed [m/s].
+        top_speed: greatest speed of the kind [m/s].
         acceleration: a_max of the model [m/s^2].
         deceleration: b of the model, the comfortable one [m/s^2].
         headway: T of the model [s].

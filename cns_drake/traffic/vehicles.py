@@ -128,9 +128,9 @@ CROSSING = np.dtype(
 class Traffic(NamedTuple):
     """Vehicles and crossings while they are simulated.
 
-    There are (N,) cars `VEHICLE`, (C,) crossings `CROSSING`, and (P,) `head`:
-    the first one of the `_ENTRY` of what is on each piece, -1 for none; see
-    `find_occupants`. The seed is that of the drawn ways.
+    There are (N,) cars `VEHICLE` and (C,) crossings `CROSSING`. `head` (P,) is
+    the first `_ENTRY` in the list of vehicles on each piece, -1 for none; see
+    `find_occupants`. The seed is that of the draws of ways.
     """
 
     streets: Streets
@@ -181,8 +181,8 @@ def place_vehicles(
     """Puts vehicles of N kinds into lanes, away from the ego car's first place.
 
     Returns:
-        Records `VEHICLE`, and the numbers of the kinds for whose vehicles a
-        place was found.
+        Records `VEHICLE` of the vehicles for which a place was found, and the
+        numbers of their kinds.
     """
     free = np.flatnonzero(~streets.pieces["is_way"])
     lengths = streets.pieces["length"]
@@ -389,7 +389,7 @@ def interaction(car: Any, gap: float, approach: float) -> float:
 def is_walked(traffic: Traffic, c: int, way: int, is_large: bool) -> bool:
     """Returns whether walkers on the c-th crossing have yet to pass a way.
 
-    They pass a vehicle on it, small or large.
+    The size of the vehicle on the way, small or large, is taken into account.
     """
     one, place = traffic.crossings[c], traffic.streets.over[way, c]
     passed = _PASSED[int(is_large)]
@@ -426,16 +426,17 @@ def lane_over(streets: Streets, car: Any, c: int) -> tuple[int, float, float]:
 def find_prior(traffic: Traffic, i: int) -> tuple[float, float, float]:
     """Returns what the i-th vehicle has to wait for on the way it holds.
 
-    It stops before a crossing that walkers use, in lanes as well, and before
-    the place where its way meets that of a vehicle that got its way earlier and
-    has not yet passed the place. Where both leave one lane or enter one, it
-    follows the other.
-    Thus vehicles wait only for those with a lower `order`, the first for none,
-    and never for ever.
+    It stops before a crossing that walkers use, in lanes as well. It also stops
+    before the place where its way meets the way of a vehicle that got its way
+    earlier and has not yet passed the place. Where both vehicles leave or enter
+    the same lane, it follows the other one. Vehicles thus wait only for
+    vehicles with a lower `order`, and the first waits for none. No vehicle
+    waits for ever.
 
     Returns:
-        The distance to the place where it has to stop, inf for none [m]; gap to
-        one it follows, inf for none [m], and its speed.
+        The distance to the place where the vehicle has to stop, inf for none
+        [m]; the gap to a vehicle that it follows, inf for none [m]; and the
+        speed of that vehicle.
     """
     line, gap, speed = np.inf, np.inf, 0.0
     streets, cars, crossings = traffic.streets, traffic.cars, traffic.crossings
@@ -672,8 +673,8 @@ def advance(traffic: Traffic, accelerations: np.ndarray) -> None:
 def choose_way(traffic: Traffic, i: int) -> None:
     """Draws the next way of the i-th vehicle, which is in a lane.
 
-    It draws two, and takes the one that leads to the emptier lane: no street
-    stays empty while vehicles queue in others.
+    It draws two ways, and takes the one that leads to the emptier lane, so that
+    no street stays empty while vehicles queue in others.
     """
     streets, cars = traffic.streets, traffic.cars
     car = cars[i]

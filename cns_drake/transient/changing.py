@@ -68,9 +68,10 @@ class Bay:
     """The room of a parked car, which overlaps no other bay.
 
     Attributes:
-        middle: (2,) of the car [m].
+        middle: (2,) middle of the car [m].
         yaw: heading of its long axis [rad].
-        reach: (4,) of the bay from there: front, back, left, right [m].
+        reach: (4,) distance from there to the front, back, left and right end
+            of the bay [m].
     """
 
     def __init__(self, car: Structure):

@@ -73,7 +73,7 @@ class SceneEditing:
         self._notes: list[str] = []
 
     def note(self, text: str) -> None:
-        """Keeps a note for the user on the changes."""
+        """Stores a note for the user on the changes."""
         self._notes.append(f"transient: {text}")
 
     def blame(self, structure: str, cause: str) -> None:

@@ -102,7 +102,7 @@ class Structure:
 
     @cached_property
     def outline(self) -> BaseGeometry:
-        """The convex hull of all of it, seen from above [m]."""
+        """The convex hull of the whole structure, seen from above [m]."""
         return _hull(self.p_WPs)
 
     @cached_property
@@ -248,8 +248,8 @@ class GroundSurface:
     ) -> np.ndarray:
         """Returns the heights of the ground at (N, 2) places; NaN without any.
 
-        They are those of carriageways, or of all other ground; with None, of
-        whichever is higher [m].
+        These are heights of carriageways, or of all other ground; with None,
+        the higher of both [m].
         """
         kinds = (False, True) if of_road is None else (of_road,)
         found = np.max([self._sides[k].heights(xy) for k in kinds], axis=0)

@@ -69,24 +69,24 @@ class AlignmentReport:
 
     Attributes:
         held: name of the drive that gives the world.
-        moved: name of the other.
-        frames: names of the original worlds of both.
+        moved: name of the other drive.
+        frames: names of the original world frames of both drives.
         guess: source of the first guess.
         candidates: pairs of places that look alike; None if not needed.
         attempts: registrations tried.
         loops: registrations that fit.
         inliers: loops that agree with the result.
-        distance_median: between inliers and result [m].
-        distance_95: 95 % of the inliers are nearer [m].
-        angle_median_deg: between inliers and result.
+        distance_median: median distance between inliers and result [m].
+        distance_95: distance below which 95 % of the inliers lie [m].
+        angle_median_deg: median angle between inliers and result [deg].
         model: "anchor" for one rigid pose, "pose graph" for a bent drive.
         move: move of the source's middle frame, along x, y, z [m].
         turn_deg: turn of that frame about the vertical.
-        bend: greatest difference of another frame's move from the middle one's
-            [m].
-        straightened: disagreement of the drives with themselves before they
-            were straightened: upper quartile over their loops [m]; 0 if not
-            needed.
+        bend: greatest difference between the move of a frame and that of the
+            middle frame [m].
+        straightened: how much the drives disagreed with themselves before they
+            were straightened, as the upper quartile over their loops [m]; 0 if
+            they were not straightened.
         ground: height that was subtracted from both [m].
     """
 
@@ -131,7 +131,7 @@ class Alignment:
     Attributes:
         first, second: the drives in the given order; either may have been
             moved.
-        report: on the alignment.
+        report: report on the alignment.
     """
 
     first: Drive
@@ -158,8 +158,7 @@ def in_one_world(
         when: `auto` aligns drives whose world frames differ by name; `always`,
             `never`.
         track: reports progress.
-        hold_first: whether the first drive must stay where it is, as of
-            `align`.
+        hold_first: whether the first drive must stay where it is, see `align`.
         across_maps: whether the drives may be of maps of different names.
 
     Raises:
@@ -183,12 +182,11 @@ def align(
     """Moves one of two drives into the world of the other.
 
     Args:
-        first: a drive. It is held, unless it has drifted more than the
-            other.
-        second: another one.
+        first: a drive, which is held unless it has drifted more than the other.
+        second: another drive.
         track: reports progress.
-        hold_first: hold the first one in any case, without any change, since
-            others are aligned to it already.
+        hold_first: whether to hold the first drive in any case, without any
+            change, because other drives are already aligned to it.
 
     Raises:
         InputError: if the two have too little in common, or a scan cannot
@@ -374,13 +372,13 @@ def _motion(X_WS: np.ndarray, X_TS: np.ndarray) -> dict:
 
 
 def make_consistent(drive: Drive, track: Track) -> tuple[Submaps, float]:
-    """Returns a drive's submaps with poses that agree where it passes again.
+    """Returns a drive's submaps, corrected where it passes a place again.
 
-    They agree at places that the drive passes more than once.
+    The corrected poses agree at places that the drive passes more than once.
 
     Returns:
-        The drive, with new poses if it had drifted; its disagreement with
-        itself before, see `AlignmentReport`.
+        The drive, with new poses if it had drifted; and how much it disagreed
+        with itself before, see `AlignmentReport`.
 
     Raises:
         InputError: if a scan cannot be read.

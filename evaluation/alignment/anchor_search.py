@@ -61,9 +61,9 @@ class Ties:
         i: (M,) index of the first pose.
         j: (M,) index of the second pose.
         Z: (M, 4, 4).
-        covariance: (M, 6, 6) of a small motion of Z from the left: turn
-            [rad], then move [m].
-        is_doubtful: whether they may be wrong.
+        covariance: (M, 6, 6) covariance of a small motion of Z from the left:
+            turn [rad], then move [m].
+        is_doubtful: whether the ties may be wrong.
     """
 
     i: np.ndarray
@@ -91,9 +91,9 @@ def optimise(
     are believed.
 
     Args:
-        V: (N, 4, 4) start.
-        all_ties: the ties; together they must hold every pose.
-        num_held: how many of the poses stay, the last ones.
+        V: (N, 4, 4) poses from which the optimisation starts.
+        all_ties: the ties, which together must determine every pose.
+        num_held: how many poses stay as they are; these are the last ones.
     """
     information = [np.linalg.inv(ties.covariance) for ties in all_ties]
     V, free = V.copy(), slice(0, len(V) - num_held)
@@ -162,10 +162,10 @@ class Candidates:
     Attributes:
         source: (M,) keyframes of the source.
         target: (M,) keyframes of the target.
-        p_S: (M, 3) position of the former in the source's world [m].
-        p_T: (M, 3) position of the latter in the target's world [m].
-        turn: (M,) about the vertical, from the source's world to the
-            target's, that makes them look alike [rad].
+        p_S: (M, 3) position of the first keyframe in the source's world [m].
+        p_T: (M, 3) position of the second keyframe in the target's world [m].
+        turn: (M,) angle about the vertical, from the source's world to the
+            target's, at which both look alike [rad].
     """
 
     source: np.ndarray
@@ -180,7 +180,7 @@ class Guess:
     """A pose of the source's world in the target's.
 
     Attributes:
-        X_TS: (4, 4), upright.
+        X_TS: (4, 4) pose, whose z axis is vertical.
         pairs: indices of the candidates that agree.
     """
 
@@ -385,7 +385,8 @@ def fit_bent(
 def straighten(loops: list[Loop], drive: Submaps) -> np.ndarray:
     """Returns poses X_WK (K, 4, 4) of a drive that agree with its loops.
 
-    Its last keyframe stays, and then all are moved so that the first does.
+    The last keyframe is held meanwhile. All poses are then moved so that the
+    first keyframe is where it was.
     """
     X_WK = drive.X_WK
     V = optimise(X_WK, [_loop_ties(loops), _drive_ties(drive)], num_held=1)

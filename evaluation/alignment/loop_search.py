@@ -30,13 +30,14 @@ _ANOTHER_GUESS = 1.0
 
 @dataclass(frozen=True)
 class Loop:
-    """A keyframe of a source registered to one of a target.
+    """A keyframe of a source drive, registered to one of a target drive.
 
     Attributes:
         source: keyframe K of the source.
         target: keyframe L of the target.
-        X_LK: (4, 4).
-        covariance: (6, 6) of a small motion of K in L: turn [rad], move [m].
+        X_LK: (4, 4) pose of K in L.
+        covariance: (6, 6) covariance of a small motion of K in L: turn [rad],
+            move [m].
     """
 
     source: int
@@ -80,7 +81,7 @@ def loop_errors(
     """Returns how much poses disagree with loops.
 
     Args:
-        loops: M of them.
+        loops: the M loops.
         X_WL: poses (L, 4, 4) of the target's keyframes.
         X_WK: poses (K, 4, 4) of the source's keyframes.
 
@@ -106,9 +107,9 @@ class LoopSearch:
     Attributes:
         source: drive of the keyframes K to register.
         target: drive of the keyframes L.
-        loops: by keyframe of the source, one each.
+        loops: keyframe of the source -> its loop.
         tried: guess X_TK from which each keyframe was registered last.
-        num_attempts: registrations tried.
+        num_attempts: number of registrations that were tried.
     """
 
     source: Submaps
@@ -206,7 +207,7 @@ class LoopSearch:
 def find_self_loops(drive: Submaps, most: int, track: Track) -> list[Loop]:
     """Registers a drive's keyframes to its earlier ones at the same place.
 
-    At most a number of them are tried, evenly along the drive.
+    If there are too many, only some are tried, evenly along the drive.
     """
     pairs = []
     for k in range(len(drive)):

@@ -40,10 +40,10 @@ class Surface:
     """Points on surfaces.
 
     Attributes:
-        points: (N, 3) [m].
-        normals: (N, 3) of unit length, with either sign.
-        cloud: small_gicp's cloud of them.
-        tree: its search tree.
+        points: (N, 3) points [m].
+        normals: (N, 3) unit normals, of either sign.
+        cloud: the points as a cloud of small_gicp.
+        tree: search tree of this cloud.
     """
 
     points: np.ndarray
@@ -76,12 +76,13 @@ class Registration:
 
     Attributes:
         X_TS: (4, 4).
-        fitness: part of the points that have a counterpart, of S or of T,
-            the greater of both: one cloud may show many things that were built
-            or torn down in between.
-        structure: the same of upright points only, since flat ground fits
+        fitness: part of the points of one cloud that have a counterpart in the
+            other: the greater part of both, since one cloud may show many
+            things that were built or torn down in between.
+        structure: the same part for upright points only, since flat ground fits
             nearly everywhere.
-        covariance: (6, 6) of a small motion of S in T: turn [rad], move [m].
+        covariance: (6, 6) covariance of a small motion of S in T: turn [rad],
+            move [m].
     """
 
     X_TS: np.ndarray
@@ -120,9 +121,9 @@ def register(
     """Returns the motion that registers a cloud to another, and its quality.
 
     Args:
-        source: S.
-        target: T.
-        guess: (4, 4) X_TS, right within some metres and degrees.
+        source: the cloud S.
+        target: the cloud T.
+        guess: (4, 4) guess of X_TS, right within some metres and degrees.
     """
     X = np.array(guess, dtype=np.float64)
     for limit, number in _STAGES:

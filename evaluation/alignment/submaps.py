@@ -39,7 +39,7 @@ class Submaps:
         X_WS: (N, 4, 4) poses of its frames.
         travelled: (N,) length of the path so far [m].
         frames: (K,) keyframes.
-        X_WK: (K, 4, 4) their poses.
+        X_WK: (K, 4, 4) poses of the keyframes.
     """
 
     def __init__(self, drive: Drive):

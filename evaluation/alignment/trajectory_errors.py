@@ -136,13 +136,13 @@ def trajectory_errors(
     Args:
         drive: drive with the true poses.
         estimate: poses of the frame in any world.
-        frame: the frame whose poses are estimated: that of the LiDAR, or the
-            vehicle's.
+        frame: the frame whose poses are estimated: that of the LiDAR or that of
+            the vehicle.
         time_offset: time to add to the estimate's [s].
 
     Raises:
-        InputError: if the drive has no such poses or the two have fewer than
-            three times in common.
+        InputError: if the drive has no such poses, or if fewer than three of
+            the estimate's times lie within the drive.
     """
     truth = _true_poses(drive, frame)
     if not abs(time_offset) <= 1e9:
@@ -195,8 +195,8 @@ def segment_errors(
         Y: (N, 4, 4) estimated ones, in any world.
 
     Returns:
-        (K,) first and (K,) last poses of the parts; (K, 4, 4) poses of the
-        true end seen from the estimated one.
+        (K,) index of the first and (K,) of the last pose of each part of 100 m;
+        and (K, 4, 4) pose of its true end, seen from the estimated end.
     """
     along = travelled(X[:, :3, 3])
     starts = np.arange(0, len(X), _STEP)

@@ -53,9 +53,9 @@ class Surveyed:
         name: name of the drive or file.
         voxels: the map in cells of `CELL_SIZE`, of which the voxels of the
             TCR are made, on any grid.
-        positions: (N, 3) of the sensor [m]; None for a map file.
+        positions: (N, 3) positions of the sensor [m]; None for a map file.
         drive: the drive, or its world frame and map; None for a map file.
-        notes: notes on how it was read.
+        notes: notes on how the drive or the file was read.
     """
 
     name: str
@@ -72,14 +72,14 @@ class ChangeReport:
     Attributes:
         source: name of A.
         target: name of B.
-        change: over the whole maps.
+        change: change over the whole maps.
         spread: least and greatest TCR_sym on this grid and on `GRIDS`.
-        masked: over the parts that both drives passed within the coverage
-            radius; None if a map has no drive.
-        control: between two drives on the two routes in one stage; None if
-            none was given.
-        control_names: the two that `control` compares.
-        alignment: alignment of the two; None if they had one world.
+        masked: change over the parts that both drives passed within the
+            coverage radius; None if a map has no drive.
+        control: change between two drives on the two routes in one stage; None
+            if no control was given.
+        control_names: names of the two drives that `control` compares.
+        alignment: alignment of A and B; None if they were in one world.
     """
 
     source: str
@@ -208,12 +208,12 @@ def compare(
     """Returns the change between two maps.
 
     Args:
-        source: A.
-        target: B.
+        source: the map A.
+        target: the map B.
         control: a drive on A's route in B's stage, or on B's route in A's
-            stage. Its route shows which one. It is compared with the drive of
-            its own stage: these two have the routes of A and B in one stage.
-        alignment: alignment of the two, for the report.
+            stage; its route shows which. It is compared with the drive of its
+            own stage, so that both routes are compared in one stage.
+        alignment: alignment of A and B, for the report.
         grids: shifts of the grid [m] whose values make the spread.
 
     Raises:

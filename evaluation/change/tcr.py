@@ -61,7 +61,7 @@ def in_convex_hull(
     Args:
         points: (N, 3) float64.
         vertices: (M, 3) float64, the points whose hull it is.
-        margin: by which each face of the hull is moved outwards [m].
+        margin: distance by which each face of the hull is moved outwards [m].
 
     Returns:
         (N,) bool; all false if there are no vertices.
@@ -129,7 +129,7 @@ class DirectedChange:
 
     Attributes:
         in_hull: (N,) bool, the set H: source points in the target's hull.
-        unchanged: (N,) bool, the set O: those of them that have a target
+        unchanged: (N,) bool, the set O: the points of H that have a target
             point within tau.
         distances: (N,) distance to the nearest target point [m]; infinite
             if there is none.
@@ -240,7 +240,7 @@ def temporal_change(
         source: (N, 3) float64 voxel centroids, in the frame of both [m].
         target: (M, 3) float64.
         tau: distance up to which a point is unchanged, inclusive [m].
-        margin: of the hulls, see `in_convex_hull` [m].
+        margin: margin of the hulls, see `in_convex_hull` [m].
         restrict_to_hull: whether O is counted inside H. False is the literal
             equation 2, under which values may be negative.
 

@@ -43,11 +43,11 @@ _NAMES = ("x", "y", "z", "intensity")
 
 @dataclass(frozen=True)
 class BinLayout:
-    """What a point of a `.bin` file is.
+    """The layout of the points in a `.bin` file.
 
     Attributes:
-        columns: number of float32 of a point.
-        note: what the user should know about how it was found; may be empty.
+        columns: number of float32 values per point.
+        note: note for the user on how the layout was found; it may be empty.
     """
 
     columns: int

@@ -382,7 +382,8 @@ def compare(
         tables: Tables of results, or folders with a results.csv.
         metric: Name of the metric to rank by, as in the tables.
         protocol: Protocol whose rows to compare; by default all protocols.
-        gate: Compare results with --gate instead of those without.
+        gate: Compare the results that were measured with the gate, instead of
+            those without it.
         rankings: Compare only the rankings, each over its own conditions, such
             as those of simulated and of real drives.
     """

@@ -91,7 +91,7 @@ def map_sessions(
     lidar: LidarName = None,
     columns: Columns = None,
 ) -> None:
-    """Make maps of two recorded drives, without labels.
+    """Make unlabelled maps of two recorded drives.
 
     Writes the maps, scans and poses that cns-drake map-truth writes, but no
     labels. Use it for drives whose world is unknown, such as real ones. Both

@@ -43,7 +43,7 @@ _ORIGIN = (620_000.0, 4_845_000.0, 0.0)
 
 
 class BoreasDrive(FileDrive):
-    """A drive of Boreas, its Alpha Prime."""
+    """The scans of the Alpha Prime on a drive of Boreas."""
 
     def __init__(self, path: Path, columns: int | None = None):
         """Opens a drive; its files have columns of their own.

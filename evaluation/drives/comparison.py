@@ -83,9 +83,10 @@ class DriveComparison:
         wander_length: distance along A at which the correlation of the offset
             in the same lane has fallen to 1/e [m].
         heading_spread_deg, heading_5_deg, heading_95_deg: standard deviation
-            and quantiles of B's heading in A's, in the same direction [deg].
-        height_5, height_95: quantiles of B's height above A's, from its median
-            [m].
+            and quantiles of B's heading relative to A's, in the same direction
+            [deg].
+        height_5, height_95: quantiles of B's height above A's, relative to the
+            median of this height [m].
         reverse_25, reverse_50, reverse_75, reverse_95: quantiles of the
             absolute offset where B goes in the opposite direction only [m].
     """
@@ -144,7 +145,7 @@ class _Way:
     tangent: np.ndarray
 
     def stops(self) -> np.ndarray:
-        """Returns the numbers of the steps at which a stop is."""
+        """Returns the indices of the path's steps that are stops."""
         return np.arange(0, len(self.p_WS), round(STOP_SPACING / _PATH_SPACING))
 
 

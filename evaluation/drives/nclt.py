@@ -51,11 +51,12 @@ _X_BS = poses.make_pose(
 
 
 class NcltDrive(FileDrive):
-    """A session of NCLT, its HDL-32E.
+    """The scans of the HDL-32E in a session of NCLT.
 
-    The unit hangs upside down, and looks up to 30.67 deg. The motion during a
-    turn is undone in the files. Rings count upwards; the lasers' numbers do
-    not: high and low ones take turns.
+    The unit hangs upside down, and its field of view reaches up to 30.67 deg.
+    The files contain scans from which the motion during a turn has been
+    removed. Rings are numbered upwards, unlike lasers, whose numbers alternate
+    between high and low ones.
     """
 
     def __init__(self, path: Path, columns: int | None = None):

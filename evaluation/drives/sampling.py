@@ -25,9 +25,9 @@ _LEAST_SPACING = 1e-6
 
 @dataclass(frozen=True, eq=False)
 class QuerySensor:
-    """A sensor Q that sees a query otherwise than the recorded sensor S.
+    """A sensor Q that replaces the recorded sensor S in a query.
 
-    Both are at one position.
+    Both are at the same position.
 
     Attributes:
         X_SQ: (4, 4) a rotation; None if Q is not turned.
@@ -50,14 +50,14 @@ class QuerySensor:
     ) -> QuerySensor:
         """Draws how a query is turned, tilted and hidden.
 
-        All drives have the same draw at a frame, so that a query of a drive and
-        the same query of its control are turned alike. Each effect has the same
-        draw with the others as without.
+        The draw at a frame is the same for all drives, so that a query of a
+        drive and the same query of its control are turned alike. The draw of
+        each effect does not depend on whether the other effects are used.
 
         Args:
-            seed: seed of the drawing.
+            seed: seed of the draws.
             frame: frame of the query.
-            turns: whether it has any yaw.
+            turns: whether the query gets a random yaw.
             tilt_deg: greatest roll, and greatest pitch [deg].
             hidden_deg: angle of the hidden sector [deg].
         """
@@ -177,8 +177,9 @@ def cropped(
 ) -> np.ndarray:
     """Returns the points of a scan that are finite and within range.
 
-    Each product and each sum is rounded, as on every processor: a matrix
-    product would be rounded as the processor likes.
+    Products and sums are computed one by one, since these are rounded in the
+    same way on every processor. The rounding of a matrix product depends on the
+    processor.
 
     Args:
         scan: structured array (N,) in the frame S of a sensor.

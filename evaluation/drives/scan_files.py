@@ -234,7 +234,7 @@ def read_packed(path: Path, dtype: np.dtype) -> np.ndarray:
 def check_below(points: np.ndarray, name: str, limit: int) -> None:
     """Raises an error for points whose field exceeds a sensor's limit.
 
-    It tells files of two sensors apart.
+    This check notices files of another sensor.
 
     Raises:
         ValueError: if `points[name]` reaches `limit`.

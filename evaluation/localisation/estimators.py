@@ -63,7 +63,7 @@ class Settings:
 
     Attributes:
         voxel: side of the voxels to which the map is thinned [m].
-        scan_voxel: that of a scan [m].
+        scan_voxel: side of the voxels to which a scan is thinned [m].
         width: greatest distance of a pair of points [m]. VGICP pairs a point
             with the Gaussian of its own voxel at any distance.
         last_width: width of a second alignment from the end of the first [m];
@@ -118,7 +118,7 @@ class LocalisationMap:
     """A map to be localised in.
 
     Attributes:
-        name: name of its drive or file.
+        name: name of the drive or file from which it was made.
         surface: the thinned points in W, with normals and covariances.
     """
 
@@ -146,7 +146,7 @@ class LocalisationMap:
         return self.surface.points[within_range(offsets, distance)]
 
     def distances(self, points_W: np.ndarray) -> np.ndarray:
-        """Returns the distance (N,) of each point to the nearest one [m]."""
+        """Returns each point's distance (N,) to the nearest map point [m]."""
         _, squares = self.surface.tree.batch_nearest_neighbor_search(points_W)
         return np.sqrt(np.asarray(squares))
 
@@ -173,7 +173,7 @@ def make_map(
 
     Args:
         source: the drive, or the cloud's file.
-        settings: those for thinning, and for the surface.
+        settings: settings for thinning, and for the surface.
         track: reports progress.
         columns: see `read_cloud`, for a cloud's file.
         on_note: likewise.
@@ -222,9 +222,9 @@ class Estimate:
     """The end of one alignment.
 
     Attributes:
-        X_WS: (4, 4); None if the estimator found no pose.
-        score: the estimator's own score, higher for a better end; None for the
-            share of the scan that fits.
+        X_WS: (4, 4) pose; None if the estimator found none.
+        score: the estimator's own score, higher for a better result; None if
+            the share of the scan that fits is to be the score.
         iterations: number of steps; 0 if unknown.
     """
 
@@ -245,13 +245,13 @@ class Fit:
     """The fit of a scan at a pose.
 
     Attributes:
-        share: share of its points that lie on a surface of the map.
-        residual: root mean square of the distances of pairs off their planes
-            [m]; NaN without a pair.
-        covariance: (6, 6) of a small motion about the LiDAR, in axes of W:
-            turn [rad], move [m]. It is the inverse of the Hessian of point to
-            plane, less what the noise of normals adds to it, times the square
-            of the residual.
+        share: share of the scan's points that lie on a surface of the map.
+        residual: root mean square distance of points from the planes with which
+            they are paired [m]; NaN without a pair.
+        covariance: (6, 6) covariance of a small motion about the LiDAR, in axes
+            of W: turn [rad], move [m]. The Hessian of point to plane is reduced
+            by what the noise of normals adds to it; the covariance is the
+            inverse of this Hessian, times the square of the residual.
     """
 
     share: float
@@ -454,8 +454,8 @@ def make_estimator(method: str, settings: Settings) -> Estimator:
 
     Args:
         method: one of `METHODS`, or the name of a Python file.
-        settings: settings of a shipped method; an own one has those of its
-            file.
+        settings: settings of a shipped method. The file of an own method
+            contains its settings.
 
     Raises:
         InputError: if there is no such method, its package is not installed,

@@ -196,7 +196,8 @@ def way_axes(p_WS: np.ndarray, X_WS: np.ndarray) -> np.ndarray:
 
     Args:
         p_WS: (N, 3) positions of a drive [m].
-        X_WS: (N, 4, 4) its poses; where it stands, x of S counts as along.
+        X_WS: (N, 4, 4) poses of the drive. Where it stands, the x axis of S
+            counts as the direction of the path.
     """
     along = np.zeros_like(p_WS)
     if len(p_WS) > 1:
@@ -219,7 +220,7 @@ class Localiser:
     Attributes:
         surroundings: the map.
         estimator: see `make_estimator`.
-        settings: those for thinning scans.
+        settings: settings for thinning scans.
     """
 
     surroundings: LocalisationMap
@@ -243,14 +244,14 @@ class Localiser:
             frame: number of the scan.
             stamp_ns: time of the scan [ns].
             scan: structured array, in S.
-            X_WS: the truth.
+            X_WS: the true pose.
             R_WT: see `way_axes`.
-            offset: (3,) of the start in W [m].
-            turn: (3,) of the start in S [rad].
-            X_WS0: another start than these two give.
+            offset: (3,) offset of the start in W [m].
+            turn: (3,) turn of the start in S [rad].
+            X_WS0: the start, if `offset` and `turn` do not determine it.
 
         Returns:
-            A record of `QUERY`; the end X_WS or None.
+            A record of `QUERY`; the estimated X_WS, or None.
 
         Raises:
             InputError: if the scan has hardly a point.
@@ -377,7 +378,7 @@ class Localisation:
 
     @property
     def believed_from(self) -> float:
-        """Score that 95 % of the right results reach; NaN without any."""
+        """Score that 95 % of the right results reach; NaN if none is right."""
         scores = self.rows["own_score"][is_right(self.rows)]
         if len(scores) == 0:
             return math.nan

@@ -45,12 +45,12 @@ def align_robustly(
         start: X_WS (4, 4).
         widths: greatest distance of a pair at first, and in the end [m].
         iterations: greatest number of steps of each alignment.
-        still: an alignment ends with a step below these [m, rad].
-        covariances: (N, 3, 3) of the scan's points in S, for GICP; None for
-            point to plane.
+        still: move and turn below which a step ends an alignment [m, rad].
+        covariances: (N, 3, 3) covariances of the scan's points in S, for GICP;
+            None for point to plane.
 
     Returns:
-        The end X_WS; the number of steps.
+        The estimated X_WS, and the number of steps.
     """
     X, width, total = start.copy(), widths[0], 0
     while True:

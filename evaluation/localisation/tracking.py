@@ -45,14 +45,14 @@ def drifting_steps(
 ) -> np.ndarray:
     """Returns the motion between poses as a drifting odometry measures it.
 
-    In each 100 m of way the lengths are wrong by one factor, and the heading
-    turns with the way at one rate: both normal, with deviations of `drift` and
-    of `drift` deg for each metre.
+    In each 100 m of way, all lengths are wrong by one factor, and the heading
+    drifts at one rate. The errors of both are drawn from normal distributions,
+    with standard deviations of `drift` and of `drift` deg per metre.
 
     Args:
         X_WS: (N, 4, 4) true poses.
         way: (N,) length of the way up to each [m].
-        drift: share of the way; 0 for none.
+        drift: drift as a share of the way; 0 for none.
         seed: seed of the draw.
 
     Returns:
@@ -96,8 +96,9 @@ def track_drive(
         track: reports progress.
 
     Returns:
-        (K,) of `TRACKED`: of `QUERY`, and before it the number of the stretch,
-        the way from the drive's first scan and from the scan before [m].
+        (K,) records of `TRACKED`. Before the fields of `QUERY`, each contains
+        the number of the stretch, the way from the drive's first scan, and the
+        way from the scan before [m].
 
     Raises:
         InputError: if a scan cannot be read, or has hardly a point.

@@ -55,9 +55,10 @@ MOVES = (*range(252, 260), 10, 11, 13, 15, 18, 20, 30, 31, 32)
 
 
 class Label(IntEnum):
-    """What became of a point; A's are 0, 1, 2 and B's are 1, 3, 4.
+    """What became of a point.
 
-    IGNORED is for labels that a user brings: the point is left out of scores.
+    Points of A have the labels 0, 1 and 2; points of B have 1, 3 and 4. IGNORED
+    occurs only in labels from a user: such a point is left out of scores.
     """
 
     UNOBSERVED = 0
@@ -77,14 +78,14 @@ SIDES = {
 
 @dataclass(frozen=True)
 class Session:
-    """One of both drives.
+    """One of the two drives, with its map.
 
     Attributes:
-        folder: folder of its files.
-        points: (N, 3) its map in the world [m].
+        folder: folder of the session's files.
+        points: (N, 3) points of the map in the world [m].
         classes: (N,) uint16, SemanticKITTI's ids; 0 if unknown.
         instances: (N,) uint16, number of a structure; 0 for none.
-        X_WS: (K, 4, 4) poses of its scans; (0, 4, 4) if unknown.
+        X_WS: (K, 4, 4) poses of the scans; (0, 4, 4) if unknown.
     """
 
     folder: Path
@@ -241,8 +242,8 @@ def read_labels(path: Path, session: Session, *, truth: bool) -> np.ndarray:
     Args:
         path: an array `.npy` of integers, or a cloud `.ply` with a property
             `truth`, `change` or `prediction` for each point.
-        session: the labelled one.
-        truth: whether points may be left out, as IGNORED.
+        session: the session to which the labels belong.
+        truth: whether points may be left out, with the label IGNORED.
 
     Returns:
         (N,) uint8.

@@ -16,14 +16,14 @@ class StructureChange:
     """A structure in one of both maps, or in one world alone.
 
     Attributes:
-        side: A or B.
-        instance: its number there.
-        structure: its name; empty if unknown.
-        semantic_class: its class; empty if unknown.
+        side: map in which the structure is, A or B.
+        instance: number of the structure in this map.
+        structure: name of the structure; empty if unknown.
+        semantic_class: class of the structure; empty if unknown.
         label: the class as a number.
-        points: number of its points in the map.
-        observed: how many of them the other drive observed.
-        changed: how many of these are gone, or new.
+        points: number of the structure's points in the map.
+        observed: how many of these points the other drive observed.
+        changed: how many of the observed points are gone, or new.
         verdict: gone (A) or new (B) if most of the observed points are, else
             kept; unobserved or newly_seen without an observed point.
         alone: whether the other drive's world has no structure of this name.
@@ -85,14 +85,15 @@ def write_structures(
 ) -> list[StructureChange]:
     """Writes the table of structures of both maps, and returns its rows.
 
-    A structure that only one world has is there without a point, too.
+    A structure that only one world contains has a row even if no point is on
+    it.
 
     Args:
         path: path of the CSV file.
         pair: both sessions.
-        truth: labels of each.
-        tables: instance -> name and class, of each.
-        present: names of the structures in the world of each.
+        truth: labels of each session.
+        tables: instance -> name and class, for each session.
+        present: names of the structures in the world of each session.
     """
     rows = []
     for session, labels, names, mine, theirs in zip(

@@ -79,7 +79,7 @@ def move(
     larger: np.ndarray,
     larger_sampled: np.ndarray,
 ) -> None:
-    """Moves all voxels of a table into a larger, empty one."""
+    """Moves all voxels of a table into a larger, empty table."""
     for i in range(len(table)):
         if table[i].count != 0:
             slot = _find(larger, table[i].ix, table[i].iy, table[i].iz)
@@ -113,18 +113,19 @@ def enter(
     """Adds points to the voxels of a table.
 
     Args:
-        points: (3, N) in the frame of a sensor [m].
-        number: number of the points to enter, the first ones.
-        X: (4, 4) its pose in the world, which is lifted so that voxels begin at
-            height 0.
+        points: (3, N) points in the frame of a sensor [m].
+        number: how many of the points to enter, beginning with the first.
+        X: (4, 4) pose of the sensor in the world, which is lifted so that
+            voxels begin at height 0.
         voxel_size: length of a voxel's side [m].
         divisions: parts of a voxel's side; 0 for no samples.
-        table: (S,) of `SLOT`, with room for all.
-        size: number of its voxels up to now.
+        table: (S,) slots of type `SLOT`, with room for all voxels.
+        size: number of voxels in the table up to now.
         sampled: (S, B) uint8, a bit for each part of a slot's voxel: whether it
             has a sample.
-        samples: (K, 3) to add to, with room for all, in that world [m].
-        num_samples: number of them up to now.
+        samples: (K, 3) array to which samples are added, with room for all, in
+            the lifted world [m].
+        num_samples: number of samples up to now.
 
     Returns:
         New size and number of samples, and how many points were skipped.
@@ -218,8 +219,8 @@ class VoxelMap:
         A voxel belongs to the larger one that holds its centroid.
 
         Args:
-            voxel_size: length of the larger ones' side [m].
-            shift: of their grid [m].
+            voxel_size: length of a larger voxel's side [m].
+            shift: shift of the grid of larger voxels [m].
         """
         x, y, z = np.add(self.origin_W, shift).tolist()
         origin = x, y, z

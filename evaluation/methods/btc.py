@@ -152,8 +152,8 @@ class BtcDescription:
     """The description of a cloud.
 
     Attributes:
-        planes: patches, one a voxel.
-        triangles: between its keypoints.
+        planes: patches of planes, one for each voxel.
+        triangles: triangles between the keypoints.
     """
 
     planes: Planes
@@ -165,8 +165,8 @@ class BtcDatabase:
     """D places.
 
     Attributes:
-        places: their descriptions.
-        table: the triangles of all.
+        places: descriptions of the places.
+        table: triangles of all places.
     """
 
     places: Sequence[BtcDescription]
@@ -175,7 +175,7 @@ class BtcDatabase:
 
 @register("btc")
 class Btc(Method[BtcDescription, BtcDatabase]):
-    """BTC; the score of a pair is the part of planes that fit.
+    """BTC; the score of a pair is the share of the planes that match.
 
     A place has no score if too few triangles match, or too few of these
     agree on a motion, or no plane fits. The public program's limit on the score
@@ -308,8 +308,8 @@ def align(query: np.ndarray, place: np.ndarray) -> np.ndarray:
     It is Kabsch's solution, without reflections.
 
     Args:
-        query: (..., 3, 3) vertices, one a row [m].
-        place: (..., 3, 3) their partners.
+        query: (..., 3, 3) vertices, one in each row [m].
+        place: (..., 3, 3) the partners of these vertices [m].
 
     Returns:
         (..., 4, 4) X_PQ.

@@ -85,17 +85,18 @@ def base_plane(
 ) -> tuple[np.ndarray, np.ndarray] | None:
     """Returns the largest plane that the patches form; outdoors, the ground.
 
-    Patches that are alike are merged, those without a partner dropped, and
-    the merged ones merged once more, the largest first.
+    Similar patches are merged, and patches without a similar one are dropped.
+    The merged patches are then merged once more, beginning with the largest.
 
     Args:
         planes: patches of the voxels.
-        normal_limit: difference of the normals of patches that are alike.
-        distance_limit: distance of each center from the other's plane [m].
+        normal_limit: greatest difference of the normals of similar patches.
+        distance_limit: greatest distance of each center from the plane of the
+            other patch [m].
 
     Returns:
-        Its center (3,) and normal (3,), pointing up; None without alike
-        patches.
+        Center (3,) and normal (3,) of the plane, pointing up; None if no
+        patches are similar.
     """
     groups = merge(planes, normal_limit, distance_limit, keep_single=False)
     if len(groups) == 0:
@@ -116,10 +117,10 @@ def merge(
     """Returns the planes that similar patches form together.
 
     Args:
-        planes: some of them alike. The groups depend on their order.
+        planes: patches to merge. The groups depend on their order.
         normal_limit: see `base_plane`.
         distance_limit: see `base_plane`.
-        keep_single: keep also patches that are like no other.
+        keep_single: whether to keep patches that are similar to no other.
     """
     labels = group_alike(
         planes.centers, planes.normals, normal_limit, distance_limit
@@ -150,11 +151,11 @@ def group_alike(
     normal_limit: float,
     distance_limit: float,
 ) -> np.ndarray:
-    """Returns the group (P,) of each patch; -1 for one without a like.
+    """Returns the group (P,) of each patch; -1 if no other is similar.
 
-    From the last patch to the first, each is compared with all before it, in
-    their order. If two are alike, one without a group joins that of the other,
-    or both found a new one; two groups never become one.
+    From the last patch to the first, each is compared with all patches before
+    it, in their order. If two are similar and one has a group, the other joins
+    it. If neither has one, both found a new group. Two groups never become one.
 
     Args:
         centers: (P, 3) centres of the patches [m].
@@ -292,10 +293,10 @@ def voxel_order(index: np.ndarray) -> np.ndarray:
 def hash_table_order(codes: np.ndarray) -> np.ndarray:
     """Returns the order (N,) in which a std::unordered_map is iterated.
 
-    The elements are one list, on which those of a bucket follow each other. A
-    new element goes to the front of its bucket, a new bucket to the front of
-    the list. When the number of buckets grows, all elements are put in anew, in
-    the order of the list.
+    All elements form one list, in which the elements of a bucket follow each
+    other. A new element goes to the front of its bucket, and a new bucket to
+    the front of the list. When the number of buckets grows, all elements are
+    inserted anew, in the order of the list.
 
     Args:
         codes: (N,) uint64 hashes of the elements, in the order in which they

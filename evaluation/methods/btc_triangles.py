@@ -65,8 +65,8 @@ class HeightImage(NamedTuple):
 
     Attributes:
         heights: (rows, columns) int64, bit k set if there are points in
-            layer k. At least one more cell than there are points for, up and
-            to the right; a multiple of the segment.
+            layer k. The image exceeds the points by at least one cell up and to
+            the right. Its size is a multiple of the segment.
         means: (rows, columns, 2) mean of the points of a cell, along rows
             and along columns [m]; NaN where there are none.
     """
@@ -78,18 +78,19 @@ class HeightImage(NamedTuple):
 def image_axes(normal: np.ndarray, orthogonal: bool) -> np.ndarray:
     """Returns the directions of an image on a plane, (3, 3) of length 1.
 
-    They are, one a row: along the rows' numbers, along the columns' (which
-    follows the x axis as far as the plane allows), and the normal.
+    The rows of the result are: the direction of increasing row numbers; that of
+    increasing column numbers, which follows the x axis as far as the plane
+    allows; and the normal.
 
     By a wrong term, the second direction of the public program has a
     component along the normal that is the normal's y component. Keypoints
     then lie on a plane through the same center that is tilted by as much:
-    on level ground, about as much as the ground itself. It is followed
-    unless `orthogonal`.
+    on level ground, about as much as the ground itself. This function copies
+    the wrong term unless `orthogonal` is true.
 
     Args:
-        normal: (3,) unit, z >= 0.
-        orthogonal: whether all directions are.
+        normal: (3,) unit normal of the plane, z >= 0.
+        orthogonal: whether to make all directions orthogonal.
     """
     a, b, c = normal
     if orthogonal:
@@ -180,9 +181,10 @@ def peaks(
 ) -> tuple[np.ndarray, np.ndarray]:
     """Returns the cells of an image that stand out and are not on a line.
 
-    There is one per segment: the cell with most heights, the first of equal
-    ones. It is part of a line if in some direction one neighbour is nearly as
-    high and the opposite one at least half as high.
+    Each segment has at most one peak: the cell with the most heights, or the
+    first of several equal ones. A cell is part of a line, and no peak, if in
+    some direction one neighbour is nearly as high and the opposite neighbour is
+    at least half as high.
 
     Args:
         num_heights: (rows, columns) bits set in each cell; multiples of the
@@ -225,8 +227,8 @@ def find_keypoints(
 
     Args:
         image: cloud seen along the normal.
-        center: (3,) with which the image was drawn [m].
-        axes: (3, 3) likewise.
+        center: (3,) center with which the image was drawn [m].
+        axes: (3, 3) axes with which the image was drawn.
         min_heights: number of heights that a keypoint needs.
     """
     cells = peaks(count_bits(image.heights), min_heights)
@@ -239,7 +241,7 @@ def find_keypoints(
 def suppress(keypoints: Keypoints, radius: float, max_number: int) -> Keypoints:
     """Returns the keypoints with more heights than any other nearby.
 
-    If two are equal, neither stays.
+    If two neighbours have equally many heights, both are dropped.
 
     Args:
         keypoints: all keypoints.
@@ -278,8 +280,8 @@ def count_bits(words: np.ndarray) -> np.ndarray:
 class Triangles:
     """Triangles of keypoints.
 
-    The vertices are, in this order: where the two shortest sides meet, where
-    the shortest and the longest meet, where the two longest meet.
+    The vertices have this order: where the two shortest sides meet, where the
+    shortest and the longest side meet, where the two longest sides meet.
 
     Attributes:
         sides: (T, 3) lengths, shortest first [m].
@@ -417,11 +419,11 @@ def match(
 ) -> tuple[np.ndarray, np.ndarray]:
     """Returns the triangles that are similar to those of a query.
 
-    Similar are triangles whose sides differ by little, relative to their length
-    (Euclidean norms of the three), and whose vertices have about the same
-    heights: Dice similarity, mean of the three. Only cells near those of the
-    query are searched, so that large triangles must be more alike than the
-    tolerance requires.
+    Two triangles are similar if their sides differ little in relation to their
+    length (by the Euclidean norms over the three sides), and if their vertices
+    have about the same heights (by the mean Dice similarity of the three). Only
+    cells near those of the query are searched. Large triangles must therefore
+    be more similar than the tolerance requires.
 
     Args:
         query: triangles of one cloud.

@@ -99,8 +99,9 @@ class LayeredScan:
     """Descriptor of one cloud.
 
     Attributes:
-        cells: (M,) uint16, filled cells of the layers, one after the other.
-        starts: (6,) int64, where each begins, and the last one ends.
+        cells: (M,) uint16, filled cells of one layer after the other.
+        starts: (6,) int64, where in `cells` each layer begins, and where the
+            last one ends.
     """
 
     cells: np.ndarray
@@ -112,8 +113,8 @@ class CoarseMaps:
     """Coarse maps of places, or of a query at some headings.
 
     Attributes:
-        bits: (N, R, 4) uint64, R rows of four maps; those of places have more
-            rows without bits on either side.
+        bits: (N, R, 4) uint64, R rows of four maps. Maps of places have
+            additional rows without bits on either side.
         counts: (N, 4) int64 number of bits set in each map.
     """
 
@@ -128,7 +129,7 @@ class LayeredDatabase:
     Attributes:
         places: the D descriptors.
         first: maps of the first search.
-        second: maps of the second and the third.
+        second: maps of the second and the third search.
     """
 
     places: Sequence[LayeredScan]
@@ -140,13 +141,15 @@ class LayeredDatabase:
 class LayeredOverlap(Method[LayeredScan, LayeredDatabase]):
     """Layered overlap, in four searches from coarse to fine.
 
-    The first three take the pose at which most bits coincide, and rank places
-    by the number of standard deviations above chance. The last one climbs from
-    there, cell by cell. The score is the weighted number of the query's cells
-    that meet one of the place or a neighbour of one, over the geometric mean of
-    both scans' numbers.
+    The first three searches find the pose at which most bits coincide. They
+    rank places by how many standard deviations this number of bits lies above
+    chance. The last search improves that pose by hill climbing, cell by cell.
 
-    The first of equal counts wins. All counts are integers, so that scores are
+    The score counts the query's cells that meet a cell of the place or a
+    neighbour of one. This weighted number is divided by the geometric mean of
+    the numbers of cells of both scans.
+
+    Of equal counts, the first wins. All counts are integers, so that scores are
     the same on every processor.
     """
 

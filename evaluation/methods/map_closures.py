@@ -54,14 +54,14 @@ class MapClosuresConfig(MethodConfig):
 
 @dataclass
 class MapClosuresDatabase:
-    """The local maps of a drive, and what the last query has found.
+    """The local maps of a drive, and the places found by the last query.
 
     Attributes:
-        num_places: local maps that queries may find.
-        program: the package's, which keeps all of them.
-        num_queries: number of queries that have joined them.
-        query: the last one.
-        found: place -> inliers and pose X_PQ (4, 4) of the last one.
+        num_places: number of local maps that queries may find.
+        program: object of the package that stores all local maps.
+        num_queries: number of queries that were added to the local maps.
+        query: the last query.
+        found: place -> inliers and pose X_PQ (4, 4) of the last query.
     """
 
     num_places: int

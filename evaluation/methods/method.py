@@ -30,7 +30,9 @@ PlaceScan = Literal["middle", "first"]
 
 
 class MethodConfig(BaseModel):
-    """The parameters that all methods share, and the base of their own.
+    """The parameters that all methods share.
+
+    A method with further parameters derives its own class from this one.
 
     Attributes:
         sensor_height: height of the LiDAR above the ground [m]; by default as

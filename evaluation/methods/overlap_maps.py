@@ -58,14 +58,14 @@ def layer_cells(
 
     Args:
         points: (N, 3) in the frame of the LiDAR [m].
-        sensor_height: above the ground [m].
+        sensor_height: height of the sensor above the ground [m].
         cell: length of a cell [m].
         least_points: number of points that fill a cell.
 
     Returns:
-        (M,) uint16 numbers of cells, layer by layer and increasing in each,
-        and (6,) int64 where each layer begins and the last one ends. Rows
-        are along x, columns along y, with the sensor in the middle.
+        (M,) uint16 numbers of the occupied cells, layer by layer, increasing in
+        each layer; and (6,) int64, where each layer begins and the last one
+        ends. Rows are along x, columns along y, with the sensor in the middle.
     """
     half = 0.5 * GRID * cell
     x, y, z = points.T
@@ -277,10 +277,10 @@ def climb(
 ) -> np.ndarray:
     """Returns the pose at which a query overlaps a place most.
 
-    It climbs from a start. A cell of the query overlaps the place where it
-    meets one of the same layer or a neighbour of one. The best of a pose and
-    its 26 neighbours becomes the next one, until none is better; then steps get
-    smaller.
+    A cell of the query overlaps the place if it meets a cell of the same layer,
+    or a neighbour of one. The search is hill climbing: it moves to the best of
+    the 26 neighbours of a pose until none is better, then continues with
+    smaller steps.
 
     Args:
         cells: (M,) uint16 of the query, see `layer_cells`.
@@ -289,14 +289,14 @@ def climb(
         place_starts: (layers + 1,) likewise.
         weights: (layers,) int64.
         turns: (H, 2) int64 cosines and sines of equal steps of a full turn.
-        start: (3,) int64: which turn, shift along rows and along columns in
-            half cells.
-        steps: (K, 2) int64: of the turn and of the shifts, which are even,
-            coarse to fine.
+        start: (3,) int64: the turn, and the shifts along rows and along columns
+            in half cells, from which the search starts.
+        steps: (K, 2) int64: steps of the turn and of the shifts, from coarse to
+            fine. Those of the shifts are even.
 
     Returns:
-        (3 + layers,) int64: the pose, and the query's cells that meet some
-        of the place, in each layer.
+        (3 + layers,) int64: the pose, and how many of the query's cells overlap
+        the place in each layer.
     """
     # The place's filled cells and their neighbours, with a margin.
     size = GRID + 2 * _MARGIN

@@ -132,9 +132,10 @@ def _judge(
 class Trend:
     """The trend of AUC over TCR_sym of some pairs.
 
-    It is Spearman's rank correlation, NaN if either does not vary, with the
-    two-sided p-value of no correlation. The slope is that of the least-squares
-    line, AUC for 0.1 of TCR_sym.
+    It consists of Spearman's rank correlation, which is NaN if one of the two
+    does not vary, and of the two-sided p-value under the hypothesis of no
+    correlation. The slope is that of the least-squares line: the change of AUC
+    for 0.1 of TCR_sym.
     """
 
     rho: float
@@ -153,9 +154,9 @@ def findings(
 ) -> list[Finding]:
     """Returns which of the paper's findings hold, if there are data for them.
 
-    Only the paper's maps and methods are judged, and only by its protocol. Of a
-    pair's results of a method, the first one is that of the report's own
-    tables.
+    Only the paper's maps and methods are judged, and only by its protocol. If a
+    method has several results on a pair, the report's own tables contain the
+    first one.
     """
     shown = {
         (*r.pair, r.method): r

@@ -29,14 +29,14 @@ class DataSet(NamedTuple):
     """A public data set, or one LiDAR of it.
 
     Attributes:
-        folder: name of its folder.
-        scans: its files there, as a pattern.
-        world: what data sets of one place share.
+        folder: name of the data set's folder.
+        scans: pattern of the files in this folder.
+        world: name of the place, which several data sets can share.
         unit: name of the LiDAR's unit.
         height: height of the LiDAR above the ground [m].
-        origin: repository, and path in it.
+        origin: repository of the data set, and the path in it.
         licence: terms of use.
-        digest: SHA-256 of all scans behind each other, by name.
+        digest: SHA-256 of all scans, concatenated in the order of their names.
         poses: `drive` for a folder of `open_drive`; `matrices` for rows of the
             upper 3 x 4 of X_WS, and `named` for rows of a scan's name, x y z
             and quat_xyzw, both in `poses.txt`; "" for none.
@@ -170,8 +170,8 @@ class _Scans(FileDrive):
 def open_data_sets(folder: Path, on_note: OnNote) -> list[RealScans]:
     """Returns the drives of the data sets in a folder.
 
-    Notes name those that are missing, those of another digest, and folders that
-    are not known.
+    Notes name the data sets that are missing, those whose digest is wrong, and
+    unknown folders.
 
     Raises:
         InputError: none is there, or one cannot be read.

@@ -71,8 +71,8 @@ class Measuring:
     """Measures data sets, one after the other.
 
     Attributes:
-        rows: what was found.
-        answers: likewise, by query.
+        rows: the results.
+        answers: the results for each query.
     """
 
     def __init__(self, names: Sequence[str], track: Track, on_note: OnNote):
@@ -115,8 +115,8 @@ class Measuring:
 
         Args:
             folder: see `open_data_sets`.
-            simulated: folder of recordings, which add places, and from which
-                the judge tells.
+            simulated: folder of recordings. They add places, and the judge
+                tells real scans from theirs.
 
         Raises:
             InputError: no data set is there, or one cannot be read.

@@ -17,15 +17,15 @@ from evaluation.recognition.scoring import ranking, score_places
 class Cost:
     """The cost of one method, on one core.
 
-    Times are of the processor, medians over some scans.
+    Times are CPU times, medians over some scans.
 
     Attributes:
-        method: its name.
+        method: name of the method.
         scans_per_place: number of scans merged into a cloud.
-        points: mean number in a cloud.
-        describe_ms: to describe a cloud, as a query [ms].
-        query_ms: to compare a query with all places, including a second stage,
-            the gate and the pose of the best place [ms].
+        points: mean number of points in a cloud.
+        describe_ms: time to describe a cloud, as a query [ms].
+        query_ms: time to compare a query with all places, including a second
+            stage, the gate and the pose of the best place [ms].
         places: number of places.
         place_bytes: mean size of a place's pickled description.
     """
@@ -92,7 +92,7 @@ def query_ms(
         method: method to measure.
         places: described places, all of them candidates.
         queries: described queries.
-        number: how many are asked, two or more.
+        number: how many queries are asked, two or more.
         gate_radius: see `score_places`.
         with_pose: whether the pose of the best place is estimated, too.
     """

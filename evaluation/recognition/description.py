@@ -32,14 +32,14 @@ class DescribedScans:
     """Places or queries of a drive, with a method's descriptions.
 
     Attributes:
-        frames: (K,) of the drive.
-        stamps_ns: (K,) int64.
+        frames: (K,) frame numbers in the drive.
+        stamps_ns: (K,) int64 time stamps.
         X_WS: (K, 4, 4) poses of the sensor.
         descriptors: K descriptors; none if the drive does not have this role.
-        clouds: the K described clouds, for methods with a second stage; else
-            none.
-        blocks: (K,) block of the route of each, see `route_blocks`; None if
-            the route is unknown.
+        clouds: the K described clouds if the method has a second stage;
+            otherwise none.
+        blocks: (K,) block of the route in which each lies, see `route_blocks`;
+            None if the route is unknown.
     """
 
     frames: np.ndarray
@@ -62,7 +62,7 @@ def joined_scans(
 ) -> DescribedScans:
     """Returns the scans of several drives, by default all of them.
 
-    Those of the k-th world lie k times so far away that no scan reaches there.
+    Scans of different worlds are moved so far apart that none reaches another.
     """
     poses = []
     for one, world in zip(every, worlds, strict=True):
@@ -84,7 +84,7 @@ class DescribedDrive:
 
     Attributes:
         name: name of the drive.
-        places: for queries to find.
+        places: places of the drive, for queries to find.
         queries: queries of the drive.
     """
 
@@ -111,7 +111,8 @@ def describe_drive(
         drive: the drive.
         methods: methods that describe the scans.
         roles: roles of the drive.
-        protocol: for the frames of places and queries, and their clouds.
+        protocol: protocol by which frames of places and queries are chosen, and
+            their clouds made.
         track: reports progress.
         visit: also receives each described frame and its single scan (N, 3),
             cropped, in the frame of the sensor: as recorded if the drive has

@@ -37,8 +37,8 @@ class PairEvidence:
     Attributes:
         overlaps: (Q,) part of the query's scan that the right place shows;
             NaN without a match.
-        hidden: (Q,) part of it that is hidden from the right place's sensor;
-            likewise.
+        hidden: (Q,) part of the query's scan that is hidden from the right
+            place's sensor; NaN without a match.
         changed: (Q,) part of the standing points of both scans on a structure
             that the other scan lacks without being hidden; NaN also if a
             recording does not name its structures.
@@ -47,8 +47,8 @@ class PairEvidence:
         right_fits: (Q,) part of the standing points of the query and its right
             place that coincide at the best alignment of the two scans; NaN if
             no method is wrong.
-        fits: method -> (Q,) the same of the query and the wrong best place;
-            NaN where that is right or just too far.
+        fits: method -> (Q,) the same part for the query and its wrong best
+            place; NaN where the best place is right or only too far.
         unchanged: (Q,) `overlaps` in the control; None without one.
     """
 
@@ -79,11 +79,12 @@ class PairEvidence:
 def visible_change_added(now: np.ndarray, before: np.ndarray | None) -> float:
     """Returns the mean visible change less that of a baseline.
 
-    What two viewpoints hide from each other, their parallax, is in both.
+    The difference cancels what two viewpoints hide from each other, their
+    parallax, which both values contain.
 
     Args:
         now: (Q,) overlaps, see `PairEvidence`.
-        before: (Q,) those of the same queries in the baseline.
+        before: (Q,) overlaps of the same queries in the baseline.
 
     Returns:
         NaN if no query has both, or the queries are not the same.

@@ -49,9 +49,9 @@ class PrCurve:
     Attributes:
         thresholds: (K,) scores from which on a place is accepted,
             decreasing.
-        true_positives: (K,) TP at each.
-        false_positives: (K,) FP.
-        false_negatives: (K,) FN.
+        true_positives: (K,) TP at each threshold.
+        false_positives: (K,) FP at each threshold.
+        false_negatives: (K,) FN at each threshold.
     """
 
     thresholds: np.ndarray
@@ -68,7 +68,7 @@ class PrCurve:
 
     @property
     def recall(self) -> np.ndarray:
-        """(K,) recall; 0 if there is nothing to recall."""
+        """(K,) recall at each threshold; 0 if there is nothing to recall."""
         return recall_of(self.true_positives, self.false_negatives)
 
     @property
@@ -182,8 +182,8 @@ def route_blocks(positions: np.ndarray, frames: np.ndarray) -> np.ndarray:
     """Returns the block (Q,) of the route in which each query lies.
 
     Args:
-        positions: (N, 3) of the sensor along the drive [m].
-        frames: (Q,) of the queries.
+        positions: (N, 3) positions of the sensor along the drive [m].
+        frames: (Q,) frame numbers of the queries.
     """
     passed = travelled(positions)[frames] / BLOCK_LENGTH
     return np.floor(passed).astype(np.int64)
@@ -194,19 +194,19 @@ def resampled_weights(
 ) -> np.ndarray:
     """Returns how often each query counts in each sample of a bootstrap.
 
-    Right and wrong correlate along a drive: whole blocks of queries are drawn
-    with replacement (Kuensch, Annals of Statistics 17, 1989; here they do not
-    overlap).
+    Neighbouring queries along a drive tend to be right or wrong together.
+    Therefore whole blocks of queries are drawn with replacement (Kuensch,
+    Annals of Statistics 17, 1989; here blocks do not overlap).
 
     Args:
         num_queries: Q, one or more.
-        seed: seed of the drawing; equal ones draw the same queries.
-        blocks: (Q,) the block of each query; whole blocks are drawn, as many
-            as there are. Each query is a block by default, and on a route
-            that is shorter than two blocks.
+        seed: seed of the draws; equal seeds draw the same queries.
+        blocks: (Q,) the block of each query. A sample draws as many blocks as
+            there are. By default, and on a route that is shorter than two
+            blocks, each query is a block of its own.
 
     Returns:
-        (B, Q) float64 counts; without blocks, each row of sum Q.
+        (B, Q) float64 counts. Without blocks, each row sums to Q.
     """
     number, of_query = num_queries, np.arange(num_queries)
     if blocks is not None:
@@ -228,7 +228,7 @@ def resampled_metrics(
 
     Args:
         outcomes: outcomes of Q queries, all of which count.
-        weights: (B, Q) how often each does in each sample.
+        weights: (B, Q) how often each query counts in each sample.
     """
     _, tp, fp, fn = weighted_counts(outcomes, weights)
     # Nothing is accepted before a sample's first query; there the curve keeps
@@ -250,7 +250,7 @@ def own_samples(
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Returns `resampled_metrics` of queries, resampled in their own blocks.
 
-    They are drawn once, whatever they are compared with.
+    The samples are cached, so that several comparisons use the same ones.
     """
     weights = resampled_weights(len(outcomes), seed, outcomes.blocks)
     return resampled_metrics(outcomes, weights)
@@ -259,10 +259,10 @@ def own_samples(
 def paired_samples(
     outcomes: QueryOutcomes, other: QueryOutcomes
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Returns `resampled_metrics` with the blocks of other queries.
+    """Returns `resampled_metrics` of queries, in the blocks of other queries.
 
-    `own_samples` draws the same blocks for the other queries, of which there
-    are as many.
+    There must be as many other queries. `own_samples` of these draws the same
+    blocks, so that both sets of samples can be compared pair by pair.
     """
     if np.array_equal(outcomes.own_blocks, other.own_blocks):
         return own_samples(outcomes)
@@ -311,7 +311,8 @@ class Difference:
     Attributes:
         value: the first less the second.
         interval: 95 % interval.
-        p_value: two-sided, of no difference; NaN with a single block.
+        p_value: two-sided p-value under the hypothesis that there is no
+            difference; NaN with a single block.
     """
 
     value: float
@@ -336,14 +337,15 @@ def mean_auc_difference(
 ) -> Difference:
     """Returns the mean AUC difference of two methods, with its p-value.
 
-    It is over several sets of queries (mode all). The bootstrap draws the same
-    blocks for both. Its deviation, corrected for the number n of blocks, gives
-    a t test of n - 1 degrees of freedom, whose small p-values do not end at the
-    number of samples. Sets of queries are independent: their variances and
-    degrees of freedom add up.
+    The mean is over one or more sets of queries (mode all). The bootstrap draws
+    the same blocks for both methods. The p-value is that of a t test with n - 1
+    degrees of freedom, which uses the standard deviation of the bootstrap,
+    corrected for the number n of blocks. Unlike a share of the samples, such a
+    p-value can be smaller than one over their number. Sets of queries are
+    independent: their variances and degrees of freedom add up.
 
     Args:
-        pairs: outcomes of both methods on each set; there is one or more.
+        pairs: outcomes of both methods on each set.
     """
     value, variance, freedom = 0.0, 0.0, 0
     for first, second in pairs:
@@ -369,7 +371,7 @@ def mean_auc_difference(
 def holm(p_values: np.ndarray) -> np.ndarray:
     """Returns p-values (N,) corrected for multiple tests, by Holm's method.
 
-    NaN stay, and do not count.
+    A NaN stays, and does not count as a test.
     """
     known = np.flatnonzero(~np.isnan(p_values))
     order = known[np.argsort(p_values[known], kind="stable")]

@@ -63,11 +63,11 @@ def overlap_matrix(
     Args:
         database: the drive of the places.
         query: the drive of the queries, in the same world frame.
-        protocol: for the frames of queries and places.
+        protocol: protocol by which frames of queries and places are chosen.
         track: reports progress.
-        see: frame of the database -> the surfaces that its sensor sees there;
-            by default those of its scan, compared with at most 8192 points of a
-            query.
+        see: frame of the database -> the surfaces that its sensor sees there.
+            By default these are the surfaces of its scan, and at most 8192
+            points of a query are compared with them.
 
     Raises:
         InputError: if a drive cannot be read.
@@ -176,8 +176,8 @@ def write_overlaps(
 
     Args:
         path: CSV file to write.
-        query_frames: (Q,) of the queries.
-        database_frames: (D,) of the places.
+        query_frames: (Q,) frames of the queries.
+        database_frames: (D,) frames of the places.
         overlaps: (Q, D) overlaps, see `overlap_truth`.
 
     Raises:

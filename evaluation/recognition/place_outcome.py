@@ -32,18 +32,19 @@ class PlaceOutcome:
     """The outcome of a method on two drives.
 
     Attributes:
-        method: its name.
+        method: name of the method.
         is_gated: whether the gate was used.
         outcomes: outcomes of Q queries.
-        query_frames: (Q,) of the query drive.
-        stamps_ns: (Q,) int64.
-        p_WQs: (Q, 3) where the sensor was [m].
+        query_frames: (Q,) frames of the queries in their drive.
+        stamps_ns: (Q,) int64 time stamps of the queries.
+        p_WQs: (Q, 3) positions of the sensor at the queries [m].
         match_drives: Q names of the drive of the best place; "" without a
             candidate.
-        match_frames: (Q,) frame of the best place there; -1 without.
-        distances: (Q,) between query and best place [m]; NaN without, and
-            where the best place is of another city.
-        pose_errors: errors of the best place.
+        match_frames: (Q,) frame of the best place in that drive; -1 without a
+            candidate.
+        distances: (Q,) distances between query and best place [m]; NaN without
+            a candidate, and where the best place is in another city.
+        pose_errors: errors of the poses at the best places.
         overlaps: (Q,) how much of the query's scan the best of its matches
             shows, see `overlap_truth`; NaN without a match.
         radius: radius of a match [m].
@@ -197,14 +198,15 @@ class Number(NamedTuple):
 def place_numbers(
     now: PlaceOutcome, before: PlaceOutcome | None
 ) -> Iterator[Number]:
-    """Yields the results of a method, next to those of the baseline.
+    """Yields the results of a method in a condition, for the table.
 
-    Intervals are by bootstrap over blocks of the route; a sample has the same
-    ones in the baseline.
+    Intervals are by bootstrap over blocks of the route. Each bootstrap sample
+    draws the same blocks in the condition and in the baseline.
 
     Args:
-        now: its outcome in a condition.
-        before: its outcome in the baseline, for what is kept, lost and found.
+        now: outcome of the method in the condition.
+        before: outcome of the method in the baseline, from which `kept`, `lost`
+            and `found` follow; None to leave these out.
     """
     outcomes = now.outcomes
     values = _areas(outcomes)
@@ -252,8 +254,9 @@ def pose_numbers(
     """Yields the results of a method's poses; none without poses.
 
     Args:
-        now: its outcome in a condition.
-        before: its outcome in the baseline, for what is kept.
+        now: outcome of the method in a condition.
+        before: outcome of the method in the baseline, from which the kept share
+            follows.
     """
     errors = now.pose_errors
     value = pose_success(errors, now.outcomes)

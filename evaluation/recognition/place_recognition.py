@@ -34,8 +34,8 @@ class PlaceRecognition:
     """The outcome of one method on one pair.
 
     Attributes:
-        method: its name.
-        parameters: all its parameters.
+        method: name of the method.
+        parameters: all parameters of the method.
         database: name of the drive of the places.
         query: name of the drive of the queries.
         retrieval: scores and truth of all pairs.
@@ -43,9 +43,9 @@ class PlaceRecognition:
         by_mode: the numbers in each mode.
         pose: errors of the estimated poses.
         protocol: protocol of the run, without open choices.
-        mode: the mode that `metrics` is in.
-        pair: names of the map, and of the stages of database and query, in a
-            report.
+        mode: mode of the numbers in `metrics`.
+        pair: names of the map and of the stages of database and query, if the
+            result is for a report.
     """
 
     method: str

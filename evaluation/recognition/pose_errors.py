@@ -69,9 +69,9 @@ def pose_error(
     """Returns the error of an estimated pose, in metres and in degrees.
 
     Args:
-        X_PQ: (4, 4) the query's sensor in that of the place, as estimated.
-        X_WP: (4, 4) truth.
-        X_WQ: (4, 4) truth.
+        X_PQ: (4, 4) estimated pose of the query's sensor in that of the place.
+        X_WP: (4, 4) true pose of the place's sensor in the world.
+        X_WQ: (4, 4) true pose of the query's sensor in the world.
     """
     X_error = poses.inverse(X_WQ) @ X_WP @ X_PQ
     # Sine and cosine together give exact small and large angles.
@@ -109,7 +109,7 @@ def pose_metrics(
 ) -> PoseMetrics:
     """Returns a summary of pose errors.
 
-    The metrics of the queries are in mode all.
+    The metrics of the queries must be those of the mode `all`.
     """
     accepted = np.zeros(len(outcomes), dtype=bool)
     if metrics.f1_max_index is not None:

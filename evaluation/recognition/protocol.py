@@ -26,10 +26,10 @@ _QUERY_CHANGES = ("turn_queries", "tilt_queries", "hide_sector")
 
 @dataclass(frozen=True)
 class RetrievalProtocol:
-    """How two drives are compared: which scans, which truth, what changes.
+    """How two drives are compared: scans, truth, and changes of queries.
 
-    By default, queries are as recorded and all other options are those of the
-    paper, except which of several merged scans stands for a place.
+    By default, queries are as recorded. All other options are those of the
+    paper, except the choice of the merged scan that stands for a place.
 
     Attributes:
         radius: greatest distance between a query and its match [m].
@@ -39,10 +39,10 @@ class RetrievalProtocol:
             farther points are left out.
         scans_per_place: number of consecutive scans that are merged into the
             described cloud; None for each method's own number.
-        place: which of the merged scans stands for a place, unless the
-            method's own parameter says so: `middle`, or as in the paper
-            `first`. Truth goes by the pose of that scan. It becomes None for
-            one scan per place.
+        place: which of the merged scans stands for a place: `middle`; or
+            `first`, as in the paper. The pose of this scan is that of the
+            place. A method's own parameter `place` overrides it. With one scan
+            per place it becomes None.
         exclude_recent: for a drive compared with itself: least time since it
             passed a place [s]. None for two drives.
         overlap: least part of a query's scan, up to 1, that a match must show,
@@ -109,7 +109,7 @@ class RetrievalProtocol:
         return method.scans_per_place
 
     def scans_before(self, method: Method) -> int:
-        """Returns how many scans of a place precede the one at its pose."""
+        """Returns how many scans of a place precede the scan at its pose."""
         is_middle = self.of(method).place == "middle"
         return self.scans(method) // 2 if is_middle else 0
 
@@ -192,7 +192,7 @@ class RetrievalProtocol:
     def asked_like(self, other: RetrievalProtocol) -> RetrievalProtocol:
         """Returns the protocol with the queries of another protocol.
 
-        Its choice of merged scans is then the other's as well.
+        The choice of the scan that stands for a place is taken over, too.
         """
         return replace(self, place=other.place, **other._asked)
 
@@ -281,7 +281,7 @@ _ASKED = (*_QUERY_CHANGES, "seed")
 
 
 def check_one_protocol(protocols: Iterable[RetrievalProtocol]) -> None:
-    """Checks that queries were asked in one way.
+    """Checks that all protocols make queries in the same way.
 
     Raises:
         InputError: otherwise.

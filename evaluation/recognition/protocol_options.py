@@ -19,8 +19,8 @@ _NAMED: Options = {
             typer.Option(
                 "--protocol",
                 help="How queries are made: fair turns and tilts them at "
-                "random, paper follows the paper's protocol, recorded leaves "
-                "the scans as recorded.",
+                "random, paper follows the protocol of the CNS paper, recorded "
+                "leaves the scans as recorded.",
             ),
         ],
         "fair",

@@ -51,7 +51,7 @@ class QueryOutcomes:
 
     @property
     def own_blocks(self) -> np.ndarray:
-        """(Q,) block of the route of each query, without blocks its number."""
+        """(Q,) block of each query; its number if there are no blocks."""
         return np.arange(len(self)) if self.blocks is None else self.blocks
 
     @property

@@ -64,14 +64,14 @@ def gated(
     method does not estimate keeps its score. If the method estimates no pose at
     all, every score stays.
 
-    A score s with weight w becomes s - (1 - w) |s|: the part w of a positive
-    score, and a negative score falls likewise.
+    A score s with weight w becomes s - (1 - w) |s|. This is the part w of a
+    positive score; a negative score falls by the same amount.
 
     Args:
-        method: method of the scores.
-        query: its description of the query.
-        database: its database of the D places.
-        scores: (D,) of the method; NaN for a place that is no candidate.
+        method: method that made the scores.
+        query: description of the query by the method.
+        database: database of the D places, made by the method.
+        scores: (D,) scores by the method; NaN for a place that is no candidate.
         radii: radii of a match [m].
 
     Raises:
@@ -129,7 +129,7 @@ def score_places(
         place_clouds: clouds of the D places, for a second stage.
         is_known: (D,) bool, which places may be candidates. Unless all are,
             every place is compared, because a search for the best few of all
-            would find others.
+            places would also find places that may not be candidates.
         gate_radius: radius of a match for `gated` [m]; None without a gate.
         exhaustive: see `Method.score`.
         where: the name of the current query, for errors.

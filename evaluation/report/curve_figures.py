@@ -19,7 +19,7 @@ from evaluation.results.table_forms import by_pair, in_table_order, title
 def draw_pr_curves(
     map_name: str, results: Sequence[PlaceRecognition], stem: Path
 ) -> None:
-    """Draws precision over recall, a row a pair and a column a mode."""
+    """Draws precision over recall, with a row per pair, a column per mode."""
     pairs = by_pair(results)
     style_of = styles(in_table_order(result.method for result in results))
     size = (9.2, 0.3 + 2.7 * len(pairs))

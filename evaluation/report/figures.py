@@ -183,11 +183,11 @@ def draw_change(
 ) -> None:
     """Draws what changed between two stages, in two figures.
 
-    The metric alone decides on a colour. In the first figure, red is a point
-    without a counterpart in the other map. It is pale where the point lies
-    outside the other map's hull: the other drive may not have passed there, and
-    the TCR does not count the point. The second shows the sets H and O in both
-    orders and united; a point has the colour of its voxel on one of the grids.
+    Only the metric decides on colours. In the first figure, points without a
+    counterpart in the other map are red. They are pale red outside the other
+    map's hull: the other drive may not have passed there, and TCR does not
+    count these points. The second figure shows the sets H and O in both orders
+    and united. A point has the colour of its voxel on one of the grids.
 
     The clouds (K, 3) in W [m], and the maps on that grid, are those of the
     earlier and of the later stage.

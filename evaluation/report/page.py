@@ -80,7 +80,7 @@ _WIDTH = 480
 
 @dataclass
 class Report:
-    """What a report is made of.
+    """The contents of a report.
 
     Attributes:
         pairs: place recognition of all pairs, each with its control.
@@ -90,9 +90,9 @@ class Report:
         tracks: drive -> its track, also for the controls.
         pages: drive -> address, relative to the page, of the page of its
             recording; drives without a page may be left out.
-        repeated: results by the protocol of the published numbers, if that is
-            another one.
-        made_by: what made it: version, protocol, settings of methods.
+        repeated: results by the protocol of the published numbers, if it
+            differs from the protocol of the report.
+        made_by: version, protocol and settings of methods that made the report.
     """
 
     changes: list[ChangeResult] = field(default_factory=list)

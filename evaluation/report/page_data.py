@@ -43,7 +43,7 @@ class Illustration:
     """A figure of the report.
 
     Attributes:
-        stem: its path without ending.
+        stem: path of the figure without ending.
         page_kind: "svg" or "webp", the form in which the page holds it.
         section: section of the page with the figure; "print" for none.
         num_panels: number of panels side by side; a phone shows one at a time.
@@ -94,7 +94,7 @@ class PageDrive:
 
     Attributes:
         frames: (K,) frames that are places or queries, increasing.
-        X_WS: (K, 4, 4) poses of the sensor there.
+        X_WS: (K, 4, 4) poses of the sensor at these frames.
         route: (M, 2) the path of the sensor from above [m].
         thumbnails: K reduced scans (see `evaluation.maps.thumbnails`).
         view: the map from above, as a WebP file.

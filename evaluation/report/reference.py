@@ -52,9 +52,9 @@ class Reference:
             method has one mode.
         protocols: method -> how the source ran it, its number of scans
             included.
-        judge: returns verdicts on all claims that our numbers can judge: on
-            the results of a report, then those that it repeated by the source's
-            protocol, and the changes.
+        judge: function that returns verdicts on all claims that our numbers can
+            judge. It takes the results of a report, the results that the report
+            repeated by the source's protocol, and the changes.
     """
 
     title: str = ""

@@ -169,7 +169,7 @@ def recognition_table(
 ) -> Table:
     """Returns Table II: a row for each pair, some columns for each method.
 
-    F1 is only in the form that is compared with the reference.
+    Only the table that is compared with the reference contains F1.
 
     Args:
         results: results of one protocol.
@@ -542,8 +542,9 @@ class DriveTrack:
     def moments(self, frames: np.ndarray) -> list[np.ndarray]:
         """Returns frame number, stamp and pose of the sensor at given frames.
 
-        They are 9 arrays (Q,) of objects, one for each name in `_MOMENT`; None
-        where a frame (Q,) is missing, which is then below 0.
+        The result consists of 9 arrays (Q,) of objects, one for each name in
+        `_MOMENT`. A missing frame is given as a number below 0; its values are
+        None.
         """
         X_WS = self.X_WS[frames]
         quats_xyzw = Rotation.from_matrix(X_WS[:, :3, :3]).as_quat()

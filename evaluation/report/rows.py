@@ -138,11 +138,11 @@ def ranked_methods(results: Results) -> tuple[list[Ranked], str]:
 
 
 def beside(results: Results) -> dict[str, dict[str, float]]:
-    """Returns what stands beside the mean AUC: column -> method -> mean.
+    """Returns the columns next to the mean AUC: column -> method -> mean.
 
-    All are shares of the queries with a match, over the pairs that all methods
-    have: those whose best place is right; those whose best place is wrong, but
-    within two radii; those with a right pose.
+    The columns are shares of the queries with a match, over the pairs that all
+    methods have: the queries whose best place is right; those whose best place
+    is wrong, but within two radii; and those with a right pose.
     """
     rows = results.where({STAGE: OWN})
     r1, far, matched, pose = (
@@ -190,9 +190,9 @@ class Survival(NamedTuple):
 
     Attributes:
         pair: map, stage of the database, and of the query.
-        method: its name.
-        before: without the change; empty without a control.
-        after: with the change.
+        method: name of the method.
+        before: rows without the change; empty if there is no control.
+        after: rows with the change.
     """
 
     pair: tuple[str, str, str]

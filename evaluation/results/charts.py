@@ -112,7 +112,7 @@ class _Chart:
 
     @property
     def panes(self) -> dict[str, list[Row]]:
-        """Title of a panel -> its rows: a map's, unless maps are the lines."""
+        """Title of a panel -> its rows: of one map, unless maps are lines."""
         found: dict[str, list[Row]] = {}
         for row in self.rows:
             name = "" if self.keys.get("over") == "map" else row.map
@@ -120,7 +120,7 @@ class _Chart:
         return found
 
     def panels(self, height: float) -> tuple[Figure, list[Axes]]:
-        """Returns a figure, and its panels of a height [px]."""
+        """Returns a figure and its panels, which have a given height [px]."""
         panes = self.panes
         columns = 1 if self.width < WIDE else min(2, len(panes))
         lines = math.ceil(len(panes) / columns)
@@ -150,7 +150,7 @@ def draw(
         chart: a mapping as above.
         results: the table.
         width: width of the drawing [px].
-        alone: whether it has its message and legend with it.
+        alone: whether the drawing includes its message and its legend.
 
     Raises:
         InputError: there is no such kind or column, or no such row.
@@ -480,9 +480,10 @@ def smooth(
 ) -> np.ndarray:
     """Returns the local linear regression of y over x at places (M,).
 
-    Not all x are equal. Gaussian weights; Fan and Gijbels, Local Polynomial
-    Modelling (1996), equation 3.1 with p = 1. If it is given how often each
-    point counts in B samples, (B, N), there are B regressions (B, M).
+    Weights are Gaussian (Fan and Gijbels, Local Polynomial Modelling, 1996,
+    equation 3.1 with p = 1). Not all x may be equal. If an array (B, N) states
+    how often each point counts in B samples, the result is B regressions
+    (B, M).
     """
     counts = np.ones(len(x)) if counts is None else counts
     width = _BANDWIDTH * max(np.ptp(grid), 1e-12)

@@ -86,11 +86,11 @@ class Compared(NamedTuple):
 
 
 class Agreement(NamedTuple):
-    """How far two tables rank the methods alike that both have by name.
+    """How similarly two tables rank the methods that both of them name.
 
     `tau` is Kendall's tau-b (Kendall, Biometrika 33, 1945): 1 if every two
-    methods have the same order in both, -1 if the opposite one; NaN if all
-    values of a table are equal.
+    methods have the same order in both tables, -1 if every two have the
+    opposite order. It is NaN if all values of a table are equal.
     """
 
     first: str
@@ -106,15 +106,15 @@ class Comparison:
 
     Attributes:
         metric: the number that is compared.
-        task: that has it.
+        task: the task to which this number belongs.
         conditions: number of the conditions that all tables have; 0 for
             rankings.
-        ranked: methods, the best first. One that also ships, or is in two
-            tables, has the name of its table behind its own. For rankings, the
-            methods of each table over its own conditions.
-        differences: differences of each two methods whose answers are there.
-        agreements: agreements of each two tables with two or more methods of
-            one name.
+        ranked: methods, the best first. The name of the table is appended to a
+            method that also ships, or that is in two tables. For rankings,
+            these are the methods of each table over its own conditions.
+        differences: differences of each two methods whose answers are known.
+        agreements: agreements of each two tables that have two or more methods
+            in common, by name.
         notes: what was left out.
     """
 
@@ -178,11 +178,12 @@ def compare(
         paths: tables of results, or folders with a `results.csv`. A
             `queries.csv` beside one gives its answers.
         metric: the number to compare; of several tasks, `place` counts.
-        protocol: name of the protocol whose rows count; by default each with
-            its like, and for rankings `fair`, or else the only one.
+        protocol: name of the protocol whose rows count. By default, rows of the
+            same protocol are compared; for rankings, only `fair` counts, or the
+            only protocol of a table.
         gate: whether rows with the gate count, or those without.
-        rankings: whether to compare the rankings alone, each of its own
-            conditions, as those of simulated and of real drives.
+        rankings: whether to compare only the rankings, each over its own
+            conditions, such as those of simulated and of real drives.
 
     Raises:
         InputError: a table cannot be read, has no such row, or the tables have

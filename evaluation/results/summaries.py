@@ -38,7 +38,7 @@ _SAMPLES = 1000
 class Mean(NamedTuple):
     """A mean over rows that have the same values in some columns.
 
-    `number` is that of the rows whose value is known; the others do not count.
+    `number` counts the rows whose value is known. All other rows are left out.
     """
 
     key: tuple
@@ -79,9 +79,9 @@ def means(rows: Iterable[Row], *columns: str) -> list[Mean]:
 
 
 class Summary(NamedTuple):
-    """A number that is made of a table, with its 95 % interval or range.
+    """A number computed from a table, with its 95 % interval or range.
 
-    `n` is the number of conditions that it is made of, or None.
+    `n` is the number of conditions from which it is computed, or None.
     """
 
     what: str
@@ -103,11 +103,11 @@ class Summary(NamedTuple):
         low: float = math.nan,
         high: float = math.nan,
     ) -> Summary:
-        """Returns the summary of what a method has on a map.
+        """Returns the summary of a number of one method on one map.
 
         Args:
-            what: what the number is.
-            key: has the map, the task, the method and the gate.
+            what: name of the number.
+            key: key with the map, the task, the method and the gate.
             value: the number itself.
             low, high: its interval or range.
         """
@@ -122,9 +122,9 @@ def excesses(queries: QueryRows) -> list[Summary]:
     itself, and ab the share that both leave together. The excess is a * b - ab:
     without an interaction, the shares would multiply.
 
-    There is an excess for each cause whose name joins those of two causes by
-    "+", if both were also measured by themselves (at their strongest level).
-    AUCs are means over the seeds.
+    An excess is computed for each cause whose name joins the names of two
+    causes by "+", if both were also measured by themselves (at their strongest
+    level). AUCs are means over the seeds.
     """
     conditions: dict[tuple, list[Answers]] = {}
     levels: dict[object, Any] = {}
@@ -180,8 +180,9 @@ def lifetime(
 ) -> float:
     """Returns the time until only a given share is left.
 
-    It is infinite if more is left. The times ascend; the share is 1 at the
-    first one, and changes linearly between two. NaN if a share is unknown.
+    The times ascend. The share is 1 at the first time, and changes linearly
+    between two times. The result is infinite if more than `left` remains at the
+    last time, and NaN if a share is unknown.
     """
     if any(math.isnan(share) for share in kept):
         return math.nan
@@ -196,12 +197,13 @@ def lifetime(
 def lifetimes(
     results: Results, factor: str, shares: Iterable[float] = (0.9, 0.5)
 ) -> list[Summary]:
-    """Returns how much of a numeric factor it takes until shares are left.
+    """Returns at which value of a numeric factor only given shares are left.
 
-    They are of all rows of `kept`: the value of the mean over seeds, infinite
-    if more is left, with the least and the greatest of a seed. The least value
-    of the factor is the baseline. What is there with one seed alone, as the
-    baseline may be, belongs to all seeds.
+    The shares are the rows with the metric `kept`; the least value of the
+    factor is the baseline. Each result is computed from means over the seeds,
+    and has the least and the greatest result of a single seed as its range. It
+    is infinite if more than the share is left at the greatest value. A row that
+    exists for one seed only, such as the baseline, is used for all seeds.
     """
     groups: dict[tuple, list[Row]] = {}
     for row in results.where(metric="kept").rows:
@@ -244,11 +246,12 @@ def _curve_of(
 
 
 def paired_values(results: Results, x: str, y: str) -> list[tuple[Row, float]]:
-    """Returns the rows of a metric, each with another number next to it.
+    """Returns the rows of the metric `y`, each with a value of `x`.
 
-    The number is a factor's, or a metric's of the same condition: of the same
-    method and gate, else without the gate, else of no method (as `tcr_sym`).
-    Rows without one are left out.
+    If `x` is a factor, the value is that of the row itself. If it is a metric,
+    the value was measured in the same condition: for the same method and gate,
+    or else without the gate, or else without a method (such as `tcr_sym`). Rows
+    for which there is no value of `x` are left out.
     """
     wider: tuple[tuple[str, ...], ...] = (
         ("task", "protocol"),
@@ -276,8 +279,8 @@ def paired_values(results: Results, x: str, y: str) -> list[tuple[Row, float]]:
 def growths(results: Results, over: str, metric: str) -> list[Summary]:
     """Returns the growth exponents of a metric over a factor or metric.
 
-    Each is from the point before, which has less of it. Points with the same
-    map, method and gate belong together.
+    Points with the same map, method and gate form a curve. Each exponent is
+    computed between a point of a curve and the one before it.
     """
     groups: dict[tuple, list[tuple[float, Row]]] = {}
     for row, at in paired_values(results, over, metric):
@@ -300,9 +303,9 @@ def correlations(
 ) -> list[Summary]:
     """Returns how well a factor or metric predicts what each method misses.
 
-    It is Spearman's rank correlation of 1 less the metric with it, over the
-    conditions where both are known, with its interval by bootstrap over these.
-    With and without the gate is to be selected before.
+    This is Spearman's rank correlation of x with 1 - metric, over the
+    conditions in which both are known. Its interval is by bootstrap over these
+    conditions. Select the rows with or without the gate before.
     """
     points: dict[str, list[tuple[float, float]]] = {}
     for row, at in paired_values(results, x, metric):
@@ -362,17 +365,17 @@ def ranking(
 ) -> tuple[list[Ranked], np.ndarray]:
     """Returns methods ranked by their means over the conditions they share.
 
-    The bootstrap draws maps, where there are several, else conditions; a sample
-    has the same ones for each method. A single condition has the interval of
-    its row.
+    The bootstrap draws maps if there are several, and conditions otherwise.
+    Each sample is the same for all methods. If there is a single condition, the
+    interval is that of its row.
 
     Args:
         rows: rows of one metric.
         least_first: whether less is better.
 
     Returns:
-        The methods, the best first, and their means (B, M) in samples. There
-        are none without a condition that all have.
+        The methods, the best first; and their means (B, M) in the samples. Both
+        are empty if no condition was measured with all methods.
     """
     table: dict[tuple, dict[str, Row]] = {}
     for row in rows:

@@ -25,8 +25,8 @@ _FORM = "METHOD.NAME=VALUE"
 class MethodChoice:
     """A method that any process can make.
 
-    A file registers it if it is not of this package. Parameters without a
-    setting have their defaults.
+    A method from outside this package is registered by its file. Parameters
+    without a setting have their defaults.
     """
 
     name: str
@@ -88,7 +88,8 @@ def choose_methods(
     Args:
         files: Python files that register a method each, or names of optional
             methods of this package.
-        settings: `METHOD.NAME=VALUE` of parameters without their defaults.
+        settings: `METHOD.NAME=VALUE` for parameters that differ from their
+            defaults.
 
     Raises:
         InputError: if a file registers no method, or one that is there

@@ -30,9 +30,9 @@ _UNPLACED = "map and stage are unknown: no scenario, and no name <map>_<stage>"
 class RecordingInfo:
     """A recording that exists or will be made, and its place in a study.
 
-    Stages of the city's life sort by name. Where the drive leads is its way
-    (see `driven_way`); None if unknown. It is read from the path, a file or
-    folder, unless `made_by` opens it.
+    Stages of the city's life sort by name. The way is the route that the drive
+    takes (see `driven_way`); None if it is unknown. The recording is read from
+    the path, a file or folder, unless `made_by` opens it.
     """
 
     name: str
@@ -62,9 +62,9 @@ Pair = tuple[RecordingInfo, RecordingInfo]
 class Run:
     """A method on a pair of drives by a protocol.
 
-    Descriptions of the places and of the queries have a name each; that of the
-    queries is also the run's. A run that repeats another one is by the protocol
-    of published numbers.
+    The descriptions of the places and those of the queries have a name each;
+    the name of the queries' descriptions is also that of the run. A run that
+    repeats another one uses the protocol of published numbers.
     """
 
     method: MethodChoice
@@ -74,12 +74,12 @@ class Run:
 
     @property
     def repeats(self) -> bool:
-        """Whether the run repeats that by the study's own protocol."""
+        """Whether the run repeats a run by the study's own protocol."""
         return self.queries != self.method.key
 
     @property
     def shares_places(self) -> bool:
-        """Whether the run has the places of the study's own protocol."""
+        """Whether the run uses the places of the study's own protocol."""
         return self.places == self.method.key
 
 
@@ -184,11 +184,12 @@ def find_recordings(
     """Opens all recordings in a folder and its direct subfolders.
 
     They may have the layout of MulRan or HeLiPR. Drives in the layout of CNS,
-    and in that of KITTI if a `scenario.yaml`
-    lies in them, are found up to three levels down, where exports put them.
-    A recording states its map and stage in its scenario; without one they
-    are taken from its name, `<map>_<stage>` or, as KAIST01, without `_`. A
-    recording with neither is left out.
+    and drives in the layout of KITTI that contain a `scenario.yaml`, are found
+    up to three levels down, where exports put them.
+
+    A recording states its map and stage in its scenario. Without a scenario,
+    they are taken from its name: `<map>_<stage>`, or without `_` as in KAIST01.
+    A recording with neither is left out.
 
     Raises:
         InputError: if no recording has a map and a stage, or one cannot be

@@ -181,7 +181,7 @@ class _Shown:
 
     @cached_property
     def standing(self) -> np.ndarray:
-        """(M, 3) points that stand, one a cell."""
+        """(M, 3) points of standing things, one for each cell."""
         return thin(self.points[self.points[:, 2] > _standing()], _CELL)
 
     @cached_property
@@ -204,7 +204,7 @@ class _Shown:
 
     @cached_property
     def some_instances(self) -> np.ndarray | None:
-        """(M,) their instances."""
+        """(M,) instances of the points in `some`."""
         return None if self.instances is None else sampled(self.instances)
 
     def seen_from(self, other: _Shown) -> np.ndarray:

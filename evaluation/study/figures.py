@@ -34,8 +34,9 @@ def draw_city(
 ) -> dict[str, PageDrive]:
     """Draws the routes of a city; returns its drives for the page, by name.
 
-    Each stage has a name, and of its drive the `SurveyedDrive`, the cloud, and
-    the source, of which the camera is shown if it is recorded.
+    Each stage consists of its name, and of the `SurveyedDrive`, the cloud and
+    the source of its drive. If the source is a recording, the page shows its
+    camera.
     """
     names, views, routes, drives = [], [], [], {}
     for done, (name, surveyed, fine, source) in enumerate(stages):
@@ -72,11 +73,11 @@ def compare_stages(
         reporter: reports progress.
         map_name: name of the map.
         stages: the earlier stage, and the later one.
-        drives: the earlier, the later and maybe a control, each a
-            `SurveyedDrive` of one world.
-        clouds: those of the earlier and the later drive.
-        stems: paths of the figures without ending: what changed, and the sets
-            of the TCR.
+        drives: the earlier drive, the later one, and optionally a control.
+            Each is a `SurveyedDrive`; all are of one world.
+        clouds: clouds of the earlier and the later drive.
+        stems: paths of the two figures, without ending. The first figure shows
+            what changed, the second one the sets from which TCR is computed.
     """
     del reporter
     read: list[SurveyedDrive] = [part.read() for part in drives]
@@ -116,7 +117,7 @@ def change_stems(
 ) -> tuple[str, str]:
     """Returns the names of the two figures of a change, without ending.
 
-    They are the points and the sets.
+    The first figure shows the points, the second one the sets.
     """
     # Underscores join the parts. They are escaped in all but the first, so that
     # two pairs of stages never share a name.

@@ -62,7 +62,7 @@ def recognise_places(
 
     Args:
         reporter: reports progress.
-        names: those of the map, and of the stages of database and query.
+        names: names of the map, and of the stages of database and query.
         described: descriptions of the database and of the query.
         choice: the method.
         protocol: protocol of the comparison.
@@ -159,7 +159,8 @@ def measure_places(
         query: described drive in the same world, whose scans ask.
         distractors: described drives through other cities, one part for each
             method.
-        num_distractors: number of their places that are added to the database.
+        num_distractors: number of places of these drives that are added to the
+            database.
         methods: the methods.
         protocol: the protocol of the comparison; its own radius does not
             matter.
@@ -246,10 +247,10 @@ def crowded(
     method: int,
     num_others: int,
 ) -> tuple[DescribedDrive, list[str]]:
-    """Returns a drive with the places of drives elsewhere behind its own.
+    """Returns a drive to which places of drives elsewhere are appended.
 
-    The others are moved so far away that none of their places is a match. They
-    add `num_others` places at most, from the first one on.
+    The other drives are moved so far away that none of their places is a match.
+    Their first `num_others` places are appended, or all if there are fewer.
 
     Args:
         database: the drive.

@@ -391,9 +391,10 @@ class MakePart(Step):
     Attributes:
         function: a function of a module, whose code counts as an input; it
             takes a `Reporter` before the arguments.
-        arguments: the inputs. Each is plain, a dataclass of plain values, a
-            file or folder, of which the name counts, or has a method
-            `identity` that says what counts; or is a tuple of such values.
+        arguments: the inputs. Each is a plain value, a dataclass of plain
+            values, a file or folder, of which only the name counts, or an
+            object whose method `identity` returns what counts; or a tuple of
+            such values.
         figures: further files that the function writes.
     """
 
@@ -449,9 +450,9 @@ def _identity(argument: Any) -> object:
 class SurveyFiles:
     """The parts that hold the survey of a recording.
 
-    A key is the name of a method, or a `described_key`.
-
-    A job that needs one method's descriptions reads no other's.
+    The descriptions of each method are a part of their own, so that a job reads
+    only those that it needs. Their key is the name of the method, or a
+    `described_key`.
     """
 
     folder: Path

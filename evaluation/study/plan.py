@@ -44,10 +44,11 @@ _RECOGNITION_COST = 2.0
 class Study:
     """The comparison of recordings, which need not exist yet.
 
-    Each may be made by the jobs that it needs; drives of one map that share
-    stage and route with others serve as same-stage controls. The methods are by
-    default those of this package; their costs, if wanted, are measured after
-    all other jobs. The reference has published numbers beside ours.
+    A recording that does not exist is made by the jobs that it needs. Drives of
+    one map that share stage and route with others serve as controls in the same
+    stage. By default, the methods are those of this package. Their costs, if
+    wanted, are measured after all other jobs. The reference contains published
+    numbers, for comparison.
     """
 
     recordings: Sequence[RecordingInfo]

@@ -61,8 +61,8 @@ class MappedDrive(RecentScans):
         """Reads the remaining scans, so that the map is complete.
 
         Returns:
-            The map of all scans in cells of the TCR, as `map_drive` makes
-            it of that size; a finer cloud of them for pictures (K, 3) in W [m].
+            The map of all scans in cells of the TCR, equal to that of
+            `map_drive`; and a finer cloud (K, 3) for pictures, in W [m].
         """
         left = range(self._num_mapped, len(self))
         for _ in track(left, f"mapping {self.name}", len(left)):
@@ -110,7 +110,7 @@ class RecordedDrive:
         return open_drive(self.path, self.lidar, self.columns)
 
     def identity(self) -> list[list]:
-        """Returns LiDAR, columns, and name, size and time of each file.
+        """Returns the LiDAR, the columns, and each file's name, size and time.
 
         The content of the files would be the surest identity, but reading it
         takes as long as evaluating it. A recording of cns-drake has a
@@ -150,9 +150,9 @@ class RecordedDrive:
 class SurveyedDrive:
     """A drive with its map in cells of the TCR.
 
-    There are N stamps (N,) int64, and poses (N, 4, 4) of the sensor. K frames,
-    increasing, are places or queries, and have reduced scans (see
-    `evaluation.maps.thumbnails`); there are none if the drive has no role.
+    It has the time stamps (N,) int64 and the poses (N, 4, 4) of the sensor at N
+    frames. K frames, increasing, are places or queries, and have reduced scans
+    (see `evaluation.maps.thumbnails`). K is 0 if the drive has no role.
     """
 
     placed: PlacedDrive
@@ -174,7 +174,7 @@ class SurveyedDrive:
 
 @dataclass(frozen=True)
 class KeptDrive:
-    """The scans of a drive's places and queries, and nothing else of it.
+    """A drive of which only the scans of places and queries are kept.
 
     Attributes:
         name: name of the drive.
@@ -204,11 +204,13 @@ class KeptDrive:
 class RecordingSurvey:
     """A recording's maps, places and queries, which replace its scans.
 
-    Each method has its descriptions of the drive, by another protocol under a
-    `described_key`; there are none without a role. The scans of places and
-    queries are None unless kept; `fine` is a cloud (K, 3) for pictures, in W
-    [m]. A drive that is not mapped has neither, and the scans are (N, 3)
-    float32, as their role sees them.
+    It contains the descriptions of the drive by each method, if the drive has a
+    role. Descriptions by another protocol are under a `described_key`. The
+    scans of places and queries are None unless they are kept. `fine` is a cloud
+    (K, 3) for pictures, in W [m].
+
+    A drive that is not mapped has neither a map nor a cloud. Its scans are
+    (N, 3) float32, as their role sees them.
     """
 
     placed: PlacedDrive
@@ -219,7 +221,7 @@ class RecordingSurvey:
 
 
 def described_key(method: str, protocol: RetrievalProtocol) -> str:
-    """Returns the name of a method's descriptions by a second protocol."""
+    """Returns the key of a method's descriptions by a second protocol."""
     return f"{method},{protocol.name}"
 
 
@@ -328,8 +330,8 @@ def _described(
 class Survey(Step):
     """Writes the survey of a drive, or its missing parts.
 
-    See `survey_recording`, and without a map `describe_recording`. Further
-    descriptions are by a second protocol; there are none without a role.
+    It calls `survey_recording`, or `describe_recording` if the drive needs no
+    map. Further descriptions are by a second protocol, if the drive has a role.
     """
 
     source: DriveSource

@@ -204,8 +204,8 @@ class Drive(abc.ABC):
     def lidar_section(self) -> Mapping:
         """Section of the scenario on this LiDAR; empty if it says nothing.
 
-        If the drive's name ends with the name of a LiDAR, it is that one, and
-        otherwise the first.
+        This is the LiDAR with whose name the drive's name ends, or otherwise
+        the first LiDAR.
         """
         lidars = (self.scenario or {}).get("lidars")
         if not isinstance(lidars, dict) or not lidars:
@@ -249,7 +249,7 @@ def index_instances(table: Any, source: str) -> dict[int, Mapping]:
 
 @dataclass(frozen=True)
 class PlacedDrive:
-    """A drive that is closed again: of its scenario, only `map` is left."""
+    """A drive that has been closed; of its scenario, only `map` is left."""
 
     name: str
     world_frame: str

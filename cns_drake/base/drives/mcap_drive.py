@@ -34,8 +34,8 @@ _LATEST = 1.0
 class McapDrive(Drive):
     """A recording on the topics /lidar/points, /odometry and /tf_static.
 
-    Without `/lidar/points` the only topic of point clouds takes its place;
-    of several LiDARs, `lidar` chooses one. The topic /imu/data is optional, and
+    Without `/lidar/points`, the only topic of point clouds takes its place.
+    Of several LiDARs, `lidar` chooses one. The topic /imu/data is optional, and
     so is /<lidar>/labels with `label` and `instance` of the same points. Images
     are those of the first topic of compressed ones.
     Scan i is the i-th message of that topic by log time. Its pose is

@@ -78,7 +78,7 @@ class RecordContent(ReadDataStream):
     """The content of one record; reads beyond its end are refused.
 
     Attributes:
-        left: how much of it is still to be read [bytes].
+        left: how much of the content is still to be read [bytes].
     """
 
     def __init__(self, content: bytes):
@@ -150,7 +150,7 @@ _READERS = {
 
 @dataclass(frozen=True)
 class Fault:
-    """What is wrong where a file cannot be read, from an offset on [bytes]."""
+    """Why a file cannot be read from an offset on [bytes]."""
 
     offset: int
     text: str
@@ -162,10 +162,10 @@ class Fault:
 def read_records(stream: BinaryIO) -> Iterator[McapRecord | Fault]:
     """Yields the readable records of an MCAP file, in the file's order.
 
-    Those are header, schemas, channels, messages, attachments and metadata;
-    chunks are opened, indexes left out. A Fault stands for each part that
-    cannot be read, also for a missing end. The stream may be moved between two
-    records.
+    These records are the header, schemas, channels, messages, attachments and
+    metadata. Chunks are opened, and indexes are left out. A Fault stands for
+    each part that cannot be read, also for a missing end. The caller may move
+    the stream between two records.
     """
     return (record for _, _, record in locate_records(stream))
 

@@ -78,9 +78,9 @@ def choose_cluster(num_jobs: int | None, scheduler: str | None) -> Cluster:
 
     Args:
         num_jobs: `--jobs`: work on this machine, so many jobs at a time.
-        scheduler: `--scheduler`. Without either it is the one of the
-            environment variable DASK_SCHEDULER_ADDRESS, or else this machine
-            with a job for each core.
+        scheduler: `--scheduler`. Without both options, the environment variable
+            DASK_SCHEDULER_ADDRESS names the scheduler. Without that, the jobs
+            run on this machine, one for each core.
 
     Raises:
         InputError: if both are given, or the number is not from 1 to 1024.
@@ -102,7 +102,7 @@ def choose_cluster(num_jobs: int | None, scheduler: str | None) -> Cluster:
 
 
 class LocalWorkers:
-    """Runs jobs in processes of this machine; at its end it ends them.
+    """Runs jobs in processes of this machine, which end with it.
 
     No port is opened, since anyone who reached it could run programs here.
     """

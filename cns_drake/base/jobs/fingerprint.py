@@ -40,8 +40,9 @@ def fingerprint(inputs: Mapping[str, object]) -> str:
 def code_digest(*modules: str, without: tuple[str, ...] = ()) -> str:
     """Returns a digest of modules and of all project modules they import.
 
-    A data file counts if a module of its folder names it, or names the folder
-    beside it that holds the file. Versions of libraries count.
+    The digest includes a data file if a module in the same folder names it, or
+    if a module next to the file's folder names that folder. It also includes
+    the versions of libraries.
 
     Args:
         modules: full names; `<package>.*` stands for all modules in it.

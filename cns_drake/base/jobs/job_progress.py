@@ -51,7 +51,7 @@ class _Work:
 class TimeLeft:
     """How long many jobs still take, by their costs and the pace so far.
 
-    Times are of any one clock [s].
+    All times must be of one clock [s].
     """
 
     def __init__(self, costs: Mapping[str, float]):

@@ -95,7 +95,7 @@ class Steps(Step):
 
     Attributes:
         place: the file or folder that they write; see `Step.output`.
-        steps: none needs a later one.
+        steps: the steps, of which none needs a later one.
     """
 
     place: Path

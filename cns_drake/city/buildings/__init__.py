@@ -62,10 +62,10 @@ def sample(
 
     Args:
         archetype: key of `ARCHETYPES`.
-        footprint: the ground it gets, in the building's frame S [m]. Its front
-            is the edge between its first two corners; for a rectangle, the edge
-            of least y. Eaves, balconies and canopies reach out of it by at most
-            the archetype's `overhang`.
+        footprint: ground of the building, in the building's frame S [m]. The
+            front is the edge between its first two corners; for a rectangle,
+            the edge of least y. Eaves, balconies and canopies reach out of the
+            footprint by at most the archetype's `overhang`.
         height: top of the building: parapet, ridge or spire; only roof
             equipment and chimneys may rise above it [m].
         rng: the only source of variation.

@@ -38,10 +38,10 @@ def pick(rng: np.random.Generator, choices: Sequence[T]) -> T:
 class Site:
     """The ground of a building, a simple polygon in the building's frame S [m].
 
-    Its front is the edge between its first two corners; for a rectangle, the
-    edge of least y. Edges count counter-clockwise from there; `blind_edges` are
-    built against a neighbour. The building's own meshes are called
-    `<name>_...`.
+    The front is the edge between the first two corners; for a rectangle, the
+    edge of least y. Edges are numbered counter-clockwise, from the front on.
+    `blind_edges` are built against a neighbour. The names of the building's own
+    meshes begin with `<name>_`.
     """
 
     footprint: Polygon
@@ -143,7 +143,7 @@ class Site:
 class Archetype(BaseModel, frozen=True, extra="forbid"):
     """The description of a kind of building: a `name` in `archetypes.yaml`.
 
-    What its fields are stands there.
+    That file explains the fields.
     """
 
     name: str
@@ -203,9 +203,9 @@ class Assembly:
         return pick(self.rng, choices)
 
     def some_of(self, words: str, low: int, high: int) -> list[str]:
-        """Returns the first words of a text, a random number of them.
+        """Returns a random number of words from the beginning of a text.
 
-        The number is from `low` to below `high`.
+        The number of words is from `low` to below `high`.
         """
         return words.split()[: self.whole(low, high)]
 
@@ -309,8 +309,8 @@ class Assembly:
 class Building(Assembly, abc.ABC):
     """A building of an archetype: it draws its parameters, then builds itself.
 
-    Functions that add something to a building take it as `p`: they find in it
-    its parameters, and gather in it what they make. Only roof equipment and
+    Functions that add something to a building take the building as `p`. They
+    read its parameters, and add to it what they make. Only roof equipment and
     chimneys may rise above its `height` [m].
     """
 

@@ -188,7 +188,7 @@ def house_door(width: float, z0: float, z1: float, depth: float) -> Bay:
 
 
 def bar(width: float, z0: float, z1: float, depth: float) -> Bay:
-    """Returns a bay with an upright bar in its middle, at its own depth."""
+    """Returns a bay with an upright bar in its middle, at a given depth."""
 
     def bay(x0: float, x1: float) -> list[Relief]:
         a, b = _centred(x0, x1, width)

@@ -345,7 +345,10 @@ def column(x: float, y: float, z0: float, z1: float, radius: float) -> Mesh:
 
 
 def beam(start: ArrayLike, end: ArrayLike, width: float) -> Mesh:
-    """Returns a square bar between two points that are not vertical."""
+    """Returns a bar of square section between two points.
+
+    One point must not be vertically above the other.
+    """
     start, end = np.asarray(start, float), np.asarray(end, float)
     length = float(np.linalg.norm(end - start))
     along = (end - start) / length

@@ -48,9 +48,9 @@ def square(x: float, y: float, half: float) -> np.ndarray:
 def inset(points: ArrayLike, distance: ArrayLike) -> np.ndarray:
     """Returns an outline with each edge moved inwards.
 
-    One distance is for all edges, or there is one per edge [m]; negative ones
-    move outwards. Corners keep their order. The caller keeps the distances
-    small against the lengths of the edges.
+    The distance is one for all edges, or one per edge [m]; a negative one moves
+    the edge outwards. Corners keep their order. Distances must be small
+    compared with the lengths of the edges.
     """
     points = np.asarray(points, dtype=float)
     distances = np.broadcast_to(np.asarray(distance, float), len(points))
@@ -188,8 +188,8 @@ def sloped_prism(
 ) -> Mesh:
     """Returns a solid under a plane that rises along y.
 
-    Its top is `height` above z0 at the outline's greatest y and the
-    fraction `low` of it at the least.
+    Its top is `height` above z0 at the outline's greatest y, and `low` times
+    `height` above z0 at the least y.
     """
     points = np.asarray(points, dtype=float)
     n, y = len(points), points[:, 1]
@@ -221,9 +221,9 @@ def revolved(
 ) -> Mesh:
     """Returns the surface that a profile sweeps around an upright axis.
 
-    The profile is (radius, z) pairs from the bottom up [m]; a last radius of
-    zero gives a tip, else the top is closed by a lid. A polygon of `count`
-    sides stands for the circle.
+    The profile is a list of (radius, z) pairs from the bottom up [m]. If the
+    last radius is zero, the surface ends in a tip; otherwise a lid closes the
+    top. The circle is approximated by a polygon of `count` sides.
     """
 
     def ring(radius: float) -> np.ndarray:
@@ -244,8 +244,8 @@ def revolved(
 def extruded(profile: Sequence[Point], x0: float, x1: float) -> Mesh:
     """Returns a shed: a roof line drawn along x, with its end walls.
 
-    The line is (y, z) points, y rising; the ends reach down to its first point
-    [m].
+    The line consists of (y, z) points with rising y [m]. The end walls reach
+    down to its first point.
     """
     base = profile[0][1]
     faces = Faces()

@@ -311,7 +311,7 @@ class Facade:
     """The walls of one or several storeys, for any polygon.
 
     Attributes:
-        height: [m].
+        height: height of the walls [m].
         bands: strips around the building, painted in order; else depth 0.
         layout: (edge index, edge length [m]) -> patches, painted in order.
         glass: depths whose fronts are glass; `facade_mesh` leaves them open

@@ -56,12 +56,12 @@ class City(NamedTuple):
 class Streets(NamedTuple):
     """Streets that a city is built along.
 
-    Sidewalks are `kerb_height` above the surface [m], or what `kerbs` has at a
-    place; junctions are the area of all of them. Margins are strips beside the
-    streets that stay free, and buildings stand along them; nothing is built or
-    planted in what is `reserved`, either. All areas are in W [m]. `furnish`
-    places the streets' furniture, after the buildings and before all else, and
-    `park` parks cars in them, last of all.
+    Sidewalks are `kerb_height` above the surface [m], or as high as `kerbs`
+    gives for a place. `junctions` is the area of all junctions. Margins are
+    strips beside the streets that stay free, and buildings stand along them.
+    Nothing is built or planted in `reserved`, either. All areas are in W [m].
+    `furnish` places the streets' furniture, after the buildings and before all
+    else. `park` parks cars in the streets, last of all.
     """
 
     areas: Areas
@@ -139,7 +139,7 @@ def lay_out(network: RoadNetwork, plan: CityPlan, source: str) -> City:
 def build_along(streets: Streets, plan: CityPlan, source: str) -> City:
     """Returns a city that is made along streets.
 
-    Things that need most room, or have the least choice of place, come first.
+    Things that need most room, or that fit in the fewest places, come first.
 
     Raises:
         InputError: if the plan names something unknown or impossible.

@@ -41,9 +41,9 @@ _COLUMNS = ("name", "class", "x", "y", "tags")
 class Renaming(NamedTuple):
     """The new names of the structures that a file of stages names.
 
-    Structures that have kept their place are `renamed`; others are `lost`, even
-    if another one has the name now. Patterns are `unclear` if they match other
-    structures than before.
+    Structures that still stand at their place are `renamed`. All others are
+    `lost`, even if another structure has their name now. Patterns are `unclear`
+    if they now match different structures.
     """
 
     renamed: dict[str, str]
@@ -67,8 +67,8 @@ def find_renaming(
 ) -> Renaming:
     """Returns the new names of structures that a `stages.yaml` names.
 
-    The table is the `structures.csv` of the city for which it was written. A
-    structure at the same place is the same.
+    The table is the `structures.csv` of the city for which `stages.yaml` was
+    written. A structure at the same place counts as the same structure.
 
     Raises:
         InputError: a file cannot be read.
@@ -256,7 +256,7 @@ def stage_sdf(
     carries no collision geometry because nothing ever touches it. The
     visual's name is `<structure>/<part>`; Drake keeps it as the geometry
     name, which is how a LiDAR return finds its structure. `comment` is one line
-    for the reader of the file, `before` SDF text of other visuals.
+    for the reader of the file. `before` is the SDF text of other visuals.
     """
     lines = [
         '<?xml version="1.0"?>',

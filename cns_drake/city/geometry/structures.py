@@ -85,11 +85,11 @@ class Model:
 
 @dataclass(frozen=True)
 class Structure:
-    """A model with a place of its frame S in the world [m, rad].
+    """A model, and the place of its frame S in the world [m, rad].
 
-    The name is stable and unique in the city, e.g. `tower_017`; tags are free
-    words for the layout and the stages, e.g. the block. Classes are the keys of
-    `cns_drake.scene.semantics.CLASS_IDS`.
+    The name is stable and unique in the city, e.g. `tower_017`. Tags are words
+    that the layout and the stages may use, e.g. the name of the block. Classes
+    are the keys of `cns_drake.scene.semantics.CLASS_IDS`.
     """
 
     name: str
@@ -142,7 +142,7 @@ _ROUND_SIDES = 12
 class Builder:
     """How to make objects of one kind, by `build(rng, **parameters) -> Model`.
 
-    Every parameter has a default, most are then drawn from `rng`. The same
+    Every parameter has a default; most defaults are drawn from `rng`. The same
     generator state gives the same model.
     """
 

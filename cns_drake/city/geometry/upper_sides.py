@@ -10,8 +10,8 @@ _UPWARDS = 0.05
 def long_normals(triangles: np.ndarray) -> np.ndarray:
     """Returns the cross products (M, 3) of two edges of triangles (M, 3, 3).
 
-    They are normals, twice as long as the areas. For a few triangles this is
-    faster than `np.cross`.
+    These are normals whose length is twice the area of the triangle. For a few
+    triangles, this function is faster than `np.cross`.
     """
     u = triangles[:, 1] - triangles[:, 0]
     v = triangles[:, 2] - triangles[:, 0]

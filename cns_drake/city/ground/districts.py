@@ -16,8 +16,8 @@ from cns_drake.city.plan.city_plan import CityPlan, DistrictPlan, PatchPlan
 class District(NamedTuple):
     """A district with all of its ground in W [m].
 
-    Kinds of ground have areas that together are `area`; terraces are patches
-    that are held level.
+    Each kind of ground has an area; together these areas are `area`. Terraces
+    are patches that are level.
     """
 
     plan: DistrictPlan

@@ -226,8 +226,8 @@ def aprons(buildings: Iterable[Structure], streets: BaseGeometry) -> list[Pad]:
 def relaxed(z: np.ndarray) -> np.ndarray:
     """Returns a grid of heights with its gaps (NaN) filled smoothly.
 
-    Every gap is at the mean of its two to four neighbours, as in a harmonic
-    field; at least one height is given.
+    The height of every gap is the mean of its two to four neighbours, as in a
+    harmonic field. At least one height must be given.
     """
     rows, columns = z.shape
     free = np.isnan(z)

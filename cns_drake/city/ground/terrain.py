@@ -206,8 +206,8 @@ def bridge_structures(
 ) -> list[Structure]:
     """Returns the sides, undersides and piers of all bridges.
 
-    A bridge is where a street crosses a district of water, and where such a
-    district has a patch of land. Its upper side is that of the street or patch.
+    There is a bridge where a street crosses a district of water, and where such
+    a district has a patch of land. Its upper side is the street or the patch.
     `shape` gives the height of everything except water.
     """
     structures = []

@@ -47,9 +47,9 @@ def lowered(model: Model, height: float, name: str, seed: int) -> Model:
     """Returns a building that ends at a height, under a flat roof.
 
     The roof is at `height` above the building's own ground [m]; its parapet and
-    the equipment on it, drawn from `seed`, reach higher. New meshes are called
-    after `name`. The model itself is returned where less than a storey of it
-    lies above `height`, or nothing there is enclosed.
+    the equipment on it, drawn from `seed`, reach higher. New meshes are
+    named after `name`. The model itself is returned if less than a storey
+    of it lies above `height`, or if nothing above `height` is enclosed.
     """
     if top_of(model) < height + _STOREY:
         return model
@@ -94,9 +94,9 @@ def top_of(model: Model) -> float:
 def cut_at(mesh: Mesh, height: float) -> tuple[Mesh, np.ndarray]:
     """Returns the part of a mesh below a height [m], and the cut.
 
-    The part is open at the cut. The mesh has plane convex faces. The cut is (N,
-    2, 2), the starts and ends of the edges in which it meets faces, whose backs
-    are on the left [m].
+    The part is open at the cut. The mesh must have plane, convex faces. The cut
+    is (N, 2, 2): the starts and ends of the edges in which it meets the faces
+    [m]. The back of a face is on the left of its edge.
     """
     corners: list[_Point] = []
     faces: list[tuple[int, ...]] = []
@@ -154,8 +154,8 @@ def _clipped(
 def enclosed(edges: np.ndarray) -> MultiPolygon:
     """Returns the ground on the left of the cut edges (N, 2, 2) of walls [m].
 
-    Polygons have their courtyards, in whole millimetres. Reveals and the gaps
-    between walls and what stands before them belong to them.
+    The polygons have holes for courtyards, and whole millimetres. They include
+    reveals, and the gaps between walls and what stands before them.
     """
     edges = edges[np.ptp(edges, axis=1).max(axis=1) > 0.001]
     lines = shapely.linestrings(edges)

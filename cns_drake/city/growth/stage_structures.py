@@ -36,7 +36,7 @@ from cns_drake.city.plan.stages import LotUse, Stages
 def younger(model: Model, height: float) -> Model:
     """Returns a plant that is scaled down to a height [m].
 
-    The plant stands on z = 0. If it is already lower it is returned itself.
+    The plant stands on z = 0. A plant that is already lower is not changed.
     """
     meshes = (part_mesh(part, model.meshes) for part in model.parts)
     top = max(mesh.vertices[:, 2].max() for mesh in meshes)
@@ -231,9 +231,9 @@ def _places(
 class GrowingCity:
     """A city and its stages.
 
-    Its structures are those of the whole city, then those on lots before they
-    are built on; an instance id is a place in this order, counted from 1, and
-    the same at all stages.
+    Its structures are first those of the whole city, then those that stand on
+    lots before the lots are built on. The instance id of a structure is its
+    number in this order, counted from 1, and is the same at all stages.
     """
 
     def __init__(

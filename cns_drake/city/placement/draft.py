@@ -30,7 +30,7 @@ _WORDS = {"car": "car", "truck": "truck", "traffic-sign": "sign"}
 
 
 def name_stem(object_name: str) -> str:
-    """Returns what an object is called, e.g. `tree` for a `lime_tree`."""
+    """Returns the stem of an object's name, e.g. `tree` for a `lime_tree`."""
     if object_name in SPECIES:
         return "tree"
     return _WORDS.get(OBJECTS[object_name].semantic_class, object_name)
@@ -46,11 +46,11 @@ _RANGE = 50
 class Draft:
     """Collects structures, gives them names and keeps them apart.
 
-    Streets are all their ground, sidewalks included, and buildings stand along
-    the `frontage`; `base` is the height of sidewalks and of the ground between
-    them, without what buildings and relief change about it, and `ground` the
-    upper sides of the finished ground, set once the buildings stand. All are in
-    W. `source` is the name of the plan's file, for messages.
+    `streets` is all ground of the streets, sidewalks included. Buildings stand
+    along the `frontage`. `base` is the height of sidewalks and of the ground
+    between them, before buildings and relief change it. `ground` is the upper
+    sides of the finished ground, which is set once the buildings stand. All
+    these are in W. `source` is the name of the plan's file, for messages.
     """
 
     def __init__(
@@ -90,9 +90,9 @@ class Draft:
     def open_range(self) -> None:
         """Starts a new range of numbers for names in the next task.
 
-        House numbers start anew with each street in the same way. One object
-        more or less in one task does not rename the objects of later tasks, to
-        which the lists of the stages refer.
+        In the same way, house numbers start anew with each street. Thus, an
+        object more or less in one task does not rename the objects of later
+        tasks, to which the lists of the stages refer.
         """
         for kind, count in self._counts.items():
             self._counts[kind] = -(-count // _RANGE) * _RANGE

@@ -75,9 +75,9 @@ class Opening(NamedTuple):
 class FacadePlan:
     """A wall with its openings.
 
-    The lowest floor, and the ground in front, have heights in the panel, and
-    the nearest drive a distance [m]. The top is free if nothing is built
-    against its upper edge.
+    The heights of the lowest floor and of the ground in front are given in the
+    panel, and the nearest drive by its distance [m]. The top is free if nothing
+    is built against its upper edge.
     """
 
     panel: Panel
@@ -114,8 +114,9 @@ class FacadePlan:
     def threshold(self, door: Opening, paving: upper_sides.UpperSides) -> float:
         """Returns the height of a door's threshold above the paving [m].
 
-        It is a step. The highest paving before the door and in its recess
-        counts, unless it is far above or below the ground.
+        A step leads up to the threshold. The height is measured from the
+        highest paving before the door and in its recess, unless this is far
+        above or below the ground.
         """
         depths = {"shop": _SHOP_DEPTH, "gate": _GATE_DEPTH}
         deep = depths.get(door.kind, self.style.depth + _DOOR_DEEPER)

@@ -131,9 +131,10 @@ _SOLID = ("building", "fence", "other-structure")
 class StreetThings:
     """The placed things.
 
-    Those from the file are counted, those at random, and those of the file that
-    would stand in the way of a drive, in a wall or in each other. Trees of the
-    file that were on a carriageway are moved beside it.
+    Three kinds of things are counted: things from the file; things placed at
+    random; and things of the file that are left out, since they would stand in
+    the way of a drive, in a wall or in each other. Trees of the file that were
+    on a carriageway are moved beside it.
     """
 
     structures: list[Imported] = field(default_factory=list)

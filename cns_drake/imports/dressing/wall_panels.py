@@ -62,7 +62,13 @@ class Panel:
     def place(
         self, x: ArrayLike, z: ArrayLike, out: ArrayLike = 0.0
     ) -> np.ndarray:
-        """Returns places (..., 3) at x, z and outwards of the panel [m]."""
+        """Returns points (..., 3) given by coordinates of the panel [m].
+
+        Args:
+            x: distance along the panel from its origin.
+            z: height above its origin.
+            out: distance outwards from its plane.
+        """
         x, z, out = (np.asarray(one, dtype=float) for one in (x, z, out))
         places = np.empty((*x.shape, 3))
         for k in range(2):

@@ -41,9 +41,9 @@ _LEAST_ROAD = 800.0
 class FreeSpace:
     """Room on a grid that begins at (2,), the corner of its first cell [m].
 
-    The clearance (rows along y, columns along x) is that from the middle of
-    each cell to the nearest obstacle, 0 where no car may be, and a path needs
-    the least one [m]. Walls are the obstacles, seen from above.
+    The clearance (rows along y, columns along x) is the distance from the
+    middle of each cell to the nearest obstacle, and 0 where no car may be [m].
+    A path needs a least clearance. Walls are the obstacles, seen from above.
     """
 
     low: np.ndarray

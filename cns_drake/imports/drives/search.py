@@ -72,7 +72,7 @@ _MOST_REACHED = 400_000
 class WaypointDrive:
     """A drive: waypoints (N, 2) or (N, 3), the path (M, 2) between them [m].
 
-    The limit is the lowest speed limit on the way, or none [m/s].
+    The limit is the lowest speed limit on the way [m/s]; None without one.
     """
 
     waypoints: np.ndarray

@@ -69,7 +69,7 @@ def lane_class(kind: str) -> str | None:
 def is_raised(kind: str, height: float) -> bool:
     """Returns whether a lane is a kerb above the road, not part of it.
 
-    Its inner edge stands at a height above the road in the file [m].
+    The height of its inner edge above the road is that in the file [m].
     """
     has_kerb = height >= _LEAST_KERB
     return kind in _RAISED or (
@@ -89,11 +89,11 @@ class LaneBand:
         inner, outer: (N, 3) places on its edges, in the order of the road; two
             are the same at a step in its width [m]. Those of a lane above a
             kerb are at the height of the road.
-        middle: (N, 3) between them.
-        heading, roll, grade: (N,) the road's there, the roll 0 for a level lane
-            [rad, rad, 1].
+        middle: (N, 3) places in the middle between both edges [m].
+        heading, roll, grade: (N,) heading, roll and grade of the road at these
+            places [rad, rad, 1]. The roll is 0 for a level lane.
         rise: (N, 2) heights of its edges above the road; NaN if unknown [m].
-        s: (N,) along the road [m].
+        s: (N,) distances along the road [m].
     """
 
     road: ImportedRoad

@@ -248,7 +248,7 @@ class MarkLine:
         start: where the first dash begins, from the start of the mark [m].
         dash, gap: lengths of a dash and of the gap after it; the line is
             continuous if the gap is 0 [m].
-        width: [m].
+        width: width of the line [m].
     """
 
     aside: float
@@ -315,11 +315,11 @@ class Thing(NamedTuple):
 
     Attributes:
         name: unique in the network.
-        is_signal: a signal, else an object.
-        kind: its type, in small letters.
+        is_signal: whether it is a signal, and not an object.
+        kind: type of the thing, in small letters.
         s, t: place along and across the road [m].
-        z: above the road [m].
-        heading: against that of the road [rad].
+        z: height above the road [m].
+        heading: heading relative to that of the road [rad].
         size: length, width, height; 0 where unknown [m].
         outline: (N, 3) corners about the place, or none: u, v, height; or
         road_outline: (N, 3) corners s, t, height; or none [m].
@@ -405,8 +405,8 @@ class ImportedRoad:
 class RoadMap:
     """All roads of a file, in its order.
 
-    The reference system is as the file names it, and the origin that of the
-    world in its coordinates [m].
+    The reference system has the name that the file gives it. The origin is that
+    of the world, in coordinates of this system [m].
     """
 
     roads: tuple[ImportedRoad, ...]

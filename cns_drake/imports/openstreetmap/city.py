@@ -121,9 +121,9 @@ def import_openstreetmap(
 ) -> ForeignCity:
     """Reads a file; its origin is the middle of its buildings.
 
-    Only for a dressed city, the sea, and grounds by what they are made of, are
-    made, bridges have parapets or are left out, and demolished buildings
-    without a date are made.
+    Some things are made only for a dressed city: the sea, grounds by their
+    material, and demolished buildings without a date. Only there, bridges have
+    parapets or are left out.
 
     Raises:
         InputError: if it cannot be read, has no building, or is larger than
@@ -365,7 +365,7 @@ def make_buildings(
         year_attribute: tag that has the year of construction; None for the
             usual ones.
         faults: counts what was repaired or omitted.
-        once: whether buildings that lie in each other are joined.
+        once: whether buildings that lie inside one another are joined.
     """
     outlines: list[_Block] = []
     parts: list[_Block] = []

@@ -264,11 +264,12 @@ class OsmArea(NamedTuple):
 class OsmFeatures:
     """The content of a file; places are longitude and latitude [deg].
 
-    Areas are closed ways and multipolygons. Ways have those of their places
-    that are in the file. Crossings are numbers of nodes with tags, and `nodes`
-    are all other ones that have tags. An outline of a building's multipolygon,
-    a way, leads to that in `outers`. All things with tags have a kind, by ids
-    with `n` before the number of a node, `w` of a way and `r` of a relation.
+    Areas are closed ways and multipolygons. A way has only those of its places
+    that are in the file. A crossing is the number of its node, with the tags;
+    `nodes` are all other nodes with tags. `outers` maps a way that is an
+    outline of a building's multipolygon to this multipolygon. All things with
+    tags have a kind. Their ids are numbers with the prefix `n` for a node, `w`
+    for a way and `r` for a relation.
     """
 
     areas: list[OsmArea] = field(default_factory=list)

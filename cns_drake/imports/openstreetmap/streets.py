@@ -52,8 +52,8 @@ _STRIPE, _STRIPE_LENGTH, _STRIPE_HEIGHT = 0.5, 3.0, 0.01
 class Bridges:
     """Ids of ways for cars and people above or below the ground.
 
-    Bridges over another street, or a railway, and all others, at the level of
-    the ground beside them; and tunnels.
+    There are three kinds: bridges over another street or a railway; all other
+    bridges, which are at the level of the ground beside them; and tunnels.
     """
 
     over_streets: AbstractSet[str] = frozenset()
@@ -405,7 +405,7 @@ def sea(
 ) -> Iterator[Imported]:
     """Yields the sea on the right of coasts, if there is any.
 
-    Limits (2, 2) are the least x and y, and greatest, of the city [m].
+    Limits (2, 2) are the least and the greatest x and y of the city [m].
     """
     if not coasts:
         return

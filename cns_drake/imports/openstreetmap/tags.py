@@ -51,17 +51,18 @@ _SPEED = re.compile(r"(\d{1,3})(?:\s*(km/h|kmh|kph|mph))?")
 
 
 def length(text: str | None) -> float | None:
-    """Returns a length in metres from text; None if there is none.
+    """Returns the length that a text states [m]; None if it states none.
 
-    Of a list or a range it is the greatest.
+    If the text is a list or a range, it is the greatest length.
     """
     return _greatest(text, _length)
 
 
 def count(text: str | None) -> float | None:
-    """Returns a number from text, such as of levels; None if there is none.
+    """Returns the number that a text states, such as a number of levels.
 
-    Of a list or a range it is the greatest.
+    If the text is a list or a range, it is the greatest number. None if the
+    text states no number.
     """
     return _greatest(
         text, lambda part: _decimal(part) if _COUNT.fullmatch(part) else None
@@ -107,11 +108,13 @@ def tag_value(
     """Returns the parsed value of a tag; None if it has no valid one.
 
     Args:
-        tags: tags of a thing.
+        tags: tags of a map element.
         key: key of the tag.
-        read: reads the text; None if it cannot.
-        most, least: limits of a plausible value. Others are counted.
-        where: name of the thing and counts of faults; None to count nothing.
+        read: parses the text; returns None for a text that it cannot parse.
+        most, least: limits of a plausible value. Any other value is counted
+            as a fault.
+        where: name of the element, and the faults to add to; None if faults
+            are not counted.
     """
     text = tags.get(key)
     if text is None:

@@ -61,7 +61,7 @@ def add_cameras(
 
     Args:
         builder: builder of a diagram with the scene.
-        scene: what they see.
+        scene: scene that the cameras see.
         base: the vehicle's frame, as in the scene that was copied.
         cameras: name -> description.
 

@@ -110,8 +110,10 @@ class CameraScene(LeafSystem):
     `frame_poses` is abstract, `KnownPoses`.
 
     Attributes:
-        scene_graphs: what cameras see: `colours`, and `classes` if asked for.
-        frames: frame in the scene that was copied -> frame in these.
+        scene_graphs: SceneGraphs that the cameras see: `colours`, and `classes`
+            if labels are recorded.
+        frames: frame in the scene that was copied -> its frame in these
+            SceneGraphs.
     """
 
     def __init__(

@@ -26,10 +26,11 @@ class Look:
 
     Attributes:
         size: side of the repeated square in the world [m].
-        paint: makes (N, N, 1 or 3) light, of any mean, from random numbers;
-            a fourth channel is 0 where there is nothing.
-        roughness: 0 of a mirror to 1 of chalk.
-        is_face: whether it covers each geometry once, with colours of its own.
+        paint: function that makes (N, N, 1 or 3) brightness, of any mean, from
+            random numbers. A fourth channel is 0 where there is nothing.
+        roughness: from 0, that of a mirror, to 1, that of chalk.
+        is_face: whether the texture covers each geometry once, with colours of
+            its own.
     """
 
     size: float
@@ -262,7 +263,7 @@ def look_of(
 def texture(name: str) -> tuple[bytes, float]:
     """Returns a look's texture as PNG, and the brightness of its white.
 
-    The mean of the product of both is 1.
+    The product of texture and brightness has the mean 1.
     """
     from PIL import Image
 
@@ -307,8 +308,8 @@ def sky(d_W: np.ndarray) -> np.ndarray:
 def texture_places(corners: np.ndarray, normals: np.ndarray) -> np.ndarray:
     """Returns texture coordinates (N, 3, 2) [m] of corners (N, 3, 3).
 
-    The (N, 3) normals are of unit length. Rows of a texture are heights on
-    walls.
+    The (N, 3) normals are of unit length. On walls, the rows of a texture are
+    horizontal.
     """
     across = np.round(np.stack([-normals[:, 1], normals[:, 0]], axis=1), 3)
     length = np.linalg.norm(across, axis=1, keepdims=True)

@@ -165,7 +165,8 @@ def add_described_imu(
         body: body that carries the IMU.
         trajectory: motion of that body.
         motion: the system that moves it.
-        scan_rate: scans per second, the rate of an IMU without one.
+        scan_rate: scans per second; the rate of an IMU whose description has
+            none.
         seed: seed of its errors.
 
     Returns:

@@ -182,9 +182,9 @@ def make_pattern(
 
 
 def describe_unit(config: LidarSection) -> dict[str, Any]:
-    """Returns the data of a calibrated unit that its user would know.
+    """Returns the data of a calibrated unit that a user would know.
 
-    Its lasers' true angles differ from these by the errors of the unit.
+    The true angles of its lasers differ from these by the errors of the unit.
     """
     nominal = getattr(make_pattern(config), "elevations_rad", ())
     return {

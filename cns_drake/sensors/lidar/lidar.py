@@ -51,14 +51,14 @@ _WITH_GREY = Fields(BaseField.kXYZs | BaseField.kRGBs)
 
 
 class Structures(Protocol):
-    """What gives labels and instance ids to geometries."""
+    """Interface of a table that gives geometries labels and instance ids."""
 
     def labels(self, names: Sequence[str]) -> Labels:
         """Returns labels of geometries, by the names of their structures."""
 
 
 class RayHits(NamedTuple):
-    """What N rays meet first.
+    """The surfaces that N rays hit first.
 
     Attributes:
         ranges: (N,) float32 distances [m], inf for a miss.
@@ -73,7 +73,7 @@ class RayHits(NamedTuple):
 
 
 class Lidar(LeafSystem):
-    """A LiDAR that sees all geometry of a role except its own body's.
+    """A LiDAR that sees all geometry of one role, except its own body's.
 
     .. pydrake_system::
 
@@ -101,39 +101,41 @@ class Lidar(LeafSystem):
     one of 255). `point_cloud_W` has them in the world, `positions_W` without
     colours, and `X_WS` is the pose of S at the time of the output.
 
-    The turn starts at the time of the output; that of a causal LiDAR ends then,
-    so that a controller may use the scan at once. All its beams are cast from
-    the pose of S at the time of the output, by the pose of P in the SceneGraph
-    (a deskewed scan). With the port `sweep`, poses come from there instead (a
-    `Sweep` of P): one for the whole turn; or with motion distortion one for
-    each column, at its own firing time. Its points are then expressed in S at
-    that time, as a real unit reports them: X_WS(start of the turn + t) takes
-    them to their places in the world. Other moving geometry stays, for the
-    turn, at its place at the time of the output.
+    The turn starts at the time of the output. The turn of a causal LiDAR ends
+    at that time instead, so that a controller may use the scan at once. By
+    default all beams are cast from the pose of S at the time of the output,
+    which follows from the pose of P in the SceneGraph (a deskewed scan).
 
-    With `moving_bodies` and the port `body_spatial_velocities` (a list over a
+    The port `sweep` replaces this pose by those of a `Sweep` of P: one for the
+    whole turn; or, with motion distortion, one for each column at its firing
+    time. A point is then expressed in S at its firing time t, as a real unit
+    reports it: X_WS(start of the turn + t) takes it to its place in the world.
+    During the turn, all other moving geometry stays where it is at the time of
+    the output.
+
+    `moving_bodies` and the port `body_spatial_velocities` (a list over a
     plant's bodies of V_WB, expressed in the world, as a MultibodyPlant gives
-    it), P and all other bodies of that plant keep the velocities that they have
-    at the time of the output for the turn: each beam is cast at its own firing
-    time, from the place of S then, on the geometry at its place then. Points
-    are expressed in S at that time, too.
+    it) make P and all other bodies of that plant move during the turn, with the
+    velocities that they have at the time of the output. Each beam is cast at
+    its own firing time: from the place that S has then, on the geometry at the
+    place that it has then. Points are expressed in S at that time, too.
 
-    `instance` of a point numbers its structure: a model, or the part of a name
-    before a slash. `EvalInstances` maps it to geometries, `EvalGeometryIds`
-    gives the very geometry of each point.
+    The field `instance` of a point is the number of its structure: a model, or
+    the part of a name before a slash. `EvalInstances` maps the number to
+    geometries. `EvalGeometryIds` returns the geometry of each single point.
 
     `moving_instances` (abstract, the instance ids of structures) lists the
     moving structures: their points have the label of the moving class.
 
-    `frame_poses` (abstract, `KnownPoses`) has poses X_WF that the SceneGraph
-    has as well; a LiDAR takes many of them from one array faster.
+    `frame_poses` (abstract, `KnownPoses`) repeats poses X_WF of the SceneGraph
+    in one array, from which a LiDAR reads many poses faster.
 
-    Drake cannot cast rays, so the system reads shapes and poses from the
-    QueryObject and casts on its own hierarchy, whose changed parts are built
-    anew. `geometry_revision` (from `geometry_revision_port`) shows when
-    geometry has changed; without it the LiDAR compares all geometry at every
-    scan, which in a world of thousands of geometries takes longer than the
-    scan.
+    Drake cannot cast rays. The system therefore reads shapes and poses from the
+    QueryObject and casts rays on a hierarchy of its own. It rebuilds the parts
+    of this hierarchy that have changed. `geometry_revision` (from
+    `geometry_revision_port`) shows when geometry has changed. Without it, the
+    LiDAR compares all geometry at every scan, which in a world of thousands of
+    geometries takes longer than the scan.
 
     Attributes:
         parent_frame_id: the frame P that carries the LiDAR.
@@ -599,11 +601,12 @@ class SeenGeometry:
     cannot be shared.
 
     Attributes:
-        scene: casts rays, None before the first update; its geometry indices
-            select from:
-        built: the geometries.
+        scene: scene on which rays are cast; None before the first update. Its
+            geometry indices are those of `built`.
+        built: the geometries in the scene.
         label: (num_geometries,) uint16 class of each geometry.
-        moving_label: (num_geometries,) uint16 its class while it moves.
+        moving_label: (num_geometries,) uint16 class of each geometry while it
+            moves.
         instance: (num_geometries,) uint16 structure of each geometry.
     """
 
@@ -660,7 +663,7 @@ class SeenGeometry:
         self._revision = revision
 
     def labels(self, moving: np.ndarray) -> np.ndarray:
-        """Returns the class of each geometry; moving instances have another."""
+        """Returns the class of each geometry, given the moving instances."""
         moves = np.zeros(MAX_INSTANCE + 1, bool)
         moves[moving] = True
         return np.where(moves[self.instance], self.moving_label, self.label)

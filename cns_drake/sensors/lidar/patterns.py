@@ -100,7 +100,10 @@ class Beams:
 
     @cached_property
     def cast_columns(self) -> np.ndarray | None:
-        """Column (N,) of each beam in packet order; None if they repeat."""
+        """(N,) column of each beam in packet order.
+
+        None if the beams pass through all columns in turn, again and again.
+        """
         columns = self.column[self.packet_order]
         turns, rest = divmod(len(columns), max(len(self.column_t_ns), 1))
         once = np.arange(len(self.column_t_ns))
@@ -447,8 +450,9 @@ def make_flash_pattern(
 ) -> DirectionPattern:
     """Returns the pattern of a solid-state LiDAR with a grid of pixels.
 
-    All pixels fire at once. They are evenly spaced in azimuth and elevation;
-    the middles of the outer ones are half a pixel within the field of view.
+    All pixels fire at once. They are evenly spaced in azimuth and elevation.
+    The middles of the outermost pixels lie half a pixel inside the edge of the
+    field of view.
     Ring 0 is the uppermost row.
 
     Args:
@@ -498,11 +502,12 @@ _NEAR_CELLS, _GAP_CELLS = 6, 48
 class BeamCoverage:
     """The directions that the beams of a turn cover.
 
-    A beam covers what is within 1.5 deg in elevation and in azimuth, unless it
-    lies outside of the field of view. That has cells of 0.25 deg: those of the
-    beams, those beside them, since points are where their beams were up to
-    rounding, and all between beams that are up to 24 deg apart (a morphological
-    closing).
+    A beam covers all directions within 1.5 deg of it in elevation and in
+    azimuth that are not outside of the field of view.
+
+    The field of view consists of cells of 0.25 deg: the cells of the beams;
+    their neighbours, since rounding can move a point off its beam; and all
+    cells between beams that are up to 24 deg apart (a morphological closing).
     """
 
     def __init__(self, d_Sset: np.ndarray):
@@ -616,10 +621,10 @@ def _fire(pattern: _TimedPattern, frame: int) -> Beams:
 class RosettePattern(_TimedPattern):
     """The pattern of two counter-rotating wedge prisms before a row of lasers.
 
-    Each prism bends a beam by a quarter of the field of view, which therefore
-    is a disc about x, densest in its middle; the bends add up as vectors (of
-    first order: a real prism bends an oblique beam somewhat more). Lasers one
-    above the other give as many discs.
+    Each prism bends a beam by a quarter of the field of view, and both bends
+    add up as vectors. The field of view is therefore a disc about x, densest in
+    its middle. This holds to first order: a real prism bends an oblique beam
+    somewhat more. Each laser of a vertical row has a disc of its own.
 
     Attributes:
         fov_deg: full angle of a disc [deg].
@@ -672,8 +677,8 @@ class NoddingPattern(_TimedPattern):
     """A pattern of lines that rotate and slowly nod, each in its own band.
 
     Bands of equal height fill the field of view. The lines turn about z 100
-    times a second and nod 6.18 times a second. The ratio is not simple, so that
-    frame after frame fills the gaps.
+    times a second and nod 6.18 times a second. The ratio of these rates is not
+    a simple fraction, so each frame fills gaps of the frames before.
 
     Attributes:
         elevations_deg: lowest and highest elevation; line 0 has the highest

@@ -295,17 +295,17 @@ class CalibratedTurn:
     """The beams of a turn in the order of casting.
 
     Attributes:
-        d_Sset: (N, 3) true directions in the order of casting.
-        height: (N,) heights of their lasers above the origin [m].
-        blocks: each height, and the rows that have it.
-        reported: (N, 3) directions by the unit, in firing order.
-        p_SLset: (N, 3) places of their lasers, in firing order [m].
+        d_Sset: (N, 3) true directions of the beams, in the order of casting.
+        height: (N,) height of each beam's laser above the origin [m].
+        blocks: each height, and the rows of the beams that have it.
+        reported: (N, 3) directions that the unit reports, in firing order.
+        p_SLset: (N, 3) place of each beam's laser, in firing order [m].
         beam: (N,) number of each beam, in firing order.
-        orders: (2, N) orders of the rays in which neighbours follow each
-            other: that of casting, and that of firing, which has the row of
-            each beam.
-        range_error: (N,) error of each beam's laser, in firing order [m].
-        gain: (N,) its gain.
+        orders: (2, N) two orders in which neighbouring rays follow each other:
+            the order of casting, and the firing order, which contains the row
+            of each beam.
+        range_error: (N,) range error of each beam's laser, in firing order [m].
+        gain: (N,) gain of each beam's laser.
     """
 
     def __init__(

@@ -94,12 +94,13 @@ def report_echoes(
 ) -> Reported:
     """Returns the points that the unit reports for the light it receives.
 
-    Light less than a pulse apart is one echo, whose distance is the mean by
-    energy. An echo is detected by the probability of its SNR, and its distance
-    has the standard deviation that belongs to that.
+    Parts of the light that are less than a pulse apart form one echo, whose
+    distance is their mean, weighted by energy. The SNR of an echo determines
+    the probability that it is detected, and the standard deviation of its
+    distance.
 
     Args:
-        light: what came back.
+        light: the light that came back.
         receiver: receiver of the unit.
         key: key of the random draws.
         range_error: (N,) error of range of each beam's laser [m].

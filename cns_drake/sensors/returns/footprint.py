@@ -46,10 +46,11 @@ class Sides(NamedTuple):
 def find_sides(shots: Shots, orders: np.ndarray, hits: BeamHits) -> Sides:
     """Returns extra rays to cast where neighbouring beams hit an edge.
 
-    Two neighbours meet one surface, or two that touch, if one point is on the
-    plane of the other, or both planes meet in between. Otherwise an edge is
-    between them: within one of their beams, or in the gap. Neighbours follow
-    each other in (2, N) orders of the beams, whose axes have the hits.
+    Two neighbours meet one surface, or two surfaces that touch, if one point is
+    on the plane of the other, or if both planes meet in between. Otherwise an
+    edge lies between the neighbours: within one of their beams, or in the gap.
+    Beams are neighbours if they follow each other in one of the (2, N) orders.
+    The hits are those of the axes of the beams.
     """
     farthest = _NEIGHBOURS * shots.divergence
     edges = [_find_edges(order, hits, farthest) for order in orders]

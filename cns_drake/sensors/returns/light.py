@@ -67,7 +67,7 @@ class Shots(NamedTuple):
     """The N beams of a turn, in the order of casting.
 
     Attributes:
-        key: the frame's; see `frame_key`.
+        key: key of the frame; see `frame_key`.
         beam: (N,) number of each beam.
         p_WSset: (K, 3) places of the lasers, taken in turn.
         times: (T,) float32 parts of the turn at which they fire, taken in turn.
@@ -176,9 +176,9 @@ def texture(
 ) -> Light:
     """Returns the light with the albedo and depth of single spots.
 
-    Both belong to the surface: they are a hash of the spot in the surface's own
-    frame, so that all scans of all drives meet the same. Darker spots are
-    deeper. No wall or floor lies along the axes of the cells.
+    Albedo and depth belong to the surface. They are a hash of the spot in the
+    surface's own frame, so that all scans of all drives meet the same values.
+    Darker spots are deeper. No wall or floor lies along the axes of the cells.
 
     Args:
         row: (B,) row of each beam in:

@@ -61,7 +61,7 @@ class LinkBudget(NamedTuple):
         own_extinction: alpha_0 [1/m].
         range_noise: standard deviation of a range at an SNR of 1 [m].
         range_floor: least standard deviation, at any SNR [m].
-        range_bias: the part of it that is a laser's own [m].
+        range_bias: the part of `range_floor` that is constant for a laser [m].
     """
 
     scale: float
@@ -121,9 +121,10 @@ def detection_probability(snr: ArrayLike) -> np.ndarray:
 def range_deviation(budget: LinkBudget, snr: np.ndarray) -> np.ndarray:
     """Returns the standard deviation of a laser's ranges [m].
 
-    Over all lasers it falls with the root of the SNR (Wagner et al., 2006),
-    down to a limit by the unit's clock and the shape of its pulses. Without the
-    part that is a laser's own, the rest is each shot's.
+    The deviation over all lasers falls with the root of the SNR (Wagner et al.,
+    2006), down to a limit that the unit's clock and the shape of its pulses
+    set. The part that is constant for a laser is subtracted; the rest differs
+    from shot to shot.
     """
     whole = np.maximum(budget.range_noise / np.sqrt(snr), budget.range_floor)
     return np.sqrt(whole**2 - budget.range_bias**2)

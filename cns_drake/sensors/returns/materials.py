@@ -50,14 +50,15 @@ class Materials(NamedTuple):
         reflectivity: (G,) float32, of a retro-reflector in units of a
             Lambertian target of reflectivity 1 that faces the beam.
         leaf_area_density: (G,) float32 [1/m].
-        rough: (G,) float32, how much the square of the sine of incidence adds
-            to the cosine.
+        rough: (G,) float32, factor of the square of the sine of incidence,
+            which is added to the cosine.
         contrast: (G,) float32, how far albedo differs within a surface.
-        relief: (G,) float32, how far beams end off the surface [m].
-        tufts: (G,) float32 height of what grows on it [m].
-        swell: (G,) float32, how far it rises and falls over some metres [m].
-        fittings: (G,) float32, how far what hangs on it stands out [m].
-        stains: (G,) float32, the part of it that is stained.
+        relief: (G,) float32, how far from the surface beams end [m].
+        tufts: (G,) float32 height of the plants on the surface [m].
+        swell: (G,) float32, how far the surface rises and falls over some
+            metres [m].
+        fittings: (G,) float32, how far objects on the surface protrude [m].
+        stains: (G,) float32, the part of the surface that is stained.
     """
 
     kind: np.ndarray
@@ -82,9 +83,9 @@ def find_materials(
 
     Structures that a table lacks have no class.
 
-    The perception property ("lidar", "reflectivity") wins over the column
-    `reflectivity` of a table of structures, and that over class and colour.
-    Surfaces of a given reflectivity are even and reflect after Lambert.
+    The perception property ("lidar", "reflectivity") overrides the column
+    `reflectivity` of a table of structures, which overrides class and colour.
+    Surfaces with a given reflectivity are even, Lambertian reflectors.
     """
     names = [geometry.structure for geometry in geometries]
     table = structures.completed(names)
@@ -180,8 +181,8 @@ def _wet(reflectivity: float) -> float:
 def is_closed(surface: Surface) -> bool:
     """Returns whether a surface encloses a volume.
 
-    A surface of triangles does if each edge belongs to an even number of them.
-    Edges are compared by the positions of their ends.
+    A surface of triangles is closed if each edge belongs to an even number of
+    triangles. Edges are compared by the positions of their ends.
     """
     if isinstance(surface, HalfSpaceSurface):
         return False

@@ -52,7 +52,7 @@ class Ways(NamedTuple):
     """N rays on their way.
 
     Attributes:
-        beam: (N,) number of the beam of each.
+        beam: (N,) number of each ray's beam.
         p_Wset: (N, 3) present origins.
         d_Wset: (N, 3) directions.
         time: (N,) float32 part of the turn at which it was sent.

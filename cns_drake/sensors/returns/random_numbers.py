@@ -30,9 +30,9 @@ def uniform(
 ) -> np.ndarray:
     """Returns random numbers that are uniform over [0, 1), from a key.
 
-    The key is that of `frame_key`. They are the n-th ones of SplitMix64
-    (Steele, Lea and Flood, OOPSLA 2014). Beams are 0 or more; draws are below
-    `DRAWS_PER_BEAM`.
+    The key comes from `frame_key`. The numbers are those of the generator
+    SplitMix64 (Steele, Lea and Flood, OOPSLA 2014), each addressed by its beam
+    and draw. Beams are 0 or more; draws are below `DRAWS_PER_BEAM`.
     """
     number = (beam * DRAWS_PER_BEAM + (draw + 1)).astype(np.uint64)
     z = key + number * _GOLDEN

@@ -20,21 +20,24 @@ _LIGHT = 299_792_458.0
 
 @dataclass(frozen=True)
 class Response:
-    """How a unit makes intensities of energy; no sheet states it.
+    """How a unit converts energy to intensity, which no data sheet states.
 
     Attributes:
-        slope: a diffuse target has `full` and this times the logarithm of its
-            energy; 0 for an intensity proportional to energy, by the sheet.
-        full: that of an energy of 1.
-        far: range beyond which the unit does not make up for distance [m].
+        slope: the intensity of a diffuse target is `full` plus this times the
+            logarithm of its energy; 0 if, by the sheet, intensity is
+            proportional to energy.
+        full: intensity of an energy of 1.
+        far: range up to which the unit compensates intensity for distance [m].
         floor: lower intensities are reported as 0, whatever the gain.
         least: echoes of less energy are not reported, however near: the unit
             turns its power down.
         gain: standard deviation of a laser's gain.
-        dim: how much faster gains fall more than that below the mean.
+        dim: how much faster gains fall that are more than one standard
+            deviation below the mean.
         flicker: by which part every second shot of a laser is brighter, and the
             others darker, as the standard deviation over lasers.
-        speckle: that of single shots, as a part of the intensity.
+        speckle: standard deviation of the intensity of single shots, as a part
+            of the intensity.
     """
 
     slope: float = 0.0
@@ -66,13 +69,14 @@ class Head:
         blocks: the lowest elevation of each block of lasers [deg], its height
             above the origin [m], and the part that its errors of range are of
             the stated ones, from the top.
-        alternate: how much farther every second laser from the first measures,
-            and the others nearer, as a part of their errors of range [m].
-        tick_deg: azimuths are reported in steps of this; 0 for exact ones.
-            Then each laser has an azimuth of its own, up to one step aside
-            [deg].
-        elevations_deg: that of each laser of one real unit, from the top;
-            empty if only the nominal ones are known.
+        alternate: range offset by which every second laser, from the first on,
+            measures too far, and all others too near. It is a part of their
+            range errors [m].
+        tick_deg: step in which azimuths are reported [deg]; 0 for exact
+            azimuths. With a step, each laser has an azimuth offset of its own,
+            of up to one step.
+        elevations_deg: elevation of each laser of one real unit, from the top;
+            empty if only the nominal elevations are known.
     """
 
     blocks: tuple[tuple[float, float, float], ...] = ((-90.0, 0.0, 1.0),)
@@ -91,17 +95,18 @@ class UnitSheet:
         range_floor: the best stated accuracy or precision, as the standard
             deviation of a range at any SNR [m].
         divergence_deg: full angle of the beam at 1 / e^2 of its peak [deg].
-        pulse_ns: width of its pulse at half of the peak [ns].
-        retro_from: the intensity at which retro-reflectors begin; diffuse
-            targets have 0 to this for reflectivities of 0 to 1.
+        pulse_ns: width of a pulse at half of its peak [ns].
+        retro_from: least intensity of retro-reflectors. Diffuse targets with
+            reflectivities from 0 to 1 have intensities from 0 to this.
         unknown: fields that the sheet does not state.
         source: where the numbers are from.
         angle_error_deg: standard deviation of a laser's elevation and azimuth
             [deg].
-        own_part: the part of the best accuracy that is each laser's own; the
-            rest is each shot's: the squares add up to 1.
-        response: its intensities.
-        head: the places of its lasers.
+        own_part: the part of the best accuracy that is constant for a laser.
+            The rest differs from shot to shot; the squares of both parts add up
+            to 1.
+        response: how the unit converts energy to intensity.
+        head: places of the lasers.
     """
 
     rows: tuple[link_budget.SheetRow, ...]

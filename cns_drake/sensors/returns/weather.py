@@ -128,7 +128,8 @@ class Scattering(NamedTuple):
             distance.
         fog_energies: (R,) energy of the echo of fog at each distance; 0 without
             fog.
-        fog_counts: (R,) part of the fog's light from nearer than each distance.
+        fog_counts: (R,) share of the light from fog that comes from nearer than
+            each distance.
     """
 
     distances: np.ndarray
@@ -151,8 +152,9 @@ def tabulate_scattering(
 ) -> Scattering:
     """Returns the detected echoes of the weather.
 
-    Drops are a Poisson process in distance and diameter. Each is detected by
-    the probability of its own SNR, which thins it to another such process.
+    Drops are a Poisson process in distance and diameter. Each is detected
+    with the probability that its own SNR gives. The detected drops are
+    therefore a Poisson process, too.
 
     Args:
         weather: fog, rain and snowfall.

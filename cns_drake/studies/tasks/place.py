@@ -63,7 +63,7 @@ class PlaceTask(Task):
 
 
 class PoseTask(PlaceTask):
-    """Where a query lies, by the method's own pose beside its best place."""
+    """Where a query lies, by the method's pose relative to the best place."""
 
     name = "pose"
 
@@ -122,7 +122,7 @@ def measure_costs(
         reporter: reports progress.
         database, query: described drives, one part for each method.
         distractors: described drives through other cities.
-        num_distractors: number of their places.
+        num_distractors: number of places of these drives.
         methods: methods to measure.
     """
     found = {}

@@ -73,8 +73,9 @@ class Pair:
 class Jobs:
     """The jobs of a study.
 
-    Each description of a drive serves all pairs that need it. A drive that one
-    pair alone needs is described by the job of that pair, and not kept.
+    Each description of a drive serves all pairs that need it. If only one pair
+    needs the drive, the job of that pair describes it, and the description is
+    not kept.
 
     Attributes:
         methods: the methods that are run.
