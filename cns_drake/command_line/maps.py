@@ -184,8 +184,9 @@ def import_city(
             the last or never.
         lod: Level of detail of the buildings; by default each building's
             highest.
-        seed: Seed of the random draws: the buildings that --grow removes, and
-            those drawn along roads that have none (OpenDRIVE).
+        seed: Seed of the random draws: which buildings --grow omits from the
+            first stage or lowers, and the buildings along roads without any
+            (OpenDRIVE).
         along: CSV file with the path of a drive of your own, x and y in the map
             [m], to use instead of the two proposed drives.
         within: Greatest distance of structures from the drives [m]; farther

@@ -45,7 +45,8 @@ Fog = Annotated[
     float | None,
     typer.Option(
         metavar="METRES",
-        help="Visibility in fog [m]. Any weather turns on calibrated returns.",
+        help="Visibility in fog [m]. With fog, rain or snowfall, returns are "
+        "calibrated.",
     ),
 ]
 Rain = Annotated[

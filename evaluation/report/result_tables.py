@@ -155,7 +155,7 @@ class _Counted(NamedTuple):
         return cls(result, result.by_mode[mode], printed)
 
     def at_f1_max(self, counts: np.ndarray) -> int | None:
-        """Returns the count at the greatest F1, of those along the curve."""
+        """Returns the count at the point of the curve with the greatest F1."""
         index = self.metrics.f1_max_index
         return None if index is None else int(counts[index])
 

@@ -92,7 +92,7 @@ class Wing:
     def flat(
         area: massing.Area, top: float, parapet: float, rim: float = 0.1
     ) -> Wing:
-        """Returns a wing under a flat roof; its walls end `rim` below."""
+        """Returns a wing with a flat roof; its walls end `rim` below `top`."""
         return Wing.at(area, top - rim, top, Roof("flat", parapet=parapet))
 
     def mirrored(self, width: float) -> Wing:

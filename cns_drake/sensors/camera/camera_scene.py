@@ -97,7 +97,7 @@ _Member = tuple[RigidTransform, tuple[float, float, float], TriangleSurface]
 
 
 class CameraScene(LeafSystem):
-    """Gives SceneGraphs of its own the poses of the frames that move.
+    """Copies a scene into SceneGraphs of its own, and moves their frames.
 
     .. pydrake_system::
 

@@ -51,7 +51,7 @@ _WITH_GREY = Fields(BaseField.kXYZs | BaseField.kRGBs)
 
 
 class Structures(Protocol):
-    """Interface of a table that gives geometries labels and instance ids."""
+    """Interface of a table of the labels and instance ids of geometries."""
 
     def labels(self, names: Sequence[str]) -> Labels:
         """Returns labels of geometries, by the names of their structures."""

@@ -33,7 +33,7 @@ _COST = 60.0
 
 
 class LocaliseTask(Task):
-    """Whether scans are aligned with the map, from starts beside the truth."""
+    """Whether scans are aligned with the map, from starts off the true pose."""
 
     name = "localise"
     defaults: ClassVar[Mapping[str, Any]] = {
