@@ -15,6 +15,7 @@ from typing import Any
 import numpy as np
 import yaml
 
+from cns_drake.base import poses
 from cns_drake.base.errors import InputError
 from cns_drake.base.files import draft_folder
 from cns_drake.base.jobs.step import Reporter
@@ -47,6 +48,8 @@ _STAGES = ("01", "02", "03")
 _PRESETS = ("os1-64", "hdl-64e", "os1-32", "vlp-16", "os1-128")
 # Stands for a map in cities whose streets are drawn.
 DRAWN_STREETS = "drawn"
+# Purpose of the random numbers of streets; cities and drives have the least.
+_STREETS = 2**32 - 1
 # The map whose first drive has the car and the LiDAR of all drives there.
 _CAR_OF = "riverside"
 # Scans farther apart are taken to share nothing [m]. So many points of a scan
@@ -86,7 +89,7 @@ class DrawnCity:
         """
         with draft_folder(folder, replaces=True) as draft:
             if self.map_name == DRAWN_STREETS:
-                roads = to_yaml("streets", draw_streets(self._rng(-1)))
+                roads = to_yaml("streets", draw_streets(self._rng(_STREETS)))
                 MapFolder(draft).roads.write_bytes(roads)
                 start_city(draft, self.city_seed)
             else:
@@ -146,7 +149,7 @@ class DrawnCity:
         return moved(drive, 0.0, aside, 0.0).with_fields(fields, drive.name)
 
     def _rng(self, purpose: int) -> np.random.Generator:
-        return np.random.default_rng([self.seed, self.number, purpose % 2**32])
+        return np.random.default_rng([self.seed, self.number, purpose])
 
 
 def scan_city(
@@ -224,7 +227,7 @@ def _overlaps(scans: Sequence[_Taken], reporter: Reporter) -> np.ndarray:
             BeamCoverage(drive.pattern.beams(place.frame).d_Sset),
             _MAX_RANGE,
         )
-        X_PW = np.linalg.inv(X_WSs[column])
+        X_PW = poses.inverse(X_WSs[column])
         apart = np.linalg.norm(X_WSs[:, :2, 3] - X_WSs[column, :2, 3], axis=1)
         for row in np.flatnonzero(apart <= _FARTHEST_OVERLAP).tolist():
             if scans[row].drive is not drive:
