@@ -291,10 +291,11 @@ def models_in(annotation: Any) -> Iterator[type[BaseModel]]:
 def _commands_page() -> str:
     parts = [
         _heading("Commands"),
-        "Results go to stdout, progress and messages to stderr. The exit "
-        "status is 0 on success; 2, with one line, for bad input; 1 if some "
-        "of many jobs could not be done. `--traceback` with any command shows "
-        "where an error comes from.",
+        "Commands print results to stdout, and progress and messages to "
+        "stderr. The exit status is 0 on success, 2 for bad input (with an "
+        "error of one line), and 1 if some of many jobs failed. Add "
+        "`--traceback` to any command to see where in the code an error comes "
+        "from.",
     ]
     for program, app in (
         ("cns-drake", cli.app),
@@ -318,7 +319,10 @@ def _commands_page() -> str:
 
 def _option(parameter: Any) -> str:
     """Returns the names of a parameter and what stands for its value."""
-    metavar = parameter.metavar or kind_of(parameter).upper()
+    kind = getattr(parameter, "type", None) or parameter.type_descriptor
+    choices = map(_plain, getattr(kind, "choices", None) or ())
+    metavar = parameter.metavar or "|".join(choices)
+    metavar = metavar or kind_of(parameter).upper()
     if parameter.param_type_name == "argument":
         return f"`{metavar}`"
     names = " / ".join([*parameter.opts, *parameter.secondary_opts])
@@ -340,7 +344,9 @@ def _option_default(parameter: Any) -> str:
     if parameter.required:
         return "required"
     default = parameter.default
-    if default in (None, False, (), [], "") or callable(default):
+    if isinstance(default, bool):
+        return "on" if default else "off"
+    if default in (None, (), [], "") or callable(default):
         return "none"
     return f"`{_plain(default)}`"
 
