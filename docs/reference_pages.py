@@ -107,33 +107,34 @@ def pages() -> dict[str, str]:
     return {
         "scenario.md": _fields_page(
             "Fields of a drive",
-            "[Drives](../scenarios.md) explains them with examples. Paths are "
-            "relative to the file.",
+            "[Drives](../scenarios.md) explains these fields with examples. "
+            "Relative paths start at the folder of the file.",
             SCENARIO,
         ),
         "family.md": _fields_page(
             "Fields of a family of drives",
-            "[Families](../scenarios.md#families) shows one. All fields but "
-            "`ride` and `imu` multiply: every part, seed, city, route and "
-            "LiDAR with every other.",
+            "[Families](../scenarios.md#families) shows an example. A family "
+            "has a member for every combination of the values of `missing`, "
+            "`seeds`, `city_seeds`, `routes` and `lidars`. The fields `ride` "
+            "and `imu` apply to all members.",
             FAMILY | {"Ride": RideConfig, "IMU": ImuSection},
         ),
         "city.md": _fields_page(
             "Fields of a city",
-            "[Files of a city](../city.md) says which file is for what, and "
-            "lists archetypes and objects.",
+            "[Files of a city](../city.md) says what each file is for, and "
+            "lists the archetypes of buildings and the objects.",
             CITY,
         ),
         "experiment.md": _fields_page(
             "Fields of an experiment",
-            "[Studies](../studies.md) explains them with examples, and lists "
-            "what can vary and the settings of tasks. Paths are relative to "
-            "the working folder.",
+            "[Studies](../studies.md) explains these fields with examples. It "
+            "also lists what can vary, and the settings of tasks. Relative "
+            "paths start at the working folder.",
             EXPERIMENT,
         ),
         "methods.md": _fields_page(
             "Settings of the methods",
-            "[Methods](../methods.md) shows how to set them.",
+            "[Methods](../methods.md) shows how to change these settings.",
             METHODS,
         ),
         "commands.md": _commands_page(),

@@ -53,9 +53,9 @@ def train(
         output: File for the weights. The training curve goes to FILE.png.
             FILE.npz.training keeps the state, so that the same command resumes
             an interrupted training.
-        minutes: Approximate computing time on one core [min], which sets the
-            numbers of cities and steps. The training is not stopped when this
-            time is over.
+        minutes: Approximate computing time on one core in minutes, which sets
+            the numbers of cities and steps. The training is not stopped when
+            this time is over.
         cities: Number of cities to train on; by default it follows from
             --minutes.
         steps: Number of training steps; by default it follows from --minutes.

@@ -305,8 +305,8 @@ def scan(
 
     Args:
         world: SDF file of the world to scan.
-        pose: Pose of the LiDAR in the world: its position [m], then its roll,
-            pitch and yaw [rad].
+        pose: Pose of the LiDAR in the world: position, then roll, pitch and yaw
+            [m, rad].
         output: File for the scan; its name ends in .pcd, .bin or .npy.
         seed: Seed of the random noise and weather. Another seed gives other
             errors of the same size.
