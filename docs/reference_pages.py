@@ -245,7 +245,7 @@ def _kind(schema: dict[str, Any], models: dict[str, Any]) -> str:
         # What a name stands for, whatever the name.
         inner = schema.get("additionalProperties", {})
         kind = _kind(inner, models) if isinstance(inner, dict) and inner else ""
-        return f"name: {kind}" if kind else "names and values"
+        return f"by name: {kind}" if kind else "values by name"
     words = {"string": "text", "boolean": "`true` or `false`", "null": ""}
     kind = words.get(schema["type"], schema["type"])
     return " ".join(part for part in (kind, _limits(schema)) if part)

@@ -312,7 +312,8 @@ class CityPlan(_Model):
         bounds: `[x0, y0, x1, y1]`, the smallest and largest x and y of the
             world [m].
         water_level: height of the water's surface [m].
-        cars: weights of the parked cars in the random choice, by name.
+        cars: weights of the models of cars in the random choice of parked cars,
+            by name.
         street: objects on sidewalks, in front of districts without a `street`
             of their own.
         medians: plants and lamps on the medians of roads. By default as

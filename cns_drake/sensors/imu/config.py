@@ -30,8 +30,8 @@ class ImuSection(Mount):
         rpy_deg: roll, pitch, yaw in `base_link` [deg].
         rate: samples per second [Hz], such as 100, 200, 250, 400 or 500: at
             most 1000, at least as many as scans, and with a whole number of
-            nanoseconds between two samples. By default one sample per scan, or
-            the rate in the file `kalibr`.
+            nanoseconds between two samples. By default the rate in the file
+            `kalibr`, or else one sample per scan.
         kalibr: file in Kalibr's format with the four noise densities of the
             IMU. By default there is no noise.
         accelerometer_turn_on_bias: standard deviation of the constant bias that

@@ -70,10 +70,9 @@ class LidarSection(Mount):
             errors and intensities of the unit's data sheet.
         echoes: which echoes of a beam are reported, with calibrated returns.
             `dual` reports the strongest and the last one.
-        unit_seed: seed that tells one unit of a LiDAR model from another, with
-            calibrated returns: it draws the errors in the ranges, angles and
-            gains of its lasers. Use the same seed in all drives with the same
-            unit.
+        unit_seed: seed of the individual unit, with calibrated returns. It
+            decides the errors in the ranges, angles and gains of the unit's
+            lasers. Use the same seed in all drives with the same unit.
         rate: turns per second [Hz]. The rate of the fastest LiDAR of the drive
             must be a multiple of it. If the lasers of a unit fire at a fixed
             rate, a slower turn has more columns.
