@@ -17,16 +17,17 @@ Jobs = Annotated[
     typer.Option(
         metavar="N",
         help="Number of jobs that run at once on this machine; by default one "
-        "for each core.",
+        "per core. Give fewer if memory runs out.",
     ),
 ]
 Scheduler = Annotated[
     str | None,
     typer.Option(
         metavar="ADDRESS",
-        help="Address of a Dask scheduler, such as tcp://10.0.0.1:8786, whose "
-        "cluster runs the jobs. Its machines must share this file system. By "
-        "default the variable DASK_SCHEDULER_ADDRESS, if set.",
+        help="Address of a Dask scheduler, such as tcp://10.0.0.1:8786, to run "
+        "the jobs on several machines. They must all see the output folder "
+        "under the same path. By default the environment variable "
+        "DASK_SCHEDULER_ADDRESS, if it is set.",
     ),
 ]
 SessionSpacing = Annotated[
@@ -34,7 +35,8 @@ SessionSpacing = Annotated[
     typer.Option(
         metavar="METRES",
         min=0.01,
-        help="Distance driven between two scans of a map [m].",
+        help="Distance that the car drives between two scans of a map [m]. "
+        "A smaller distance makes a denser map.",
     ),
 ]
 MethodSettings = Annotated[
@@ -42,16 +44,16 @@ MethodSettings = Annotated[
     typer.Option(
         "--set",
         metavar="METHOD.NAME=VALUE",
-        help="Setting of a method, such as btc.candidates=20; may be repeated. "
-        "Separate several numbers by commas.",
+        help="Change a setting of a method, such as btc.candidates=20. "
+        "Separate the numbers of a list by commas. May be repeated.",
     ),
 ]
 Costs = Annotated[
     bool,
     typer.Option(
         "--costs/--no-costs",
-        help="Also measure the time and memory that each method needs. These "
-        "numbers differ from run to run.",
+        help="Whether to measure the time and memory that each method needs, "
+        "too. These numbers differ from run to run.",
     ),
 ]
 

@@ -21,14 +21,14 @@ Acceleration = Annotated[float, Field(ge=0.05, le=9.81, allow_inf_nan=False)]
 
 
 class Speeds(BaseModel):
-    """The limits of a drive's speed and acceleration at every instant.
+    """The limits of speed and acceleration, which the car always keeps.
 
     Attributes:
-        cruise: highest speed [m/s]; the speed limits of the roads apply as
-            well.
-        longitudinal_acceleration: largest acceleration and braking along the
-            path [m/s^2].
-        lateral_acceleration: largest centripetal acceleration [m/s^2].
+        cruise: highest speed of the car [m/s]. The speed limits of the roads
+            apply as well.
+        longitudinal_acceleration: largest acceleration and deceleration along
+            the path [m/s^2].
+        lateral_acceleration: largest centripetal acceleration in bends [m/s^2].
     """
 
     model_config = ConfigDict(extra="forbid", frozen=True, strict=True)

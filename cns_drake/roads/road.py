@@ -33,18 +33,22 @@ class _Model(BaseModel):
 
 
 class RoadStyle(_Model):
-    """The style of roads. Each road can override the common one.
+    """The style of a road.
+
+    The field `defaults` of the file sets the style of all roads. Each road can
+    have these fields as well, and overrides the defaults.
 
     Attributes:
-        lanes: number of lanes along the centreline and against it, up to 4
-            each; a zero makes the road one-way.
+        lanes: numbers of lanes along the road's centreline and against it, each
+            from 0 to 4. A zero makes the road one-way.
         lane_width: width of a lane [m].
-        median: width of the kerbed strip between the directions [m].
-        parking: width of the parking bays cut into both sidewalks [m]; 0 for
+        median: width of the kerbed strip between the two directions [m]; 0 for
             none.
+        parking: width of the parking bays that are cut into the sidewalks on
+            both sides [m]; 0 for none.
         sidewalk: width of the sidewalk on each side [m].
-        kerb_height: height of sidewalks and medians above the lanes [m].
-        speed_limit: speed limit [m/s].
+        kerb_height: height of sidewalks and medians above the carriageway [m].
+        speed_limit: speed limit of the road [m/s].
     """
 
     lanes: tuple[LaneCount, LaneCount] = Field(default=(1, 1), strict=False)
@@ -60,16 +64,17 @@ class RoadEntry(RoadStyle):
     """One road between two junctions.
 
     Attributes:
-        start: name of the junction where the centreline begins.
-        end: name of the junction where the centreline ends.
-        via: corners on the way, each as `[x, y, radius of the bend]` [m].
-        heights: heights between the junctions, each as `[distance along the
-            centreline, height]` [m]. A monotone cubic interpolates them, and is
-            level where the road meets a junction.
+        start: name of the junction at which the road's centreline starts.
+        end: name of the junction at which the road's centreline ends.
+        via: corners of the centreline between the junctions, each as `[x, y,
+            radius of the bend]` [m].
+        heights: heights of the road between the junctions, each as `[distance
+            along the centreline, height]` [m]. A monotone cubic curve joins
+            them; it is level where the road meets a junction.
         start_setback: distance from the position of the first junction to the
-            begin of the road [m]; by default it follows from the kerb radius.
+            start of the road [m]. By default it follows from the kerb radius.
         end_setback: distance from the end of the road to the position of the
-            last junction [m]; by default it follows from the kerb radius.
+            last junction [m]. By default it follows from the kerb radius.
     """
 
     start: str
@@ -81,15 +86,15 @@ class RoadEntry(RoadStyle):
 
 
 class JunctionEntry(_Model):
-    """A junction of roads, or the joint between two different roads.
+    """A junction of roads, or the joint between two roads that differ.
 
     Attributes:
-        position: `[x, y]` where the centrelines meet [m].
-        height: height z of the whole area of the junction, which is level [m].
+        position: `[x, y]` of the point where the centrelines meet [m].
+        height: height z of the junction [m]. Its whole area is level.
         kerb_radius: radius of the kerb round each corner [m]. At a dead end,
-            radius of the disc in which the road ends.
-        dead_end: whether the only road that comes here ends, so that traffic
-            cannot go on.
+            the radius of the disc in which the road ends.
+        dead_end: whether this is the dead end of its only road. Traffic cannot
+            go on there.
     """
 
     position: tuple[Finite, Finite] = Field(strict=False)
@@ -99,12 +104,12 @@ class JunctionEntry(_Model):
 
 
 class RoadsFile(_Model):
-    """The file `roads.yaml`: common styles, junctions and roads.
+    """The file `roads.yaml`: a common style, junctions and roads.
 
     Attributes:
-        defaults: style of all roads, for the fields that a road does not give.
-        junctions: name -> junction. At least one.
-        roads: name -> road. At least one.
+        defaults: style of all roads. It sets the fields that a road leaves out.
+        junctions: junctions by name, at least one.
+        roads: roads by name, at least one.
     """
 
     defaults: RoadStyle = RoadStyle()

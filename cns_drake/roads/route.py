@@ -35,18 +35,20 @@ LaneChange = Annotated[tuple[LaneNumber, LaneNumber], Strict(False)]
 
 
 class RouteLeg(BaseModel):
-    """One road of a route.
+    """One leg of a route: a road and the lane to follow on it.
 
     Attributes:
         road: name of the road.
-        direction: `forward` along its centreline, or `backward`.
-        lane: number of the lane, 1 next to the middle of the road. Two numbers
-            change from the first lane to the second.
-        start: start of the drive, as a distance from where the leg enters the
-            road [m]. Only in the first leg.
-        end: end of the drive, as such a distance [m]. Only in the last leg, or
-            in a leg along which the next one leads back: there the car turns
-            round.
+        direction: direction of travel: `forward` along the road's centreline,
+            or `backward` against it.
+        lane: number of the lane, counted from 1 next to the middle of the road.
+            Two numbers, such as `[1, 2]`, make the car change from the first
+            lane to the second.
+        start: where the drive starts: the distance from the point where the
+            first leg enters its road [m]. Only in the first leg.
+        end: where the drive ends, or the car turns round: the distance from the
+            point where the leg enters the road [m]. Only in the last leg, or in
+            a leg after which the next one leads back along the same road.
     """
 
     model_config = ConfigDict(extra="forbid", frozen=True, strict=True)

@@ -63,20 +63,21 @@ _TO_LAST = np.array([1, 2, 8, 8])
 class LayeredOverlapConfig(MethodConfig):
     """Settings of layered overlap.
 
-    All values come from trials on development worlds, which are not the worlds
-    of the reported results.
+    All values were chosen by trials on development worlds. The reported results
+    come from other worlds.
 
     Attributes:
-        cell: side of a cell of the finest maps, which have 256 x 256 cells [m].
-        min_points: number of points that make a cell occupied.
-        poses: number of pairs of a place and a heading that the second search
-            compares.
-        refined: number of these pairs that the third search compares.
-        candidates: number of places that are compared cell by cell.
-        weights: weights of common cells with low, middle and high points, poles
-            and kerbs.
-        least_cells: number of weighted cells that is added to both scans, so
-            that two nearly empty scans do not look alike.
+        cell: side of a cell of the finest maps [m]. These maps have 256 x 256
+            cells.
+        min_points: number of points from which on a cell is occupied.
+        poses: number of candidate poses (a place and a heading) that the second
+            search compares.
+        refined: number of candidate poses that the third search compares.
+        candidates: number of places that the last search compares cell by cell.
+        weights: weights of a common cell in the score, by layer: low, middle
+            and high points, poles, kerbs.
+        least_cells: weighted number of cells that is added to that of each scan
+            in the score, so that two nearly empty scans do not look alike.
     """
 
     cell: PositiveFloat = 0.5

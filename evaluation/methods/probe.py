@@ -39,19 +39,18 @@ _LEAST_BLUR, _LEAST_DENSITY = 0.1, 0.01
 
 
 class ProbeConfig(MethodConfig):
-    """Settings of PROBE; the defaults are those of the paper's Table I.
+    """Settings of PROBE. The defaults are those of Table I of its paper.
 
-    The height of the sensor is not used: heights are measured in the LiDAR's
-    frame.
+    `sensor_height` has no effect: heights are measured in the LiDAR's frame.
 
     Attributes:
-        voxel_size: side of the voxels to which clouds are thinned first [m];
-            the first point of each voxel is kept.
-        rings: number of equal cells up to `max_range`.
-        sectors: number of equal cells of azimuth.
-        max_range: greatest range of a point that counts [m].
-        sigma_t: standard deviation of the expected displacement between query
-            and place [m].
+        voxel_size: side of the voxels to which each cloud is first thinned [m].
+            The first point of each voxel stays.
+        rings: number of equal cells of range, up to `max_range`.
+        sectors: number of equal cells of azimuth in a turn.
+        max_range: largest range of a point that is used [m].
+        sigma_t: standard deviation of the displacement that is expected between
+            a query and its place [m].
     """
 
     voxel_size: PositiveFloat = 0.5

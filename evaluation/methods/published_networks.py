@@ -390,11 +390,11 @@ def _deformable_attention(
 class NetworkConfig(MethodConfig):
     """Settings of a published neural network.
 
-    The height of the sensor is not used: the method finds the ground in the
-    cloud.
+    `sensor_height` has no effect: the method finds the ground in the cloud.
 
     Attributes:
-        weights: file of the weights that the authors published.
+        weights: file with the weights that the authors of the network
+            published.
     """
 
     weights: Path
