@@ -18,9 +18,10 @@ from cns_drake.base.errors import validated
 from cns_drake.base.yaml_files import read_yaml
 from cns_drake.roads.road import MeshStem
 
-# A city's extent [m]: what is generated grows with its area.
+# Greatest extent of a city [m]; the size of the generated files grows with its
+# area.
 _LARGEST_SIDE = 10_000.0
-# No object is so large [m].
+# Greatest size of any object [m].
 _LARGEST_PARAMETER = 1000.0
 Point = tuple[float, float]
 Line = Annotated[list[Point], Field(min_length=2)]
@@ -40,9 +41,9 @@ def _not_huge(value: Any) -> Any:
     return value
 
 
-# Arguments of an object's builder.
+# Arguments for the builder of an object.
 Parameters = dict[str, Annotated[Any, AfterValidator(_not_huge)]]
-# Least and greatest value of a drawn number.
+# Least and greatest value of a random number.
 Range = Annotated[
     tuple[float, float],
     AfterValidator(_in_order),
@@ -62,9 +63,10 @@ class BuildingPlan(_Model):
     Attributes:
         archetype: name of an archetype.
         at: `[x, y]` of the middle of the footprint [m].
-        size: `[width along the front, depth]` [m]; give this or
+        size: `[width along the front, depth]` [m]; give either this or
             `outline`.
-        outline: corners of the footprint relative to `at`, before turning [m].
+        outline: corners of the footprint relative to `at`, before the building
+            is turned [m].
         yaw_deg: heading of the building [deg]; at 0 its front faces -y.
         height: height of the walls [m].
         kind: beginning of its name; by default the archetype.
@@ -116,7 +118,7 @@ class PatchPlan(_Model):
 
     Attributes:
         ground: kind of ground.
-        area: corners of the patch [m]; give this or `line`.
+        area: corners of the patch [m]; give either this or `line`.
         line: points of the middle line of a path [m].
         width: width of the path [m].
         level: height at which the patch is level [m]; by default it follows the
@@ -154,12 +156,12 @@ class ParkingPlan(_Model):
 
 
 class ScatterPlan(_Model):
-    """Plants or objects scattered over a district's open ground.
+    """Plants or objects at random places on a district's open ground.
 
     Attributes:
         objects: object -> weight in the random choice.
         spacing: least distance between two objects [m].
-        fill: share of the possible places that are used.
+        fill: share of the possible places that get an object.
         within: corners of the area to which the objects are limited [m].
         clearance: least distance to buildings and streets [m].
         ground: kinds of ground on which the objects can stand.
@@ -176,7 +178,7 @@ class ScatterPlan(_Model):
 
 
 class LinePlan(_Model):
-    """Objects along a line, such as trees of an avenue, a fence or benches.
+    """Objects along a line, such as the trees of an avenue, a fence or benches.
 
     Attributes:
         objects: object -> weight in the random choice.
@@ -187,7 +189,7 @@ class LinePlan(_Model):
             and hedges.
         yaw_deg: heading of each object relative to the line [deg].
         kind: beginning of the objects' names; by default the object.
-        parameters: arguments of the objects' builder.
+        parameters: arguments for the builder of the objects.
     """
 
     objects: Weights = Field(min_length=1)
@@ -245,23 +247,23 @@ class DistrictPlan(_Model):
     """A district: one block between streets, or another area.
 
     Attributes:
-        name: unique name, from lower-case letters, digits and underscores. It
-            is also part of the seed of the district.
-        block: `[x, y]` of a point in the block between streets that the
+        name: unique name of lower-case letters, digits and underscores. The
+            random draws in the district depend on it.
+        block: `[x, y]` of any point in the block between streets that the
             district fills [m]; give this, `area` or neither.
         area: corners of the district [m]. Without `block` and `area`, the
-            district takes all ground that no other one has.
+            district takes all ground that belongs to no other district.
         ground: kind of the ground.
         relief: height of the swells in its lawns [m].
         relief_margin: distance from paths and buildings over which the relief
-            rises [m].
+            rises from 0 to its full height [m].
         patches: parts with another kind of ground.
         buildings: single buildings.
         rows: rows of buildings along the streets.
         parking: parking lots.
         objects: single objects.
         lines: lines of objects.
-        scatter: scattered objects.
+        scatter: objects at random places.
         street: objects on its sidewalks; by default those of the city.
     """
 
@@ -295,9 +297,10 @@ class CityPlan(_Model):
         bounds: `[x0, y0, x1, y1]` of the generated world [m].
         water_level: height of the water's surface [m].
         cars: car -> weight in the random choice of parked cars.
-        street: objects on sidewalks, in districts that have none of their own.
-        medians: plants and lamps on the medians of roads, with the same fields;
-            by default as `street`.
+        street: objects on the sidewalks of districts that have no `street` of
+            their own.
+        medians: plants and lamps on the medians of roads, with the fields of
+            `street`; by default the same as `street`.
         districts: districts, in the order in which they take ground.
     """
 
@@ -333,7 +336,7 @@ class CityPlan(_Model):
 
 
 def load_plan(path: Path) -> CityPlan:
-    """Reads `city.yaml`.
+    """Returns the plan in a file `city.yaml`.
 
     Raises:
         InputError: if it cannot be read or has a wrong key or type.

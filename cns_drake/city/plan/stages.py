@@ -1,4 +1,4 @@
-"""Stages of a city: how much younger than the whole city each one is."""
+"""The stages of a city: what each one lacks of the whole city."""
 
 from collections.abc import Collection, Iterable, Mapping
 from fnmatch import fnmatchcase
@@ -25,8 +25,8 @@ class Growth(_Model):
         height: height of the structures above their own ground at this stage
             [m].
         structures: names in `structures.csv`; `*` stands for any text and `?`
-            for any letter.
-        but: names of structures to which this does not apply.
+            for any single character.
+        but: names of structures that are exceptions.
     """
 
     height: float = Field(gt=2.0, allow_inf_nan=False)
@@ -38,14 +38,14 @@ class Stage(_Model):
     """One stage: its story, and how it differs from the next stage.
 
     Attributes:
-        story: differences to the next stage that a visitor would notice.
-        absent: heading -> names of the structures that this stage lacks and the
-            next has; none in the last stage.
+        story: differences from the next stage that a visitor would notice.
+        absent: heading -> names of structures that this stage lacks and the
+            next one has; empty in the last stage.
         lower: heading -> buildings and plants that are lower than in the next
-            stage; none in the last stage.
+            stage; empty in the last stage.
         sites: heading -> buildings that are under construction at this stage
-            only, as a frame of the given height with scaffolds and a crane.
-            Their lots need 16 m by 16 m.
+            only: a frame of the given height, with scaffolds and a crane. Their
+            lots must be at least 16 m by 16 m.
     """
 
     story: str
@@ -57,13 +57,13 @@ class Stage(_Model):
 class Stages(_Model):
     """The file `stages.yaml`: how the city looked at each stage.
 
-    Each stage lists only what the next stage adds or raises; the last stage is
-    the whole city. A stage therefore has all structures of the stage before,
-    none of them lower, except those that filled lots which are built on in
-    between.
+    The last stage is the whole city, and each other stage lists only what the
+    next one adds or raises. Every structure of a stage therefore also exists at
+    all later stages, at the same height or higher. The exceptions are the
+    objects on lots that are built on in between.
 
     Attributes:
-        stages: number of the stage, two digits in quotes, ascending -> stage.
+        stages: number of the stage (two digits in quotes, ascending) -> stage.
         lots: use -> buildings whose lots have this use until they are built:
             `car_park`, `market`, `garden`, `yard` or `empty`. By default the
             use of a lot depends on its size.
@@ -86,7 +86,7 @@ class Stages(_Model):
         }
 
     def heights(self, stage: str) -> dict[str, float]:
-        """Returns the height of each structure that is lower at a stage [m].
+        """Returns name -> height of the structures lower at a stage [m].
 
         Raises:
             KeyError: if there is no such stage.
@@ -100,7 +100,7 @@ class Stages(_Model):
         return heights
 
     def sites(self, stage: str) -> dict[str, float]:
-        """Returns the height of each building site at a stage [m]."""
+        """Returns the height of each building site at a stage, by name [m]."""
         return {
             name: group.height
             for group in self.stages[stage].sites.values()
@@ -120,8 +120,8 @@ def load_stages(
 ) -> Stages:
     """Returns the stages of `stages.yaml`, checked against all structures.
 
-    `text` is the coming content of the file; by default the present one.
-    Patterns are replaced by the names that they stand for.
+    `text` is the new content of the file; by default the file is read. Patterns
+    are replaced by the names that they match.
 
     Raises:
         InputError: if the file cannot be read, has a wrong key or type, its
@@ -137,7 +137,7 @@ def load_stages(
 
 
 class _Names:
-    """The names of a city's structures, by which patterns are resolved."""
+    """The names of a city's structures, to which patterns are resolved."""
 
     def __init__(self, path: Path, structures: Iterable[str]):
         self._path = path
@@ -145,7 +145,7 @@ class _Names:
         self._known = set(self._all)
 
     def of(self, field: str, patterns: Iterable[str]) -> list[str]:
-        """Returns the structures of names and patterns, in their order."""
+        """Returns the structures that names and patterns match, in order."""
         found: list[str] = []
         for pattern in patterns:
             names = [pattern]
