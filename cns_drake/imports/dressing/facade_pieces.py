@@ -101,12 +101,15 @@ class FacadePlan:
         return [o for o in self.openings if o.row == 0 and on_ground]
 
     def is_in_the_way(self, z: float, reach: float) -> bool:
-        """Returns whether a part of depth `reach` at height z blocks cars [m]."""
+        """Returns whether a part at height z would block a car on a drive [m].
+
+        The part extends out of the wall by `reach`.
+        """
         is_low = z - self.ground < _TALLEST_CAR
         return is_low and self.to_drive < reach + _BESIDE
 
     def probes(self) -> np.ndarray:
-        """Returns points (N + 1, 3) in front of each opening and the top [m]."""
+        """Returns points (N + 1, 3) in front of each opening and the top."""
         panel = self.panel
         at = [((o.x0 + o.x1) / 2, (o.z0 + o.z1) / 2) for o in self.openings]
         at.append((panel.length / 2, panel.height - _FROM_FOOT))
