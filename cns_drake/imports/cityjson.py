@@ -230,10 +230,15 @@ class CityObject(NamedTuple):
 
 @dataclass
 class CityFile:
-    """The objects of a file by id, its reference system, and its faults.
+    """The content of a CityJSON file.
 
-    `order_is_open` if the order of the first two coordinates is uncertain,
-    because both orders lead to places in the system's area of use.
+    Attributes:
+        objects: id -> object.
+        system: reference system of the coordinates.
+        faults: counts of faulty parts.
+        order_is_open: whether the order of the first two coordinates is
+            uncertain, because both orders lead to places in the system's area
+            of use.
     """
 
     objects: dict[str, CityObject] = field(default_factory=dict)

@@ -89,9 +89,9 @@ class Imported:
 class Thing:
     """A small object of a file, such as a bench, at a place [m].
 
-    `source` is its id in the file, and `element` the element. `kind` is a key
-    of `cns_drake.city.placement.objects.OBJECTS`. The heading is None if
-    unknown [rad].
+    `source` is its id in the file, and `element` its kind there. `kind` is a
+    key of `cns_drake.city.placement.objects.OBJECTS`. The heading `yaw` is None
+    if unknown [rad].
     """
 
     source: str

@@ -36,7 +36,7 @@ _PARALLEL = 1 - 1e-9
 
 
 class JointMotion(NamedTuple):
-    """The position, rate and acceleration of a joint [rad or m; per s]."""
+    """The angle [rad] or distance [m] of a joint, its rate and acceleration."""
 
     position: np.ndarray
     rate: np.ndarray

@@ -36,8 +36,7 @@ class ForeignMeshes:
 
         Returns:
             Vertices (N, 3), float64 [m], and triangles (M, 3), int32. There are
-            no triangles if
-            the file is not a mesh.
+            no triangles if the file is not a mesh.
 
         Raises:
             ValueError: if Open3D crashes on the file, or cannot be loaded.

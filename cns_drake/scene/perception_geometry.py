@@ -294,8 +294,7 @@ def geometry_revision_port(scene_graph: SceneGraph) -> OutputPort:
 
     Returns:
         An abstract port. Its value is an int, which is different for any other
-        geometry in
-        this process, even in another Context.
+        geometry in this process, even in another Context.
 
     Raises:
         RuntimeError: the SceneGraph is already part of a Diagram.

@@ -242,8 +242,7 @@ def with_unmarked_crossings(
 
     Returns:
         The graph with the additional crossings. The walkways, which are cut at
-        these places,
-        and additional ones over the crossings.
+        these places, and additional ones over the crossings.
     """
     sides = [k for k, way in enumerate(walkways) if way.crossing < 0]
     lines = [LineString(walkways[k].points[:, :2]) for k in sides]

@@ -20,8 +20,8 @@ _MOST_SHORT, _MOST_WAYS = 8, 12
 class DirectedLane(NamedTuple):
     """A lane in one direction, by the points (N, 3) of its middle [m].
 
-    `limit` is its speed limit [m/s]. `connects` if it is in a junction, where
-    it connects lanes.
+    `limit` is its speed limit [m/s]. `connects` says whether it is in a
+    junction, where it connects lanes.
     """
 
     points: np.ndarray

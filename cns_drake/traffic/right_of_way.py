@@ -1,10 +1,10 @@
 """Who may enter a junction: first come, first served.
 
-A vehicle may enter its way through a junction, up to its end, under three
-conditions: vehicles on conflicting ways will have passed when it gets there;
-there is room for it behind the way; and its signal is green or, without a
-signal, it has stopped at the line. If another vehicle is slower than expected,
-it waits on its way for those that entered earlier. These never wait for it, so
+A vehicle may enter its way through a junction under three conditions: vehicles
+on conflicting ways will have passed when it gets there; there is room for it
+behind the way; and its signal is green or, without a signal, it has stopped at
+the line. If a vehicle with the right of way is slower than expected, later
+vehicles wait for it on their ways. Earlier ones never wait for later ones, so
 no vehicle waits forever.
 """
 

@@ -373,14 +373,11 @@ def find_conflicts(
 
     Returns:
         Three arrays (2, P + C, P + C) for a row a and a column b. First, the
-        place of a front
-        along a at which the area of a begins to meet that of b; inf if they
-        never meet [m].
-        Second, the place of a rear along a from which on b is free again; 0 if
-        they never
-        meet, or if a is a crossing [m]. Third, `SPLIT` or `MERGE` where two
-        ways meet only at
-        their beginning or end, in a lane that they share.
+        place of a front along a at which the area of a begins to meet that of
+        b; inf if they never meet [m]. Second, the place of a rear along a from
+        which on b is free again; 0 if they never meet, or if a is a crossing
+        [m]. Third, `SPLIT` or `MERGE` where two ways meet only at their
+        beginning or end, in a lane that they share.
     """
     small_axles = (-1.6, 1.75)
     num_pieces = len(graph.pieces)

@@ -184,8 +184,7 @@ def place_vehicles(
 
     Returns:
         Records `VEHICLE` of the vehicles for which a place was found, and the
-        numbers of
-        their kinds.
+        numbers of their kinds.
     """
     free = np.flatnonzero(~streets.pieces["is_way"])
     lengths = streets.pieces["length"]
@@ -408,9 +407,8 @@ def lane_over(streets: Streets, car: Any, c: int) -> tuple[int, float, float]:
 
     Returns:
         The lane that leads over it, -1 if the vehicle's path has none; and the
-        distances to
-        the places where the vehicle enters the crossing and leaves it, inf for
-        none [m].
+        distances to the places where the vehicle enters the crossing and leaves
+        it, inf for none [m].
     """
     begin, number = -car.s, len(streets.pieces) + c
     for column in range(CURRENT, NUM_PIECES):
@@ -438,9 +436,8 @@ def find_prior(traffic: Traffic, i: int) -> tuple[float, float, float]:
 
     Returns:
         The distance to the place where the vehicle has to stop, inf for none
-        [m]; the gap to
-        a vehicle that it follows, inf for none [m]; and the speed of that
-        vehicle [m/s].
+        [m]; the gap to a vehicle that it follows, inf for none [m]; and the
+        speed of that vehicle [m/s].
     """
     line, gap, speed = np.inf, np.inf, 0.0
     streets, cars, crossings = traffic.streets, traffic.cars, traffic.crossings

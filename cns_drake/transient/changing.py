@@ -123,8 +123,8 @@ class Bay:
     ) -> tuple[np.ndarray, float] | None:
         """Returns a random middle (2,) and yaw of a car in the bay [m, rad].
 
-        `half_size` (2,) is half the length and the width of the car [m]. The
-        result is None if the car is too big.
+        `half_size` (2,) is half the length and half the width of the car [m].
+        The result is None if the car is too big.
         """
         skew = float(rng.uniform(-_SKEW, _SKEW))
         across, turned = rng.uniform(size=2), rng.uniform() < 0.5

@@ -24,10 +24,10 @@ _SIDE_PITCH_M = 3.8
 def storeys_for(
     height: float, floor: float, span: float, pitch_deg: float
 ) -> int:
-    """Returns the number of storeys that leaves a roof closest to a pitch.
+    """Returns the number of storeys that brings a roof closest to a pitch.
 
-    The roof spans `span`, its ridge is at `height`, and the ground floor is at
-    `floor` [m]. The roof fills the height that the storeys leave.
+    The roof spans `span` and fills the height between the storeys and its
+    ridge, which is at `height`. The ground floor is at `floor` [m].
     """
     wanted = wings.ridge_rise(span, pitch_deg)
     room = height - ROOF_M - floor - 0.15

@@ -171,10 +171,10 @@ HEAD_ROOM_M = 2.3
 class Assembly:
     """Collects the parts and meshes of one building, which a builder adds.
 
-    `add` makes a part of its own of meshes. `paint` and `add_to` collect meshes
-    by material instead: each material becomes one part, so that a building of
-    many small pieces has few visuals. Parts without a colour of their own have
-    the colour `rgb`.
+    `add` makes one part of the meshes it gets. `paint` and `add_to` collect
+    meshes by material instead: each material becomes one part, so that a
+    building of many small pieces has few visuals. Parts without a colour of
+    their own have the colour `rgb`.
     """
 
     site: Site

@@ -34,10 +34,8 @@ def divided(
 
     Returns:
         The number of groups, the number of storeys in a group, and the height
-        of a
-        storey [m]. It is rounded down to millimetres, so that stacked storeys
-        leave no
-        gap.
+        of a storey [m]. It is rounded down to millimetres, so that stacked
+        storeys leave no gap.
     """
     count = max(1, round(height / storey))
     per_group = -(-count // most)

@@ -378,10 +378,8 @@ def _cut_into_squares(
 
     Returns:
         First, the (N, 4, 2) corners of the squares that lie wholly inside,
-        counter-
-        clockwise from the lower right one. Second, the piece in each square in
-        the
-        order of the grid; None for each whole square.
+        counter-clockwise from the lower right one. Second, the piece in each
+        square in the order of the grid; None for each whole square.
     """
     corners, squares = _squares(geometry, size)
     is_whole = shapely.contains_properly(geometry, squares)

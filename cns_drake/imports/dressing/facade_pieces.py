@@ -77,9 +77,14 @@ class Opening(NamedTuple):
 class FacadePlan:
     """The plan of a wall: its panel, style and openings.
 
-    `floor` and `ground` are the heights of the lowest floor and of the ground
-    in front, in the panel [m]. `to_drive` is the distance of the nearest drive
-    [m]. `top_is_free` if no building touches its upper edge.
+    Attributes:
+        panel: the wall.
+        style: the style of its building.
+        openings: its windows and doors.
+        floor, ground: heights of the lowest floor, and of the ground in front,
+            in the panel [m].
+        to_drive: distance of the nearest drive [m].
+        top_is_free: whether no building touches its upper edge.
     """
 
     panel: Panel
@@ -306,8 +311,7 @@ def _in_outline(
 
     Returns:
         The plan, its reliefs with their materials, and the rectangle x0, z0,
-        x1, z1 that
-        contains them [m].
+        x1, z1 that contains them [m].
     """
     panel = plan.panel
     area = (0.0, 0.0, panel.length, panel.height)

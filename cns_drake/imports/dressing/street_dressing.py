@@ -312,9 +312,9 @@ def may_park_on(side: str, street: Street) -> bool:
 
 
 class Row(NamedTuple):
-    """A street: its name, middle line, half its width, and where cars park.
+    """A street: its name, middle line, half its width [m], and where cars park.
 
-    `may_park` says whether they may park on the right, and on the left [m].
+    `may_park` says whether they may park on the right, and whether on the left.
     """
 
     name: str

@@ -1,11 +1,11 @@
 """Builds a town on an imported road network, and writes its files.
 
-Road marks follow ASAM OpenDRIVE 1.7, 11.9: a mark lies on the outer border of
-its lane, and that of lane 0 on the middle. Double lines are listed from the
-inside outwards; those of the middle are listed from left to right. A line on
-the border of two lanes lies half on each of them. If one of these lanes is no
-carriageway, half of the line would be hidden below the kerb stones, so the
-import moves the line off them.
+Road marks follow ASAM OpenDRIVE 1.7, 11.9. The mark of a lane lies on the
+lane's outer border, and the mark of lane 0 in the middle of the road. Double
+lines are listed from the inside outwards; those of the middle are listed from
+left to right. A line on the border of two lanes lies half on each of them. If
+one of these lanes is no carriageway, half of the line would be hidden below the
+kerb stones, so the import moves the line off them.
 """
 
 from collections import Counter, defaultdict

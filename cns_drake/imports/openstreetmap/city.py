@@ -122,8 +122,9 @@ def import_openstreetmap(
     """Returns the city in a file; its origin is the middle of its buildings.
 
     Some things are made only for a dressed city: the sea, grounds by their
-    material, and buildings demolished at an unknown date. Only in a dressed
-    city, bridges have parapets or are left out.
+    material, and buildings demolished at an unknown date. In a dressed city,
+    bridges at ground level get parapets, and bridges over streets are left out,
+    like tunnels; otherwise all of them are streets on the ground.
 
     Raises:
         InputError: if the file cannot be read, has no building, or is larger
@@ -337,7 +338,7 @@ def standing_buildings(
     """Yields buildings and parts that stand, or once stood, above ground.
 
     Buildings demolished at an unknown date are included only with `with_gone`.
-    All others are counted as faults.
+    Buildings that are left out are counted as faults.
     """
     for one in areas:
         absent = why_absent(one.tags)
