@@ -168,7 +168,7 @@ def add_roof(
     attic: Attic | None = None,
     material: str = "walls",
 ) -> None:
-    """Adds a wing's roof, and its gables in the material of the walls.
+    """Adds a wing's roof, and its gables in a given material.
 
     `attic` returns the windows of the gables.
     """
@@ -244,7 +244,9 @@ def _fits(hole: walls.Patch, under: list[bays.Span]) -> bool:
 def attic_window(
     width: float, z0: float, z1: float, depth: float, count: int = 1
 ) -> Attic:
-    """Returns an attic of windows side by side in the middle of a gable.
+    """Returns a function that returns the windows of a gable.
+
+    The windows are side by side in the middle of the gable.
 
     Args:
         width: width of each window [m].
