@@ -18,9 +18,10 @@ from cns_drake.base.errors import validated
 from cns_drake.base.yaml_files import read_yaml
 from cns_drake.roads.road import MeshStem
 
-# A city's extent [m]: what is generated grows with its area.
+# Greatest extent of a city [m]; the size of the generated files grows with its
+# area.
 _LARGEST_SIDE = 10_000.0
-# No object is so large [m].
+# Greatest size of any object [m].
 _LARGEST_PARAMETER = 1000.0
 Point = tuple[float, float]
 Line = Annotated[list[Point], Field(min_length=2)]
@@ -40,9 +41,9 @@ def _not_huge(value: Any) -> Any:
     return value
 
 
-# Arguments of an object's builder.
+# Arguments for the builder of an object.
 Parameters = dict[str, Annotated[Any, AfterValidator(_not_huge)]]
-# Least and greatest value of a drawn number.
+# Least and greatest value of a random number.
 Range = Annotated[
     tuple[float, float],
     AfterValidator(_in_order),
@@ -162,7 +163,7 @@ class ParkingPlan(_Model):
 
 
 class ScatterPlan(_Model):
-    """Plants or objects scattered over a district's open ground.
+    """Plants or objects at random places on a district's open ground.
 
     Attributes:
         objects: weights of the objects in the random choice, by name.
@@ -354,7 +355,7 @@ class CityPlan(_Model):
 
 
 def load_plan(path: Path) -> CityPlan:
-    """Reads `city.yaml`.
+    """Returns the plan in a file `city.yaml`.
 
     Raises:
         InputError: if it cannot be read or has a wrong key or type.

@@ -1,4 +1,4 @@
-"""Stages of a city: how much younger than the whole city each one is."""
+"""The stages of a city: what each one lacks of the whole city."""
 
 from collections.abc import Collection, Iterable, Mapping
 from fnmatch import fnmatchcase
@@ -89,7 +89,7 @@ class Stages(_Model):
         }
 
     def heights(self, stage: str) -> dict[str, float]:
-        """Returns the height of each structure that is lower at a stage [m].
+        """Returns name -> height of the structures lower at a stage [m].
 
         Raises:
             KeyError: if there is no such stage.
@@ -103,7 +103,7 @@ class Stages(_Model):
         return heights
 
     def sites(self, stage: str) -> dict[str, float]:
-        """Returns the height of each building site at a stage [m]."""
+        """Returns the height of each building site at a stage, by name [m]."""
         return {
             name: group.height
             for group in self.stages[stage].sites.values()
@@ -123,8 +123,8 @@ def load_stages(
 ) -> Stages:
     """Returns the stages of `stages.yaml`, checked against all structures.
 
-    `text` is the coming content of the file; by default the present one.
-    Patterns are replaced by the names that they stand for.
+    `text` is the new content of the file; by default the file is read. Patterns
+    are replaced by the names that they match.
 
     Raises:
         InputError: if the file cannot be read, has a wrong key or type, its
@@ -140,7 +140,7 @@ def load_stages(
 
 
 class _Names:
-    """The names of a city's structures, by which patterns are resolved."""
+    """The names of a city's structures, to which patterns are resolved."""
 
     def __init__(self, path: Path, structures: Iterable[str]):
         self._path = path
@@ -148,7 +148,7 @@ class _Names:
         self._known = set(self._all)
 
     def of(self, field: str, patterns: Iterable[str]) -> list[str]:
-        """Returns the structures of names and patterns, in their order."""
+        """Returns the structures that names and patterns match, in order."""
         found: list[str] = []
         for pattern in patterns:
             names = [pattern]
