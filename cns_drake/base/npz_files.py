@@ -9,8 +9,8 @@ import numpy as np
 
 from cns_drake.base.files import read_bytes
 
-# Those that `np.savez` and `np.savez_compressed` write, and whose readers stop
-# at a given size.
+# The compressions that `np.savez` and `np.savez_compressed` write. Their
+# readers stop at the declared size.
 _COMPRESSIONS = (zipfile.ZIP_STORED, zipfile.ZIP_DEFLATED)
 
 

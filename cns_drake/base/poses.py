@@ -54,7 +54,7 @@ def interpolate(
 
     Args:
         X_0, X_1: (N, 4, 4) poses at both ends.
-        fraction: (N,) share of the way from the one to the other.
+        fraction: (N,) interpolation parameter: 0 at X_0, 1 at X_1.
 
     Returns:
         (N, 4, 4); rotations are made orthonormal.

@@ -2,13 +2,14 @@
 
 The `mcap` package reads messages in time order, or all of a span of time.
 Reading a scan by its number needs the location of each message of a topic, and
-the one chunk that holds it. Both come from the index at the end of a complete
-file, so that opening a file of gigabytes reads a few kilobytes. All of that end
-is optional: where its numbers of messages do not confirm the index, the whole
-file is read once.
+the one chunk that contains it. Both come from the index at the end of a
+complete file, so that opening a file of gigabytes reads a few kilobytes. The
+format makes this index optional. If the message counts at the end of the file
+do not confirm the index, the whole file is read once.
 
 The package checks only the checksums of chunks, and trusts the sizes that a
-chunk claims. Here damaged or hostile records are refused."""
+chunk claims. Here damaged or hostile records are refused.
+"""
 
 from collections.abc import Iterator
 import contextlib
@@ -48,8 +49,8 @@ from cns_drake.base.drives.mcap_records import (
 from cns_drake.base.errors import InputError
 from cns_drake.base.files import check_regular, user_errors
 
-# An index or a table of structures has a few megabytes, of which Python makes a
-# hundred times as much.
+# An index or a table of structures has a few megabytes; as Python objects it
+# takes a hundred times as much memory.
 SUMMARY_LIMIT_BYTES = 1 << 25
 _ATTACHMENT_LIMIT_BYTES = 1 << 23
 # Size of a chunk's record without its data.
@@ -63,7 +64,7 @@ _MESSAGE_HEADER = struct.Struct("<HIQQ")
 # A message index, after its record header: channel id, length of the rest.
 _INDEX_HEADER = struct.Struct("<HI")
 _INDEX_ENTRY = np.dtype([("log_time", "<u8"), ("offset", "<u8")])
-# The frame that is being read, and its neighbour when two of them interleave.
+# The chunk that is being read, and its neighbour where messages interleave.
 _CHUNKS_KEPT = 2
 # The location of a message: the number of its chunk in the file's index, the
 # offset of its record in the uncompressed chunk [bytes], its log time [ns] and
@@ -251,7 +252,8 @@ class McapFile:
         """Returns the content of the attachment of this name, if any.
 
         Raises:
-            InputError: if it cannot be read, or others of this name differ.
+            InputError: the attachment cannot be read, or several attachments of
+                this name differ.
         """
         content = None
         for found, offset in self._contents.attachments:
@@ -302,7 +304,7 @@ class McapFile:
         return locations[np.lexsort([locations[key] for key in _ORDER[::-1]])]
 
     def _indexed(self, numbers: list[int]) -> np.ndarray:
-        """Returns where the messages of channels are, by the index."""
+        """Returns the locations (N,) of channels' messages from the index."""
         parts = [np.empty(0, LOCATION)]
         with self._reading() as stream:
             # Many indexes at one place could claim more than the file holds.

@@ -49,8 +49,8 @@ _CHUNK_START = re.compile(
 _LONGEST_CHUNK_START = 9 + 28 + 8 + 8
 _FIRST_SEARCH_BLOCK = 4096
 _LAST_SEARCH_BLOCK = 4 * 1024 * 1024
-# Bytes that look like a chunk are read in vain. A hostile file could keep a
-# reader busy for days, hence a limit, in sizes of the file.
+# Limit of the bytes read in search of chunks, in multiples of the file's size:
+# a hostile file with many false chunks could keep a reader busy for days.
 _MOST_READ = 16
 _FAULTS = (
     McapError,
@@ -132,7 +132,7 @@ def uncompress(chunk: Chunk) -> bytes:
     return data
 
 
-# Opcode -> what reads the content of a record; those of chunks first.
+# Opcode -> function that reads a record's content; first records in chunks.
 _IN_CHUNKS: dict[int, Callable[[bytes], McapRecord]] = {
     Opcode.MESSAGE: lambda content: Message.read(
         RecordContent(content), len(content)
@@ -175,12 +175,13 @@ def locate_records(
 ) -> Iterator[tuple[int, int, McapRecord | Fault]]:
     """Yields the records of an MCAP file, each with its place in the file.
 
-    They are the records that `read_records` yields.
+    These are the records that `read_records` yields.
 
     Yields:
-        The offset of a chunk in the file and that of a record in the
-        uncompressed chunk, or the offset of a record in the file and 0 [bytes];
-        and the record.
+        Two offsets [bytes], and the record. For a record in a chunk, the
+            offsets are those of the chunk in the file and of the record in the
+            uncompressed chunk. For any other record, they are its offset in the
+            file and 0.
     """
     size = stream.seek(0, os.SEEK_END)
     stream.seek(0)

@@ -50,7 +50,7 @@ def make_message(message_type: str, **fields: Any) -> Any:
 
 
 def _value(kind: tuple, given: Any) -> Any:
-    """Returns a value as a field of a kind has it; its zero for None."""
+    """Converts a value to the type of a message's field; None becomes zero."""
     node, inner = kind
     if node is Nodetype.NAME:
         if dataclasses.is_dataclass(given):

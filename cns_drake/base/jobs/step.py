@@ -71,7 +71,7 @@ class Step(abc.ABC):
         """Returns whether all files of the step exist and are up to date.
 
         Raises:
-            InputError: that cannot be found out.
+            InputError: a file that decides this cannot be read.
         """
 
     @abc.abstractmethod
@@ -91,11 +91,11 @@ class Step(abc.ABC):
 
 @dataclass(frozen=True)
 class Steps(Step):
-    """Several steps one after the other, each unless it is done.
+    """Several steps run in order; steps that are done already are skipped.
 
     Attributes:
-        place: the file or folder that they write; see `Step.output`.
-        steps: the steps, of which none needs a later one.
+        place: the file or folder that the steps write; see `Step.output`.
+        steps: the steps, each after those that it needs.
     """
 
     place: Path

@@ -134,13 +134,13 @@ class ImuErrors:
         return errors
 
     def _walk_in_block(self, number: int) -> np.ndarray:
-        """Returns (1024, 6) of a walk of standard normal steps."""
+        """Returns a block (1024, 6) of a walk with standard normal steps."""
         start = self._walk_at_block(number)
         end = self._walk_at_block(number + 1)
         steps = self._draw(_WALK_STEPS, number, _BLOCK)
         free = np.vstack([np.zeros(6), np.cumsum(steps, axis=0)])
-        # The walk is fixed at both ends: a straight line removes the error of a
-        # free walk at its end.
+        # The walk has given values at both ends of the block: a straight line
+        # is added to a free walk so that it ends at the right value.
         part = np.arange(_BLOCK)[:, None] / _BLOCK
         return start + free[:-1] + part * (end - start - free[-1])
 
