@@ -13,9 +13,9 @@ from cns_drake.base.files import open_plain, part_path, user_errors
 class RecordingFolder:
     """A rosbag2 folder with one MCAP file; its last part names the recording.
 
-    The fingerprint covers all inputs; see `cns_drake.scenarios.provenance`. The
-    file of metadata gets its name last: a folder with it holds a finished
-    recording.
+    The fingerprint covers all inputs; see `cns_drake.scenarios.provenance`.
+    `metadata.yaml` gets its name last, so a folder with this file holds a
+    finished recording.
     """
 
     def __init__(self, path: Path):

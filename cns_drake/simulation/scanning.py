@@ -40,7 +40,7 @@ def still_scene(
 ) -> RayCastingScene:
     """Returns the world's models in their initial state, to cast rays on.
 
-    Rays start within some kilometres of S.
+    Rays must start within some kilometres of S.
     """
     lidar, context = _stand(world, X_WS, pattern)
     return lidar.EvalScene(context)
@@ -50,7 +50,7 @@ def check_ending(path: Path) -> None:
     """Checks that `save_scan` can write the format of a file.
 
     Raises:
-        InputError: it does not.
+        InputError: the ending is not .pcd, .bin or .npy.
     """
     if path.suffix not in _ENCODERS:
         raise InputError(
