@@ -257,9 +257,7 @@ def write_part(path: Path, text: str) -> None:
     part = _new_part(path)
     # Several files must all be whole before the first gets its name.
     with user_errors(part):
-        if (
-            not part.is_char_device()
-        ):  # Writing to /dev/full fails as it should.
+        if not part.is_char_device():  # A full device reports its error.
             part.unlink(missing_ok=True)
     with user_errors(part), open(part, "w", encoding="utf-8") as stream:
         stream.write(text)

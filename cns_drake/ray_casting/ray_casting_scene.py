@@ -120,9 +120,7 @@ class RayCastingScene:
         """
         placed = self._moving.place(calc_X_WF, motions, known, seen)
         if len(placed.rows):
-            if (
-                self._planes
-            ):  # Half spaces are the last groups, after those in the scene.
+            if self._planes:  # Half spaces are the last groups.
                 placed = placed.below(min(self._planes))
             self._scene.place(placed)
             self._normal_matrices = None

@@ -539,6 +539,6 @@ class BackgroundWriter:
 
     def _write_batch(self, batch: list[tuple], before: Future | None) -> None:
         if before is not None:
-            before.result()  # The batch before is done; if it failed, this one fails with its error.
+            before.result()  # If the batch before failed, this one fails, too.
         for message in batch:
             self._write(*message)

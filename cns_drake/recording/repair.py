@@ -134,9 +134,7 @@ def _find_definitions(
         elif isinstance(record, Channel) and record.id not in channels:
             channels[record.id] = record
             kept = (record.topic, *itertools.chain(*record.metadata.items()))
-        elif isinstance(
-            record, Attachment
-        ):  # Names take up memory in an index.
+        elif isinstance(record, Attachment):  # The index has its name.
             kept = (record.name, record.media_type)
         elif isinstance(record, Metadata):
             kept = (record.name,)

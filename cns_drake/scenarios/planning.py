@@ -71,9 +71,7 @@ def plan_drive(
         source = scenario.waypoints
         cure = "place waypoints farther apart, or leave some out"
     else:
-        assert (
-            scenario.route is not None
-        )  # Either a route or waypoints are given.
+        assert scenario.route is not None  # There is a route or waypoints.
         network = load_road_network(map_folder(scenario).roads)
         path = make_lane_path(
             network,

@@ -307,9 +307,7 @@ def _decay_order(
         raise InputError(f"{table}: none of its structures can be missing")
     try:
         xy = np.array([(float(row["x"]), float(row["y"])) for row in rows])
-        if not (
-            np.abs(xy) <= _FARTHEST
-        ).all():  # Written so that NaN fails, too.
+        if not (np.abs(xy) <= _FARTHEST).all():  # NaN fails, too.
             raise ValueError
     except (KeyError, ValueError):
         raise InputError(
