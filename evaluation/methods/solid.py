@@ -1,8 +1,9 @@
 """SOLiD (Kim, Choi, Sim, Kim, Park: RA-L 2024), for narrow fields of view.
 
 Points are counted over range and elevation, and over azimuth and elevation.
-An elevation's weight grows with its number of points. The weighted counts over
-range distinguish places at any heading; those over azimuth give the heading.
+Each elevation has a weight that grows with its number of points. The weighted
+counts over range identify a place at any heading; the weighted counts over
+azimuth give the heading.
 """
 
 from __future__ import annotations
@@ -19,7 +20,7 @@ from cns_drake.base.drives.lidar_fields import LidarField
 from evaluation.maps.voxel_maps import Z_ORIGIN, thin
 from evaluation.methods.method import Method, MethodConfig, register, yaw_pose
 
-# The LiDAR of the `cns` preset [S].
+# Field of view of the `cns` preset's LiDAR [S].
 _CNS = LidarField(32, -22.5, 22.5)
 
 
@@ -39,8 +40,8 @@ class SolidConfig(MethodConfig):
         ranges: number of equal cells up to `max_range`; [P], [C] 40.
         azimuths: number of equal cells of azimuth; [P], [C] 60.
         elevations: number of equal cells of elevation over the field of view;
-            [P], [C] the beams of the LiDAR. By default those of the drive's
-            LiDAR, or 32 if its unit is unknown [S].
+            [P], [C] the number of beams. By default that of the drive's LiDAR,
+            or 32 if its unit is unknown [S].
         lowest_deg: lower limit of the field of view [deg]; by default that of
             the drive's LiDAR, or -22.5 if its unit is unknown [S].
         highest_deg: upper limit of the field of view [deg]; by default that of
@@ -110,13 +111,13 @@ class SolidMethod(Method[Solid, SolidDatabase]):
     Where it differs from the authors' programs:
 
     - An elevation outside the field of view counts in the outermost cell.
-      [P] lets those below wrap around to the top; [C] reads outside its
+      In [P], elevations below it wrap around to the top; [C] reads outside its
       table if they are more than one cell too low.
     - Coordinates that are exactly zero stay zero; the programs replace them
       by 1 mm.
-    - If all elevations have equally many points, all weigh 1 (the programs
-      divide by zero).
-    - A scan without points within range is no candidate and finds none.
+    - If all elevations have the same number of points, all weights are 1 (the
+    programs divide by zero). - A place without points within range is never a
+    candidate, and a query without such points has no candidates.
     """
 
     Config = SolidConfig
@@ -183,15 +184,15 @@ class SolidMethod(Method[Solid, SolidDatabase]):
     def score(
         self, query: Solid, database: SolidDatabase, *, exhaustive: bool = False
     ) -> np.ndarray:
-        del exhaustive  # It always is.
+        del exhaustive  # Always true here.
         return (database.ranges * _unit(query.ranges)).sum(axis=1)
 
     def relative_pose(
         self, query: Solid, database: SolidDatabase, place: int
     ) -> np.ndarray | None:
-        """Returns the query's heading at a place, in steps of one azimuth cell.
+        """Returns a pose with the query's heading, in steps of one cell.
 
-        None if one of the two has no points within range.
+        Returns None if one of the two scans has no points within range.
         """
         azimuths = database.azimuths[place]
         if not (query.azimuths.any() and azimuths.any()):
@@ -220,7 +221,7 @@ class SolidMethod(Method[Solid, SolidDatabase]):
             return within
         least = np.array([column.min() for column in within.T])
         first = least - 0.5 * config.voxel_size
-        # `thin` has a grid through the origin, but for z.
+        # The grid of `thin` goes through the origin in x and y, but not in z.
         offset = first - [0.0, 0.0, Z_ORIGIN]
         return thin(within - offset, config.voxel_size) + offset
 
@@ -235,7 +236,7 @@ def _count(
 
 
 def _elevation_weights(counts: np.ndarray) -> np.ndarray:
-    """Returns the counts, scaled so that the least is 0 and the most is 1."""
+    """Returns weights: counts scaled so that the least is 0, the greatest 1."""
     least, most = counts.min(), counts.max()
     if least == most:
         return np.ones(len(counts))

@@ -179,9 +179,9 @@ def locate_records(
 
     Yields:
         Two offsets [bytes], and the record. For a record in a chunk, the
-            offsets are those of the chunk in the file and of the record in the
-            uncompressed chunk. For any other record, they are its offset in the
-            file and 0.
+        offsets are those of the chunk in the file and of the record in the
+        uncompressed chunk. For any other record, they are its offset in the
+        file and 0.
     """
     size = stream.seek(0, os.SEEK_END)
     stream.seek(0)

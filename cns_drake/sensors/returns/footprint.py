@@ -163,7 +163,7 @@ def meet_sides(sides: Sides, side_hits: BeamHits, hits: BeamHits) -> np.ndarray:
 
     Returns:
         (N,) fraction of each beam's light that its axis represents; its
-            additional rays represent the rest.
+        additional rays represent the rest.
     """
     rest = np.ones(len(hits.ranges))
     for side in range(len(sides.row)):
