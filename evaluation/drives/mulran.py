@@ -77,9 +77,7 @@ class MulranDrive(BinDrive):
             )
         else:
             X_UB = to_world(X_UB, trajectory.path)
-        scenario = read_scenario(
-            path
-        )  # Drives exported by cns-drake have a scenario.
+        scenario = read_scenario(path)  # cns-drake exports one.
         super().__init__(
             columns,
             name=name,

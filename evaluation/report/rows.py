@@ -1,9 +1,10 @@
-"""The numbers of a report as rows of the table of results, and what they say.
+"""The numbers of a report as rows of a table of results, and conclusions.
 
-How the methods rank, and what of each survives structural change. A control
-drive takes the place of one drive of a pair: it follows the same route, but in
-the stage of the other drive. What a method loses from the control to the pair
-is due to the change alone, and not to the routes.
+The conclusions are the ranking of the methods, and the share of its result that
+each method keeps under structural change. A control drive takes the place of
+one drive of a pair: it follows the same route, but in the stage of the other
+drive. What a method loses from the control to the pair is due to the change
+alone, and not to the routes.
 """
 
 from collections import Counter

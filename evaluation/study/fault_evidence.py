@@ -75,7 +75,7 @@ def find_evidence(
 
     Args:
         database: drive of the places.
-        query: drive whose scans asked.
+        query: drive of the queries.
         results: results of methods on this pair.
         protocol: protocol of the results.
         track: reports progress.

@@ -76,7 +76,7 @@ class MappedDrive(RecentScans):
 
 
 class DriveSource(Protocol):
-    """Opens a drive; can be pickled."""
+    """A picklable object that opens a drive when it is called."""
 
     def __call__(self) -> Drive:
         """Opens the drive.
@@ -242,7 +242,8 @@ def survey_recording(
         recording: the drive.
         roles: whether it makes a database, asks queries, or both; it may have
             no role.
-        asked: name of a description -> what is described; none without a role.
+        asked: name of a description -> method, roles and protocol; empty
+            without a role.
         protocol: protocol of the frames that are shown and kept.
         track: reports progress.
         with_scans: whether to keep the scans of places and queries.
