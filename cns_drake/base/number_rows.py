@@ -47,7 +47,7 @@ def _fault(
     separator: str | None,
     first: int,
 ) -> str:
-    """Returns what is wrong with the first row of another form."""
+    """Returns text on the first row that has another form."""
     kinds = [
         dtype[name].base.kind
         for name in dtype.names or ()

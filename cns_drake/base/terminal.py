@@ -201,10 +201,10 @@ def run(app: typer.Typer, program: str) -> NoReturn:
 
 
 def _open_standard_streams() -> None:
-    """Opens the three standard streams where a process lacks them.
+    """Opens standard streams that a process lacks.
 
-    Otherwise the next opened file would take their place and receive what is
-    printed.
+    Otherwise the next opened file would get the number of a missing stream, and
+    receive the printed text.
     """
     for number, name in enumerate(("stdin", "stdout", "stderr")):
         try:

@@ -16,7 +16,7 @@ _WHOLE = "tag:yaml.org,2002:int"
 
 
 def read_yaml(path: Path) -> Any:
-    """Returns what a YAML file holds; None if it is empty.
+    """Returns the content of a YAML file; None if it is empty.
 
     Raises:
         InputError: the file cannot be read, is not YAML, expands to too many

@@ -105,10 +105,10 @@ def merge_second(group: RayGroup) -> Iterator[Primitives]:
 
 
 def _numbered(group: RayGroup) -> list[Member]:
-    """Returns the members of a group with their numbers in it.
+    """Returns a group's members, numbered from 0 within the group.
 
-    Primitives then depend on shapes alone, and groups of the same shapes share
-    them.
+    The primitives then depend only on the shapes, so that groups of the same
+    shapes can share them.
     """
     return [(k, X, surface) for k, (_, X, surface) in enumerate(group.members)]
 

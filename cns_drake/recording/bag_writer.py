@@ -8,7 +8,8 @@ An interrupted run leaves a part file. A later run of the same recording takes
 over its messages by writing them again; see PartFile.
 
 Messages are written in a thread, while the next frame is computed: compression
-takes half of a frame's time, and other Python code can run meanwhile."""
+takes half of a frame's time, during which other Python code can run.
+"""
 
 from __future__ import annotations
 

@@ -141,7 +141,7 @@ def make_imu(
 
 
 def _covariance(value: object, variance: float) -> np.ndarray:
-    """Returns the covariance, row by row, of a value, which may be None."""
+    """Returns the covariance of a value, row by row; -1 first for None."""
     covariance = np.zeros(9)
     if value is None:
         covariance[0] = -1.0

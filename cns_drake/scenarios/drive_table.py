@@ -1,8 +1,8 @@
 """The table of a map's drives and their figures, a CSV file.
 
 Planning a drive and reading a stage take seconds; a listing should not. Each
-row of `sequences.csv` therefore has a checksum of its input files, and is
-measured anew when they have changed.
+row of `sequences.csv` therefore has a checksum of its input files; if these
+change, the figures are computed again.
 """
 
 from collections.abc import Callable, Mapping
@@ -109,7 +109,7 @@ def write_table(
 
 
 def _read(path: Path) -> list[DriveRow]:
-    """Returns a table's rows; none if it is damaged, to be measured anew."""
+    """Returns the rows of a table; empty if it is damaged."""
     types = get_type_hints(DriveRow)
     try:
         return [

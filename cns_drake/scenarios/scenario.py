@@ -270,7 +270,7 @@ class Scenario(Section):
         stage: stage of the map.
         world: SDF file of a world, instead of `map` and `stage`.
         without: names of structures to leave out, from `structures.csv`.
-        title: what the drive shows, for readers.
+        title: one sentence on what the drive shows.
         route: lanes to follow, leg by leg; give this or `waypoints`.
         waypoints: CSV file of places to pass. A `world` needs it, because it
             has no roads.

@@ -254,7 +254,7 @@ def write_scenarios(scenarios: Sequence[Scenario], folder: Path) -> list[Path]:
 def _check_redrawable(
     base: Scenario, family: Family, last: str, source: Path | str
 ) -> None:
-    """Checks that the city can be drawn anew."""
+    """Checks that the base's city can be drawn again with other seeds."""
     why = (
         f"not with city_seeds: stages before the last one, {last}, are lists "
         "of names that another draw of the city need not have"

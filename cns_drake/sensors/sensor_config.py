@@ -1,4 +1,4 @@
-"""What the descriptions of all sensors share.
+"""Base classes and checks for the descriptions of all sensors.
 
 These descriptions are the sections of a scenario. Reading them needs no Drake,
 which is slow to import.

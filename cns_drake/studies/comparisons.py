@@ -60,7 +60,7 @@ _FROZEN = ("map", "level", "drives")
 
 
 class MissingError(Exception):
-    """A map lacks what a condition needs; the message says what."""
+    """A map cannot have a condition; the message says what it lacks."""
 
 
 @dataclass(frozen=True)
@@ -68,9 +68,9 @@ class Compared:
     """A database and a query in one condition.
 
     Attributes:
-        database: the drive that makes the database.
-        query: the drive that asks.
-        protocol: protocol by which the query asks.
+        database: the drive of the database.
+        query: the drive of the queries.
+        protocol: protocol of the queries.
         distractors: number of places elsewhere that are added to the database.
         asked: fields of the protocol that the condition sets.
     """
@@ -106,8 +106,8 @@ class PairOfDrives:
     """The two drives of a map whose conditions are built.
 
     Attributes:
-        database: the drive that makes the database in the unchanged map.
-        query: the drive that asks.
+        database: the drive of the database, in the unchanged map.
+        query: the drive of the queries.
         same_route: whether the database drives the query's route, at another
             viewpoint.
         source: file of the experiment, for errors.

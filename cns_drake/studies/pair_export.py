@@ -61,7 +61,7 @@ _DRIVE_COST, _PAIR_COST = 20.0, 60.0
 
 @dataclass(frozen=True)
 class ExportOptions:
-    """What is exported of each drive.
+    """Settings of the export of each drive.
 
     Attributes:
         format: format of the program that trains.

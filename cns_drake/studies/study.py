@@ -347,7 +347,7 @@ class Study:
     def _plan(
         self, drives: Iterable[_Drives]
     ) -> tuple[dict[str, Job], list[_Measured]]:
-        """Returns the jobs, and what they measure."""
+        """Returns the jobs, and the pairs that they measure."""
         jobs: dict[str, Job] = {}
         notes: dict[str, None] = {}
         measured: list[_Measured] = []

@@ -120,7 +120,7 @@ class Batch:
 
 
 class Sampler:
-    """Draws batches; a step's batch depends on seed and step alone."""
+    """Draws batches; each depends only on the seed and its step."""
 
     def __init__(self, scans: TrainingScans, seed: int):
         """Finds the pairs of drives that meet.

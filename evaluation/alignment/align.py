@@ -89,7 +89,8 @@ class AlignmentReport:
         straightened: upper quartile of the errors of the drives' loops with
             themselves, before the drives were straightened [m]; 0 if they were
             not straightened.
-        ground: height that was subtracted from both [m].
+        ground: height of the ground that was subtracted from both drives'
+            heights [m].
     """
 
     held: str
@@ -161,7 +162,7 @@ def in_one_world(
         across_maps: whether the drives may be of maps of different names.
 
     Raises:
-        InputError: if they should be aligned and cannot be.
+        InputError: the drives should be aligned, but that failed.
     """
     if not across_maps:
         check_same_map(first, second)

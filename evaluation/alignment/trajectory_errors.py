@@ -171,7 +171,7 @@ def trajectory_errors(
 
 
 def aligned_offsets(p: np.ndarray, q: np.ndarray) -> np.ndarray:
-    """Returns the distances (N,) of points from others, after alignment.
+    """Returns distances (N,) of true and estimated positions, aligned [m].
 
     Args:
         p: (N, 3) true positions [m].

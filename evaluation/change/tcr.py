@@ -240,8 +240,8 @@ def temporal_change(
     """Returns the temporal change ratios between two maps.
 
     Args:
-        source: (N, 3) float64 voxel centroids, in the frame of both [m].
-        target: (M, 3) float64.
+        source: (N, 3) float64 voxel centroids, in the common world frame [m].
+        target: (M, 3) float64 voxel centroids of the other map [m].
         tau: distance up to which a point is unchanged, inclusive [m].
         margin: margin of the hulls, see `in_convex_hull` [m].
         restrict_to_hull: whether O is counted inside H. False is the literal
@@ -274,8 +274,8 @@ def covered(
 ) -> np.ndarray:
     """Returns which points lie near each of several trajectories.
 
-    Even without a change, two routes see different parts of a city. Points near
-    both routes are free of most of that difference.
+    Even without a change, two routes see different parts of a city. This hardly
+    affects points near both routes.
 
     Args:
         points: (N, 3) points in the world [m].

@@ -114,7 +114,9 @@ class HeliprDrive(FileDrive):
 
 
 def read_scan(lidar: str, path: Path, stamp_ns: int = 2**63) -> np.ndarray:
-    """Returns the points (N,) of a scan of a LiDAR, by its time [ns].
+    """Returns the points (N,) of a scan file of a LiDAR.
+
+    Aeva's format depends on the time of the scan [ns].
 
     Raises:
         ValueError: if the file is not of that LiDAR.

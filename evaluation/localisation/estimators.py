@@ -181,7 +181,7 @@ def make_map(
         on_note: see `read_cloud`.
 
     Raises:
-        InputError: if it cannot be read, or has hardly a point.
+        InputError: the source cannot be read, or has too few points.
     """
     if isinstance(source, Drive):
         blocks = _scans(source, track)
@@ -504,7 +504,7 @@ def thinned(measured: np.ndarray, settings: Settings, where: str) -> np.ndarray:
     """Returns a scan (N, 3) with at most one point per voxel.
 
     Raises:
-        InputError: if hardly a point is left.
+        InputError: too few points are left.
     """
     points = thin(measured, settings.scan_voxel)
     if len(points) < FEWEST_POINTS:

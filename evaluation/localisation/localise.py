@@ -256,7 +256,7 @@ class Localiser:
             A record of `QUERY`; the estimated X_WS, or None.
 
         Raises:
-            InputError: if the scan has hardly a point.
+            InputError: the scan has too few points.
         """
         if X_WS0 is None:
             R = Rotation.from_rotvec(turn).as_matrix()
@@ -322,7 +322,7 @@ def localise(
         (K,) of `QUERY`, in the order of the frames.
 
     Raises:
-        InputError: if a scan cannot be read, or has hardly a point.
+        InputError: a scan cannot be read, or has too few points.
     """
     global _localiser
     X_WS, stamps = query.X_WS, query.stamps_ns

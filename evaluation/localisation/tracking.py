@@ -102,7 +102,7 @@ def track_drive(
         scan, and that from the scan before [m].
 
     Raises:
-        InputError: if a scan cannot be read, or has hardly a point.
+        InputError: a scan cannot be read, or has too few points.
     """
     X_WS = query.X_WS
     way = travelled(X_WS[:, :3, 3])

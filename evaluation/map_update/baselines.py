@@ -80,7 +80,7 @@ def run_baseline(name: str, pair: Pair, track: Track = silent) -> Labels:
 def by_distance(
     mine: Session, theirs: Session, track: Track = silent
 ) -> np.ndarray:
-    """Returns labels (N,) of a map by its distance from the other map."""
+    """Returns labels (N,) of a map by the baseline `distance`."""
     del track
     _, kept, changed = SIDES[mine.side]
     far = np.isinf(nearest(mine.points, theirs.points, _APART))
@@ -90,7 +90,7 @@ def by_distance(
 def by_free_space(
     mine: Session, theirs: Session, track: Track = silent
 ) -> np.ndarray:
-    """Returns labels (N,) of a map by what the other drive's scans see."""
+    """Returns labels (N,) of a map by the baseline `free-space`."""
     unobserved, kept, changed = SIDES[mine.side]
     _check_scans(theirs)
     labels = np.full(len(mine.points), kept, np.uint8)

@@ -22,8 +22,8 @@ class StructureChange:
         semantic_class: class of the structure; empty if unknown.
         label: the class as a number.
         points: number of the structure's points in the map.
-        observed: how many of these points the other drive observed.
-        changed: how many of the observed points are gone, or new.
+        observed: number of these points that the other drive observed.
+        changed: number of the observed points that are gone (A) or new (B).
         verdict: gone (A) or new (B) if most of the observed points are, else
             kept. Without an observed point: unobserved (A) or newly_seen (B).
         alone: whether the other drive's world has no structure of this name.

@@ -154,8 +154,9 @@ def group_alike(
     """Returns the group (P,) of each patch; -1 if no other is similar.
 
     From the last patch to the first, each is compared with all patches before
-    it, in their order. If two are similar and one has a group, the other joins
-    it. If neither has one, both found a new group. Two groups never become one.
+    it, in their order. If two patches are similar and one has a group, the
+    other joins this group. If neither has a group, they form a new one. Two
+    groups are never merged.
 
     Args:
         centers: (P, 3) centres of the patches [m].
@@ -297,7 +298,7 @@ def hash_table_order(codes: np.ndarray) -> np.ndarray:
     All elements form one list, in which the elements of a bucket follow each
     other. A new element goes to the front of its bucket, and a new bucket to
     the front of the list. When the number of buckets grows, all elements are
-    inserted anew, in the order of the list.
+    inserted again, in the order of the list.
 
     Args:
         codes: (N,) uint64 hashes of the elements, in the order in which they

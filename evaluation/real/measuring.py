@@ -78,7 +78,7 @@ class Measuring:
     """
 
     def __init__(self, names: Sequence[str], track: Track, on_note: OnNote):
-        """Chooses what is measured.
+        """Chooses the methods and estimators to measure.
 
         Args:
             names: names of methods and estimators, or Python files with your

@@ -55,7 +55,7 @@ def measure_cost(
             counted, since it includes loading and compiling.
         scans_per_place: number of merged scans.
         database: described drive with places.
-        query: described drive with queries; as many are used as there are
+        query: described drive with queries; the number used is that of the
             clouds.
         gate_radius: see `score_places`.
     """

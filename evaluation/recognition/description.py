@@ -104,8 +104,8 @@ def describe_drive(
 ) -> list[DescribedDrive]:
     """Describes the places and queries of a drive, each cloud once.
 
-    If a frame is both a place and a query, a method that describes both alike
-    describes it once. Clouds are shared between methods.
+    If a frame is both a place and a query, and the method describes both in the
+    same way, it is described only once. Clouds are shared between methods.
 
     Args:
         drive: the drive.

@@ -25,7 +25,8 @@ class PoseErrors:
     Attributes:
         translation: (Q,) distance to the true position [m]; NaN without a
             candidate or a pose.
-        rotation_deg: (Q,) angle to the true orientation [deg]; likewise.
+        rotation_deg: (Q,) angle to the true orientation [deg]; NaN without a
+            candidate or a pose.
     """
 
     translation: np.ndarray

@@ -32,7 +32,7 @@ class Finding:
 
 @dataclass(frozen=True)
 class Judgement:
-    """Findings under a heading that says whose claims they judge."""
+    """Findings under a heading that says whose claims they test."""
 
     heading: str
     findings: Sequence[Finding]

@@ -85,7 +85,7 @@ class Drawn:
     """A chart.
 
     Attributes:
-        message: what it shows, in words.
+        message: sentence that says what the chart shows.
         figure: the drawing.
         legend: name -> colour, line style and marker; empty where the drawing
             has the names.

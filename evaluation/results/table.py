@@ -209,7 +209,7 @@ class Row(Key):
 
 @dataclass(frozen=True, eq=False)
 class Answers(Key):
-    """What a method answered to Q queries.
+    """The answers of a method to Q queries.
 
     Attributes:
         columns: name -> (Q,) values, of the columns of `queries.csv`. NaN
@@ -463,7 +463,7 @@ def _range(metric: str) -> tuple[float, float]:
 
 
 def _measured(one: _Line) -> dict[str, Any]:
-    """Returns what a row holds behind its key."""
+    """Returns a row's values that follow the columns of its key."""
     metric = one.text("metric")
     value, low, high = (
         one.value(name, float) for name in ("value", "low", "high")

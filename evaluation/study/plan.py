@@ -314,7 +314,7 @@ class Study:
         return Job(name, step, _survey_names(pair), cost)
 
     def _cost_job(self, pair: Pair, needs: tuple[str, ...]) -> Job:
-        """Returns the job that runs after all others, alone on the machine."""
+        """Returns the job that measures costs, after all others and alone."""
         places, queries = (self._files.survey(one.name) for one in pair)
         described = tuple(
             (places.described(one.key), queries.described(one.key))

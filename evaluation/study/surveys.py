@@ -240,8 +240,8 @@ def survey_recording(
 
     Args:
         recording: the drive.
-        roles: whether it makes a database, asks queries, or both; it may have
-            no role.
+        roles: whether the drive has places of the database, queries, or both;
+            the set may be empty.
         asked: name of a description -> method, roles and protocol; empty
             without a role.
         protocol: protocol of the frames that are shown and kept.
@@ -378,7 +378,7 @@ class Survey(Step):
 
     @property
     def _asked(self) -> dict[str, Further]:
-        """Name of each description -> what is described."""
+        """Name of each description -> method, roles and protocol."""
         asked = {
             one.key: (one, self.roles, self.protocol) for one in self.methods
         }

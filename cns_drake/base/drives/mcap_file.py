@@ -97,17 +97,18 @@ def _read_body(stream: BinaryIO, limit: int, what: str) -> bytes:
 
 @dataclass
 class _Contents:
-    """What a file holds.
+    """The contents of a file, by type of record.
 
     Attributes:
-        schemas: by id.
-        channels: likewise.
-        blocks: where each chunk, or message outside of chunks, begins in the
-            file [bytes], in its order.
-        indexes: for each block, channel id -> where its message index begins.
-        attachments: (name, where it begins) of each.
+        schemas: id -> schema.
+        channels: id -> channel.
+        blocks: offset in the file of each chunk, or of each message outside of
+            chunks, in the file's order [bytes].
+        indexes: for each block, channel id -> offset of the message index
+            [bytes].
+        attachments: (name, offset in the file [bytes]) of each.
         found: channel id -> (block, offset in it, log time [ns]) of each
-            message; None where the index has them.
+            message; None if the index has them.
         statistics: the file's own, if any.
     """
 
@@ -442,7 +443,7 @@ class McapFile:
 
     @contextlib.contextmanager
     def _faults(self) -> Iterator[None]:
-        """Turns what a damaged file raises into one line."""
+        """Turns the errors of a damaged file into an InputError of one line."""
         try:
             yield
         except (

@@ -105,7 +105,7 @@ def uncompress(chunk: Chunk) -> bytes:
     Raises:
         ValueError: if it is damaged, too large or of unknown compression.
         RuntimeError: if lz4 finds it damaged.
-        zstandard.ZstdError: likewise.
+        zstandard.ZstdError: if zstd finds it damaged.
     """
     size = chunk.uncompressed_size
     if size > CHUNK_LIMIT_BYTES:

@@ -58,8 +58,8 @@ class Cluster:
     def slots(self) -> int | None:
         """Number of jobs that run at once; None if it is not fixed.
 
-        A foreign scheduler gets all jobs at once, since others may use it, and
-        it may start workers for them.
+        An existing scheduler gets all jobs at once: it may have other users,
+        and may start workers for the jobs.
         """
         return self.num_workers if self.scheduler is None else None
 
@@ -78,7 +78,7 @@ def choose_cluster(num_jobs: int | None, scheduler: str | None) -> Cluster:
     """Returns the cluster that the options --jobs and --scheduler name.
 
     Args:
-        num_jobs: `--jobs`: work on this machine, so many jobs at a time.
+        num_jobs: `--jobs`: number of jobs that run at a time, on this machine.
         scheduler: `--scheduler`. Without both options, the environment variable
             DASK_SCHEDULER_ADDRESS names the scheduler. Without that, the jobs
             run on this machine, one for each core.

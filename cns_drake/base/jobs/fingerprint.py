@@ -105,7 +105,7 @@ def _source(module: _Module) -> Path | None:
 
 
 def _imported(module: _Module) -> Iterator[_Module]:
-    """Yields what a module imports, if it is ours or beside it."""
+    """Yields imported modules that are ours or beside the module."""
     for home, name in _imports_of(module).names:
         own = home.partition(".")[0] in _PACKAGES
         package = _Module(_ROOT if own else module.root, home)

@@ -217,7 +217,7 @@ class _Run:
             self._shown.note(f"{name}: failed: {fault}")
 
     def _stop(self) -> None:
-        """Ends what is running, and waits until it has closed its files."""
+        """Ends running jobs, and waits until they have closed their files."""
         self._submitted.clear()
         self._workers.stop()
         deadline = time.monotonic() + processes.PATIENCE

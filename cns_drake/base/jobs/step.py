@@ -1,7 +1,7 @@
-"""A piece of work: its inputs, what it does and the files it leaves.
+"""A piece of work, with its inputs and the files that it writes.
 
-A step leaves files and nothing else. An interrupted study goes on where it was
-when the same steps are run again, on any machine.
+A step has no other result than its files. An interrupted study goes on where it
+was when the same steps are run again, on any machine.
 """
 
 import abc
@@ -78,10 +78,10 @@ class Step(abc.ABC):
     def run(self, reporter: Reporter) -> None:
         """Does the work of the step.
 
-        It never leaves an incomplete file under a final name.
+        An incomplete file never has its final name.
 
         Raises:
-            InputError: it cannot be done.
+            InputError: the work cannot be done.
         """
 
     def made_of(self, inputs: Mapping[str, object]) -> dict[str, object]:

@@ -183,8 +183,8 @@ class Lidar(LeafSystem):
                 default, structures have no class, and ids in alphabetical
                 order.
             anchored_frames: frames that never move, besides the world's; their
-                geometry is cheaper to cast on. If one moves after all, all
-                static geometry is built anew.
+                geometry is cheaper to cast on. If such a frame moves after all,
+                all static geometry is rebuilt.
             num_threads: number of threads that share its rays; the measurement
                 does not depend on it.
             causal: whether a scan is the turn that ends at the time of the

@@ -265,9 +265,9 @@ class SpinningPattern(BeamPattern):
     In the sensor frame S (x forward, y left, z up) the turn starts at the rear
     and goes clockwise seen from above, as Ouster's and Velodyne's units turn:
     column k of n points at azimuth pi - 2 pi k / n. With azimuth limits it goes
-    from the first to the last one, both included, and fires only in that part
-    of the turn. Ring 0 is the highest beam. Beams are ordered as they fire:
-    column by column, and from ring 0 downwards in each.
+    from the first limit to the last, including both, and fires only in that
+    part of the turn. Ring 0 is the highest beam. Beams are ordered as they
+    fire: column by column, and from ring 0 downwards in each.
 
     Attributes:
         elevations_rad: elevation of each ring, descending [rad].

@@ -72,8 +72,8 @@ def make_beam_pattern(
     Args:
         preset: a key of `LIDAR_PRESETS`; `source` there names its data sheet.
         period: duration of a turn [s]; by default that of the data sheet.
-        num_columns: columns in a turn; by default those of the data sheet. A
-            unit that fires at a fixed rate has as many as fit into the period.
+        num_columns: columns in a turn; by default those of the data sheet. The
+            number is fixed by the period if a unit fires at a fixed rate.
         min_range: nearest range that is measured [m]; by default that of the
             data sheet.
         max_range: farthest range that is measured [m]; by default that of the
