@@ -390,7 +390,7 @@ class EmbreeHierarchy:
         mask: int = ALL,
         with_normals: bool = False,
     ) -> Hits:
-        """Casts rays on the geometry; returns what they hit."""
+        """Casts rays on the geometry; returns the hits."""
         num_rays = len(rays.d_Sset)
         hits = Hits.misses(num_rays, with_normals)
         # All threads take parts from one iterator, which yields each part once.
@@ -478,7 +478,7 @@ class EmbreeScene:
         self._axes.place(placed)
 
     def cast_rays(self, rays: Rays, with_normals: bool) -> Hits:
-        """Casts rays on the scene; returns what they hit."""
+        """Casts rays on the scene; returns the hits."""
         hits = self._first.cast(rays, with_normals=with_normals)
         if self._second.rows:
             self._cast_again(rays, hits, with_normals)

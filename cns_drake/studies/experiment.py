@@ -449,7 +449,7 @@ def _factors(
 def _split(
     fields: Changes, above: tuple[str, ...]
 ) -> tuple[dict[str, Any], dict[str, list[Any]]]:
-    """Returns path -> value of single fields, and path -> values of factors."""
+    """Returns path -> value of fixed fields, and path -> values of factors."""
     single: dict[str, Any] = {}
     varied: dict[str, list[Any]] = {}
     for path, value in _leaves(fields, above):
@@ -475,7 +475,7 @@ class _Values(list):
 def _leaves(
     fields: Mapping[Any, Any], above: tuple[str, ...]
 ) -> Iterator[tuple[str, Any]]:
-    """Yields path -> value, or values, of nested fields."""
+    """Yields (path, value or values) for each leaf of nested fields."""
     for name, value in fields.items():
         place = (*above, str(name))
         path = ".".join(place)

@@ -479,7 +479,7 @@ class TrainingPlan:
         return cls(**{"cities": cities, "steps": steps, **fields})
 
     def drawn(self) -> list[DrawnCity]:
-        """Returns the cities."""
+        """Returns the cities of the training, with their drives."""
         return [
             DrawnCity(
                 DRAWN_STREETS

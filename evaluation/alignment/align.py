@@ -361,7 +361,7 @@ def _lowered(
 
 
 def _motion(X_WS: np.ndarray, X_TS: np.ndarray) -> dict:
-    """Returns the fields of the report on a drive's move."""
+    """Returns the report's fields `move`, `turn_deg` and `bend`."""
     moves = X_TS @ poses.inverse(X_WS)
     middle = moves[len(moves) // 2]
     rigid = middle @ X_WS

@@ -171,8 +171,8 @@ class TrackSummary:
     def losses(self) -> list[tuple[float, bool]]:
         """Returns, for each loss, its length [m] and whether it ended.
 
-        The length is the path from the loss until the estimate is right again,
-        or else to the end of the part.
+        The length is the path from the loss until the error is at most `LOST`
+        again, or else to the end of the part.
         """
         found = []
         for stretch in np.unique(self.rows["stretch"]):

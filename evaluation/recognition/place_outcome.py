@@ -181,7 +181,7 @@ class Number(NamedTuple):
 
     Attributes:
         method: method, estimator or baseline; "" if there is none. For a place
-            recognition method it is the `key` of its choice.
+            recognition method, it is the method's name with its settings.
         gate: whether the gate was used.
         metric: name of the metric.
         value: its value.

@@ -357,7 +357,7 @@ class Part:
 
     @contextlib.contextmanager
     def _opened(self) -> Iterator[tuple[dict, BinaryIO]]:
-        """Yields header and value, which must have its full length."""
+        """Yields the header, and the value after checking its length."""
         check_regular(self.path)
         try:
             with open(self.path, "rb") as stream:

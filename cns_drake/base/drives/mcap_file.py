@@ -1,11 +1,11 @@
 """Random access to the messages of an MCAP file.
 
-The `mcap` package reads messages in time order, or all of a span of time.
-Reading a scan by its number needs the location of each message of a topic, and
-the one chunk that contains it. Both come from the index at the end of a
-complete file, so that opening a file of gigabytes reads a few kilobytes. The
-format makes this index optional. If the message counts at the end of the file
-do not confirm the index, the whole file is read once.
+The `mcap` package reads all messages, or those of a span of time, in the order
+of time. Reading a scan by its number needs the location of each message of a
+topic, and the one chunk that contains it. Both come from the index at the end
+of a complete file, so that opening a file of gigabytes reads a few kilobytes.
+The format makes this index optional. If the message counts at the end of the
+file do not confirm the index, the whole file is read once.
 
 The package checks only the checksums of chunks, and trusts the sizes that a
 chunk claims. Here damaged or hostile records are refused.
@@ -324,8 +324,8 @@ class McapFile:
         """Finds everything in the file without any index.
 
         Raises:
-            InputError: if it cannot be read, or lacks what its statistics
-                count.
+            InputError: the file cannot be read, or has fewer messages than its
+                statistics state.
         """
         told = self._contents.statistics
         contents = _Contents(

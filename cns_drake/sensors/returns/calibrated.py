@@ -96,9 +96,9 @@ class CalibratedReturns:
         geometries: Sequence[PerceptionGeometry],
         structures: object,
     ) -> Materials:
-        """Returns how geometries reflect; rain wets the ground.
+        """Returns the materials of geometries, with wet ground in rain.
 
-        Structures have classes if they are a `StructureTable`.
+        The classes of structures are known only from a `StructureTable`.
         """
         if not isinstance(structures, StructureTable):
             structures = StructureTable(())
