@@ -96,7 +96,7 @@ class Command(TyperCommand):
 def with_options(
     keyword: str, options: Options, make: Callable[..., Any]
 ) -> Callable[[Callable[..., None]], Callable[..., None]]:
-    """Returns a decorator that gives a command a group of options.
+    """Returns a decorator that adds a group of options to a command.
 
     Args:
         keyword: parameter of the command that gets the options as one value.

@@ -195,7 +195,7 @@ def decode_text(data: bytes) -> str:
 
 
 def file_name(text: str) -> str:
-    """Returns a text as a file name that cannot lead to another folder.
+    """Turns a text into a file name that cannot lead to another folder.
 
     Names from a recording (its own, its map's, its stage's) pass through here
     before they become parts of paths. Usual names stay as they are. Other names
@@ -249,7 +249,7 @@ def open_plain(path: Path, flags: int) -> int:
 
 
 def write_part(path: Path, text: str) -> None:
-    """Writes text under the part name of `path`, down to the disk.
+    """Writes text under the part name of `path`, and flushes it to disk.
 
     Raises:
         InputError: if that fails, e.g. on a full disk.
@@ -317,7 +317,7 @@ def make_folder(path: Path) -> None:
 
 @contextlib.contextmanager
 def exclusive(path: Path, on_wait: Callable[[], None]) -> Iterator[None]:
-    """Keeps other processes that use the same lock out of the block.
+    """Locks a file, so that one process at a time runs the block.
 
     The file `<path>.lock` is locked meanwhile, also for other machines if the
     file system has locks. It is unlocked however the process ends. Before

@@ -17,7 +17,7 @@ _COMPRESSIONS = (zipfile.ZIP_STORED, zipfile.ZIP_DEFLATED)
 def read_npz(
     path: Path, names: Iterable[str], most_bytes: int
 ) -> dict[str, np.ndarray]:
-    """Returns the wanted arrays of an .npz file by name, if present.
+    """Returns name -> array, of the wanted arrays that an .npz file has.
 
     The size is limited, and no code is run.
 

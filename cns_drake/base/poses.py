@@ -8,7 +8,7 @@ FARTHEST = 1e8
 
 
 def make_pose(R: np.ndarray, p: np.ndarray) -> np.ndarray:
-    """Returns poses X (..., 4, 4) of R (..., 3, 3) and p (..., 3) [m]."""
+    """Returns poses (..., 4, 4) from R (..., 3, 3) and p (..., 3) [m]."""
     X = np.zeros((*R.shape[:-2], 4, 4))
     X[..., :3, :3] = R
     X[..., :3, 3] = p

@@ -1,4 +1,4 @@
-"""Progress bars on stderr; each takes one line in any terminal."""
+"""Progress bars on stderr, one line each whatever the terminal's width."""
 
 from collections.abc import Callable, Iterator
 import contextlib

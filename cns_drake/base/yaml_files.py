@@ -81,7 +81,7 @@ def _check_depth(text: str | bytes, loader: type) -> None:
 
 
 def _check(node: yaml.Node, sizes: dict[int, int]) -> int:
-    """Returns how many nodes a node stands for when aliases are resolved."""
+    """Returns the number of nodes of a tree when aliases are resolved."""
     line = node.start_mark.line + 1
     if isinstance(node, yaml.ScalarNode):
         # Python cannot print what `0xff...` stands for.

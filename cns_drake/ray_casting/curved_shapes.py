@@ -258,7 +258,7 @@ def _meet_capsule(
     half: float,
     radius: float,
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Returns where N rays meet a capsule, in closed form.
+    """Returns the hits of N rays on a capsule, in closed form.
 
     Origins are relative to its middle [m]. `half` is half the length of its
     straight part [m].

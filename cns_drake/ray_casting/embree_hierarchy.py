@@ -57,7 +57,7 @@ _MOST_PIECES = 1000
 
 
 class Primitives(NamedTuple):
-    """One Embree geometry, of a kind that Embree numbers.
+    """The data of one Embree geometry, and its type number in Embree.
 
     Buffers are (slot, format, array) each. `owners` has the (P,) int32 number
     of each primitive's member in its group, and `mask` is `SOLID` or `PROXY`.
@@ -551,7 +551,7 @@ def _release(lib: ctypes.CDLL, device: int, scenes: Sequence[int]) -> None:
 
 
 def _decompose_motion(group: RayGroup) -> np.ndarray:
-    """Returns the poses of a moving group at even times of the turn.
+    """Returns the poses of a moving group at evenly spaced times of a turn.
 
     Embree turns from one orientation to the next at a constant rate about F's
     origin, which moves in a straight line. That is the motion of a frame with

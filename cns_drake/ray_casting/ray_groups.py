@@ -1,4 +1,4 @@
-"""Geometry in groups that move as one, for the ray casters."""
+"""Groups of geometry that moves rigidly together, for ray casters."""
 
 from collections import Counter
 from collections.abc import Callable, Collection, Iterable, Sequence

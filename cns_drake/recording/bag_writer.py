@@ -54,7 +54,7 @@ _MOST_HELD = 64
 
 
 class RecordedMessage(NamedTuple):
-    """A message as `BagWriter.write` takes it."""
+    """A message with the arguments of `BagWriter.write`."""
 
     topic: str
     stamp_ns: int
@@ -166,7 +166,7 @@ class BagWriter:
         return self
 
     def __exit__(self, exception_type: type | None, *_: object) -> None:
-        """Completes the recording, or closes it as a part.
+        """Completes the recording, or closes it as a part file.
 
         Raises:
             InputError: if the files cannot be completed, e.g. on a full disk;

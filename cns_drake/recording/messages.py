@@ -153,7 +153,7 @@ def _covariance(value: object, variance: float) -> np.ndarray:
 def make_odometry(
     X_WB: RigidTransform, V_WB_B: SpatialVelocity, stamp_ns: int
 ) -> Any:
-    """Returns an Odometry message: pose in the map, twist in the vehicle.
+    """Returns an Odometry message: pose in the map, twist expressed in B.
 
     The velocity V_WB_B is expressed in B [rad/s, m/s]. The values are exact;
     their standard deviations are given as 1e-6.

@@ -31,7 +31,7 @@ _OPACITY = 0.45
 
 
 class RecordedObjects(NamedTuple):
-    """The N vehicles and walkers that are present at a time.
+    """The N vehicles and walkers at one time.
 
     Attributes:
         instance: (N,) uint16 ids in points and tables.
@@ -57,7 +57,7 @@ class RecordedObjects(NamedTuple):
 
 
 class BoxMessages:
-    """Makes one message of all boxes at a time.
+    """Makes messages that contain all boxes of a time.
 
     For each set of objects, a message is made only once, with placeholders for
     its float64 numbers and its stamp. Later messages fill in these numbers,
@@ -175,7 +175,7 @@ def marked_boxes(who: Sequence[tuple[int, str]], numbers: np.ndarray) -> Any:
 
 
 def _box(numbers: np.ndarray) -> tuple[tuple, np.ndarray]:
-    """Returns the fields of a pose, and the size."""
+    """Returns the fields of a box's pose, and its size."""
     return (numbers[:3], numbers[3:7]), numbers[7:]
 
 

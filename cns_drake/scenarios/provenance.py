@@ -85,7 +85,7 @@ def digest_inputs(
 
 
 def combined_digest(inputs: dict[str, str]) -> str:
-    """Returns one digest for the digests from `digest_inputs`."""
+    """Returns one digest that combines the results of `digest_inputs`."""
     return hashlib.sha256(json.dumps(inputs).encode()).hexdigest()
 
 

@@ -65,7 +65,7 @@ def load_scenario(name_or_file: str | Path) -> Scenario:
 
 
 def _name_drives(given: str | Path, folder: MapFolder) -> str:
-    """Returns the fault that a folder was given in place of one drive."""
+    """Returns the error for a folder that was given in place of a drive."""
     files = folder.drives()
     if not files:
         return f"{given}: a folder without a drive (sequence_NN.yaml)"
@@ -109,7 +109,7 @@ def read_scenario_file(path: Path) -> Scenario:
 def _find_base(
     base: object, path: Path, found: Collection[Path]
 ) -> Path | None:
-    """Returns the file of a base; None without one."""
+    """Returns the file of a scenario's base; None if it has no base."""
     if base is None:
         return None
     drives = shipped_drives()

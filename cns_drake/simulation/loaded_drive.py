@@ -1,4 +1,4 @@
-"""A scenario with all that its simulation needs: plan, stage, traffic."""
+"""A scenario with the inputs of its simulation: plan, stage, traffic."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace

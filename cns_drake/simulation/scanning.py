@@ -90,7 +90,7 @@ def _stand(
     pattern: BeamPattern,
     returns: CalibratedReturns | None = None,
 ) -> tuple[Lidar, Context]:
-    """Returns a LiDAR that stands in a world, and its Context."""
+    """Returns a LiDAR at a fixed pose in a world, and its Context."""
     lidar = Lidar(
         world.scene_graph.world_frame_id(),
         X_WS,

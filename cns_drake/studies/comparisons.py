@@ -146,7 +146,7 @@ class PairOfDrives:
         """Returns the drives of a condition.
 
         Raises:
-            MissingError: the map lacks what the condition needs.
+            MissingError: the map cannot have the condition.
             InputError: a field is unknown or not usable.
         """
         chosen: list[Mapping[str, Changes]] = [condition.changes]
@@ -413,7 +413,7 @@ class PairOfDrives:
     def _decayed(
         self, side: str, drive: Scenario, fields: Changes, seed: int
     ) -> Scenario:
-        """Returns a drive through a city that lacks a part of itself."""
+        """Returns a drive through a city with some structures missing."""
         values = {**fields, "base": drive.name, "stage": drive.stage}
         values["missing"] = [fields.get("missing", 0.0)]
         family = validated(
@@ -487,7 +487,7 @@ def control_drive(drive: Scenario, stage: str) -> Scenario:
 
 
 def _ending(side: str, condition: Condition, seed: int) -> str:
-    """Returns the end of the name of a drive with changes."""
+    """Returns the suffix of the name of a changed drive."""
     factors = dict(condition.factors)
     labels = []
     cause, level = factors.pop(CAUSE, NO_CAUSE), factors.pop(LEVEL, 0)

@@ -98,7 +98,7 @@ _FORMER = (
 
 @dataclass(frozen=True)
 class _Measured:
-    """A pair of drives in a condition, with what its tasks write."""
+    """A pair of drives in a condition, with the parts that tasks write."""
 
     map_name: str
     names: tuple[str, str]
@@ -564,7 +564,7 @@ class Study:
             )
 
     def _rows(self, measured: Sequence[_Measured]) -> Iterator[Row]:
-        """Yields all numbers."""
+        """Yields all rows of the table of results."""
         # The values of the baseline of a map, its drives and protocol, by
         # seed and task.
         baselines: dict[tuple, dict[int, dict[str, Any]]] = {}

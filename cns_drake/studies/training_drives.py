@@ -59,7 +59,7 @@ _OVERLAP_POINTS = 1000
 
 @dataclass(frozen=True)
 class DrawnCity:
-    """A city with its drives, as a seed draws them.
+    """A city with its drives, all drawn from a seed.
 
     `map_name` is the shipped map that has its streets, or `DRAWN_STREETS`. With
     `graded`, the overlap of each scan with the places of the other scans is
@@ -296,7 +296,7 @@ def draw_streets(rng: np.random.Generator) -> dict[str, Any]:
 
 
 def draw_stages(city: City, rng: np.random.Generator) -> dict[str, dict]:
-    """Returns stages of a city: some buildings absent, lower, trees young.
+    """Returns random stages of a city: absent or lower buildings, small trees.
 
     Returns:
         The content of `stages.yaml`, in which the last one is the whole city.

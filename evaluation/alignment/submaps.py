@@ -32,7 +32,7 @@ _NUM_KEPT = 48
 
 
 class Submaps:
-    """Keyframes K of a drive, and their surroundings.
+    """Keyframes of a drive, with a submap around each.
 
     Attributes:
         drive: the drive.

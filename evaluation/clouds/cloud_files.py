@@ -395,7 +395,7 @@ class _Element(NamedTuple):
     properties: list[tuple[str, str]]
 
     def dtype(self, order: str) -> np.dtype:
-        """Returns the type of a record in an order of bytes."""
+        """Returns the type of a record with a given byte order."""
         for name, kind in self.properties:
             if kind not in _PLY_TYPES:
                 raise ValueError(
@@ -604,7 +604,8 @@ def read_npy(path: Path) -> np.ndarray:
     """Returns the array of a .npy file, in C order.
 
     Raises:
-        InputError: it cannot be read, or holds no array of the size it names.
+        InputError: the file cannot be read, or its size does not fit its
+            header.
     """
     with user_errors(path), value_errors(path):
         check_regular(path)

@@ -317,7 +317,7 @@ def _driving(drive: Drive, way: _Way) -> Driving:
 
 
 def _runs(flags: np.ndarray) -> np.ndarray:
-    """Returns the lengths of the runs of true values, in their order."""
+    """Returns the length of each run of consecutive true values."""
     edges = np.flatnonzero(np.diff(flags, prepend=False, append=False))
     return edges[1::2] - edges[::2]
 
@@ -325,7 +325,7 @@ def _runs(flags: np.ndarray) -> np.ndarray:
 def _quantiles(
     name: str, values: np.ndarray, *percentages: int
 ) -> dict[str, float]:
-    """Returns quantiles, named by their percentages; NaN of no values."""
+    """Returns name -> quantile; NaN if there are no values."""
     if len(values) == 0:
         return {name.format(one): math.nan for one in percentages}
     return {

@@ -25,7 +25,7 @@ _LIMITS = ((100_000.0, 900_000.0), (0.0, 10_000_000.0))
 
 
 def is_local(X_WB: np.ndarray) -> bool:
-    """Returns whether poses (N, 4, 4) are too near the origin to be in UTM."""
+    """Returns whether poses (N, 4, 4) are too near the origin for UTM."""
     return bool((np.abs(X_WB[:, :2, 3]) < _LIMITS[0][0]).all())
 
 
@@ -216,7 +216,7 @@ def keep_spanned(
 
 
 def read_packed(path: Path, dtype: np.dtype) -> np.ndarray:
-    """Returns the records of a file that contains nothing else.
+    """Returns the records of a file without a header.
 
     Raises:
         ValueError: if the last record is incomplete.

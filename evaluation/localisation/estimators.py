@@ -262,7 +262,7 @@ class Fit:
 
 
 def judge(surface: Surface, scan: np.ndarray, X_WS: np.ndarray) -> Fit:
-    """Returns how well a scan (N, 3) in S fits a map at a pose."""
+    """Returns the `Fit` of a scan (N, 3) in S to a map at a pose."""
     p_W = poses.transform(X_WS, scan)
     found, squares = surface.tree.batch_nearest_neighbor_search(p_W)
     is_pair = np.asarray(squares) < _PAIR**2

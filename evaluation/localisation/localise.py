@@ -191,7 +191,7 @@ def mapped_frames(
 
 
 def way_axes(p_WS: np.ndarray, X_WS: np.ndarray) -> np.ndarray:
-    """Returns rotations R_WT (N, 3, 3) along the path.
+    """Returns rotations R_WT (N, 3, 3) to axes along, left of and above a path.
 
     Columns point along the path, to its left, and up.
 

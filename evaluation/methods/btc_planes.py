@@ -114,7 +114,7 @@ def merge(
     distance_limit: float,
     keep_single: bool,
 ) -> Planes:
-    """Returns the planes that similar patches form together.
+    """Merges similar patches; returns the merged planes.
 
     Args:
         planes: patches to merge. The groups depend on their order.

@@ -136,7 +136,7 @@ class Method(abc.ABC, Generic[Descriptor, Database]):
 
     @property
     def describes_alike(self) -> bool:
-        """Whether places and queries have the same descriptions."""
+        """Whether places and queries are described in the same way."""
         return type(self).describe_place is Method.describe_place
 
     @abc.abstractmethod

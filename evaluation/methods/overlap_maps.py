@@ -145,7 +145,7 @@ def _extremes(
 
 
 def _poles(is_tall: np.ndarray) -> np.ndarray:
-    """Returns the numbers of tall cells that stand alone.
+    """Returns the numbers of isolated tall cells: poles.
 
     Args:
         is_tall: (GRID, GRID) bool.

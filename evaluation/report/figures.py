@@ -390,7 +390,7 @@ def colour_by_height(
     lowest: tuple[int, int, int],
     highest: tuple[int, int, int],
 ) -> np.ndarray:
-    """Returns colours (N, 3) uint8 that go from one to another by height."""
+    """Returns colours (N, 3) uint8, blended between two colours by height."""
     part = _height_parts(heights)[:, None]
     return ((1.0 - part) * lowest + part * highest).astype(np.uint8)
 

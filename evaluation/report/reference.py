@@ -117,7 +117,7 @@ class Reference:
     def values(self, result: PlaceRecognition, mode: Mode) -> Published | None:
         """Returns the published numbers, if they were counted in this mode.
 
-        None for numbers that were found by another protocol.
+        Returns None for numbers that were measured by another protocol.
         """
         if not self._ran(result):
             return None

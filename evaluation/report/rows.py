@@ -187,7 +187,7 @@ def _headline(
 
 
 class Survival(NamedTuple):
-    """A method on a pair of drives: metric -> row.
+    """Results of a method on a pair, with and without the change.
 
     Attributes:
         pair: map, stage of the database, and of the query.
@@ -211,7 +211,7 @@ class Survival(NamedTuple):
 
 
 def survivals(rows: Iterable[Row], stages: Mapping[str, str]) -> list[Survival]:
-    """Returns what each method keeps on each pair, in the order of tables.
+    """Returns a `Survival` per method and pair, in the order of tables.
 
     The stages are those of drives.
     """
@@ -242,7 +242,7 @@ def interval_text(kept: Row) -> str:
 
 
 def survival_numbers(survivals: Sequence[Survival]) -> tables.Table:
-    """Returns what methods keep, for `survival.csv`."""
+    """Returns the shares that methods keep, for `survival.csv`."""
     numbers: dict[str | tuple[str, str], tuple[str, ...]] = {
         "auc_unchanged": ("before", "auc"),
         "auc_changed": ("after", "auc"),
@@ -272,7 +272,7 @@ def survival_numbers(survivals: Sequence[Survival]) -> tables.Table:
 
 
 def survival_table(survivals: Sequence[Survival]) -> tables.Table:
-    """Returns what methods keep, for print: a row per pair and method."""
+    """Returns the shares that methods keep, for print."""
     return tables.Table.of(
         survivals,
         {

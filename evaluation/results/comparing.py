@@ -73,7 +73,7 @@ class _Table:
 
 
 class Compared(NamedTuple):
-    """Two methods by name, and the mean AUC of the first less the second.
+    """The mean AUC of one method minus that of another.
 
     The p-value is corrected, by Holm's method, for all differences of the
     comparison.
@@ -374,7 +374,7 @@ def _differences(
     entries: Mapping[str, tuple[_Table, str]],
     common: Sequence[tuple[object, ...]],
 ) -> list[Compared]:
-    """Compares each two methods whose answers in all conditions are there."""
+    """Compares each two methods that have answers in all conditions."""
     asked: dict[str, list[Answers]] = {}
     for name, (table, method) in entries.items():
         places = [(method, one) for one in common]

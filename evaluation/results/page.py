@@ -231,7 +231,7 @@ def _cells(numbers: Summary) -> list[object]:
 
 
 def _shown(value: object) -> str:
-    """Returns a value for a reader."""
+    """Returns a value as text for a reader."""
     if value is None or (isinstance(value, float) and math.isnan(value)):
         return ""
     if value == math.inf:

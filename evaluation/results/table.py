@@ -517,7 +517,7 @@ class _Line:
         return cell
 
     def value(self, column: str, kind: type) -> Any:
-        """Returns a value of a kind, or what stands for an empty one."""
+        """Returns a cell as a value of a type; an empty cell has a stand-in."""
         cell = self.cells[self.columns[column]]
         if kind is bool:
             if cell.lower() not in _TRUTH:
@@ -588,7 +588,7 @@ class _Cells:
         needed: Iterable[str],
         known: Iterable[str] = (),
     ) -> _Cells:
-        """Reads a file, or the one in a folder that has the usual name."""
+        """Reads a file, or the file of the usual name in a folder."""
         path = Path(path)
         file = path / usual if path.is_dir() else path
         try:

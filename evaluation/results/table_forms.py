@@ -212,7 +212,7 @@ class Table:
         return [_latex_row(names), rules]
 
     def _full_names(self) -> list[str]:
-        """Returns the name of each column behind that of its group."""
+        """Returns the names of the columns, each after its group's name."""
         groups = [name for name, span in self.groups for _ in range(span)]
         return [
             f"{group} {name}".strip()

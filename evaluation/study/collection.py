@@ -74,7 +74,7 @@ class Run:
 
     @property
     def repeats(self) -> bool:
-        """Whether the run repeats a run by the study's own protocol."""
+        """Whether the run repeats another run, by the published protocol."""
         return self.queries != self.method.key
 
     @property

@@ -165,7 +165,7 @@ class _Encoder:
 
 
 def _read_arrays(data: bytes, start: int) -> list[np.ndarray]:
-    """Returns the arrays from a place on."""
+    """Returns the arrays that are stored from an offset onwards."""
     stream = io.BytesIO(data)
     stream.seek(start)
     arrays = []
@@ -387,7 +387,7 @@ class Part:
 
 @dataclass(frozen=True)
 class MakePart(Step):
-    """Writes what a function returns as a part.
+    """Writes the result of a function as a part.
 
     Attributes:
         function: a function of a module, whose code counts as an input; it

@@ -41,7 +41,7 @@ _KEPT_FIELDS = ("x", "y", "z", "instance")
 
 
 class MappedDrive(RecentScans):
-    """A drive whose scans enter a map as they are read for the first time.
+    """A drive that adds each scan to a map when it is first read.
 
     Reading and unpacking scans takes longer than mapping them. In nearly
     increasing order, each scan is read only once.

@@ -1,4 +1,4 @@
-"""Undoing the distortion of scans that a moving LiDAR takes."""
+"""Removal of the motion distortion from scans of a moving LiDAR."""
 
 import numpy as np
 from scipy.interpolate import CubicSpline
@@ -77,7 +77,7 @@ def deskew(drive: Drive, index: int) -> np.ndarray:
 def _evaluate(
     times: np.ndarray, X_WS: np.ndarray, wanted: np.ndarray
 ) -> np.ndarray:
-    """Returns (M, 4, 4) poses at (M,) times, from N at (N,) [s]."""
+    """Returns poses (M, 4, 4) at (M,) times by splines through N poses [s]."""
     p = CubicSpline(times, X_WS[:, :3, 3])(wanted)
     R = RotationSpline(times, Rotation.from_matrix(X_WS[:, :3, :3]))(wanted)
     return poses.make_pose(R.as_matrix(), p)

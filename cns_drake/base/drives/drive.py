@@ -48,7 +48,7 @@ _NAME = re.compile(r"\w[\w.-]*")
 
 
 class ImuSamples(NamedTuple):
-    """Samples of an IMU that follow each other at an even rate.
+    """Consecutive samples of an IMU with a constant rate.
 
     Attributes:
         first: number of the first sample, counted from time zero, which has
@@ -202,7 +202,7 @@ class Drive(abc.ABC):
 
     @property
     def lidar_section(self) -> Mapping:
-        """Section of the scenario on this LiDAR; empty if it says nothing.
+        """Section of the scenario on this LiDAR; empty if there is none.
 
         This is the LiDAR with whose name the drive's name ends, or otherwise
         the first LiDAR.

@@ -4,7 +4,7 @@ from typing import NamedTuple
 
 
 class LidarField(NamedTuple):
-    """What a LiDAR sees: number of rings, lowest and highest elevation."""
+    """Rings and vertical field of view of a LiDAR."""
 
     rings: int
     lowest_deg: float

@@ -148,7 +148,7 @@ class McapDrive(Drive):
 
     @property
     def distortion_note(self) -> str | None:
-        """Note that the scans have motion distortion, if they are known to.
+        """Note that the scans have motion distortion, if this is known.
 
         This is known only of simulated drives.
         """
@@ -200,7 +200,7 @@ class McapDrive(Drive):
             )
 
     def _labels(self, index: int, cloud: Any) -> np.ndarray | None:
-        """Returns the labels of a scan that has a topic for them."""
+        """Returns the labels of a scan from their own topic, if any."""
         topic = self._labels_topic
         if topic is None:
             return None

@@ -1,9 +1,10 @@
-"""The records of an MCAP file, from its beginning on, without any index.
+"""The records of an MCAP file, read from its beginning without an index.
 
 The readers of the `mcap` package need an intact file and trust the sizes that
 it declares. Here every size is checked against the file and a limit before
 memory is reserved, and every checksum is checked. The reader finds the next
-intact chunk behind damage."""
+intact chunk behind damage.
+"""
 
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
@@ -62,7 +63,7 @@ _FAULTS = (
 
 
 def parse_attachment(body: bytes) -> Attachment:
-    """Returns the attachment whose record has this content.
+    """Returns the attachment in the content of a record.
 
     Raises:
         ValueError: if its checksum is wrong, or a field is cut off.
@@ -89,7 +90,7 @@ class RecordContent(ReadDataStream):
         """Returns the next bytes.
 
         Raises:
-            ValueError: if there are fewer.
+            ValueError: there are not that many bytes left.
         """
         if not 0 <= length <= self.left:
             raise ValueError("a field reaches beyond the end of its record")
@@ -150,7 +151,7 @@ _READERS = {
 
 @dataclass(frozen=True)
 class Fault:
-    """Why a file cannot be read from an offset on [bytes]."""
+    """Why a file cannot be read from an offset [bytes] onwards."""
 
     offset: int
     text: str

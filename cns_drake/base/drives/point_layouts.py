@@ -286,7 +286,7 @@ def from_layout(
 
 
 def _nanoseconds(times: np.ndarray | None) -> np.ndarray | None:
-    """Returns floats as nanoseconds since the stamp, if they surely are times.
+    """Returns times as nanoseconds since the stamp, if the unit is certain.
 
     Some drivers count backwards from the last point, or since 1970.
 

@@ -32,12 +32,12 @@ for _path in sorted(_FOLDER.glob("*/msg/*.msg")):
 
 
 def message_class(message_type: str) -> type:
-    """Returns the class of a type of messages."""
+    """Returns the Python class of a message type."""
     return _TYPESTORE.types[message_type]
 
 
 def make_message(message_type: str, **fields: Any) -> Any:
-    """Returns a message of plain values.
+    """Returns a message made from plain values.
 
     Fields that are left out are zero or empty. A field that is a message takes
     that message, a mapping of its fields, or all of its fields in order.

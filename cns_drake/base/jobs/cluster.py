@@ -217,7 +217,7 @@ class LostSchedulerError(InputError):
 
 @contextlib.contextmanager
 def dask_workers(address: str, listener: Listener) -> Iterator[DaskWorkers]:
-    """Yields the workers of the scheduler at an address.
+    """Yields the `DaskWorkers` of the scheduler at an address.
 
     Raises:
         InputError: if it does not answer.

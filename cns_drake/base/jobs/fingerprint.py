@@ -74,7 +74,7 @@ class _Module(NamedTuple):
     name: str
 
     def parents(self) -> Iterator[_Module]:
-        """Yields the packages that it is in."""
+        """Yields the packages that contain the module."""
         name = self.name
         while name := name.rpartition(".")[0]:
             yield _Module(self.root, name)

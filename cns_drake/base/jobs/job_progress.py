@@ -50,7 +50,7 @@ class _Work:
 
 
 class TimeLeft:
-    """How long many jobs still take, by their costs and the pace so far.
+    """Estimate of the time left for jobs, from their costs and the pace.
 
     All times must be of one clock [s].
     """

@@ -189,7 +189,7 @@ def _describe(status: int) -> str:
 
 
 def _work(connection: Connection, job: bytes) -> None:
-    """Runs a job; its whole process."""
+    """Runs a job: the main function of its process."""
     interrupts.interrupt_on_termination(once=True)
     # In its own session, which Ctrl-C does not reach: the interrupted parent
     # ends its jobs in good order.
@@ -242,7 +242,7 @@ def _run(job: bytes, reporter: Reporter) -> tuple[str, str]:
 
 
 def nothing_left(step: Step) -> bool:
-    """Returns whether a step is known to be done; False if unclear."""
+    """Returns whether a step is done; False if that cannot be determined."""
     try:
         return step.is_done()
     except InputError:

@@ -122,7 +122,7 @@ class _Run:
         self._faults: dict[str, str] = {}
 
     def run(self) -> None:
-        """Runs until nothing more can be done."""
+        """Runs jobs until none is left that can run."""
         self._submit_ready()
         try:
             while self._submitted:

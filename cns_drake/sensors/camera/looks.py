@@ -23,7 +23,7 @@ HORIZON_RGB = np.array([204.0, 221.0, 237.0]) / 255.0
 
 @dataclass(frozen=True)
 class Look:
-    """A repeated texture, and how a surface with it returns light.
+    """The look of a surface: a repeated texture, and its roughness.
 
     Attributes:
         size: side of the repeated square in the world [m].

@@ -223,7 +223,7 @@ class NoisyImu(LeafSystem):
             )
 
     def _measure(self, context: Context) -> np.ndarray:
-        """Returns the present sample; the last block of errors is kept."""
+        """Returns the present sample; the latest block of errors is cached."""
         sample = math.floor(context.get_time() * self._rate + _TOLERANCE)
         exact = [
             port.Eval(context) if port.HasValue(context) else np.zeros(3)

@@ -60,7 +60,7 @@ class ImuNoise:
     sensor_name: str = "imu"
 
     def variances(self, rate: float) -> tuple[float, float]:
-        """Returns the variances of white noise in samples.
+        """Returns the variances of the white noise at a sample rate.
 
         Args:
             rate: samples per second [1/s].
@@ -114,7 +114,7 @@ class ImuErrors:
         return self._of_samples(sample, 1)[0]
 
     def _of_samples(self, first: int, count: int) -> np.ndarray:
-        """Returns the (count, 6) errors of samples that follow each other."""
+        """Returns the (count, 6) errors of consecutive samples."""
         parts = []
         for number in range(first // _BLOCK, (first + count - 1) // _BLOCK + 1):
             if number != self._block_number:
@@ -125,7 +125,7 @@ class ImuErrors:
         return np.concatenate(parts)
 
     def of_block(self, number: int) -> np.ndarray:
-        """Returns the (1024, 6) errors from sample 1024 * number on."""
+        """Returns the (1024, 6) errors of samples 1024 * number onwards."""
         errors = np.tile(self._turn_on, (_BLOCK, 1))
         if self._walk.any():
             errors += self._walk * self._walk_in_block(number)

@@ -517,10 +517,9 @@ class Lidar(LeafSystem):
         )
 
     def _calc_poses(self, context: Context) -> tuple[np.ndarray, np.ndarray]:
-        """Returns positions (C, 3) and rotations (C, 3, 3) of S, or one each.
+        """Returns positions (K, 3) and rotations (K, 3, 3) of S in a turn.
 
-        There is one pose per column with motion distortion, or one for the
-        whole turn.
+        K is the number of columns with motion distortion, otherwise 1.
         """
         sweep = _value(self._sweep, context)
         if sweep is not None:
@@ -676,7 +675,7 @@ class SeenGeometry:
         return np.where(moves[self.instance], self.moving_label, self.label)
 
     def materials(self, returns: CalibratedReturns) -> Materials:
-        """Returns how each geometry of `scene` reflects."""
+        """Returns the material of each geometry of `scene`."""
         if self._materials is None:
             self._materials = returns.materials(
                 self.built, self._lidar.structures
@@ -740,7 +739,7 @@ class SeenGeometry:
 
 
 class BeamTable(NamedTuple):
-    """Constants of all scans, for all beams in firing order.
+    """Properties of the beams that are the same in every scan.
 
     Attributes:
         d_Sset: (num_beams, 3) float32 unit directions, expressed in S.

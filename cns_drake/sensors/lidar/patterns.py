@@ -113,7 +113,7 @@ class Beams:
 
 
 def make_beams(d_Sset: np.ndarray, ring: np.ndarray, t_ns: np.ndarray) -> Beams:
-    """Returns beams that may point anywhere, in the order of firing.
+    """Returns beams with arbitrary directions, in firing order.
 
     They have (N, 3) unit directions, (N,) rings and (N,) firing times, which do
     not decrease.
@@ -513,7 +513,7 @@ class BeamCoverage:
     """
 
     def __init__(self, d_Sset: np.ndarray):
-        """Covers the directions about beams (N, 3), unit vectors in S."""
+        """Takes the directions of the beams, (N, 3) unit vectors in S."""
         # Imported here: the rest of the module needs no library that is slow
         # to load.
         from scipy.ndimage import maximum_filter1d, minimum_filter1d
@@ -622,7 +622,7 @@ def _fire(pattern: _TimedPattern, frame: int) -> Beams:
 
 @dataclass(frozen=True)
 class RosettePattern(_TimedPattern):
-    """The pattern of two counter-rotating wedge prisms before a row of lasers.
+    """The pattern of two counter-rotating wedge prisms and a row of lasers.
 
     Each prism bends a beam by a quarter of the field of view, and both bends
     add up as vectors. The field of view is therefore a disc about x, densest in
@@ -677,7 +677,7 @@ class RosettePattern(_TimedPattern):
 
 @dataclass(frozen=True)
 class NoddingPattern(_TimedPattern):
-    """A pattern of lines that rotate and slowly nod, each in its own band.
+    """A pattern of lines that rotate and slowly nod within their bands.
 
     Bands of equal height fill the field of view. The lines turn about z 100
     times a second and nod 6.18 times a second. The ratio of these rates is not

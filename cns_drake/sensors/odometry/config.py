@@ -4,7 +4,7 @@ from cns_drake.sensors.sensor_config import Section
 
 
 class OdometrySection(Section):
-    """How often the exact motion of the vehicle is recorded.
+    """The rate at which the exact motion of the vehicle is recorded.
 
     Attributes:
         rate: messages per second, at most 1000: a multiple of the fastest

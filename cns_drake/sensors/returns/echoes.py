@@ -273,7 +273,7 @@ def _fog(
     scattering: Scattering,
     key: np.uint64,
 ) -> _Pulses:
-    """Returns fog's echoes nearer than each beam's nearest light [m]."""
+    """Returns the echoes of fog nearer than `nearest` light of a beam [m]."""
     beam = np.flatnonzero(nearest > 0.0)
     share = uniform(key, beam, _FIRST_DROP_DRAW + 2 * _MOST_DROPS)
     distance = np.interp(share, scattering.fog_counts, scattering.distances)
@@ -295,7 +295,7 @@ def _fog(
 def _detect(
     pulses: _Pulses, receiver: Receiver, key: np.uint64, range_error: np.ndarray
 ) -> _Pulses:
-    """Returns the echoes that are detected, with errors of their ranges."""
+    """Returns the echoes that are detected, with range errors added."""
     # The true distance of a surface decides, not the measured one.
     is_seen = pulses.snr >= HOPELESS_SNR
     is_seen &= pulses.energy >= receiver.sheet.response.least
@@ -320,7 +320,7 @@ def _detect(
 
 
 def _choose(pulses: _Pulses, choice: Echoes, num_beams: int) -> np.ndarray:
-    """Returns the rows of the reported echoes, in the order of their beams."""
+    """Returns the rows of the echoes to report, in the order of the beams."""
 
     def find_greatest(values: np.ndarray) -> np.ndarray:
         return _find_greatest(pulses.beam, pulses.number, values, num_beams)
@@ -363,7 +363,7 @@ def _find_greatest(
 
 
 def _first_draw(pulses: _Pulses) -> np.ndarray:
-    """Returns the number of the first draw of each echo."""
+    """Returns the number of the first random draw of each echo."""
     number = np.minimum(pulses.number, _MOST_ECHOES)
     return _FIRST_ECHO_DRAW + _DRAWS_PER_ECHO * number
 

@@ -245,7 +245,7 @@ def texture(
 
 @compiled
 def _swell(a: float, b: float) -> float:
-    """Returns a smooth number from -1 to 1 at a place of the ground [m]."""
+    """Returns a smooth function of a place on the ground [m], from -1 to 1."""
     first, second, third = _WAVES
     crossed = _wave(a / first) * _wave(b / second)
     return 0.5 * crossed + 0.5 * _wave((a + b) / third)
@@ -260,7 +260,7 @@ def _wave(turns: float) -> float:
 
 @compiled
 def cell_number(a: float, b: float, c: float) -> float:
-    """Returns a random number from -1 to 1, constant in each unit cell."""
+    """Returns a random number from -1 to 1 for the unit cell of a point."""
     z = (
         np.uint64(np.int64(np.floor(a))) * np.uint64(0x9E3779B97F4A7C15)
         ^ np.uint64(np.int64(np.floor(b))) * np.uint64(0xC2B2AE3D27D4EB4F)

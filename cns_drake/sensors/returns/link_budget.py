@@ -35,7 +35,7 @@ HOPELESS_SNR = 0.9
 
 @dataclass(frozen=True)
 class SheetRow:
-    """A range on a data sheet [m], with the probability of detection there.
+    """A row of a data sheet: range [m] and probability of detection there.
 
     The Lambertian target faces the unit; its reflectivity is from 0 to 1.
     """

@@ -130,7 +130,7 @@ def _material(
 def _reflection(
     geometry: PerceptionGeometry, entry: StructureEntry
 ) -> tuple[int, float, float]:
-    """Returns kind, reflectivity and leaf area density."""
+    """Returns kind, reflectivity and leaf area density of a geometry."""
     given = geometry.reflectivity
     if given is None:
         given = entry.reflectivity

@@ -82,7 +82,7 @@ def start_ways(
     sides: Sides,
     side_hits: BeamHits,
 ) -> tuple[list[Light], Ways, BeamHits]:
-    """Returns light from opaque surfaces, and rays that go on elsewhere.
+    """Returns light from opaque surfaces, and the rays that hit others.
 
     Args:
         shots: the beams.

@@ -141,7 +141,7 @@ class UnitSheet:
 
     @property
     def resolution(self) -> float:
-        """Distance below which two echoes are one [m]."""
+        """Distance below which two echoes merge [m]."""
         return _LIGHT * self.pulse_ns * 1e-9 / 2.0
 
     def aimed(self, pattern: _Pattern) -> _Pattern:

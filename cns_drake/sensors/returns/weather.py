@@ -80,7 +80,7 @@ class Weather:
 
     @property
     def is_clear(self) -> bool:
-        """Whether the air neither weakens light nor sends it back."""
+        """Whether the air neither attenuates nor scatters light."""
         return self.visibility is None and self.rain == self.snowfall == 0.0
 
     @property

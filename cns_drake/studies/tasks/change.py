@@ -1,4 +1,4 @@
-"""How much the city changed between two drives."""
+"""The task `change`: how much the city changed between two drives."""
 
 from __future__ import annotations
 
