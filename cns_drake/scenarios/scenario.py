@@ -216,28 +216,32 @@ class TrafficConfig(Section):
 class TransientConfig(Section):
     """Temporary changes to a city, such as snow, that no stage contains.
 
-    The effect of each switch depends on the seed and on the names of
-    structures, but not on the other switches, except for `roadsides`.
+    `roadsides` is applied first, so the other switches change the objects that
+    it adds, too. Otherwise the switches do not depend on each other: the effect
+    of each depends only on the seed and on the names of structures.
 
     Attributes:
-        seed: seed of all draws.
-        parked_cars: share of the parked cars that changed. Of these, three in
-            ten have left, two in ten stand elsewhere in their bay, and another
-            car has replaced the rest.
-        leaves: share of the leaves and needles that are left on plants. Wood
-            stays; a shrub without wood keeps a tenth, as twigs.
-        snow: depth of the snow on surfaces that face the sky, within 120 m of
-            the drive [m]. Roads are cleared, with banks along their kerbs.
-        scaffolds: share of the fronts within 30 m of the drive that stand
-            behind a scaffold; four in ten of the scaffolds have a net.
+        seed: seed of all random draws.
+        parked_cars: share of the parked cars that are changed. Of the changed
+            cars, three in ten have left, two in ten stand elsewhere in their
+            bay, and another car has replaced the rest.
+        leaves: share of the leaves and needles that remain on plants; 0 is
+            winter. Wood stays. A shrub without wood keeps a tenth of its
+            leaves, as twigs.
+        snow: depth of the snow within 120 m of the drive, on surfaces that face
+            the sky [m]. Roads are cleared, and banks of snow lie along their
+            kerbs.
+        scaffolds: share of the building fronts within 30 m of the drive that
+            stand behind a scaffold. Four in ten of the scaffolds have a net.
         works: share of the stretches of kerb within 30 m of the drive that have
             road works: fences, skips or diggers beside the road, and a new kerb
-            stone 0.3 m into the road.
-        furniture: share of the poles, lamps and signs that were replaced by
-            others within 2 m.
-        roadsides: share of the places beside kerbs, within 30 m of the drive,
-            that get hedges, garden walls, bushes, young trees, garages or
-            parked cars. Only the cars depend on the seed.
+            stone that reaches 0.3 m into the road.
+        furniture: share of the poles, lamps and signs that are replaced by new
+            ones up to 2 m away.
+        roadsides: share of the free places beside kerbs, within 30 m of the
+            drive, that get hedges, garden walls, bushes, young trees, garages
+            or parked cars. Only the cars depend on the seed; all else is the
+            same in every drive.
     """
 
     seed: int = Field(default=1, ge=0)
@@ -258,41 +262,47 @@ class TransientConfig(Section):
 class Scenario(Section):
     """A vehicle with sensors that follows a route through a stage.
 
-    The vehicle drives either in a stage of a map or in any SDF world. It
-    follows either lanes of the map's roads or waypoints.
+    The vehicle drives in a stage of a map, or in any SDF world. It follows
+    either lanes of the map's roads (`route`) or given points (`waypoints`).
 
     Attributes:
         name: name of the drive and its files, from letters, digits and
             underscores.
-        base: name or file of another drive, which provides all fields that this
-            one leaves out.
-        map: name of a shipped map, or a folder laid out like one.
-        stage: stage of the map.
-        world: SDF file of a world, instead of `map` and `stage`.
-        without: names of structures to leave out, from `structures.csv`.
-        title: one sentence on what the drive shows.
-        route: lanes to follow, leg by leg; give this or `waypoints`.
-        waypoints: CSV file of places to pass. A `world` needs it, because it
-            has no roads.
-        u_turns: whether the car turns round where the waypoints double back.
-        aside: distance of the car to the right of the middle of its lanes [m];
-            negative to the left. It applies between junctions, as far as the
-            road has room.
+        base: name or file of another drive. Fields that you leave out here have
+            the values of that drive.
+        map: name of a shipped map, or a folder with the same layout.
+        stage: stage of the map, such as `"01"`.
+        world: SDF file of a world to drive in, instead of `map` and `stage`. It
+            needs `waypoints`.
+        without: names of structures to leave out of the world, as in the map's
+            `structures.csv`.
+        title: one line for readers that says what the drive shows.
+        route: lanes to follow, road by road. Give either `route` or
+            `waypoints`.
+        waypoints: CSV file of points for the car to pass. A drive through a
+            `world` needs it, because an SDF world has no roads.
+        u_turns: whether the car turns round where the waypoints lead straight
+            back.
+        aside: distance by which the car drives to the right of the middle of
+            its lane [m]; a negative one is to the left. It applies between
+            junctions, as far as the road has room.
         speeds: limits of speed and acceleration.
-        driver: how the driver departs from the middle of the lanes.
-        ride: how the car moves on its springs.
-        traffic: moving vehicles and walkers.
-        transient: temporary changes, such as parked cars or snow.
-        lidars: name -> LiDAR. Its frame and its topic have this name. By
-            default one LiDAR named `lidar`.
-        cameras: name -> camera. Its optical frame (x right, y down, z ahead)
-            and its topics have this name.
+        driver: how the driver leaves the middle of the lane.
+        ride: how an uneven road shakes the car.
+        traffic: vehicles and walkers that move.
+        transient: temporary changes to the city, such as other parked cars, or
+            snow.
+        lidars: LiDARs by name. The name of a LiDAR is also that of its frame
+            and its topic. By default there is one, named `lidar`.
+        cameras: cameras by name. The name of a camera is also that of its
+            optical frame (x right, y down, z ahead) and its topics. By default
+            there is none.
         imu: the inertial measurement unit.
         weather: fog, rain and snowfall for calibrated returns.
-        odometry: the recorded motion of the vehicle.
-        frames: number of frames to record; each frame is a scan of the first
-            LiDAR. By default the whole drive.
-        seed: seed of the noise of all LiDARs and the IMU.
+        odometry: how often the true motion of the vehicle is recorded.
+        frames: number of frames to record, from the start. A frame is a scan of
+            the first LiDAR. By default the whole drive.
+        seed: seed of the random noise of all LiDARs and the IMU.
 
     Example:
         from cns_drake import load_scenario

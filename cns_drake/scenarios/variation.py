@@ -86,22 +86,25 @@ class Family(Section):
     """A family of drives: a base drive and what varies among its members.
 
     Attributes:
-        base: name or file of the drive that provides map, route, speeds and
-            sensors.
-        stage: stage from which structures are removed; by default the map's
-            last one.
-        towards: another stage. Only structures that it lacks are removed, and
-            structures that are lower in it keep their height.
-        missing: shares of the structures that are removed, each from 0 to 1, or
-            `{from: 0, to: 0.6, count: 20}` for evenly spaced ones.
-        scattered: class of structures, such as `pole` -> share of it that is
-            also removed at random.
-        seeds: seeds of the random draws. With each seed, the removal of
-            structures begins at another place.
-        city_seeds: seeds of other cities, drawn along the same streets.
-        routes: random routes, instead of the base's.
-        lidars: presets that replace the LiDARs of the base, such as `[cns,
-            os1-64]`.
+        base: name or file of the drive that provides the map, route, speeds and
+            sensors of all members.
+        stage: stage through which the members drive, and from which structures
+            are removed. By default the map's last one.
+        towards: another stage, usually an earlier one. Only structures that
+            this stage lacks are removed, and structures that are lower in it
+            keep their height.
+        missing: shares of the structures to remove. Each share makes a member:
+            give numbers from 0 to 1, or `{from: 0, to: 0.6, count: 20}` for
+            evenly spaced ones.
+        scattered: shares of single classes to remove at random in addition, by
+            the name of the class, such as `{pole: 0.3}`.
+        seeds: seeds of the random draws. Each seed makes a member, and begins
+            to remove structures at another place.
+        city_seeds: seeds of other cities along the same streets, each of which
+            makes a member.
+        routes: random routes for the members, instead of the base's route.
+        lidars: presets of LiDARs that replace those of the base, such as `[cns,
+            os1-64]`. Each preset makes a member.
         ride: ride of all members, instead of the base's.
         imu: IMU of all members, instead of the base's.
     """

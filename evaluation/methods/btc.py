@@ -71,53 +71,57 @@ def _increasing(limits: tuple[float, float]) -> tuple[float, float]:
 class BtcConfig(MethodConfig):
     """Settings of BTC.
 
-    Sources of the values: [O] the outdoor settings of the public program, [P]
-    constants in its code. The height of the sensor is not used: the method
-    finds the ground in the cloud.
+    Letters in brackets name the source of a value: [O] stands for the outdoor
+    settings of the authors' program, [P] for constants in its code.
+    `sensor_height` has no effect, because the method finds the ground in the
+    cloud.
 
     Attributes:
-        voxel_size: side of the voxels in which planes are sought [m]; [O] 2.
-        max_sparse_points: number of points above which a voxel can be a plane;
-            [O] 10.
-        flatness: largest variance of a plane's points along its normal [m^2];
-            [O] 0.01.
-        merge_normal_limit: largest difference of the normals of two planes that
-            are merged; [O] 0.1.
-        merge_distance_limit: largest distance of the centre of one plane from
-            the other, for merging [m]; [O] 0.3.
-        image_axes: axes of the image in which keypoints are found. `public`
-            copies the public program, in which a wrong term tilts the second
-            axis out of the plane (see `btc_triangles.image_axes`); `orthogonal`
-            corrects it. [P] public.
-        resolution: side of a cell of the image [m]; [O] 0.5.
+        voxel_size: side of the voxels in which the method looks for planes [m];
+            [O] 2.
+        max_sparse_points: number of points that a voxel must exceed to be
+            checked for a plane; [O] 10.
+        flatness: largest variance along the normal at which points count as a
+            plane [m^2]; [O] 0.01.
+        merge_normal_limit: largest difference between the normals of two planes
+            that are merged; [O] 0.1.
+        merge_distance_limit: largest distance from the centre of a plane to
+            another plane with which it is merged [m]; [O] 0.3.
+        image_axes: axes of the image on a plane, in which keypoints are found.
+            `public` copies the authors' program, in which a wrong term tilts
+            the second axis out of the plane (see `btc_triangles.image_axes`).
+            `orthogonal` corrects it. [P] public.
+        resolution: side of a cell of the image on a plane [m]; [O] 0.5.
         height_range: lowest and highest height above the ground of the points
-            in the image [m]; [O] -1, 4.
-        height_step: height of each layer of the image [m]; [O] 0.1.
-        num_layers: number of layers; [P] 49. The public program divides the
-            range by the step in single precision. It therefore has one layer
-            less than intended, and writes higher points beyond the end of its
-            array; here these points are ignored.
-        min_heights: number of layers that a keypoint needs; [O] 10.
-        suppression_radius: distance within which only the keypoint with the
-            most layers is kept [m]; [O] 2.
-        max_keypoints: largest number of keypoints of a place; [O] 500.
-        num_neighbours: number of neighbouring keypoints with which triangles
-            are made, including the keypoint itself; [O] 10.
-        side_range: least and greatest length of the triangles' sides [m]; [O]
+            that are used [m]; [O] -1, 4.
+        height_step: thickness of each layer of the image [m]; [O] 0.1.
+        num_layers: number of layers of the image; [P] 49. The authors' program
+            divides the range of heights by the step in single precision, which
+            gives one layer less than intended. It then writes points of the
+            missing layer beyond the end of an array; here these points are
+            ignored.
+        min_heights: number of occupied layers that a keypoint needs; [O] 10.
+        suppression_radius: radius within which only the keypoint with the most
+            layers is used [m]; [O] 2.
+        max_keypoints: largest number of keypoints per place; [O] 500.
+        num_neighbours: number of nearest keypoints that form triangles with
+            each keypoint, including itself; [O] 10.
+        side_range: smallest and largest length of a triangle's sides [m]; [O]
             2, 50.
-        side_resolution: step by which side lengths are rounded in the table of
-            triangles [m]; [O] 0.2.
-        side_tolerance: largest relative difference between the sides of
-            matching triangles; [O] 0.01.
-        min_similarity: least similarity of the descriptors of matching
-            triangles; [O] 0.7.
-        min_votes: number of matches that a candidate needs; [P] 5.
-        candidates: number of places with the most votes that are verified; [O]
-            50.
-        normal_limit: largest difference between the normals of matching planes;
-            [O] 0.2.
-        distance_limit: largest distance of the centre of one plane from a
-            matching one [m]; [O] 0.5.
+        side_resolution: step to which side lengths are rounded in the hash
+            table of triangles [m]; [O] 0.2.
+        side_tolerance: largest relative difference between the sides of two
+            triangles that match; [O] 0.01.
+        min_similarity: smallest similarity of the descriptors of two triangles
+            that match; [O] 0.7.
+        min_votes: number of matching triangles that a place needs to be a
+            candidate; [P] 5.
+        candidates: number of candidates, those with the most matching
+            triangles, whose planes are then compared; [O] 50.
+        normal_limit: largest difference between the normals of two planes that
+            match; [O] 0.2.
+        distance_limit: largest distance from the centre of a plane to a plane
+            that it matches [m]; [O] 0.5.
     """
 
     voxel_size: PositiveFloat = 2.0

@@ -114,11 +114,12 @@ class LearnedConfig(MethodConfig):
     """Settings of the learned descriptor.
 
     Attributes:
-        weights: file of weights from `cns-drake train`; by default the shipped
-            weights of the variant.
-        variant: `radius`, trained with places within 7.5 m as matches, on
-            streets of the shipped cities; or `graded`, trained to rank places
-            by their exact overlap, on streets of no map.
+        weights: file with weights from `cns-drake train`. By default the
+            shipped weights of the variant.
+        variant: which shipped weights to use. `radius` was trained on streets
+            of the shipped cities, and every place within 7.5 m counted as
+            right. `graded` was trained on streets of no shipped map, and places
+            were ranked by their exact overlap.
     """
 
     weights: Path | None = None

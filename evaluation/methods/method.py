@@ -35,14 +35,15 @@ class MethodConfig(BaseModel):
     A method with further parameters derives its own class from this one.
 
     Attributes:
-        sensor_height: height of the LiDAR above the ground [m]; by default as
-            on the CNS vehicle.
-        place: which of the merged scans stands for a place, `middle` or
-            `first`; by default the protocol decides. Methods of single scans do
-            not use it.
-        sequence: length of path before a query [m]; the scores of earlier
-            queries on it also count for the query's place, as in SeqSLAM (see
-            `sequences.along_the_way`). 0 uses only the query.
+        sensor_height: height of the LiDAR above the ground [m]. The default is
+            that of the CNS vehicle.
+        place: which of the merged scans gives a place its pose: the one in the
+            `middle`, or the `first`. By default the protocol decides. Methods
+            that describe single scans do not use it.
+        sequence: length of the path before a query [m]. Earlier queries on this
+            path also vote for the place of the query, as in SeqSLAM (see
+            `sequences.along_the_way`). With 0, each query is recognised by
+            itself.
 
     Example:
         from evaluation import MethodConfig

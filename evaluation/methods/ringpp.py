@@ -43,25 +43,26 @@ _CORRELATION_SCALE = 0.15
 class RingPlusPlusConfig(MethodConfig):
     """Settings of RING++.
 
-    All values are from the authors' program, with its settings for KITTI.
+    All defaults are the values of the authors' program for KITTI.
 
     Attributes:
-        half_width: half the side of the square map from above [m]; 70. The
-            protocol's limit of 100 m is wider.
-        crop: which points of the map count: `square` uses all of them, `round`
-            those within half a side of its middle. A square contains other
-            points when the LiDAR is rotated.
-        min_height: least height above the ground of a point that counts [m];
-            0.73 (z > -1.0 m from a LiDAR at 1.73 m).
-        max_height: greatest height above the ground of a point that counts [m];
-            11.73 (z < 10 m).
-        height_unit: divisor of heights when the shape around a point is
-            described [m]; 10. Horizontal coordinates are divided by
+        half_width: half the side of the square map from above [m]. The protocol
+            uses points up to 100 m away; RING++ leaves out those beyond this
+            square.
+        crop: which points of the map are used: `square` uses all of them,
+            `round` only those within `half_width` of its centre. A square
+            contains other points if the LiDAR is turned; a circle does not.
+        min_height: smallest height above the ground of a point that is used
+            [m]; the authors have z > -1.0 m for a LiDAR at 1.73 m.
+        max_height: largest height above the ground of a point that is used [m];
+            the authors have z < 10 m for a LiDAR at 1.73 m.
+        height_unit: number by which heights are divided where the shape around
+            a point is described [m]. Horizontal coordinates are divided by
             `half_width`.
-        neighbours: number of points that describe the shape around a point,
-            including the point itself; 30.
-        cells: number of rows and columns of the map from above, and of angles
-            and rays of its Radon transform; 120.
+        neighbours: number of nearest points that describe the shape around a
+            point, including itself.
+        cells: number of rows and of columns of the map from above, and also of
+            angles and of rays of its Radon transform.
     """
 
     half_width: PositiveFloat = 70.0

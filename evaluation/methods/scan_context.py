@@ -46,33 +46,36 @@ Variant = Literal["polar", "augmented-polar", "cart", "augmented-cart"]
 class ScanContextConfig(MethodConfig):
     """Settings of Scan Context++.
 
-    Sources of the values: [T] the T-RO program, [C] the C++ program, [E] the
-    evaluation program, all by the method's authors.
+    Letters in brackets name the source of a value: [T] stands for the authors'
+    program of their T-RO paper, [C] for their C++ program, [E] for their
+    evaluation program.
 
     Attributes:
-        variant: kind of context, polar or Cartesian (cart). The augmented
-            variants also add shifted copies of each place to the database. The
-            default is called A-PC in [T].
-        voxel_size: side of the voxels to which clouds are thinned first [m];
+        variant: kind of context (descriptor): polar or Cartesian (cart). The
+            augmented kinds also add shifted copies of each place to the
+            database. The default is the one that [T] calls A-PC.
+        voxel_size: side of the voxels to which each cloud is first thinned [m];
             [T] 0.5.
         rings: number of rings of the polar context; [T], [C] 20.
         sectors: number of sectors of the polar context; [T], [C] 60.
-        max_range: farthest range of the polar context [m]; [T], [C] 80.
-        far_points: what happens to points beyond `max_range`: they count in the
-            last ring, as in [T], or are dropped, as in [C].
-        min_points: number of points that a cell of the polar context needs; [T]
-            5, [C] 1.
-        cart_cell: length and width of a cell of the cart context [m];
-            [T] 5 and 2.
-        cart_range: half length and half width of the cart context [m];
-            [T] 100 and 40.
-        lateral_shift: distance by which augmenting copies are shifted sideways
+        max_range: range up to which the polar context has rings [m]; [T], [C]
+            80.
+        far_points: what happens to points beyond `max_range`. With `last-ring`
+            they count in the last ring, as in [T]; with `dropped` they are left
+            out, as in [C].
+        min_points: number of points from which on a cell of the polar context
+            is filled; [T] 5, [C] 1.
+        cart_cell: length and width of a cell of the Cartesian context [m]; [T]
+            5 and 2.
+        cart_range: half the length and half the width of the Cartesian context
+            [m]; [T] 100 and 40.
+        lateral_shift: sideways shift of the copies that an augmented kind adds
             [m]; [T] 2.
         candidates: number of places that the search in the KD-tree returns; [E]
-            50. With an augmented variant it returns this number times the
-            contexts per place.
-        search_ratio: share of all shifts that are tried, around the best shift
-            by the aligning key; [C] 0.1.
+            50. With augmented places, it returns as many more contexts as each
+            place has copies.
+        search_ratio: share of all shifts of the context that are compared,
+            around the shift that fits the aligning key best; [C] 0.1.
     """
 
     variant: Variant = "augmented-polar"

@@ -27,25 +27,26 @@ _CNS = LidarField(32, -22.5, 22.5)
 class SolidConfig(MethodConfig):
     """Settings of SOLiD.
 
-    Sources of the values: [P] the Python program and [C] the C++ program, both
-    by the method's authors; [S] the data sheet of the `cns` LiDAR.
+    Letters in brackets name the source of a value: [P] stands for the authors'
+    Python program, [C] for their C++ program, [S] for the data sheet of the
+    `cns` LiDAR.
 
     Attributes:
-        voxel_size: side of the voxels to which clouds are thinned first [m];
-            [P] 1.0. ([C] has 0.4, but only [P] lists LiDARs of this field of
+        voxel_size: side of the voxels to which each cloud is first thinned [m];
+            [P] 1.0. ([C] has 0.4, but only [P] is for LiDARs with this field of
             view.)
-        min_range: least range of a point that counts [m]; [P] 3.
-        max_range: greatest range of a point that counts [m]; [P] 80, for a
-            LiDAR of this field of view.
-        ranges: number of equal cells up to `max_range`; [P], [C] 40.
-        azimuths: number of equal cells of azimuth; [P], [C] 60.
+        min_range: smallest range of a point that is used [m]; [P] 3.
+        max_range: largest range of a point that is used [m]; [P] 80, for a
+            LiDAR with this field of view.
+        ranges: number of equal cells of range, up to `max_range`; [P], [C] 40.
+        azimuths: number of equal cells of azimuth in a turn; [P], [C] 60.
         elevations: number of equal cells of elevation over the field of view;
-            [P], [C] the number of beams. By default that of the drive's LiDAR,
-            or 32 if its unit is unknown [S].
-        lowest_deg: lower limit of the field of view [deg]; by default that of
-            the drive's LiDAR, or -22.5 if its unit is unknown [S].
-        highest_deg: upper limit of the field of view [deg]; by default that of
-            the drive's LiDAR, or 22.5 if its unit is unknown [S].
+            [P], [C] the number of beams of the LiDAR. By default the number of
+            beams of the drive's LiDAR, or 32 if its model is unknown [S].
+        lowest_deg: lower limit of the field of view [deg]. By default that of
+            the drive's LiDAR, or -22.5 if its model is unknown [S].
+        highest_deg: upper limit of the field of view [deg]. By default that of
+            the drive's LiDAR, or 22.5 if its model is unknown [S].
     """
 
     voxel_size: PositiveFloat = 1.0
