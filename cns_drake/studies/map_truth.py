@@ -303,7 +303,7 @@ def observed(
 
 @dataclass(frozen=True)
 class _Look:
-    """Decides what a LiDAR observes from one pose."""
+    """What a LiDAR observes from a place."""
 
     scene: RayCastingScene
     X_WS: RigidTransform

@@ -369,7 +369,7 @@ def _by_kiss_matcher(
     start: np.ndarray,
 ) -> Estimate:
     del scan
-    # KISS-Matcher computes in float32: large coordinates would lose precision.
+    # Its numbers are float32: far coordinates would lose decimals.
     p_WS = start[:3, 3]
     target = surroundings.around(p_WS, MAX_RANGE) - p_WS
     if len(target) < FEWEST_POINTS:

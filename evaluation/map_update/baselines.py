@@ -80,7 +80,7 @@ def run_baseline(name: str, pair: Pair, track: Track = silent) -> Labels:
 def by_distance(
     mine: Session, theirs: Session, track: Track = silent
 ) -> np.ndarray:
-    """Returns labels (N,) of a map by the baseline `distance`."""
+    """Returns labels (N,) of a map by its distance from the other map."""
     del track
     _, kept, changed = SIDES[mine.side]
     far = np.isinf(nearest(mine.points, theirs.points, _APART))

@@ -131,7 +131,7 @@ class Method(abc.ABC, Generic[Descriptor, Database]):
         return self
 
     def assumption(self, field: LidarField | None) -> str | None:
-        """Returns text on what the method assumes about a LiDAR, or None."""
+        """Returns what the method assumes about a LiDAR, in words, or None."""
         del field
         return None
 

@@ -153,7 +153,7 @@ class Measuring:
         gate: bool = False,
         database: str = "",
     ) -> Key:
-        """Adds rows of a task; returns the `Key` that they have in common."""
+        """Adds rows, and returns what identifies them."""
         key = Key(
             experiment="real",
             map=one.data_set.world,
@@ -267,7 +267,7 @@ class Measuring:
                     one, "place", method.name, numbers, len(drive), gate=gate
                 )
                 columns = {
-                    # In whole numbers, -1 stands for an empty cell.
+                    # None, in whole numbers, is empty.
                     name: np.array([-1 if v is None else v for v in values])
                     for name, values in now.columns().items()
                 }

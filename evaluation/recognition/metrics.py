@@ -324,7 +324,7 @@ class Difference:
 def auc_difference(first: QueryOutcomes, second: QueryOutcomes) -> Difference:
     """Returns the AUC difference of two methods on the same queries.
 
-    See `mean_auc_difference` for the interval and the p-value.
+    See `mean_auc_difference`.
 
     Args:
         first: outcomes of Q queries.

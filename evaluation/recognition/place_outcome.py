@@ -45,7 +45,7 @@ class PlaceOutcome:
         distances: (Q,) distances between query and best place [m]; NaN without
             a candidate, and where the best place is in another city.
         pose_errors: errors of the poses at the best places.
-        overlaps: (Q,) share of the query's scan that the best of its matches
+        overlaps: (Q,) how much of the query's scan the best of its matches
             shows, see `overlap_truth`; NaN without a match.
         radius: radius of a match [m].
     """
@@ -80,9 +80,9 @@ class PlaceOutcome:
             method: method that made the scores.
             is_gated: whether they were gated.
             retrieval: retrieval of Q queries and D places.
-            query: (Q,) stamps [ns] and (Q, 3) positions [m] of the queries.
-            drives: D names of the drives of the places; the drive in the
-                query's own city comes first.
+            query: (Q,) stamps [ns] and (Q, 3) places [m] of the queries.
+            drives: D names of the drives of the places; that of the query's
+                own city comes first.
             overlaps: (Q,) of the best match of each query.
             radius: radius of a match [m].
         """
@@ -123,8 +123,7 @@ class PlaceOutcome:
     def num_hidden(self) -> int:
         """Number of wrong answers to queries with little overlap.
 
-        Little means that the best match shows less than half of the query's
-        scan.
+        Their best match shows less than half of their scan.
         """
         is_hidden = self.overlaps < _HALF
         return int((is_hidden & ~self.outcomes.is_right).sum())
@@ -133,10 +132,9 @@ class PlaceOutcome:
         """Returns the reason for each query's wrong best place.
 
         Returns:
-            Q reasons, the first that applies: "" if the best place is right;
-            `no_place` if the query has no match; `no_candidate` if the method
-            finds no place or rejects all; `other_city`; `too_far` if the best
-            place is within two radii; `elsewhere`.
+            Q of: "" if it is right; `no_place` if the query has no match;
+            `no_candidate` if the method has no place, or rejects all;
+            `other_city`; `too_far` if it is within two radii; `elsewhere`.
         """
         wrong = [
             ~self.outcomes.has_match,
