@@ -1,4 +1,4 @@
-"""How both programs make commands of functions, and the options they share."""
+"""Commands made from functions, and options that both programs share."""
 
 from collections.abc import Callable, Mapping
 import functools
@@ -57,8 +57,7 @@ Costs = Annotated[
     ),
 ]
 
-# The name of an option's parameter -> its type with the option, and its
-# default.
+# Parameter name -> its type, annotated with the option, and its default.
 Options = Mapping[str, tuple[Any, Any]]
 
 
@@ -66,11 +65,12 @@ class Command(TyperCommand):
     """A command whose docstring explains its options to the user.
 
     The section `Args` of the docstring contains the help of options and
-    arguments. An option without an entry already has a help of its own.
+    arguments. An option without an entry there keeps the help of its own
+    declaration.
     """
 
     def __init__(self, *args: Any, help: str, params: list, **settings: Any):
-        """Gives each parameter its help."""
+        """Copies each parameter's help from the docstring."""
         text, _, entries = help.partition("\n\nArgs:\n")
         helps = {}
         for entry in re.split(r"\n(?! )", textwrap.dedent(entries)):
@@ -82,8 +82,9 @@ class Command(TyperCommand):
 
     def invoke(self, ctx: Any) -> Any:
         """Runs the command, after checking that its numbers are finite."""
-        # Others are checked where they are used. Until typer 0.28 the limits of
-        # an option were those of its type.
+        # Only options with a lower limit are checked here; others are checked
+        # where they are used. Before typer 0.28, the limits belonged to the
+        # option's type.
         check_finite(
             {
                 str(one.name): ctx.params[str(one.name)]
@@ -97,7 +98,7 @@ class Command(TyperCommand):
 def with_options(
     keyword: str, options: Options, make: Callable[..., Any]
 ) -> Callable[[Callable[..., None]], Callable[..., None]]:
-    """Returns a decorator that gives a command a group of options.
+    """Returns a decorator that adds a group of options to a command.
 
     Args:
         keyword: parameter of the command that gets the options as one value.

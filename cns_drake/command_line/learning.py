@@ -21,7 +21,7 @@ _Recorded = Annotated[
 
 
 class Part(str, Enum):
-    """What a training can leave out."""
+    """Kinds of variation that a training can leave out."""
 
     CHANGE = "change"
     RETURNS = "returns"

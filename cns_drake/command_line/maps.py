@@ -272,7 +272,7 @@ def _shortcomings(
 def _report_rows(
     report: ImportReport, output: Path, years: tuple[int, ...]
 ) -> Iterator[tuple[str, str]]:
-    """Yields the most important numbers, and the command that comes next."""
+    """Yields lines with the most important numbers, and the next command."""
     kinds = sorted(report.kinds.items(), key=lambda item: -item[1])
     parts = [f"{number} {kind}" for kind, number in kinds]
     yield "structures", _shortened(parts)
@@ -355,9 +355,9 @@ def city(
 def maps_and_years(
     words: list[str], first: list[int]
 ) -> tuple[list[str], tuple[int, ...]]:
-    """Returns maps and years.
+    """Returns the maps and the years among a command's arguments.
 
-    Years that follow the first come as arguments.
+    The years after the first one of --years come as arguments.
 
     Raises:
         InputError: a word begins like an option.

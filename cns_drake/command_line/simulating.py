@@ -72,8 +72,8 @@ def family_members(
 ) -> list[Scenario]:
     """Returns the members of a family.
 
-    Their scenario files go to `<output>/scenarios`, cities of their own to
-    `<output>/cities`.
+    Their scenario files are written to `<output>/scenarios`, and cities drawn
+    for them to `<output>/cities`.
 
     Raises:
         InputError: the family cannot be used.
@@ -96,7 +96,7 @@ def family_members(
 def choose_returns(
     returns: Kind | None, fog: float | None, rain: float, snowfall: float
 ) -> tuple[Kind | None, WeatherConfig | None]:
-    """Returns the returns and the weather of the options; None if not given.
+    """Returns the LiDAR returns and the weather that options name, or None.
 
     Raises:
         InputError: a value is out of range; the message names its option.

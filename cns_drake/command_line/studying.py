@@ -130,7 +130,7 @@ def study(
     chosen: list[str | tuple[str, Any]] = list(overrides)
     for field, names in (("tasks", task), ("methods", method)):
         if names:
-            # They keep their settings.
+            # Methods of the experiment keep their settings.
             given = getattr(experiment, field) or {}
             chosen.append((field, {one: given.get(one, {}) for one in names}))
     experiment = load_experiment(name, chosen, quick=quick)

@@ -35,7 +35,7 @@ from cns_drake.sensors.sensor_config import (
 )
 
 Name = Annotated[str, StringConstraints(pattern=r"^[A-Za-z0-9][A-Za-z0-9_]*$")]
-# Defaults are checked as well: another field may require one.
+# Defaults are validated as well, because a rule may depend on another field.
 _Optional = Field(default=None, validate_default=True)
 # More vehicles or walkers than any map can hold.
 _MOST_TRAFFIC = 2000
@@ -45,8 +45,8 @@ def _not_both(one: bool, other: bool) -> bool:
     return not (one and other)
 
 
-# Field, an earlier one, whether the two fit by what is given, and the fault if
-# they do not.
+# Two fields, the second declared before the first; a function that says whether
+# the two may be combined, given whether each is set; the error if not.
 _ALTERNATIVES: tuple[tuple[str, str, Any, str], ...] = (
     ("stage", "map", operator.eq, "give a map and its stage together"),
     (
@@ -76,7 +76,7 @@ _ALTERNATIVES: tuple[tuple[str, str, Any, str], ...] = (
         "back on its road",
     ),
 )
-# Field -> fields that it takes the place of.
+# Field -> fields that are removed when it is set.
 _REPLACED: dict[str, tuple[str, ...]] = {
     "world": ("map", "stage", "route", "aside"),
     "map": ("world",),
@@ -543,7 +543,7 @@ class Scenario(Section):
     def with_lidar_preset(self, preset: str) -> Scenario:
         """Returns the scenario with every LiDAR replaced by a unit of a preset.
 
-        Their poses and the settings of their measurements stay.
+        The LiDARs keep their poses and measurement settings.
 
         Raises:
             InputError: there is no such preset.

@@ -1,4 +1,4 @@
-"""Experiments: what differs between two drives, and what is asked of them.
+"""Experiments: what differs between two drives, and what is measured.
 
 An experiment is a YAML file. It names maps, fields of the drive that makes the
 database and of the drive that queries it, and the tasks to measure. A field
@@ -44,7 +44,7 @@ _LISTS: Mapping[str, tuple[type, ...]] = {
     "xyz": (int, float),
     "rpy_deg": (int, float),
 }
-# A list of so many evenly spaced numbers.
+# A list of evenly spaced numbers.
 _SPREAD = {"from", "to", "count"}
 # The factor of the fresh versions of the shipped maps.
 FRESH = "both.fresh"
@@ -361,7 +361,7 @@ def merged(values: Any, changes: Any) -> Any:
 
 
 def _chosen_anew(values: Changes, changes: Changes) -> dict[str, Any]:
-    """Returns `merged` fields, in which new tasks or methods stand alone."""
+    """Returns `merged` fields; new tasks or methods replace all old ones."""
     chosen = {n: changes[n] for n in ("tasks", "methods") if n in changes}
     return {**merged(values, changes), **chosen}
 
@@ -460,7 +460,7 @@ def _factors(
 def _split(
     fields: Changes, above: tuple[str, ...]
 ) -> tuple[dict[str, Any], dict[str, list[Any]]]:
-    """Returns path -> value of single fields, and path -> values of factors."""
+    """Returns path -> value of fixed fields, and path -> values of factors."""
     single: dict[str, Any] = {}
     varied: dict[str, list[Any]] = {}
     for path, value in _leaves(fields, above):
@@ -486,7 +486,7 @@ class _Values(list):
 def _leaves(
     fields: Mapping[Any, Any], above: tuple[str, ...]
 ) -> Iterator[tuple[str, Any]]:
-    """Yields path -> value, or values, of nested fields."""
+    """Yields (path, value or values) for each leaf of nested fields."""
     for name, value in fields.items():
         place = (*above, str(name))
         path = ".".join(place)

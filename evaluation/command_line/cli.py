@@ -30,7 +30,7 @@ if TYPE_CHECKING:
     from evaluation.recognition.metrics import Interval
     from evaluation.recognition.place_recognition import PlaceRecognition
 
-# Command of an earlier version -> what takes its place.
+# Command of an earlier version -> the command that replaces it.
 RENAMED = {
     "ranking": "compare --rankings",
     "trend": "cns-drake study FILE.yaml FOLDER",
@@ -202,7 +202,7 @@ def pr(
             f"--exclude-recent: it is for a drive against itself, but {query} "
             f"is not {database}"
         )
-    # Before a long work.
+    # Checked before the long work.
     if overlaps is not None:
         files.check_writable(overlaps)
     if exact_overlaps is not None:

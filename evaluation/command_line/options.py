@@ -1,4 +1,4 @@
-"""What commands share: options, drives that are opened, results."""
+"""Options and functions that several commands share."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ if TYPE_CHECKING:
     from evaluation.drives import Drive
 
 
-# When drives are aligned to one world.
+# Option: when drives are aligned to one world.
 When = Literal["auto", "always", "never"]
 Align = Annotated[
     When,
@@ -118,10 +118,10 @@ def show(
 
 
 def overlap_of(truth: str) -> float | None:
-    """Returns the least overlap, of `overlap:PART`; None for `radius`.
+    """Returns PART of `overlap:PART`; None for `radius`.
 
     Raises:
-        InputError: if it is neither.
+        InputError: the text is neither.
     """
     if truth == "radius":
         return None

@@ -1,8 +1,9 @@
 """SOLiD (Kim, Choi, Sim, Kim, Park: RA-L 2024), for narrow fields of view.
 
 Points are counted over range and elevation, and over azimuth and elevation.
-An elevation's weight grows with its number of points. The weighted counts over
-range distinguish places at any heading; those over azimuth give the heading.
+Each elevation has a weight that grows with its number of points. The weighted
+counts over range identify a place at any heading; the weighted counts over
+azimuth give the heading.
 """
 
 from __future__ import annotations
@@ -19,7 +20,7 @@ from cns_drake.base.drives.lidar_fields import LidarField
 from evaluation.maps.voxel_maps import Z_ORIGIN, thin
 from evaluation.methods.method import Method, MethodConfig, register, yaw_pose
 
-# The LiDAR of the `cns` preset [S].
+# Field of view of the `cns` preset's LiDAR [S].
 _CNS = LidarField(32, -22.5, 22.5)
 
 
@@ -111,13 +112,13 @@ class SolidMethod(Method[Solid, SolidDatabase]):
     Where it differs from the authors' programs:
 
     - An elevation outside the field of view counts in the outermost cell.
-      [P] lets those below wrap around to the top; [C] reads outside its
+      In [P], elevations below it wrap around to the top; [C] reads outside its
       table if they are more than one cell too low.
     - Coordinates that are exactly zero stay zero; the programs replace them
       by 1 mm.
-    - If all elevations have equally many points, all weigh 1 (the programs
-      divide by zero).
-    - A scan without points within range is no candidate and finds none.
+    - If all elevations have the same number of points, all weights are 1 (the
+    programs divide by zero). - A place without points within range is never a
+    candidate, and a query without such points has no candidates.
     """
 
     Config = SolidConfig
@@ -184,15 +185,15 @@ class SolidMethod(Method[Solid, SolidDatabase]):
     def score(
         self, query: Solid, database: SolidDatabase, *, exhaustive: bool = False
     ) -> np.ndarray:
-        del exhaustive  # It always is.
+        del exhaustive  # Always true here.
         return (database.ranges * _unit(query.ranges)).sum(axis=1)
 
     def relative_pose(
         self, query: Solid, database: SolidDatabase, place: int
     ) -> np.ndarray | None:
-        """Returns the query's heading at a place, in steps of one azimuth cell.
+        """Returns a pose with the query's heading, in steps of one cell.
 
-        None if one of the two has no points within range.
+        Returns None if one of the two scans has no points within range.
         """
         azimuths = database.azimuths[place]
         if not (query.azimuths.any() and azimuths.any()):
@@ -221,7 +222,7 @@ class SolidMethod(Method[Solid, SolidDatabase]):
             return within
         least = np.array([column.min() for column in within.T])
         first = least - 0.5 * config.voxel_size
-        # `thin` has a grid through the origin, but for z.
+        # The grid of `thin` goes through the origin in x and y, but not in z.
         offset = first - [0.0, 0.0, Z_ORIGIN]
         return thin(within - offset, config.voxel_size) + offset
 
@@ -236,7 +237,7 @@ def _count(
 
 
 def _elevation_weights(counts: np.ndarray) -> np.ndarray:
-    """Returns the counts, scaled so that the least is 0 and the most is 1."""
+    """Returns weights: counts scaled so that the least is 0, the greatest 1."""
     least, most = counts.min(), counts.max()
     if least == most:
         return np.ones(len(counts))

@@ -101,6 +101,6 @@ def _named(named_protocol: str, **fields: Any) -> RetrievalProtocol:
     return replace(PROTOCOLS[named_protocol], **fields)
 
 
-# Gives a command the options of the protocol, which replace its keyword
+# Decorator: the command gets the protocol's options in place of its keyword
 # `protocol`.
 with_protocol = with_options("protocol", {**_NAMED, **_FIELDS, **_GATE}, _named)

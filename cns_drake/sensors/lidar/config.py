@@ -1,4 +1,4 @@
-"""The description of a LiDAR and of the weather, and the models it gives."""
+"""Descriptions of a LiDAR and of the weather, and the models made from them."""
 
 from __future__ import annotations
 
@@ -170,8 +170,9 @@ def make_pattern(
 ) -> UnitPattern:
     """Returns the beam pattern of a LiDAR.
 
-    A turn takes another period [s] if it is given. Calibrated returns have the
-    elevations of a real unit, if they are known.
+    A turn takes `period` [s] if it is given, or else the period that follows
+    from the rate. With calibrated returns, the elevations are those of a real
+    unit, where they are known.
     """
     pattern = make_beam_pattern(
         config.preset,
@@ -189,9 +190,10 @@ def make_pattern(
 
 
 def describe_unit(config: LidarSection) -> dict[str, Any]:
-    """Returns the data of a calibrated unit that a user would know.
+    """Returns what a user of a calibrated unit would know about it.
 
-    The true angles of its lasers differ from these by the errors of the unit.
+    These are its preset, unit seed and nominal elevations. The true angles of
+    the lasers differ by the unit's errors.
     """
     nominal = getattr(make_pattern(config), "elevations_rad", ())
     return {
