@@ -7,8 +7,6 @@ from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
-import numpy as np
-
 from cns_drake.base.errors import InputError, did_you_mean
 from cns_drake.base.files import make_folder
 from cns_drake.base.jobs.cluster import Cluster
@@ -587,17 +585,8 @@ class Study:
                 for method, gate, columns in self._tasks[name].answers(
                     self._found(one, name)
                 ):
-                    yield Answers(
-                        **self._key(one, name, method, gate),
-                        columns={
-                            column: np.array(
-                                [-1 if v is None else v for v in some]
-                            )
-                            if isinstance(some, list)
-                            else np.asarray(some)
-                            for column, some in columns.items()
-                        },
-                    )
+                    key = self._key(one, name, method, gate)
+                    yield Answers(**key, columns=columns)
 
     def _found(self, one: _Measured, task: str) -> Any:
         return self._tasks[task].found(one.parts[task], one.pair)

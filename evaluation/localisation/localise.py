@@ -33,6 +33,7 @@ from evaluation.localisation.estimators import (
     thinned,
 )
 from evaluation.localisation.robust import MAX_RANGE
+from evaluation.recognition.place_outcome import Number
 from evaluation.recognition.pose_errors import (
     SUCCESS_ROTATION_DEG,
     SUCCESS_TRANSLATION,
@@ -436,11 +437,14 @@ class Localisation:
         found["seconds_mean"] = float(rows["seconds"].mean())
         return found
 
-    def numbers(self) -> dict[str, float]:
-        """Returns the numbers of the summary that go into tables of results."""
+    def numbers(self, method: str) -> Iterator[Number]:
+        """Yields the numbers of the summary that go into tables of results."""
         found = self.to_json()
-        known = {name: found[name] for name in _SHOWN}
-        return {k: float(v) for k, v in known.items() if v is not None}
+        for name in _SHOWN:
+            if (value := found[name]) is not None:
+                yield Number(
+                    method, False, name, float(value), n=len(self.rows)
+                )
 
     def columns(self) -> dict[str, np.ndarray]:
         """Returns the columns of `queries.csv`."""

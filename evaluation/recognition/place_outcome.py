@@ -148,7 +148,7 @@ class PlaceOutcome:
             np.select(wrong, FAULTS[:-1], FAULTS[-1]),
         ).tolist()
 
-    def columns(self) -> dict[str, np.ndarray | list]:
+    def columns(self) -> dict[str, np.ndarray]:
         """Returns the columns of `queries.csv` for each of the Q queries."""
         outcomes = self.outcomes
         blocks = outcomes.blocks
@@ -162,9 +162,9 @@ class PlaceOutcome:
             "correct": outcomes.is_right,
             "has_match": outcomes.has_match,
             "score": outcomes.best_scores,
-            "first_right_rank": outcomes.known_ranks,
-            "why": self.faults(),
-            "match_drive": self.match_drives,
+            "first_right_rank": outcomes.first_right_ranks,
+            "why": np.array(self.faults()),
+            "match_drive": np.array(self.match_drives),
             "match_frame": self.match_frames,
             "distance": self.distances,
             "translation_error": self.pose_errors.translation,
