@@ -84,12 +84,10 @@ class NcltDrive(FileDrive):
             files=kept,
             stamps_ns=stamps_ns[spanned],
             X_WS=_X_WN @ X_NB @ _X_BS,
+            read=lambda path, stamp_ns: read_scan(path),
             notes=unknown + notes,
             unit="hdl-32e-upside-down",
         )
-
-    def _read(self, path: Path, stamp_ns: int) -> np.ndarray:
-        return read_scan(path)
 
 
 def holds_nclt(path: Path) -> bool:

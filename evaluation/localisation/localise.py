@@ -25,6 +25,7 @@ from cns_drake.base.json_text import json_number
 from cns_drake.base.progress import Track, silent
 from evaluation.clouds.cloud_files import read_cloud
 from evaluation.drives.sampling import cropped, sample_frames
+from evaluation.drives.scan_files import FileDrive
 from evaluation.localisation.estimators import (
     Estimator,
     LocalisationMap,
@@ -131,38 +132,26 @@ class Starts:
         )
 
 
-class _OneScan(Drive):
+class OneScan(FileDrive):
     """A cloud as a drive of one scan, at the origin of its world."""
 
-    def __init__(self, path: Path, columns: int | None):
-        self.name = path.name
-        self.world_frame = "map"
-        self._notes: list[str] = []
-        self._scan = read_cloud(path, columns, self._notes.append)
-
-    @property
-    def notes(self) -> tuple[str, ...]:
-        return tuple(self._notes)
-
-    def __len__(self) -> int:
-        return 1
-
-    @property
-    def stamps_ns(self) -> np.ndarray:
-        return np.zeros(1, np.int64)
-
-    @property
-    def X_WS(self) -> np.ndarray:
-        return np.eye(4)[None]
+    def __init__(self, path: Path, columns: int | None = None):
+        """Reads the cloud, with its columns if it is a `.bin` file."""
+        notes: list[str] = []
+        scan = read_cloud(path, columns, notes.append)
+        super().__init__(
+            name=path.name,
+            world_frame="map",
+            files=[path],
+            stamps_ns=np.zeros(1, np.int64),
+            X_WS=np.eye(4)[None],
+            read=lambda path, stamp_ns: scan,
+            notes=tuple(notes),
+        )
 
     def scan(self, index: int) -> np.ndarray:
-        del index
-        return self._scan
-
-
-def as_query(source: Drive | Path, columns: int | None = None) -> Drive:
-    """Returns the queries: a drive, or a cloud as one scan at the origin."""
-    return source if isinstance(source, Drive) else _OneScan(source, columns)
+        """Returns the whole cloud: a map has points at its origin, too."""
+        return self._read(self._files[index], 0)
 
 
 def mapped_frames(
