@@ -381,7 +381,6 @@ def _parse_small_obj(
     path: Path, identity: tuple[int, int, int]
 ) -> tuple[np.ndarray, np.ndarray]:
     """Returns what a file holds: the stages of a city share most files."""
-    del identity
     p_GVset, triangles = _parse_obj(path)
     for array in (p_GVset, triangles):
         array.setflags(write=False)

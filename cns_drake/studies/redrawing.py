@@ -160,7 +160,6 @@ class RedrawCity(MakeMap):
     seed: int
 
     def make(self, finish: Callable[[Path], None], reporter: Reporter) -> None:
-        del reporter
         with files.draft_folder(self.folder) as draft:
             for name, content in self.inputs().items():
                 (draft / name).write_bytes(content)

@@ -51,7 +51,6 @@ class BoreasDrive(FileDrive):
         Raises:
             InputError: if there is none, or its poses cannot be used.
         """
-        del columns
         files, stamps_ns = list_stamped(
             path / _SCANS, ".bin", parse_microseconds
         )

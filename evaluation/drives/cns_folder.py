@@ -77,7 +77,6 @@ class CnsFolderDrive(FileDrive):
                 "map": resolved.parent.name.lower(),
                 "stage": resolved.name,
             }
-        del columns
         super().__init__(
             name=str((scenario or {}).get("name", name)),
             world_frame="map",

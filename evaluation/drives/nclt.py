@@ -65,7 +65,6 @@ class NcltDrive(FileDrive):
         Raises:
             InputError: if there is none, or its poses cannot be used.
         """
-        del columns
         if not (path / _SCANS).is_dir():
             raise InputError(
                 f"{path / _HITS}: packets as they came; {_SCANS}, the data"

@@ -300,7 +300,6 @@ def _by_small_gicp(
     measured: np.ndarray,
     start: np.ndarray,
 ) -> Estimate:
-    del measured
     source = small_gicp.PointCloud(scan)
     surface = surroundings.surface
     X_VW = np.eye(4)
@@ -338,7 +337,6 @@ def _by_robust(
     measured: np.ndarray,
     start: np.ndarray,
 ) -> Estimate:
-    del measured
     spread = None
     if kind == "GICP":
         source = small_gicp.PointCloud(scan)
@@ -366,7 +364,6 @@ def _by_kiss_matcher(
     measured: np.ndarray,
     start: np.ndarray,
 ) -> Estimate:
-    del scan
     # Its numbers are float32: far coordinates would lose decimals.
     p_WS = start[:3, 3]
     target = surroundings.around(p_WS, MAX_RANGE) - p_WS
@@ -395,7 +392,6 @@ def _by_own(
     measured: np.ndarray,
     start: np.ndarray,
 ) -> Estimate:
-    del scan
     nearby = surroundings.around(start[:3, 3], MAX_RANGE)
     answer = function(nearby, measured.copy(), start.copy())
     try:

@@ -144,7 +144,6 @@ def measure_localisation(
         (K,) of `QUERY` for each method and start, the starts of a method side
         by side; nothing if the query is nowhere near the map.
     """
-    del texts
     mapped, asked = database(), query()
     maps: dict[tuple[float, int], estimators.LocalisationMap] = {}
     localisers = []
