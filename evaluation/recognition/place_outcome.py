@@ -9,7 +9,11 @@ from typing import NamedTuple
 
 import numpy as np
 
-from evaluation.recognition.fault_kinds import NEARLY, visible_change_added
+from evaluation.recognition.fault_kinds import (
+    NEARLY,
+    mean_visible_change,
+    visible_change_added,
+)
 from evaluation.recognition.metrics import (
     UNKNOWN,
     Interval,
@@ -243,9 +247,8 @@ def place_numbers(
     for name in FAULTS:
         yield now.number(name, float(why.count(name)))
     yield now.number("hidden", float(now.num_hidden))
-    known = now.overlaps[~np.isnan(now.overlaps)]
-    if len(known):
-        yield now.number("visible_change", 1.0 - float(known.mean()))
+    if not math.isnan(shown := mean_visible_change(now.overlaps)[0]):
+        yield now.number("visible_change", shown)
 
 
 def pose_numbers(
