@@ -261,7 +261,7 @@ class Measuring:
                     method.name,
                     place_numbers(now, None),
                     gate=gate,
-                    columns=now.columns(),
+                    columns=now.columns,
                 )
                 poses = pose_numbers(now, None)
                 self._add(one, "pose", method.name, poses, gate=gate)
