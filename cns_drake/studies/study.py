@@ -7,7 +7,7 @@ from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
-from cns_drake.base.errors import InputError, did_you_mean
+from cns_drake.base.errors import InputError, did_you_mean, errors_at
 from cns_drake.base.files import make_folder
 from cns_drake.base.jobs.cluster import Cluster
 from cns_drake.base.jobs.fingerprint import fingerprint
@@ -189,11 +189,8 @@ class Study:
                     f" {', '.join(TASKS)}){did_you_mean(name, TASKS)}"
                 )
             self._tasks[name] = TASKS[name](settings, self.source)
-        try:
+        with errors_at(f"{self.source}: methods", "--method: "):
             self._variants = self._choose_methods()
-        except InputError as error:
-            fault = str(error).removeprefix("--method: ")
-            raise InputError(f"{self.source}: methods: {fault}") from None
         self._conditions = conditions(self.experiment)
         self._protocol = self._protocol_of(self._conditions[0])
         self._made = MadeMaps(self.output / "cities")

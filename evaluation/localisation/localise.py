@@ -20,7 +20,7 @@ from cns_drake.base import points as clouds
 from cns_drake.base import poses
 from cns_drake.base.csv_files import write_csv
 from cns_drake.base.drives.drive import Drive
-from cns_drake.base.errors import InputError
+from cns_drake.base.errors import InputError, errors_at
 from cns_drake.base.json_text import json_number
 from cns_drake.base.progress import Track, silent
 from evaluation.clouds.cloud_files import read_cloud
@@ -338,10 +338,8 @@ def localise(
                     yield one.result()
 
     _localiser = localiser
-    try:
+    with errors_at(query.name):
         done = list(track(rows(), f"localising {query.name}", len(frames)))
-    except InputError as error:
-        raise InputError(f"{query.name}: {error}") from error
     return np.array(done, QUERY)
 
 

@@ -81,6 +81,17 @@ class Site:
         return y1 - y0
 
     @property
+    def open_length(self) -> float:
+        """Length of all walls that get windows [m]."""
+        outline = self.outline
+        ends = np.roll(outline, -1, axis=0)
+        lengths = np.linalg.norm(ends - outline, axis=1)
+        open_edges = (
+            k for k in range(len(lengths)) if k not in self.blind_edges
+        )
+        return float(sum(lengths[k] for k in open_edges))
+
+    @property
     def free_corners(self) -> list[int]:
         """The front corners, 0 left and 1 right, that no neighbour hides."""
         flanks = {0: {3, 0}, 1: {0, 1}}
