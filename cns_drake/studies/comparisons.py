@@ -9,7 +9,7 @@ import re
 from typing import Any
 
 from cns_drake.base.csv_files import read_records
-from cns_drake.base.errors import InputError, validated
+from cns_drake.base.errors import InputError, errors_at, validated
 from cns_drake.base.jobs.fingerprint import fingerprint
 from cns_drake.scenarios.scenario import Scenario
 from cns_drake.scenarios.scenario_files import map_folder
@@ -285,13 +285,8 @@ class PairOfDrives:
         for name in (*_QUERY_FIELDS, "distractors", "years", "rates"):
             left.pop(name, None)
         if "lidar" in left:
-            try:
+            with errors_at(f"{self.source}: {side}.lidar", "--lidar: "):
                 drive = drive.with_lidar_preset(left.pop("lidar"))
-            except InputError as error:
-                fault = str(error).removeprefix("--lidar: ")
-                raise InputError(
-                    f"{self.source}: {side}.lidar: {fault}"
-                ) from None
         if "returns" in left:
             returns, weather = left.pop("returns"), left.pop("weather", None)
             if returns not in _RETURNS:

@@ -12,7 +12,9 @@ The place's sensor sees the world of its own drive, with that drive's stage and
 traffic.
 """
 
+from collections.abc import Callable
 from dataclasses import dataclass
+import functools
 import math
 
 import numpy as np
@@ -30,22 +32,66 @@ from evaluation.recognition.seen_surfaces import TOLERANCE
 
 
 @dataclass(frozen=True)
-class VisibleSurfaces:
-    """The surfaces that a LiDAR sees from a place of a simulated drive.
-
-    Points with a coordinate beyond `max_range` [m] in its frame are left out.
-    """
+class Sight:
+    """A LiDAR at a place of a simulated drive, and the world around it."""
 
     scene: RayCastingScene
     X_WS: RigidTransform
     pattern: BeamPattern
     coverage: BeamCoverage
+
+    def reached(
+        self, p_S: np.ndarray
+    ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        """Returns which points are in range, and in the field of view.
+
+        Args:
+            p_S: (N, 3) points in the LiDAR's frame [m].
+
+        Returns:
+            (K,) rows of these points; (K, 3) directions to them in S, and (K,)
+            distances [m].
+        """
+        distances = np.linalg.norm(p_S, axis=1)
+        rows = np.flatnonzero(
+            (distances >= self.pattern.min_range)
+            & (distances <= self.pattern.max_range)
+        )
+        d_Sset = p_S[rows] / distances[rows, None]
+        covered = self.coverage.covers(d_Sset)
+        rows = rows[covered]
+        return rows, d_Sset[covered], distances[rows]
+
+
+def sights(drive: SimulatedDrive) -> Callable[[int], Sight]:
+    """Returns a function: frame of a drive -> what its LiDAR can see there."""
+
+    @functools.lru_cache(maxsize=1)
+    def coverage(turn: int) -> BeamCoverage:
+        return BeamCoverage(drive.pattern.beams(turn).d_Sset)
+
+    return lambda frame: Sight(
+        *drive.look(frame),
+        drive.pattern,
+        coverage(0 if drive.pattern.repeats else frame),
+    )
+
+
+@dataclass(frozen=True)
+class VisibleSurfaces:
+    """The surfaces that a LiDAR sees from a place.
+
+    Points with a coordinate beyond `max_range` [m] in its frame are left out.
+    """
+
+    sight: Sight
     max_range: float
 
     @property
     def reach(self) -> float:
         """Distance of the farthest visible surface [m]."""
-        return min(self.pattern.max_range, math.sqrt(3.0) * self.max_range)
+        farthest = self.sight.pattern.max_range
+        return min(farthest, math.sqrt(3.0) * self.max_range)
 
     def share_of(self, points: np.ndarray) -> float:
         """Returns which share of points (N, 3) is visible.
@@ -55,20 +101,15 @@ class VisibleSurfaces:
         if len(points) == 0:
             return math.nan
         kept = points[within_range(points, self.max_range)]
-        distances = np.linalg.norm(kept, axis=1)
-        reached = (distances >= self.pattern.min_range) & (
-            distances <= self.pattern.max_range
+        _, d_Sset, distances = self.sight.reached(kept)
+        X_WS = self.sight.X_WS
+        hits = self.sight.scene.cast_rays(
+            X_WS.translation(),
+            d_Sset,
+            self.sight.pattern.max_range,
+            R_WSset=X_WS.rotation().matrix(),
         )
-        kept, distances = kept[reached], distances[reached]
-        d_Sset = kept / distances[:, None]
-        covered = self.coverage.covers(d_Sset)
-        hits = self.scene.cast_rays(
-            self.X_WS.translation(),
-            d_Sset[covered],
-            self.pattern.max_range,
-            R_WSset=self.X_WS.rotation().matrix(),
-        )
-        is_seen = np.abs(hits.ranges - distances[covered]) <= TOLERANCE
+        is_seen = np.abs(hits.ranges - distances) <= TOLERANCE
         return float(is_seen.sum() / len(points))
 
 
@@ -86,15 +127,11 @@ def exact_overlaps(
         InputError: the two are of different maps.
     """
     check_same_world(database, query)
-    pattern = database.pattern
-    first = BeamCoverage(pattern.beams(0).d_Sset)
-
-    def see(frame: int) -> VisibleSurfaces:
-        coverage = first
-        if not pattern.repeats:
-            coverage = BeamCoverage(pattern.beams(frame).d_Sset)
-        return VisibleSurfaces(
-            *database.look(frame), pattern, coverage, protocol.max_range
-        )
-
-    return overlap_matrix(database, query, protocol, track, see)
+    look = sights(database)
+    return overlap_matrix(
+        database,
+        query,
+        protocol,
+        track,
+        lambda frame: VisibleSurfaces(look(frame), protocol.max_range),
+    )

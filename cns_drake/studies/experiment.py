@@ -26,7 +26,13 @@ from pydantic import (
     model_validator,
 )
 
-from cns_drake.base.errors import InputError, did_you_mean, validated
+from cns_drake.base.errors import (
+    InputError,
+    did_you_mean,
+    errors_at,
+    validated,
+    value_errors,
+)
 from cns_drake.base.yaml_files import parse_yaml, read_yaml
 from cns_drake.scenarios.scenario import Name
 from cns_drake.sensors.sensor_config import Section
@@ -322,17 +328,12 @@ def load_experiment(
         else:
             values = values | dict([one])
     experiment = validated(Experiment, values, path)
-    try:
+    with value_errors(path):
         conditions(experiment)
         method_variants(experiment.methods or {})
-    except ValueError as error:
-        raise InputError(f"{path}: {error}") from None
     if not quick and experiment.quick:
-        try:
+        with errors_at(f"{path}: quick", f"{path}: "):
             load_experiment(name_or_file, overrides, quick=True)
-        except InputError as error:
-            fault = str(error).removeprefix(f"{path}: ")
-            raise InputError(f"{path}: quick: {fault}") from None
     return experiment
 
 
@@ -340,10 +341,8 @@ def _override(text: str) -> dict[str, Any]:
     name, equals, value = text.partition("=")
     if not (name and equals):
         raise InputError(f"--set: {text!r} is not FIELD=VALUE")
-    try:
+    with value_errors(f"--set: {name}"):
         parsed = parse_yaml(value)
-    except ValueError as error:
-        raise InputError(f"--set: {name}: {error}") from None
     return _nested(name, parsed)
 
 

@@ -21,7 +21,7 @@ from cns_drake.ageing.rates import (
     check_rates,
     read_rates,
 )
-from cns_drake.base.errors import InputError
+from cns_drake.base.errors import InputError, errors_at
 from cns_drake.base.files import read_bytes
 from cns_drake.base.jobs.cluster import Cluster
 from cns_drake.base.jobs.fingerprint import code_digest, fingerprint
@@ -197,11 +197,8 @@ class MadeMaps:
             check_rates(found, "rates")
         if isinstance(factor, bool) or not isinstance(factor, int | float):
             raise InputError(f"rates: {factor!r} is no number")
-        try:
+        with errors_at("rates", "--rate: "):
             known = read_rates(None, factor)
-        except InputError as error:
-            fault = str(error).removeprefix("--rate: ")
-            raise InputError(f"rates: {fault}") from None
         return {**known, **found}
 
     def _aged_folder(

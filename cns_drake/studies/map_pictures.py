@@ -78,7 +78,6 @@ def picture_drives(
     reporter: Reporter, drives: tuple[_ShownDrive, ...], picture: Path
 ) -> None:
     """Draws the drives of a map from above."""
-    del reporter
     scenarios = [one.scenario for one in drives]
     stage_pictures.draw_drives(
         {s.name.replace("_", " "): s for s in scenarios}, picture
@@ -89,7 +88,6 @@ def picture_stages(
     reporter: Reporter, read: tuple[_ReadFile, ...], picture: Path
 ) -> None:
     """Draws a street of a map in its first and its last stage."""
-    del reporter
     views, *stages = (one.path for one in read)
     stage_pictures.draw_stages(
         {stage.stem.replace("_", " "): stage for stage in stages},

@@ -32,7 +32,6 @@ from pathlib import Path
 
 import jinja2
 import numpy as np
-from pydrake.math import RigidTransform
 
 from cns_drake.base.drives.drive import Drive, check_same_world
 from cns_drake.base.drives.mcap_drive import McapDrive, holds_mcap
@@ -48,10 +47,10 @@ from cns_drake.scenarios.scenario_files import (
     load_scenario,
     map_folder,
 )
-from cns_drake.sensors.lidar.patterns import BeamCoverage, BeamPattern
 from cns_drake.simulation.loaded_drive import load_stage
 from cns_drake.simulation.scanning import still_scene
 from cns_drake.simulation.simulated_drive import SimulatedDrive
+from cns_drake.studies.exact_overlap import Sight, sights
 from evaluation.drives.sampling import sample_frames
 from evaluation.map_update.sessions import (
     SIDES,
@@ -275,22 +274,21 @@ def observed(
     The drive observes them from its frames (K,).
     """
     result = np.zeros(len(points), bool)
-    pattern = drive.pattern
-    coverage = BeamCoverage(pattern.beams(0).d_Sset)
+    look = sights(drive)
     tiles = _Tiles(points)
     first = sample_frames(drive.X_WS[frames, :3, 3], _FIRST_LOOKS)
     looks = np.concatenate([frames[first], np.delete(frames, first)]).tolist()
     with ThreadPoolExecutor(num_cores()) as threads:
         for frame in track(looks, f"looking from {drive.name}", len(looks)):
-            if not pattern.repeats:
-                coverage = BeamCoverage(pattern.beams(frame).d_Sset)
-            near = tiles.near(drive.X_WS[frame, :3, 3], pattern.max_range)
+            near = tiles.near(drive.X_WS[frame, :3, 3], drive.pattern.max_range)
             if not near:
                 continue
-            look = _Look(*drive.look(frame), pattern, coverage)
+            sight = look(frame)
             rows = np.concatenate([tiles.left[tile] for tile in near])
             for seen in threads.map(
-                lambda chunk, look=look: chunk[look.sees(points[chunk])],
+                lambda chunk, sight=sight: chunk[
+                    _visible(points[chunk], sight)
+                ],
                 list(_chunks(rows)),
             ):
                 result[seen] = True
@@ -301,41 +299,22 @@ def observed(
     return result
 
 
-@dataclass(frozen=True)
-class _Look:
-    """What a LiDAR observes from a place."""
-
-    scene: RayCastingScene
-    X_WS: RigidTransform
-    pattern: BeamPattern
-    coverage: BeamCoverage
-
-    def sees(self, points: np.ndarray) -> np.ndarray:
-        """Returns the rows of the points (N, 3) in W that are observed."""
-        p_WS, R_WS = self.X_WS.translation(), self.X_WS.rotation().matrix()
-        offsets = points - p_WS
-        distances = np.sqrt(np.einsum("ij,ij->i", offsets, offsets))
-        rows = np.flatnonzero(
-            (distances >= self.pattern.min_range)
-            & (distances <= self.pattern.max_range)
-        )
-        distances = distances[rows]
-        d_Sset = (offsets[rows] / distances[:, None]) @ R_WS
-        covered = self.coverage.covers(d_Sset)
-        rows, d_Sset = rows[covered], d_Sset[covered]
-        distances = distances[covered]
-        hits = self.scene.cast_rays(p_WS, d_Sset, distances, R_WSset=R_WS)
-        # A miss is infinitely far behind the point.
-        before = distances - hits.ranges
-        is_free = before <= NEAR
-        grazed = np.flatnonzero(~is_free & (before <= _GRAZING))
-        d_Sset = d_Sset[grazed]
-        hits = self.scene.cast_rays(
-            p_WS, d_Sset, distances[grazed], R_WSset=R_WS, with_normals=True
-        )
-        cosines = np.einsum("ij,ij->i", hits.normals_W, d_Sset @ R_WS.T)
-        is_free[grazed] = before[grazed] * np.abs(cosines) <= _SKIN
-        return rows[is_free]
+def _visible(points: np.ndarray, sight: Sight) -> np.ndarray:
+    """Returns the rows of the points (N, 3) in W that are observed."""
+    p_WS, R_WS = sight.X_WS.translation(), sight.X_WS.rotation().matrix()
+    rows, d_Sset, distances = sight.reached((points - p_WS) @ R_WS)
+    hits = sight.scene.cast_rays(p_WS, d_Sset, distances, R_WSset=R_WS)
+    # A miss is infinitely far behind the point.
+    before = distances - hits.ranges
+    is_free = before <= NEAR
+    grazed = np.flatnonzero(~is_free & (before <= _GRAZING))
+    d_Sset = d_Sset[grazed]
+    hits = sight.scene.cast_rays(
+        p_WS, d_Sset, distances[grazed], R_WSset=R_WS, with_normals=True
+    )
+    cosines = np.einsum("ij,ij->i", hits.normals_W, d_Sset @ R_WS.T)
+    is_free[grazed] = before[grazed] * np.abs(cosines) <= _SKIN
+    return rows[is_free]
 
 
 class _Tiles:

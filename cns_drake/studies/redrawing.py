@@ -23,7 +23,7 @@ import yaml
 
 from cns_drake.base import files
 from cns_drake.base.csv_files import read_records
-from cns_drake.base.errors import InputError
+from cns_drake.base.errors import InputError, errors_at
 from cns_drake.base.jobs.cluster import Cluster
 from cns_drake.base.jobs.fingerprint import code_digest
 from cns_drake.base.jobs.running import Job, run_jobs
@@ -161,18 +161,13 @@ class RedrawCity(MakeMap):
     seed: int
 
     def make(self, finish: Callable[[Path], None], reporter: Reporter) -> None:
-        del reporter
         with files.draft_folder(self.folder) as draft:
             for name, content in self.inputs().items():
                 (draft / name).write_bytes(content)
-            try:
+            place = f"{self.map_folder}: seed {self.seed}"
+            with errors_at(place, f"{draft}{os.sep}"):
                 self.finish_inputs(draft)
                 generate_city(draft)
-            except InputError as error:
-                fault = str(error).removeprefix(f"{draft}{os.sep}")
-                raise InputError(
-                    f"{self.map_folder}: seed {self.seed}: {fault}"
-                ) from error
             finish(draft)
 
     def inputs(self) -> dict[str, bytes]:

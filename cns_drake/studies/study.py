@@ -7,9 +7,7 @@ from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
-import numpy as np
-
-from cns_drake.base.errors import InputError, did_you_mean
+from cns_drake.base.errors import InputError, did_you_mean, errors_at
 from cns_drake.base.files import make_folder
 from cns_drake.base.jobs.cluster import Cluster
 from cns_drake.base.jobs.fingerprint import fingerprint
@@ -191,11 +189,8 @@ class Study:
                     f" {', '.join(TASKS)}){did_you_mean(name, TASKS)}"
                 )
             self._tasks[name] = TASKS[name](settings, self.source)
-        try:
+        with errors_at(f"{self.source}: methods", "--method: "):
             self._variants = self._choose_methods()
-        except InputError as error:
-            fault = str(error).removeprefix("--method: ")
-            raise InputError(f"{self.source}: methods: {fault}") from None
         self._conditions = conditions(self.experiment)
         self._protocol = self._protocol_of(self._conditions[0])
         self._made = MadeMaps(self.output / "cities")
@@ -588,17 +583,8 @@ class Study:
                 for method, gate, columns in self._tasks[name].answers(
                     self._found(one, name)
                 ):
-                    yield Answers(
-                        **self._key(one, name, method, gate),
-                        columns={
-                            column: np.array(
-                                [-1 if v is None else v for v in some]
-                            )
-                            if isinstance(some, list)
-                            else np.asarray(some)
-                            for column, some in columns.items()
-                        },
-                    )
+                    key = self._key(one, name, method, gate)
+                    yield Answers(**key, columns=columns)
 
     def _found(self, one: _Measured, task: str) -> Any:
         return self._tasks[task].found(one.parts[task], one.pair)

@@ -27,10 +27,9 @@ from cns_drake.roads.route import draw_route
 from cns_drake.scenarios.scenario import Scenario
 from cns_drake.scenarios.scenario_files import load_scenario
 from cns_drake.scenarios.shipped import shipped_maps
-from cns_drake.sensors.lidar.patterns import BeamCoverage
 from cns_drake.simulation.simulated_drive import SimulatedDrive
 from cns_drake.studies.comparisons import moved
-from cns_drake.studies.exact_overlap import VisibleSurfaces
+from cns_drake.studies.exact_overlap import VisibleSurfaces, sights
 from cns_drake.studies.redrawing import redrawn_inputs, to_yaml, turned
 from evaluation.drives.sampling import gather, sample_frames
 from evaluation.methods.learned import polar_image
@@ -218,19 +217,11 @@ def _overlaps(scans: Sequence[_Taken], reporter: Reporter) -> np.ndarray:
     X_WSs = np.stack([one.drive.X_WS[one.frame] for one in scans])
     places = reporter.track(enumerate(scans), "overlaps", len(scans))
     for column, place in places:
-        drive = place.drive
-        scene, X_WP = drive.look(place.frame)
-        seen = VisibleSurfaces(
-            scene,
-            X_WP,
-            drive.pattern,
-            BeamCoverage(drive.pattern.beams(place.frame).d_Sset),
-            _MAX_RANGE,
-        )
+        seen = VisibleSurfaces(sights(place.drive)(place.frame), _MAX_RANGE)
         X_PW = poses.inverse(X_WSs[column])
         apart = np.linalg.norm(X_WSs[:, :2, 3] - X_WSs[column, :2, 3], axis=1)
         for row in np.flatnonzero(apart <= _FARTHEST_OVERLAP).tolist():
-            if scans[row].drive is not drive:
+            if scans[row].drive is not place.drive:
                 X_PS = X_PW @ X_WSs[row]
                 p_P = scans[row].points @ X_PS[:3, :3].T + X_PS[:3, 3]
                 result[row, column] = seen.share_of(p_P)

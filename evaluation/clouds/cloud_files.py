@@ -352,7 +352,6 @@ def _read_ply(path: Path, block: int, on_note: OnNote) -> Iterator[np.ndarray]:
     vertices may have no lists, because lists would hide where the vertices
     begin.
     """
-    del on_note
     encoding, elements, offset = _read_ply_header(path)
     order = _PLY_ORDERS[encoding]
     before = []
@@ -554,7 +553,6 @@ def _find_reader(path: Path) -> _Reader:
 
 
 def _read_npy(path: Path, block: int, on_note: OnNote) -> Iterator[np.ndarray]:
-    del on_note
     dtype, shape, by_column, offset = _read_npy_header(path)
     count = math.prod(shape)
     _check_size(path, offset + count * dtype.itemsize, exactly=True)

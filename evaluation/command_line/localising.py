@@ -86,7 +86,10 @@ def localise(
     )
     estimator = estimators.make_estimator(method, settings)
     source = open_source(place, lidar, columns)
-    drive = queries.as_query(open_source(query, lidar, columns), columns)
+    asked = open_source(query, lidar, columns)
+    drive = (
+        asked if isinstance(asked, Drive) else queries.OneScan(asked, columns)
+    )
     for one in (source, drive):
         for note in one.notes if isinstance(one, Drive) else ():
             terminal.note(note)

@@ -14,6 +14,7 @@ from evaluation.command_line.options import (
     Json,
     LidarName,
     open_noted,
+    show,
 )
 
 
@@ -78,10 +79,7 @@ def map_update(
         for session, labels in zip(pair, found, strict=True):
             sessions.write_labels(output / f"{session.side}.npy", labels)
     scores = score(pair, truth, found, class_names(folder))
-    if json:
-        terminal.print_json({"method": name, **scores})
-    else:
-        terminal.print_rows(_rows(name, scores))
+    show({"method": name, **scores}, _rows(name, scores), json=json)
 
 
 def map_sessions(

@@ -52,7 +52,6 @@ class BoreasDrive(FileDrive):
         Raises:
             InputError: there is no such drive, or its poses cannot be used.
         """
-        del columns
         files, stamps_ns = list_stamped(
             path / _SCANS, ".bin", parse_microseconds
         )
@@ -70,18 +69,20 @@ class BoreasDrive(FileDrive):
             files=kept,
             stamps_ns=stamps_ns[spanned],
             X_WS=X_WS,
+            read=_read,
             notes=unknown + notes,
             unit="alpha-prime",
         )
 
-    def _read(self, path: Path, stamp_ns: int) -> np.ndarray:
-        stored = read_packed(path, _STORED)
-        check_below(stored, "laser", _NUM_LASERS)
-        points = np.empty(len(stored), _POINT)
-        for name in ("x", "y", "z", "intensity", "laser"):
-            points[name] = stored[name]
-        points["t"] = np.rint(stored["time"] * 1e9)
-        return points
+
+def _read(path: Path, stamp_ns: int) -> np.ndarray:
+    stored = read_packed(path, _STORED)
+    check_below(stored, "laser", _NUM_LASERS)
+    points = np.empty(len(stored), _POINT)
+    for name in ("x", "y", "z", "intensity", "laser"):
+        points[name] = stored[name]
+    points["t"] = np.rint(stored["time"] * 1e9)
+    return points
 
 
 def holds_boreas(path: Path) -> bool:

@@ -78,13 +78,13 @@ class CnsFolderDrive(FileDrive):
                 "map": resolved.parent.name.lower(),
                 "stage": resolved.name,
             }
-        del columns
         super().__init__(
             name=str((scenario or {}).get("name", name)),
             world_frame="map",
             files=files,
             stamps_ns=stamps_ns,
             X_WS=X_WB @ _read_mount(mount),
+            read=lambda path, stamp_ns: read_cloud(path),
             scenario=scenario,
             unit="cns",
         )
@@ -106,9 +106,6 @@ class CnsFolderDrive(FileDrive):
         imu["angular_velocity"] = values[:, 4:7]
         imu["specific_force"] = values[:, 7:]
         return imu
-
-    def _read(self, path: Path, stamp_ns: int) -> np.ndarray:
-        return read_cloud(path)
 
 
 def holds_cns(path: Path) -> bool:

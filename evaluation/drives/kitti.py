@@ -142,8 +142,8 @@ class KittiDrive(BinDrive):
             table = parse_json(read_bytes(path))
         return index_instances(table, str(path))
 
-    def _read(self, path: Path, stamp_ns: int) -> np.ndarray:
-        stored = super()._read(path, stamp_ns)
+    def _read_bin(self, path: Path, stamp_ns: int) -> np.ndarray:
+        stored = super()._read_bin(path, stamp_ns)
         if self._labels is None:
             return stored
         labels_path = self._labels / f"{path.stem}.label"

@@ -65,7 +65,6 @@ class NcltDrive(FileDrive):
         Raises:
             InputError: there is no such session, or its poses cannot be used.
         """
-        del columns
         if not (path / _SCANS).is_dir():
             raise InputError(
                 f"{path / _HITS}: packets as they came; {_SCANS}, the data"
@@ -84,12 +83,10 @@ class NcltDrive(FileDrive):
             files=kept,
             stamps_ns=stamps_ns[spanned],
             X_WS=_X_WN @ X_NB @ _X_BS,
+            read=lambda path, stamp_ns: read_scan(path),
             notes=unknown + notes,
             unit="hdl-32e-upside-down",
         )
-
-    def _read(self, path: Path, stamp_ns: int) -> np.ndarray:
-        return read_scan(path)
 
 
 def holds_nclt(path: Path) -> bool:

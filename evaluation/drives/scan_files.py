@@ -1,6 +1,5 @@
 """Drives that are stored as one file for each scan."""
 
-import abc
 from collections.abc import Callable, Mapping
 from functools import cached_property
 from pathlib import Path
@@ -66,6 +65,7 @@ class FileDrive(Drive):
         files: list[Path],
         stamps_ns: np.ndarray,
         X_WS: np.ndarray,
+        read: Callable[[Path, int], np.ndarray],
         notes: tuple[str, ...] = (),
         datum: str | None = None,
         scenario: Mapping | None = None,
@@ -79,6 +79,9 @@ class FileDrive(Drive):
             files: N scans.
             stamps_ns: (N,) int64 [ns], strictly increasing.
             X_WS: (N, 4, 4) poses of the LiDAR in the world.
+            read: returns the points of a scan's file, by its stamp [ns], as
+                they are in the file. A ValueError says that it is not of its
+                format.
             notes: see `Drive.notes`.
             datum: see `Drive.datum`.
             scenario: see `Drive.scenario`.
@@ -89,6 +92,7 @@ class FileDrive(Drive):
         self._files = files
         self._stamps_ns = stamps_ns
         self._X_WS = X_WS
+        self._read = read
         self._notes = notes
         self._datum = datum
         self._scenario = scenario
@@ -128,15 +132,6 @@ class FileDrive(Drive):
         with user_errors(path), value_errors(path):
             return _returns(self._read(path, int(self._stamps_ns[index])))
 
-    @abc.abstractmethod
-    def _read(self, path: Path, stamp_ns: int) -> np.ndarray:
-        """Reads the points of one scan as they are in the file.
-
-        Raises:
-            ValueError: if the file is not of its format.
-            OSError: if it cannot be read.
-        """
-
 
 class BinDrive(FileDrive):
     """A drive whose scans are `.bin` files: float32 without a header."""
@@ -148,7 +143,7 @@ class BinDrive(FileDrive):
             columns: see `find_layout`.
             drive: see `FileDrive`.
         """
-        super().__init__(**drive)
+        super().__init__(read=self._read_bin, **drive)
         self._columns = columns
 
     @cached_property
@@ -160,7 +155,7 @@ class BinDrive(FileDrive):
         note = self._layout.note
         return (*super().notes, *([note] if note else []))
 
-    def _read(self, path: Path, stamp_ns: int) -> np.ndarray:
+    def _read_bin(self, path: Path, stamp_ns: int) -> np.ndarray:
         return read_packed(path, self._layout.dtype)
 
 

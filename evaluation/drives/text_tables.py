@@ -344,10 +344,8 @@ def read_angles(path: Path, width: int) -> tuple[Trajectory, tuple[str, ...]]:
     columns = [("stamp", "U40"), ("values", "f8", width)]
     rows = read_numbers(path, columns, ",")
     known = rows[~np.isnan(rows["values"]).any(axis=1)]
-    try:
+    with value_errors(f"{path}: time"):
         stamps_ns = parse_microseconds(known["stamp"])
-    except ValueError as error:
-        raise InputError(f"{path}: time: {error}") from error
     values = known["values"]
     if not len(values):
         raise InputError(f"{path}: no row without NaN")

@@ -302,7 +302,6 @@ def _by_small_gicp(
     measured: np.ndarray,
     start: np.ndarray,
 ) -> Estimate:
-    del measured
     source = small_gicp.PointCloud(scan)
     surface = surroundings.surface
     X_VW = np.eye(4)
@@ -340,7 +339,6 @@ def _by_robust(
     measured: np.ndarray,
     start: np.ndarray,
 ) -> Estimate:
-    del measured
     spread = None
     if kind == "GICP":
         source = small_gicp.PointCloud(scan)
@@ -368,7 +366,6 @@ def _by_kiss_matcher(
     measured: np.ndarray,
     start: np.ndarray,
 ) -> Estimate:
-    del scan
     # Its numbers are float32: far coordinates would lose decimals.
     p_WS = start[:3, 3]
     target = surroundings.around(p_WS, MAX_RANGE) - p_WS
@@ -397,7 +394,6 @@ def _by_own(
     measured: np.ndarray,
     start: np.ndarray,
 ) -> Estimate:
-    del scan
     nearby = surroundings.around(start[:3, 3], MAX_RANGE)
     answer = function(nearby, measured.copy(), start.copy())
     try:

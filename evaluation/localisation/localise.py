@@ -20,11 +20,12 @@ from cns_drake.base import points as clouds
 from cns_drake.base import poses
 from cns_drake.base.csv_files import write_csv
 from cns_drake.base.drives.drive import Drive
-from cns_drake.base.errors import InputError
+from cns_drake.base.errors import InputError, errors_at
 from cns_drake.base.json_text import json_number
 from cns_drake.base.progress import Track, silent
 from evaluation.clouds.cloud_files import read_cloud
 from evaluation.drives.sampling import cropped, sample_frames
+from evaluation.drives.scan_files import FileDrive
 from evaluation.localisation.estimators import (
     Estimator,
     LocalisationMap,
@@ -33,6 +34,7 @@ from evaluation.localisation.estimators import (
     thinned,
 )
 from evaluation.localisation.robust import MAX_RANGE
+from evaluation.recognition.place_outcome import Number
 from evaluation.recognition.pose_errors import (
     SUCCESS_ROTATION_DEG,
     SUCCESS_TRANSLATION,
@@ -131,38 +133,26 @@ class Starts:
         )
 
 
-class _OneScan(Drive):
+class OneScan(FileDrive):
     """A cloud as a drive of one scan, at the origin of its world."""
 
-    def __init__(self, path: Path, columns: int | None):
-        self.name = path.name
-        self.world_frame = "map"
-        self._notes: list[str] = []
-        self._scan = read_cloud(path, columns, self._notes.append)
-
-    @property
-    def notes(self) -> tuple[str, ...]:
-        return tuple(self._notes)
-
-    def __len__(self) -> int:
-        return 1
-
-    @property
-    def stamps_ns(self) -> np.ndarray:
-        return np.zeros(1, np.int64)
-
-    @property
-    def X_WS(self) -> np.ndarray:
-        return np.eye(4)[None]
+    def __init__(self, path: Path, columns: int | None = None):
+        """Reads the cloud, with its columns if it is a `.bin` file."""
+        notes: list[str] = []
+        scan = read_cloud(path, columns, notes.append)
+        super().__init__(
+            name=path.name,
+            world_frame="map",
+            files=[path],
+            stamps_ns=np.zeros(1, np.int64),
+            X_WS=np.eye(4)[None],
+            read=lambda path, stamp_ns: scan,
+            notes=tuple(notes),
+        )
 
     def scan(self, index: int) -> np.ndarray:
-        del index
-        return self._scan
-
-
-def as_query(source: Drive | Path, columns: int | None = None) -> Drive:
-    """Returns the queries: a drive, or a cloud as one scan at the origin."""
-    return source if isinstance(source, Drive) else _OneScan(source, columns)
+        """Returns the whole cloud: a map has points at its origin, too."""
+        return self._read(self._files[index], 0)
 
 
 def mapped_frames(
@@ -351,10 +341,8 @@ def localise(
                     yield one.result()
 
     _localiser = localiser
-    try:
+    with errors_at(query.name):
         done = list(track(rows(), f"localising {query.name}", len(frames)))
-    except InputError as error:
-        raise InputError(f"{query.name}: {error}") from error
     return np.array(done, QUERY)
 
 
@@ -438,11 +426,14 @@ class Localisation:
         found["seconds_mean"] = float(rows["seconds"].mean())
         return found
 
-    def numbers(self) -> dict[str, float]:
-        """Returns the numbers of the summary that go into tables of results."""
+    def numbers(self, method: str) -> Iterator[Number]:
+        """Yields the numbers of the summary that go into tables of results."""
         found = self.to_json()
-        known = {name: found[name] for name in _SHOWN}
-        return {k: float(v) for k, v in known.items() if v is not None}
+        for name in _SHOWN:
+            if (value := found[name]) is not None:
+                yield Number(
+                    method, False, name, float(value), n=len(self.rows)
+                )
 
     def columns(self) -> dict[str, np.ndarray]:
         """Returns the columns of `queries.csv`."""

@@ -81,7 +81,6 @@ def by_distance(
     mine: Session, theirs: Session, track: Track = silent
 ) -> np.ndarray:
     """Returns labels (N,) of a map by its distance from the other map."""
-    del track
     _, kept, changed = SIDES[mine.side]
     far = np.isinf(nearest(mine.points, theirs.points, _APART))
     return np.where(far, changed, kept).astype(np.uint8)

@@ -137,9 +137,7 @@ def write_structures(
         field.name.replace("semantic_class", "class")
         for field in fields(StructureChange)
     ]
-    write_csv(
-        path, header, ((*astuple(row)[:-1], int(row.alone)) for row in rows)
-    )
+    write_csv(path, header, map(astuple, rows))
     return rows
 
 

@@ -266,7 +266,6 @@ def load_weights(path: Path) -> Mapping[str, np.ndarray]:
 
 @lru_cache(maxsize=4)
 def _load(path: Path, mtime_ns: int, size: int) -> Mapping[str, np.ndarray]:
-    del mtime_ns
     if size > _MOST_BYTES:
         raise InputError(
             f"{path}: {size} bytes are too many for weights (at most "

@@ -127,12 +127,10 @@ class Method(abc.ABC, Generic[Descriptor, Database]):
 
         By default, the method itself is returned.
         """
-        del field
         return self
 
     def assumption(self, field: LidarField | None) -> str | None:
         """Returns what the method assumes about a LiDAR, in words, or None."""
-        del field
         return None
 
     @property
@@ -202,7 +200,6 @@ class Method(abc.ABC, Generic[Descriptor, Database]):
         Returns:
             (K,) float64, higher is more similar; NaN for no candidate.
         """
-        del query, places
         return scores
 
     def relative_pose(

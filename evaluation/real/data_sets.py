@@ -9,7 +9,7 @@ from collections.abc import Callable, Sequence
 from functools import partial
 import hashlib
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 
@@ -157,17 +157,6 @@ class RealScans(NamedTuple):
         return self.data_set.folder
 
 
-class _Scans(FileDrive):
-    """Files without times, each read by the data set's own function."""
-
-    def __init__(self, read: Callable[[Path], np.ndarray], **drive: Any):
-        self._read_file = read
-        super().__init__(**drive)
-
-    def _read(self, path: Path, stamp_ns: int) -> np.ndarray:
-        return self._read_file(path)
-
-
 def open_data_sets(folder: Path, on_note: OnNote) -> list[RealScans]:
     """Returns the drives of the data sets in a folder.
 
@@ -216,13 +205,13 @@ def _open(folder: Path, one: DataSet, files: Sequence[Path]) -> Drive:
             raise InputError(f"{table}: {len(X_WS)} rows for {number} scans")
     elif one.poses:
         X_WS = _named_poses(table, files)
-    return _Scans(
-        one.read,
+    return FileDrive(
         name=one.folder,
         world_frame=one.world,
         files=list(files),
         stamps_ns=np.arange(number),
         X_WS=X_WS,
+        read=lambda path, stamp_ns: one.read(path),
         unit=one.unit,
     )
 

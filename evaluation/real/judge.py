@@ -18,7 +18,6 @@ Needs the extra `judge`.
 from __future__ import annotations
 
 from collections.abc import Iterator
-from pathlib import Path
 
 import numpy as np
 from scipy.spatial import cKDTree
@@ -26,9 +25,8 @@ from sklearn.ensemble import HistGradientBoostingClassifier
 from sklearn.metrics import roc_auc_score
 from threadpoolctl import threadpool_limits
 
-from cns_drake.base.errors import InputError
 from cns_drake.base.progress import Track, silent
-from evaluation.drives import Drive, open_drive
+from evaluation.drives import Drive
 
 _PATCHES = 16
 _HALF_WIDTH = 4.0
@@ -68,24 +66,6 @@ def scan_table(scan: np.ndarray) -> np.ndarray:
             ring = np.full(len(table), np.nan)
     table = np.column_stack([table[:, :3], bright, ring])
     return table[np.isfinite(table[:, :3]).all(axis=1)]
-
-
-def read_places(path: Path) -> list[list[np.ndarray]]:
-    """Returns the scans of each place in a data set."""
-    if not path.is_dir():
-        raise InputError(f"{path}: no folder of scans")
-    files = sorted(path.glob("*.bin"))
-    if files:
-        raws = (np.fromfile(file, np.float32).reshape(-1, 4) for file in files)
-        return [[scan_table(raw) for raw in raws]]
-    try:
-        drive = open_drive(path)
-    except InputError:
-        folders = sorted(one for one in path.iterdir() if one.is_dir())
-        if not folders:
-            raise
-        return [place for one in folders for place in read_places(one)]
-    return places_of(drive)
 
 
 def places_of(drive: Drive) -> list[list[np.ndarray]]:

@@ -8,12 +8,12 @@ the scans around it. The judge, a classifier, tells each data set from simulated
 scans of the same unit.
 """
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import replace
 import importlib.util
 import math
 from pathlib import Path
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -34,16 +34,16 @@ from evaluation.recognition.description import (
     describe_drive,
     joined_scans,
 )
-from evaluation.recognition.metrics import UNKNOWN, Interval
 from evaluation.recognition.overlap_truth import best_overlaps
 from evaluation.recognition.place_outcome import (
+    Number,
     PlaceOutcome,
     place_numbers,
     pose_numbers,
 )
 from evaluation.recognition.protocol import FAIR_PROTOCOL, RetrievalProtocol
 from evaluation.recognition.retrieval import compare_with_gates
-from evaluation.results.table import Answers, Key, QueryRows, Results, Row
+from evaluation.results.table import Answers, QueryRows, Results, Row
 
 _SIMULATED = replace(FAIR_PROTOCOL, scans_per_place=1)
 # Every real scan is a query and a place.
@@ -147,30 +147,28 @@ class Measuring:
         one: RealScans,
         task: str,
         method: str,
-        values: Sequence[tuple[str, float, Interval]],
-        n: int,
+        numbers: Iterable[Number],
         *,
         gate: bool = False,
         database: str = "",
-    ) -> Key:
-        """Adds rows, and returns what identifies them."""
-        key = Key(
-            experiment="real",
-            map=one.data_set.world,
-            database=database or one.name,
-            query=one.name,
-            seed=_REAL.seed,
-            factors={},
-            task=task,
-            method=method,
-            gate=gate,
-            protocol=_REAL.name,
-        )
-        self.rows += [
-            Row(**vars(key), metric=m, value=v, low=i.low, high=i.high, n=n)
-            for m, v, i in values
-        ]
-        return key
+        columns: Mapping[str, np.ndarray] | None = None,
+    ) -> None:
+        """Adds the results of a method, and its answers if it has columns."""
+        key: dict[str, Any] = {
+            "experiment": "real",
+            "map": one.data_set.world,
+            "database": database or one.name,
+            "query": one.name,
+            "seed": _REAL.seed,
+            "factors": {},
+            "task": task,
+            "method": method,
+            "gate": gate,
+            "protocol": _REAL.name,
+        }
+        self.rows += [Row.of(number, **key) for number in numbers]
+        if columns is not None:
+            self.answers.append(Answers(**key, columns=columns))
 
     def _recognise(
         self, sets: Sequence[RealScans], made: Sequence[Drive]
@@ -259,31 +257,16 @@ class Measuring:
                     overlaps,
                     _REAL.radius,
                 )
-                numbers = [
-                    (n.metric, n.value, n.interval)
-                    for n in place_numbers(now, None)
-                ]
-                key = self._add(
-                    one, "place", method.name, numbers, len(drive), gate=gate
-                )
-                columns = {
-                    # None, in whole numbers, is empty.
-                    name: np.array([-1 if v is None else v for v in values])
-                    for name, values in now.columns().items()
-                }
-                self.answers.append(Answers(**vars(key), columns=columns))
-                poses = [
-                    (n.metric, n.value, n.interval)
-                    for n in pose_numbers(now, None)
-                ]
                 self._add(
                     one,
-                    "pose",
+                    "place",
                     method.name,
-                    poses,
-                    int(now.outcomes.has_match.sum()),
+                    place_numbers(now, None),
                     gate=gate,
+                    columns=now.columns,
                 )
+                poses = pose_numbers(now, None)
+                self._add(one, "pose", method.name, poses, gate=gate)
 
     def _localise(self, one: RealScans) -> None:
         """Adds the rows of `localise`: each scan in a map of the rest."""
@@ -310,10 +293,9 @@ class Measuring:
         for name, rows in found.items():
             if rows:
                 result = localise.Localisation(np.array(rows))
-                values = [(n, v, UNKNOWN) for n, v in result.numbers().items()]
-                key = self._add(one, "localise", name, values, len(rows))
+                numbers = result.numbers(name)
                 columns = result.columns()
-                self.answers.append(Answers(**vars(key), columns=columns))
+                self._add(one, "localise", name, numbers, columns=columns)
 
     def _judge(self, one: RealScans, made: Sequence[Drive]) -> None:
         """Adds the rows of `judge`, by groups of features."""
@@ -340,6 +322,9 @@ class Measuring:
         )
         for group, auc in found["auc"].items():
             values = {"auc": auc, "auc_control": found["control"][group]}
-            known = [(n, v, UNKNOWN) for n, v in values.items() if v == v]
-            number = found["patches"][0]
-            self._add(one, "judge", group, known, number, database="simulated")
+            known = [
+                Number(group, False, n, v, n=found["patches"][0])
+                for n, v in values.items()
+                if v == v
+            ]
+            self._add(one, "judge", group, known, database="simulated")

@@ -20,11 +20,12 @@ In both modes, R@N is the share of the queries with a match that have a match
 among their N best places.
 """
 
-from collections.abc import Sequence
+from collections.abc import Hashable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import lru_cache
+import itertools
 import math
-from typing import Literal
+from typing import Any, Literal
 
 import numpy as np
 from scipy.special import stdtr, stdtrit
@@ -321,18 +322,6 @@ class Difference:
     p_value: float
 
 
-def auc_difference(first: QueryOutcomes, second: QueryOutcomes) -> Difference:
-    """Returns the AUC difference of two methods on the same queries.
-
-    See `mean_auc_difference`.
-
-    Args:
-        first: outcomes of Q queries.
-        second: outcomes of the same queries, in the same blocks.
-    """
-    return mean_auc_difference([(first, second)])
-
-
 def mean_auc_difference(
     pairs: Sequence[tuple[QueryOutcomes, QueryOutcomes]],
 ) -> Difference:
@@ -381,6 +370,29 @@ def holm(p_values: np.ndarray) -> np.ndarray:
     result = np.full(len(p_values), math.nan)
     result[order] = np.minimum(np.maximum.accumulate(steps), 1.0)
     return result
+
+
+def compared_by_auc(
+    answers: Mapping[Hashable, Sequence[QueryOutcomes]],
+) -> dict[tuple[Any, Any], tuple[Difference, float]]:
+    """Returns the AUC difference of each two of several methods.
+
+    Args:
+        answers: method -> its outcomes on each set of queries. All methods
+            answered the same queries, in the same blocks.
+
+    Returns:
+        Two methods -> the AUC of the first less the second, see
+        `mean_auc_difference`; and the p-value, corrected for all of these
+        differences by Holm's method.
+    """
+    pairs = list(itertools.combinations(answers, 2))
+    found = [
+        mean_auc_difference(list(zip(answers[a], answers[b], strict=True)))
+        for a, b in pairs
+    ]
+    corrected = holm(np.array([one.p_value for one in found])).tolist()
+    return dict(zip(pairs, zip(found, corrected, strict=True), strict=True))
 
 
 @dataclass(frozen=True)

@@ -2,14 +2,18 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 import math
 from typing import NamedTuple
 
 import numpy as np
 
-from evaluation.recognition.fault_kinds import NEARLY, visible_change_added
+from evaluation.recognition.fault_kinds import (
+    NEARLY,
+    mean_visible_change,
+    visible_change_added,
+)
 from evaluation.recognition.metrics import (
     UNKNOWN,
     Interval,
@@ -35,32 +39,17 @@ class PlaceOutcome:
         method: name of the method.
         is_gated: whether the gate was used.
         outcomes: outcomes of Q queries.
-        query_frames: (Q,) frames of the queries in their drive.
-        stamps_ns: (Q,) int64 time stamps of the queries.
-        p_WQs: (Q, 3) positions of the sensor at the queries [m].
-        match_drives: Q names of the drive of the best place; "" without a
-            candidate.
-        match_frames: (Q,) frame of the best place in that drive; -1 without a
-            candidate.
-        distances: (Q,) distances between query and best place [m]; NaN without
-            a candidate, and where the best place is in another city.
+        columns: columns of `queries.csv`, (Q,) each. An index that is unknown
+            is -1, other numbers are NaN or infinite.
         pose_errors: errors of the poses at the best places.
-        overlaps: (Q,) how much of the query's scan the best of its matches
-            shows, see `overlap_truth`; NaN without a match.
         radius: radius of a match [m].
     """
 
     method: str
     is_gated: bool
     outcomes: QueryOutcomes
-    query_frames: np.ndarray
-    stamps_ns: np.ndarray
-    p_WQs: np.ndarray
-    match_drives: list[str]
-    match_frames: np.ndarray
-    distances: np.ndarray
+    columns: Mapping[str, np.ndarray]
     pose_errors: PoseErrors
-    overlaps: np.ndarray
     radius: float
 
     @classmethod
@@ -82,29 +71,40 @@ class PlaceOutcome:
             retrieval: retrieval of Q queries and D places.
             query: (Q,) stamps [ns] and (Q, 3) places [m] of the queries.
             drives: D names of the drives of the places; that of the query's
-                own city comes first.
-            overlaps: (Q,) of the best match of each query.
+                own city comes first. Distances to others are unknown.
+            overlaps: (Q,) how much of the query's scan the best of its matches
+                shows, see `overlap_truth`; NaN without a match.
             radius: radius of a match [m].
         """
         best = retrieval.best_places.tolist()
-        names = [drives[k] if k >= 0 else "" for k in best]
-        at_home = np.array([name == drives[0] for name in names])
-        return cls(
-            method=method,
-            is_gated=is_gated,
-            outcomes=judge(
-                retrieval.scores, retrieval.matches, retrieval.query_blocks
-            ),
-            query_frames=retrieval.query_frames,
-            stamps_ns=query[0],
-            p_WQs=query[1],
-            match_drives=names,
-            match_frames=retrieval.best_frames,
-            distances=np.where(at_home, retrieval.best_distances, np.nan),
-            pose_errors=retrieval.pose_errors,
-            overlaps=overlaps,
-            radius=radius,
+        names = np.array([drives[k] if k >= 0 else "" for k in best])
+        outcomes = judge(
+            retrieval.scores, retrieval.matches, retrieval.query_blocks
         )
+        distances = retrieval.best_distances
+        distances[names != drives[0]] = math.nan
+        columns = {
+            "query_frame": retrieval.query_frames,
+            "query_stamp_ns": query[0],
+            "query_x": query[1][:, 0],
+            "query_y": query[1][:, 1],
+            "query_z": query[1][:, 2],
+            "block": outcomes.own_blocks,
+            "correct": outcomes.is_right,
+            "has_match": outcomes.has_match,
+            "score": outcomes.best_scores,
+            "first_right_rank": outcomes.first_right_ranks,
+            "why": faults(outcomes, retrieval.best_frames, distances, radius),
+            "match_drive": names,
+            "match_frame": retrieval.best_frames,
+            "distance": distances,
+            "translation_error": retrieval.pose_errors.translation,
+            "rotation_error_deg": retrieval.pose_errors.rotation_deg,
+            "overlap": overlaps,
+            "visible_change": 1.0 - overlaps,
+        }
+        errors = retrieval.pose_errors
+        return cls(method, is_gated, outcomes, columns, errors, radius)
 
     def number(
         self,
@@ -119,59 +119,34 @@ class PlaceOutcome:
             self.method, self.is_gated, metric, value, interval, count
         )
 
-    @property
-    def num_hidden(self) -> int:
-        """Number of wrong answers to queries with little overlap.
 
-        Their best match shows less than half of their scan.
-        """
-        is_hidden = self.overlaps < _HALF
-        return int((is_hidden & ~self.outcomes.is_right).sum())
+def faults(
+    outcomes: QueryOutcomes,
+    match_frames: np.ndarray,
+    distances: np.ndarray,
+    radius: float,
+) -> np.ndarray:
+    """Returns the reason for each query's wrong best place.
 
-    def faults(self) -> list[str]:
-        """Returns the reason for each query's wrong best place.
+    Args:
+        outcomes: outcomes of Q queries.
+        match_frames: (Q,) frame of the best place; -1 without a candidate.
+        distances: (Q,) distance to the best place [m]; NaN in another city.
+        radius: radius of a match [m].
 
-        Returns:
-            Q of: "" if it is right; `no_place` if the query has no match;
-            `no_candidate` if the method has no place, or rejects all;
-            `other_city`; `too_far` if it is within two radii; `elsewhere`.
-        """
-        wrong = [
-            ~self.outcomes.has_match,
-            self.match_frames < 0,
-            np.isnan(self.distances),
-            self.distances <= NEARLY * self.radius,
-        ]
-        return np.where(
-            self.outcomes.is_right,
-            "",
-            np.select(wrong, FAULTS[:-1], FAULTS[-1]),
-        ).tolist()
-
-    def columns(self) -> dict[str, np.ndarray | list]:
-        """Returns the columns of `queries.csv` for each of the Q queries."""
-        outcomes = self.outcomes
-        blocks = outcomes.blocks
-        return {
-            "query_frame": self.query_frames,
-            "query_stamp_ns": self.stamps_ns,
-            "query_x": self.p_WQs[:, 0],
-            "query_y": self.p_WQs[:, 1],
-            "query_z": self.p_WQs[:, 2],
-            "block": np.arange(len(outcomes)) if blocks is None else blocks,
-            "correct": outcomes.is_right,
-            "has_match": outcomes.has_match,
-            "score": outcomes.best_scores,
-            "first_right_rank": outcomes.known_ranks,
-            "why": self.faults(),
-            "match_drive": self.match_drives,
-            "match_frame": self.match_frames,
-            "distance": self.distances,
-            "translation_error": self.pose_errors.translation,
-            "rotation_error_deg": self.pose_errors.rotation_deg,
-            "overlap": self.overlaps,
-            "visible_change": 1.0 - self.overlaps,
-        }
+    Returns:
+        (Q,) "" if it is right; `no_place` if the query has no match;
+        `no_candidate` if the method has no place, or rejects all; `other_city`;
+        `too_far` if it is within two radii; `elsewhere`.
+    """
+    wrong = [
+        ~outcomes.has_match,
+        match_frames < 0,
+        np.isnan(distances),
+        distances <= NEARLY * radius,
+    ]
+    kinds = np.select(wrong, FAULTS[:-1], FAULTS[-1])
+    return np.where(outcomes.is_right, "", kinds)
 
 
 class Number(NamedTuple):
@@ -231,7 +206,9 @@ def place_numbers(
             right, was = outcomes.is_right, before.outcomes.is_right
             yield now.number("lost", float((was & ~right).sum()))
             yield now.number("found", float((right & ~was).sum()))
-            added = visible_change_added(now.overlaps, before.overlaps)
+            added = visible_change_added(
+                now.columns["overlap"], before.columns["overlap"]
+            )
             if not math.isnan(added):
                 yield now.number("visible_change_added", added)
     yield now.number("with_match", float(outcomes.has_match.sum()))
@@ -239,13 +216,14 @@ def place_numbers(
     yield now.number(
         "recall_at_full_precision", pr_curve(outcomes).recall_at_full_precision
     )
-    why = now.faults()
+    overlaps = now.columns["overlap"]
     for name in FAULTS:
-        yield now.number(name, float(why.count(name)))
-    yield now.number("hidden", float(now.num_hidden))
-    known = now.overlaps[~np.isnan(now.overlaps)]
-    if len(known):
-        yield now.number("visible_change", 1.0 - float(known.mean()))
+        yield now.number(name, float(np.sum(now.columns["why"] == name)))
+    # Their best match shows less than half of their scan.
+    is_hidden = (overlaps < _HALF) & ~outcomes.is_right
+    yield now.number("hidden", float(is_hidden.sum()))
+    if not math.isnan(shown := mean_visible_change(overlaps)[0]):
+        yield now.number("visible_change", shown)
 
 
 def pose_numbers(

@@ -9,7 +9,6 @@ from __future__ import annotations
 from collections import Counter
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, fields, replace
-import itertools
 from operator import attrgetter
 from types import MappingProxyType
 from typing import Any, NamedTuple
@@ -29,8 +28,7 @@ from evaluation.recognition.metrics import (
     Difference,
     Mode,
     PlaceRecognitionMetrics,
-    auc_difference,
-    holm,
+    compared_by_auc,
 )
 from evaluation.recognition.place_outcome import kept_share
 from evaluation.recognition.place_recognition import RADII, PlaceRecognition
@@ -339,16 +337,12 @@ def method_differences(
     """Returns the AUC difference of any two methods on each pair (mode all)."""
     found: list[MethodDifference] = []
     for some in by_pair(by_pair_and_method(results)).values():
-        both = list(itertools.combinations(some, 2))
-        differences = [
-            auc_difference(*(one.outcomes for one in two)) for two in both
-        ]
-        corrected = holm(np.array([one.p_value for one in differences]))
+        compared = compared_by_auc(
+            {k: [one.outcomes] for k, one in enumerate(some)}
+        )
         found += [
-            MethodDifference(*two, one, p)
-            for two, one, p in zip(
-                both, differences, corrected.tolist(), strict=True
-            )
+            MethodDifference(some[a], some[b], difference, p)
+            for (a, b), (difference, p) in compared.items()
         ]
     return found
 

@@ -18,8 +18,7 @@ from cns_drake.base.json_text import json_number
 from evaluation.recognition.metrics import (
     Difference,
     Interval,
-    holm,
-    mean_auc_difference,
+    compared_by_auc,
     percentile_interval,
     resampled_metrics,
     resampled_weights,
@@ -380,20 +379,13 @@ def _differences(
         places = [(method, one) for one in common]
         if all(place in table.answers for place in places):
             asked[name] = [table.answers[place] for place in places]
-    pairs = list(itertools.combinations(asked, 2))
-    found = []
-    for one, other in pairs:
-        both = list(zip(asked[one], asked[other], strict=True))
-        for first, second in both:
-            check_same_queries(first, second)
-        found.append(
-            mean_auc_difference([(a.outcomes, b.outcomes) for a, b in both])
-        )
-    corrected = holm(np.array([one.p_value for one in found])).tolist()
-    return [
-        Compared(*pair, difference, p)
-        for pair, difference, p in zip(pairs, found, corrected, strict=True)
-    ]
+    for one, *others in zip(*asked.values(), strict=True):
+        for other in others:
+            check_same_queries(one, other)
+    compared = compared_by_auc(
+        {name: [a.outcomes for a in some] for name, some in asked.items()}
+    )
+    return [Compared(*two, *found) for two, found in compared.items()]
 
 
 def _agreement(first: _Table, second: _Table, metric: str) -> Agreement:

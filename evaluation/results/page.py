@@ -101,7 +101,7 @@ def write_page(
         shown.append({"message": alone.message, "legend": alone.legend, **svgs})
     numbers = summarised(results, queries, charts)
     if numbers:
-        write_csv(folder / _SUMMARIES, Summary._fields, map(_cells, numbers))
+        write_csv(folder / _SUMMARIES, Summary._fields, numbers)
     environment = jinja2.Environment(
         loader=jinja2.FileSystemLoader(Path(__file__).parent),
         autoescape=True,
@@ -220,14 +220,6 @@ def _wide_table(results: Results) -> dict[str, Any]:
         "header": list(zip(names, is_text, strict=True)),
         "rows": [[_shown(value) for value in line] for line in cells],
     }
-
-
-def _cells(numbers: Summary) -> list[object]:
-    """Returns the cells of a summary, with all digits."""
-    return [
-        "" if isinstance(v, float) and math.isnan(v) else v
-        for v in (*numbers[:4], int(numbers.gate), *numbers[5:])
-    ]
 
 
 def _shown(value: object) -> str:

@@ -213,7 +213,8 @@ class Answers(Key):
 
     Attributes:
         columns: name -> (Q,) values, of the columns of `queries.csv`. NaN
-            stands for an empty number, -1 (or NaN) for an empty whole one.
+            stands for an empty number, -1 (or NaN, or infinity) for an empty
+            whole one.
     """
 
     columns: Mapping[str, np.ndarray]

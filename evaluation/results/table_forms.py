@@ -130,14 +130,7 @@ class Table:
 
     def to_csv(self) -> str:
         """Returns the table as CSV with all digits."""
-        cells = (
-            [
-                int(v) if isinstance(v, bool) else "" if _is_missing(v) else v
-                for v in row
-            ]
-            for row in self.rows
-        )
-        return csv_text(self._full_names(), cells)
+        return csv_text(self._full_names(), self.rows)
 
     def write_csv(self, path: Path) -> None:
         """Writes the table as CSV, as `to_csv` returns it.

@@ -79,7 +79,6 @@ def compare_stages(
         stems: paths of the two figures, without ending. The first figure shows
             what changed, the second one the sets from which TCR is computed.
     """
-    del reporter
     read: list[SurveyedDrive] = [part.read() for part in drives]
     earlier, later, *controls = (
         Surveyed(one.name, one.coarse, one.positions, one.placed)

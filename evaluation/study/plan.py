@@ -23,7 +23,6 @@ from evaluation.study.collection import (
     City,
     Pair,
     RecordingInfo,
-    Run,
     find_recordings,
     group_cities,
     nothing_to_compare,
@@ -87,8 +86,12 @@ class Study:
 
     @property
     def _costed_pairs(self) -> list[Pair]:
-        pairs = (city.recognition_pairs() for city in self.cities)
-        return [one for some in pairs for one in some if self.with_costs]
+        return [
+            pair
+            for city in self.cities
+            for pair in city.recognition_pairs()
+            if self.with_costs
+        ]
 
     def assemble(
         self,
@@ -141,9 +144,6 @@ class Study:
         if self._costed_pairs:
             report.costs = self._files.part("costs", "costs").read()
         return page.write_report(report, self.output)
-
-    def _runs(self, city: City, pair: Pair) -> list[Run]:
-        return city.runs(pair, self.methods, self.protocol)
 
     def _result(self, pair: Pair, key: str) -> Part:
         """Returns the part with the result of a run by name."""
@@ -209,7 +209,7 @@ class Study:
         roles: dict[tuple[MethodChoice, RetrievalProtocol], set[Role]]
         roles = defaultdict(set)
         for pair in city.recognition_pairs():
-            for run in self._runs(city, pair):
+            for run in city.runs(pair, self.methods, self.protocol):
                 key = run.method, run.protocol
                 if run.repeats and pair[1] is drive:
                     roles[key].add("queries")
@@ -294,7 +294,7 @@ class Study:
                     run.protocol,
                 ),
             )
-            for run in self._runs(city, pair)
+            for run in city.runs(pair, self.methods, self.protocol)
             if explains or not run.repeats
         ]
         asked = self.methods if explains else self.methods[:1]
@@ -337,7 +337,7 @@ class Study:
         compared = []
         for pair in self._pairs(city):
             control = city.unchanged_pair(*pair)
-            for run in self._runs(city, pair):
+            for run in city.runs(pair, self.methods, self.protocol):
                 result = self._result(pair, run.queries).read()
                 if run.repeats:
                     report.repeated.append(result)

@@ -15,7 +15,7 @@ import numpy as np
 from numpy.lib.recfunctions import repack_fields
 
 from cns_drake.base.errors import InputError
-from cns_drake.base.files import read_bytes
+from cns_drake.base.files import read_bytes, user_errors
 from cns_drake.base.jobs.step import Reporter, Step
 from cns_drake.base.points import xyz
 from cns_drake.base.progress import Track, silent
@@ -117,7 +117,7 @@ class RecordedDrive:
         fingerprint beside it, which takes the place of the times: a copy is the
         same recording.
         """
-        try:
+        with user_errors(self.path):
             path = self.path.resolve(strict=True)
             files = [path]
             if path.is_dir():
@@ -128,10 +128,6 @@ class RecordedDrive:
             if (folder / "fingerprint.txt").is_file():
                 content = read_bytes(folder / "fingerprint.txt")
                 known = content.decode("utf-8", "replace")
-        except OSError as error:
-            raise InputError(
-                f"{self.path}: {error.strerror or error}"
-            ) from error
         chosen: list[list] = [
             [one] for one in (self.lidar, self.columns) if one is not None
         ]

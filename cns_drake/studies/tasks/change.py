@@ -82,7 +82,6 @@ def measure_change(
     reporter: Reporter, first: Part, second: Part
 ) -> dict[str, tuple[float, int]]:
     """Returns metric -> value and number of voxels, for two mapped drives."""
-    del reporter
     a, b = (
         Surveyed(name, *part.read())
         for name, part in (("database", first), ("query", second))

@@ -105,15 +105,13 @@ class LocaliseTask(Task):
     def numbers(self, found: Any, before: Any | None) -> Iterator[Number]:
         then = dict(self._runs(before)) if before is not None else {}
         for method, rows in self._runs(found):
-            values = localise.Localisation(rows).numbers()
+            yield from localise.Localisation(rows).numbers(method)
             if method in then:
                 share = kept_share(
                     float(localise.is_right(rows).mean()),
                     float(localise.is_right(then[method]).mean()),
                 )
-                values["kept"] = float(share)
-            for name, value in values.items():
-                yield Number(method, False, name, value, n=len(rows))
+                yield Number(method, False, "kept", float(share), n=len(rows))
 
     def answers(self, found: Any) -> Iterator[Answered]:
         for method, rows in self._runs(found):
@@ -146,7 +144,6 @@ def measure_localisation(
         (K,) records of `QUERY` for each method and start, with the starts of a
         method next to each other; empty if the query is nowhere near the map.
     """
-    del texts
     mapped, asked = database(), query()
     maps: dict[tuple[float, int], estimators.LocalisationMap] = {}
     localisers = []

@@ -59,7 +59,7 @@ class PlaceTask(Task):
 
     def answers(self, found: Outcomes) -> Iterator[Answered]:
         for now in found:
-            yield now.method, now.is_gated, now.columns()
+            yield now.method, now.is_gated, now.columns
 
 
 class PoseTask(PlaceTask):

@@ -27,9 +27,7 @@ _DESCRIPTION_COST = 30.0
 
 # A method, whether its gate was used, and its answers to Q queries: column -> Q
 # values.
-Answered: TypeAlias = (
-    "tuple[str, bool, Mapping[str, Sequence[Any] | np.ndarray]]"
-)
+Answered: TypeAlias = "tuple[str, bool, Mapping[str, np.ndarray]]"
 
 
 @dataclass(frozen=True)
