@@ -1,6 +1,7 @@
 """Maps that an experiment makes: aged, drawn anew or imported.
 
-Also drives through other cities, for a crowded database.
+The module also makes drives through other cities, whose places are added to a
+database to make recognition harder.
 """
 
 from __future__ import annotations
@@ -168,7 +169,7 @@ class MadeMaps:
         """Makes all maps that were noted and do not exist yet.
 
         Raises:
-            InputError: one could not be made; all are named.
+            InputError: maps could not be made; the error names all of them.
         """
         aged = [
             AgeCity(
@@ -253,7 +254,7 @@ def distracting_drives(
     cluster: Cluster,
     on_note: Callable[[str], None] = lambda text: None,
 ) -> list[Scenario]:
-    """Returns drives through other cities that distract a method.
+    """Returns drives through other cities, whose places distract a method.
 
     Together, the drives have about the wanted number of places. The first ones
     are the shipped drives of other maps, each through its own stage. If the
@@ -262,8 +263,8 @@ def distracting_drives(
     at last the same drives through those cities drawn anew.
 
     Args:
-        query: the drive whose LiDARs measure all of them, and whose city is
-            left out.
+        query: the query drive. The returned drives have its LiDARs, and do not
+            go through its city.
         number: approximate number of places.
         spacing: distance between two places [m].
         output: folder for cities that are drawn anew.

@@ -1,4 +1,4 @@
-"""Sets of scans for trainers of place recognition, with exact truth.
+"""Writes training data for place-recognition networks, with exact truth.
 
 The drives are simulated without recording them. Scans of drives through the
 same city can match each other. Cities are put `CITY_DISTANCE` apart, so that
@@ -64,10 +64,11 @@ class ExportOptions:
     """Settings of the export of each drive.
 
     Attributes:
-        format: format of the program that trains.
+        format: data format, that of the training program.
         spacing: distance between two clouds, along the path [m].
         scans: consecutive scans that are merged into a cloud.
-        max_range: points with a greater x, y or z are left out [m].
+        max_range: points that are farther away than this along x, y or z are
+            left out [m].
     """
 
     format: Format = "pointnetvlad"
@@ -120,16 +121,16 @@ def export_pairs(
 
     Args:
         scenarios: the drives to learn from.
-        held_out: drives for evaluation only; without any, all drives are
-            evaluated.
+        held_out: drives for evaluation only. If there are none, all drives are
+            used for training and evaluation.
         output: the folder of the set.
         options: format and spacing of the exported clouds.
         cluster: runs the work.
         on_note: takes notes on missing parts of the set.
 
     Raises:
-        InputError: there is no drive to learn from, two drives have one name,
-            or one cannot be simulated; all such are named.
+        InputError: there is no drive to learn from, two drives have the same
+            name, or drives cannot be simulated; the error names all of these.
     """
     if not scenarios:
         raise InputError("export-pairs: no drive to learn from")
@@ -231,7 +232,7 @@ def compare_runs(
     database: DriveSimulation,
     options: ExportOptions,
 ) -> np.ndarray:
-    """Returns the exact overlaps of a drive's scans with another's, (Q, D)."""
+    """Returns the exact overlap of each query with each place, (Q, D)."""
     protocol = RetrievalProtocol(
         query_spacing=options.spacing,
         place_spacing=options.spacing,
@@ -309,9 +310,9 @@ def _locations(
 
     A location is a city; if there are fewer cities than locations, some cities
     occur twice. The evaluation divides by the number of pairs of drives, and
-    for each of these by the number of queries with a match. Cities for which
-    that is impossible are left out, with a note; without any city, there is no
-    location.
+    for each of these by the number of queries with a match. Cities where one of
+    these numbers is 0 are left out, with a note. If no city is left, there is
+    no location.
     """
     cities: dict[int, list[Run]] = {}
     for run in runs:
@@ -400,7 +401,7 @@ _MODULE = "datasets.base_datasets"
 
 
 def _tuple_class() -> type:
-    """Returns the class that trainers unpickle, under its name there."""
+    """Returns the class that training programs unpickle, named as there."""
     if _MODULE in sys.modules:
         return sys.modules[_MODULE].TrainingTuple
     module: Any = types.ModuleType(_MODULE)

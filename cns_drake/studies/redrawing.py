@@ -72,7 +72,8 @@ def redraw_cities(
 
     Raises:
         InputError: the map cannot be used, another file or folder has the name
-            of a city, or some could not be drawn; all are named.
+            of a city, or cities could not be drawn; the error names all of
+            them.
     """
     map_folder, output = map_folder.resolve(), output.resolve()
     folders = {seed: output / f"{map_folder.name}_c{seed}" for seed in seeds}
@@ -140,8 +141,8 @@ def make_maps(steps: Sequence[MakeMap], output: Path, cluster: Cluster) -> None:
     """Makes maps in a folder, with progress on stderr; finished ones are kept.
 
     Raises:
-        InputError: another file or folder has the name of a map, or some could
-            not be made; all are named.
+        InputError: another file or folder has the name of a map, or maps could
+            not be made; the error names all of them.
     """
     # Quick checks come before all slow work.
     for step in steps:
@@ -154,7 +155,7 @@ def make_maps(steps: Sequence[MakeMap], output: Path, cluster: Cluster) -> None:
 
 @dataclass(frozen=True)
 class RedrawCity(MakeMap):
-    """Draws the city of a map anew, with one stage, the whole city."""
+    """Draws a map's city anew; its only stage contains the whole city."""
 
     map_folder: Path
     stage: str
@@ -175,7 +176,7 @@ class RedrawCity(MakeMap):
         return redrawn_inputs(self.map_folder, self.stage, self.seed)
 
     def finish_inputs(self, draft: Path) -> None:
-        """Writes the inputs that can only be made once the city is drawn."""
+        """Writes the inputs that can be made only after the city is drawn."""
 
     def sources(self) -> dict[str, object]:
         """Returns everything on which the city depends, ready for JSON."""
@@ -191,9 +192,10 @@ class RedrawCity(MakeMap):
 def redrawn_inputs(map_folder: Path, stage: str, seed: int) -> dict[str, bytes]:
     """Returns the inputs of a map's city drawn anew: name -> content.
 
-    They are `roads.yaml`, which is the map's own, `city.yaml` and `stages.yaml`
-    with one stage, the whole city. The map's own stages name structures that
-    another draw need not have.
+    The inputs are the map's own `roads.yaml`, a `city.yaml` with the new seed,
+    and a `stages.yaml` with one stage that contains the whole city. The map's
+    own stages cannot be used, because they name structures that the new city
+    may lack.
 
     Raises:
         InputError: a file of the map cannot be read, or is no plan.
@@ -227,7 +229,11 @@ def to_yaml(title: str, values: dict) -> bytes:
 
 @dataclass(frozen=True)
 class Version:
-    """A version of a shipped map, from 1 on, turned about the origin [deg]."""
+    """A freshly drawn version of a shipped map.
+
+    Its number begins with 1. Its city is rotated about the origin by
+    `turn_deg`.
+    """
 
     map_name: str
     number: int
@@ -363,7 +369,7 @@ def _turned_bounds(bounds: Sequence[float], turn_deg: float) -> list[float]:
 def kept_names(stages: Any, names: Sequence[str]) -> Any:
     """Returns a `stages.yaml` without the structures that a city lacks.
 
-    A row can have fewer houses in another draw. Groups that would have no
+    A row can have fewer houses if it is drawn anew. Groups that would have no
     structure are left out.
     """
     if isinstance(stages, list):

@@ -45,9 +45,9 @@ def reproduce_maps(
     contains the tables and figures. Finished work is not repeated. The function
     returns the path of the report's page.
 
-    With `quick`, only the report is made, from the same frames. Drives that are
-    not recorded yet are then evaluated while they are simulated, and they are
-    not recorded.
+    With `quick`, only the report is made, and no drive is recorded. Drives that
+    are not recorded yet are evaluated while they are simulated, at the same
+    frames as a recording.
 
     Args:
         maps: names or folders of maps; all shipped maps if None.

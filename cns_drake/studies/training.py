@@ -191,7 +191,8 @@ class Sampler:
     def _cluster(
         self, city: int, rng: np.random.Generator
     ) -> tuple[list[int], list[int]]:
-        """Returns near queries, and two places for each of them."""
+        """Returns queries near each other, with a right and a wrong place each.
+        """
         xy = self._scans.xy
         drives = list(self._groups[city].values())
         first, second = rng.permutation(len(drives))[:2]
@@ -312,7 +313,8 @@ def train(
 ) -> tuple[Parameters, np.ndarray]:
     """Trains a network; an interrupted training goes on from its `state` file.
 
-    Returns the weights, and (steps, 2) loss and share of right best places.
+    Returns the weights; and, for each step, the loss and the share of queries
+    whose best place is right, (steps, 2).
 
     Args:
         scans: images of scans and which of them are of one place.
@@ -432,8 +434,8 @@ def write_weights(
 ) -> None:
     """Writes a file of weights, as the method `learned` reads it.
 
-    `seen` is the least and the greatest share of sectors with a point that the
-    scans of the training have.
+    `seen` describes the training scans: the least and the greatest share of a
+    scan's sectors that contain a point.
     """
     arrays: dict[str, Any] = {
         "version": np.int64(WEIGHTS_VERSION),
@@ -511,7 +513,7 @@ def make_weights(
     Args:
         plan: cities, drives and steps.
         output: file of weights.
-        command: text that the file keeps.
+        command: command line that is stored in the file.
         cluster: runs the jobs.
         track: reports progress.
 

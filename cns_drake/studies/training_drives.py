@@ -60,9 +60,9 @@ _OVERLAP_POINTS = 1000
 class DrawnCity:
     """A city with its drives, all drawn from a seed.
 
-    `map_name` is the shipped map that has its streets, or `DRAWN_STREETS`. With
-    `graded`, the overlap of each scan with the places of the other scans is
-    computed.
+    `map_name` is the shipped map whose streets the city has, or
+    `DRAWN_STREETS`. With `graded`, the overlap of each scan with the places of
+    the other scans is computed.
     """
 
     map_name: str
@@ -287,10 +287,12 @@ def draw_streets(rng: np.random.Generator) -> dict[str, Any]:
 
 
 def draw_stages(city: City, rng: np.random.Generator) -> dict[str, dict]:
-    """Returns random stages of a city: absent or lower buildings, small trees.
+    """Returns random stages: buildings are missing or lower, trees smaller.
+
+    The last stage is the whole city.
 
     Returns:
-        The content of `stages.yaml`, in which the last one is the whole city.
+        The content of `stages.yaml`.
     """
     buildings = [s for s in city.structures if s.semantic_class == "building"]
     trees = [s for s in city.structures if s.name.startswith("tree_")]

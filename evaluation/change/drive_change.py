@@ -1,8 +1,8 @@
 """The structural change between two drives, with its context.
 
-TCR_sym is reported with two more values: the control, which is due to the two
-routes only, and the coverage-masked value, for the parts of the city that both
-routes saw.
+TCR_sym is reported with two more values. The control is the TCR_sym that the
+different routes alone cause. The coverage-masked value counts only the parts of
+the city that both routes saw.
 """
 
 from __future__ import annotations
@@ -316,7 +316,11 @@ def _same_stage_partner(
 
 
 def _route_distance(first: np.ndarray, second: np.ndarray) -> float:
-    """Returns the mean distance between routes, the larger of both ways [m]."""
+    """Returns the mean distance between two routes [m].
+
+    The distance is measured from each route to the nearest points of the other
+    route; the larger mean counts.
+    """
     there, _ = cKDTree(second).query(first)
     back, _ = cKDTree(first).query(second)
     return float(max(there.mean(), back.mean()))
@@ -345,7 +349,7 @@ class ChangeResult:
 def symmetric_changes(
     changes: Iterable[ChangeResult],
 ) -> dict[tuple[str, str, str], float]:
-    """Returns (map, stage, stage) -> TCR_sym, in both orders."""
+    """Returns (map, stage, stage) -> TCR_sym, with stages in both orders."""
     values = {}
     for result in changes:
         value = result.report.change.symmetric

@@ -1,14 +1,15 @@
 """Temporal change ratio (TCR) of two maps, directed and symmetric.
 
-Source: "The City that Never Settles", equations 1 to 3. The following choices
-are open in the paper.
+Source: "The City that Never Settles", equations 1 to 3. The paper leaves the
+following choices open; this module makes them.
 
 - X is the map of a whole drive in world coordinates, as the centroids of
   the voxels of a grid that is fixed in the world (see `evaluation.maps`).
-- Shifting that grid changes TCR_sym. By how much is shown by the least and the
-greatest value on `GRIDS`, shifts that are spread evenly over a voxel. - The
-hull is widened by `HULL_MARGIN` on all sides. Flat ground is a face of the
-hull; without a margin, a millimetre would decide whether the ground counts.
+- TCR_sym changes if that grid is shifted. The least and the greatest value over
+  `GRIDS`, shifts that are spread evenly over a voxel, show by how much.
+- The hull is widened by `HULL_MARGIN` on all sides. Flat ground is a face of
+  the hull; without a margin, a millimetre would decide whether the ground
+  counts.
 - O, the unchanged points, is counted inside H, the points in the other map's
   convex hull; otherwise the ratio could become negative.
 - The two sets of a union are points of different clouds, so that the union is a

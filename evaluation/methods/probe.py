@@ -17,8 +17,8 @@ BSD-3); on the same scans, scores agree to 1e-6. Deliberate differences:
 - All places are compared. The program first takes the 50 nearest ones by the
   means of the rings, which saves time.
 - A place without points within range is never a candidate, and a query without
-such points has no candidates. - Scans with a narrow field of view get no
-special treatment.
+  such points has no candidates.
+- Scans with a narrow field of view get no special treatment.
 """
 
 from collections.abc import Sequence

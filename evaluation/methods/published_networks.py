@@ -12,9 +12,9 @@ The rest is thinned to 4096 points, centred, and scaled so that the mean
 distance from the centre is 1/2. Points outside of [-1, 1] are replaced by other
 points. As in that program, x points backwards. Deliberate differences:
 
-- A place is one scan of a spinning LiDAR, not 20 m of a planar scanner. -
-Random draws have a fixed seed. - A cloud with fewer points than 4096 repeats
-some.
+- A place is one scan of a spinning LiDAR, not 20 m of a planar scanner.
+- Random draws have a fixed seed.
+- A cloud with fewer points than 4096 repeats some.
 """
 
 import abc

@@ -17,9 +17,10 @@ dropped`, scores agree with the authors' C++ program to 3e-4, the precision of
 its heights. Deliberate differences:
 
 - The voxels for thinning start at the sensor. The T-RO program leaves this to
-MATLAB, the C++ program to its caller. - The sensor's height is a parameter, 1.6
-m for CNS, instead of 1.9 or 2 m. - A function of the T-RO program accumulates
-the shifts that it tries; the code here follows its corrected copy.
+  MATLAB, the C++ program to its caller.
+- The sensor's height is a parameter, 1.6 m for CNS, instead of 1.9 or 2 m.
+- A function of the T-RO program accumulates the shifts that it tries; the code
+  here follows its corrected copy.
 - A cell may hold more than 500 points.
 - Two scans without a column in common have no score.
 """

@@ -3,9 +3,10 @@
 The definitions were derived from the paper's numbers. Only the best place of
 each query counts:
 
-- TP: accepted, and the best place is a true match, - FP: accepted, and the best
-place is not a true match, whether or not the query has a match, - FN: rejected,
-although the query has a match.
+- TP: accepted, and the best place is a true match,
+- FP: accepted, and the best place is not a true match, whether or not the query
+  has a match,
+- FN: rejected, although the query has a match.
 
 A rejected query without a match is in none of these. A query without a
 candidate is never accepted. In mode `all` every query counts; in mode

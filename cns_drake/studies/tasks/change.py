@@ -28,7 +28,12 @@ _WHOLE_COST, _COST = 60.0, 20.0
 
 
 class ChangeTask(Task):
-    """TCR_sym of two drives, or of the query's route in the two cities."""
+    """Measures the change (TCR_sym) between two drives or their cities.
+
+    If the query's route was also driven through the database's city, that drive
+    is compared with the query, so that only the city differs. Otherwise the
+    database is compared with the query.
+    """
 
     name = "change"
     defaults: ClassVar[Mapping[str, Any]] = {"spacing": None}

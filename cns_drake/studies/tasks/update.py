@@ -39,7 +39,7 @@ _COST = 60.0
 
 
 class MapTask(Task):
-    """Which points of two maps are kept, gone, new or not observed."""
+    """Scores change detectors, which label points as kept, gone or new."""
 
     name = "map"
     defaults: ClassVar[Mapping[str, Any]] = {"methods": None, "spacing": 5.0}
