@@ -419,7 +419,7 @@ class PairOfDrives:
         return drive.replaced(without=member.without)
 
     def _fit(self, drive: Scenario, fields: dict[str, Any]) -> None:
-        """Reduces traffic to the roads' room; drops impossible lane changes."""
+        """Reduces traffic to what roads hold; drops impossible lane changes."""
         driver, traffic = (
             one if isinstance(one := fields.get(name), Mapping) else {}
             for name in ("driver", "traffic")

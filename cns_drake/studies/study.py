@@ -265,8 +265,7 @@ class Study:
         return found
 
     def _drives(self, maps: Sequence[str]) -> Iterator[_Drives]:
-        """Yields the drives of all maps; makes maps that are aged or imported.
-        """
+        """Yields the drives of all maps; makes aged and imported maps."""
         made = {
             one.name: one
             for one in self.experiment.maps or ()

@@ -191,8 +191,7 @@ class Sampler:
     def _cluster(
         self, city: int, rng: np.random.Generator
     ) -> tuple[list[int], list[int]]:
-        """Returns queries near each other, with a right and a wrong place each.
-        """
+        """Returns neighbouring queries, with a right and a wrong place each."""
         xy = self._scans.xy
         drives = list(self._groups[city].values())
         first, second = rng.permutation(len(drives))[:2]

@@ -89,7 +89,7 @@ def _text_records(
 
     Args:
         kind: the kind of file, for errors.
-        more: whether something else follows.
+        more: whether the file continues after these rows.
     """
     with open(path, "rb") as stream:
         stream.seek(offset)

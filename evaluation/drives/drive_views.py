@@ -111,7 +111,7 @@ class RecentScans(DriveView):
     """
 
     def __init__(self, drive: Drive, kept: int):
-        """Wraps a drive, without a scan in memory.
+        """Wraps a drive; no scan is in memory yet.
 
         Args:
             drive: the drive.

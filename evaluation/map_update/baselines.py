@@ -124,7 +124,10 @@ def by_free_space(
 def _count_views(
     points: np.ndarray, other: Session, track: Track
 ) -> np.ndarray:
-    """Returns how many scans see past each point, show it and hide it.
+    """Returns how many scans see past each point, show it, or hide it.
+
+    The module's text on `free-space` defines the first two. A scan hides a
+    point if a surface lies in front of it.
 
     Returns:
         (3, N) counts for the points (N, 3).

@@ -6,7 +6,7 @@ A folder holds the older drive as `A` and the newer one as `B`. Each has
   `y`, `z` [m], and, where they are known, `label` (class, SemanticKITTI's ids)
   and `instance` (number of a structure),
 - `truth.npy`: a label for each point of the map, see `Label`,
-- `Scans/000000.pcd` and on: the scans in the frame of the LiDAR,
+- `Scans/000000.pcd` onwards: the scans in the frame of the LiDAR,
 - `poses.txt`: a row for each scan, the upper 3 x 4 of the LiDAR's pose in the
   world, and `singlesession_posegraph.g2o`, the same as a pose graph.
 
@@ -55,7 +55,7 @@ MOVES = (*range(252, 260), 10, 11, 13, 15, 18, 20, 30, 31, 32)
 
 
 class Label(IntEnum):
-    """What became of a point.
+    """What happened to a point of a map: kept, gone, new or not observed.
 
     Points of A have the labels 0, 1 and 2; points of B have 1, 3 and 4. IGNORED
     occurs only in labels of a user; scores leave out such points.

@@ -1,4 +1,4 @@
-"""Layered overlap: a matched filter on maps of bits, made to survive change.
+"""Layered overlap: a matched filter on binary maps, robust to change.
 
 A scan becomes maps from above: one for each layer of height, one for poles and
 one for kerbs. Two scans are compared at the pose at which most of their filled
@@ -102,7 +102,7 @@ class LayeredScan:
     """Descriptor of one cloud.
 
     Attributes:
-        cells: (M,) uint16, filled cells, layer by layer.
+        cells: (M,) uint16 numbers of the filled cells, layer by layer.
         starts: (6,) int64, index in `cells` at which each layer begins and the
             last one ends.
     """
@@ -152,8 +152,8 @@ class LayeredOverlap(Method[LayeredScan, LayeredDatabase]):
     of the place or its neighbour. It is divided by the geometric mean of the
     two scans' weighted numbers of cells.
 
-    Among equal counts, the first wins. All counts are integers, so that scores
-    are the same on every processor.
+    Of several poses with equal counts, the first one is used. All counts are
+    integers, so that scores are the same on every processor.
     """
 
     Config = LayeredOverlapConfig

@@ -116,10 +116,11 @@ class LearnedConfig(MethodConfig):
     Attributes:
         weights: file with weights from `cns-drake train`. By default the
             shipped weights of the variant.
-        variant: which shipped weights to use. `radius` was trained on streets
-            of the shipped cities, and every place within 7.5 m counted as
-            right. `graded` was trained on streets of no shipped map, and places
-            were ranked by their exact overlap.
+        variant: which shipped weights to use. With `radius`, the network was
+            trained on streets of the shipped cities, and every place within 7.5
+            m of a query counted as right. With `graded`, it was trained on
+            other streets, and the places of a query were ranked by their exact
+            overlap.
     """
 
     weights: Path | None = None
@@ -230,7 +231,7 @@ class Learned(Method[LearnedScan, LearnedDatabase]):
         return yaw_pose(yaw)
 
     def _check_seen(self, image: np.ndarray) -> None:
-        """Warns once if the sensor sees less than any did in training."""
+        """Warns once if the sensor sees less than any sensor in training."""
         if self._warned:
             return
         seen = seen_part(image)

@@ -61,7 +61,8 @@ class MapClosuresDatabase:
         program: object of the package that stores all local maps.
         num_queries: number of queries that were added to the local maps.
         query: the last query.
-        found: place -> inliers and pose X_PQ (4, 4) of the last query.
+        found: place -> number of inliers and pose X_PQ (4, 4) of the last
+            query.
     """
 
     num_places: int

@@ -97,7 +97,7 @@ def _without_ground(points: np.ndarray, rng: np.random.Generator) -> np.ndarray:
 def _drawn(
     points: np.ndarray, chosen: np.ndarray, rng: np.random.Generator
 ) -> np.ndarray:
-    """Returns random points, as many as `chosen` lacks of the full number."""
+    """Returns random points, as many as `chosen` lacks to be complete."""
     lacking = NUM_POINTS - len(chosen)
     repeats = lacking > len(points)
     return points[rng.choice(len(points), lacking, replace=repeats)]
@@ -409,7 +409,9 @@ class NetworkConfig(MethodConfig):
 
 
 class _Network(Method[np.ndarray, np.ndarray]):
-    """A network; descriptors (256,) are NaN without points.
+    """A published network as a place-recognition method.
+
+    The descriptor (256,) of a cloud without points is NaN.
 
     Scores are negative distances.
     """

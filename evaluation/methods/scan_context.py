@@ -307,7 +307,7 @@ def _polar_context(points: np.ndarray, config: ScanContextConfig) -> np.ndarray:
 
 
 def _cart_context(points: np.ndarray, config: ScanContextConfig) -> np.ndarray:
-    """Returns the greatest height per cell: rows along x, columns across.
+    """Returns the greatest height per cell: rows along x, columns along y.
 
     As in the T-RO program, cells are counted outwards from the axes, so that
     the cells around the axes are twice as large, and the first row and column
@@ -361,10 +361,11 @@ def _unit_columns(images: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
 
 
 def _key_shift(key: np.ndarray, others: np.ndarray) -> np.ndarray:
-    """Returns the shift (C,) at which each other key fits a key best.
+    """Returns the shift (C,) at which each of `others` fits `key` best.
 
-    It is the s that minimises |key - roll(other, s)|, and equally the s that
-    maximises the product of the two; the lowest of several equal ones.
+    The shift is the s that minimises |key - roll(other, s)|, which also
+    maximises the product of the two keys. Of several equal shifts, the lowest
+    is returned.
     """
     column = np.arange(len(key))
     rolled = key[(column + column[:, None]) % len(key)]

@@ -68,7 +68,7 @@ class SolidConfig(MethodConfig):
         return self
 
     def field(self, lidar: LidarField = _CNS) -> LidarField:
-        """Returns the given field of view, or else that of the LiDAR."""
+        """Returns the field of view of the settings, or else of the LiDAR."""
         elevations, lowest_deg, highest_deg = lidar
         if self.elevations is not None:
             elevations = self.elevations
@@ -111,9 +111,10 @@ class SolidMethod(Method[Solid, SolidDatabase]):
 
     Where it differs from the authors' programs:
 
-    - An elevation outside the field of view counts in the outermost cell.
-      In [P], elevations below it wrap around to the top; [C] reads outside its
-      table if they are more than one cell too low.
+    - An elevation outside the field of view counts in the outermost cell. In
+      [P] (the authors' Python program), elevations below the field of view wrap
+      around to the top. [C] (their C++ program) reads outside its table if
+      elevations are more than one cell too low.
     - Coordinates that are exactly zero stay zero; the programs replace them
       by 1 mm.
     - If all elevations have the same number of points, all weights are 1 (the
@@ -209,7 +210,8 @@ class SolidMethod(Method[Solid, SolidDatabase]):
     def _prepare(self, points: np.ndarray) -> np.ndarray:
         """Returns the thinned points within range.
 
-        The voxels of [P] begin half a voxel below the least coordinates.
+        As in the authors' Python program, the voxels begin half a voxel below
+        the least coordinates.
         """
         config = self.config
         # One column at a time: NumPy reduces slowly along a short axis.

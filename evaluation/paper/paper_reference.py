@@ -69,9 +69,10 @@ def paper() -> Reference:
 
     Two misprints are corrected, each with a note in its row: Table I gives
     Downtown 01-04 the value of 02-04, and one R@1 of RING++ on Riverside 02->01
-    contradicts the F1 beside it. The paper does not state the mode of
-    `recognition.metrics` of a method. The mode is inferred from the relation
-    between R@1, F1 and AUC in all rows of a method.
+    contradicts the F1 beside it. The paper does not state whether a method was
+    scored on all queries or only on queries with a match (the mode, see
+    `recognition.metrics`). This is inferred from the relation between R@1, F1
+    and AUC in all rows of the method.
     """
     changes = {
         (row["map"], row["sequence_a"], row["sequence_b"]): float(
@@ -216,7 +217,7 @@ def _trends(
     tcr: Mapping[tuple[str, str, str], float],
     methods: Sequence[str],
 ) -> dict[str, Trend]:
-    """Returns method -> its trend in mode all, if it has enough pairs."""
+    """Returns the trend of each method (mode all) that has enough pairs."""
     trends = {}
     for method in methods:
         points = [
@@ -283,7 +284,10 @@ def _counted_alike(
     results: Sequence[PlaceRecognition],
     words: str = "When all methods are counted alike",
 ) -> str:
-    """Returns a sentence on which methods are best if all are in mode all."""
+    """Returns a sentence on which methods are best if all queries count.
+
+    That is the mode `all` for every method.
+    """
     best = _best_methods(results, "all")
     number = sum(_RING in methods for methods in best)
     return (
@@ -297,8 +301,9 @@ def _best_methods(
 ) -> list[list[str]]:
     """Returns the methods with the greatest AUC on each pair.
 
-    Table II prints these in bold; there are several if their printed digits are
-    equal. If no mode is given, each method has the paper's mode.
+    Table II of the paper prints these methods in bold. A pair has several if
+    their AUCs are equal as printed. By default, each method is scored in the
+    mode that the paper used for it.
     """
     table = recognition_table(results, (), mode, paper())
     methods = [name for name, _ in table.groups[1:]]
@@ -316,7 +321,10 @@ def _best_methods(
 
 
 def _listed(best: Iterable[Iterable[str]]) -> str:
-    """Returns "<method> on <number>, ...": the pairs on which each is best."""
+    """Returns on how many pairs each method is best, as text.
+
+    The text has the form "<method> on <number>, ...".
+    """
     counts = Counter(itertools.chain.from_iterable(best)).most_common()
     return ", ".join(f"{method} on {number}" for method, number in counts)
 
@@ -381,7 +389,9 @@ def _part(number: int, total: int) -> str:
 def aims(
     results: Sequence[PlaceRecognition], changes: Sequence[ChangeResult]
 ) -> list[Finding]:
-    """Returns whether each aim is met; empty unless all pairs are present.
+    """Returns whether each aim of the shipped cities is met.
+
+    The list is empty unless the results of all the paper's pairs are present.
 
     RING++ is evaluated on queries with a match and all other methods on all
     queries, as the paper seems to have done.

@@ -98,7 +98,11 @@ def patches(scan: np.ndarray, rng: np.random.Generator) -> Iterator[np.ndarray]:
 
 
 def describe(patch: np.ndarray, rng: np.random.Generator) -> dict[str, float]:
-    """Returns name -> feature of a patch; a name begins with its group."""
+    """Returns name -> feature of a patch.
+
+    A name begins with the name of the group of features, such as all features
+    of intensity.
+    """
     p, bright, ring = patch[:, :3], patch[:, 3], patch[:, 4]
     tree = cKDTree(p)
     result = _intensity(bright, tree) | _density(p, ring, tree)
@@ -252,7 +256,7 @@ def _quantile(values: np.ndarray, part: float) -> float:
 
 
 class Features:
-    """The features of the patches of a set.
+    """The features of all patches of a set of scans (real or simulated).
 
     Attributes:
         rows: a dictionary for each patch.
@@ -322,14 +326,16 @@ def tell_apart(real: Features, simulated: Features, names: list[str]) -> float:
 
 
 def _in_folds(one: Features) -> np.ndarray:
-    """Returns the number of each patch's place, in order of appearance."""
+    """Returns the number of each patch's place, counted by appearance."""
     return np.unique(one.place, return_inverse=True)[1]
 
 
 def judge(real: Features, simulated: Features) -> dict:
-    """Returns the AUC of a classifier by groups of features, and of a control.
+    """Returns how well a classifier tells real from simulated scans.
 
-    The classifier tells real from simulated scans.
+    The result contains the AUC of the classifier for each group of features,
+    and that of a control: the same classifier on two halves of the simulated
+    scans.
     """
     names = common_names([real, simulated])
     groups = {"all": names}

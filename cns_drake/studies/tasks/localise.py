@@ -91,8 +91,7 @@ class LocaliseTask(Task):
         return jobs.add(part, measure_localisation, arguments, cost=_COST)
 
     def _runs(self, found: Sequence[np.ndarray]) -> Iterator[tuple[str, Any]]:
-        """Yields the name of each method and initial error, with its queries.
-        """
+        """Yields the name of each method and initial error, and its queries."""
         starts = self.settings["starts"]
         rows = iter(found)
         if not found:

@@ -167,7 +167,9 @@ class Jobs:
         needs: Iterable[str] = (),
         cost: float = 20.0,
     ) -> Part:
-        """Adds the job of a part, named like it; returns the part.
+        """Adds the job that writes a part (file of results); returns the part.
+
+        The job has the name of the part.
 
         Args:
             part: file and name of the part.
@@ -231,8 +233,7 @@ class Task(abc.ABC):
 
     @abc.abstractmethod
     def measure(self, pair: Pair, jobs: Jobs) -> Part:
-        """Adds the jobs that measure a pair; returns the file of their result.
-        """
+        """Adds the jobs that measure a pair; returns the file of the result."""
 
     def found(self, part: Part, pair: Pair) -> Any:
         """Returns the task's result for a pair, read from a file of results."""
