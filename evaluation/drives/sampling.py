@@ -73,8 +73,7 @@ class QuerySensor:
         return cls(X_SQ, float(hidden_from), math.radians(hidden_deg))
 
     def without_hidden(self, scan: np.ndarray) -> np.ndarray:
-        """Returns the points of a scan in S that are outside the hidden sector.
-        """
+        """Returns the points of a scan in S outside the hidden sector."""
         if self.hidden == 0.0:
             return scan
         azimuth = np.arctan2(scan["y"], scan["x"]).astype(np.float64)

@@ -375,8 +375,7 @@ class Localisation:
 
     @property
     def believed_from(self) -> float:
-        """Score that 95 % of the correct results reach; NaN if none is correct.
-        """
+        """Score that 95 % of correct results reach; NaN if none is correct."""
         scores = self.rows["own_score"][is_right(self.rows)]
         if len(scores) == 0:
             return math.nan

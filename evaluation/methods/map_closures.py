@@ -138,7 +138,7 @@ class MapClosures(Method[np.ndarray, MapClosuresDatabase]):
         return None if found is None else found[1]
 
     def _find(self, query: np.ndarray, database: MapClosuresDatabase) -> None:
-        """Aligns a query with all places, unless it was just done."""
+        """Aligns a query with all places, unless it was aligned last."""
         if database.query is query:
             return
         number = _ALL - database.num_queries

@@ -59,7 +59,7 @@ _MEAN_DIFFERENCE = 0.15
 
 
 def reference_for(map_names: Iterable[str]) -> Reference:
-    """Returns the paper's values if it has one of the maps, else none."""
+    """Returns the paper's values if it uses one of the maps, else none."""
     return NO_REFERENCE if paper().city_names.isdisjoint(map_names) else paper()
 
 

@@ -33,11 +33,12 @@ _HALF = 0.5
 
 @dataclass(frozen=True)
 class PlaceOutcome:
-    """The outcome of a method on two drives.
+    """The answers of a method to the queries of a drive, and their truth.
 
     Attributes:
         method: name of the method.
-        is_gated: whether the gate was used.
+        is_gated: whether the gate was used, which rejects places that lie too
+            far away by the method's own pose estimate.
         outcomes: outcomes of Q queries.
         columns: columns of `queries.csv`, (Q,) each. An index that is unknown
             is -1, other numbers are NaN or infinite.
@@ -67,11 +68,13 @@ class PlaceOutcome:
 
         Args:
             method: method that made the scores.
-            is_gated: whether they were gated.
+            is_gated: whether the scores are those after the gate.
             retrieval: retrieval of Q queries and D places.
-            query: (Q,) stamps [ns] and (Q, 3) places [m] of the queries.
-            drives: D names of the drives of the places; that of the query's
-                own city comes first. Distances to others are unknown.
+            query: time stamps (Q,) [ns] and positions (Q, 3) [m] of the
+                queries.
+            drives: name of each place's drive (D names). The first one is the
+                drive through the query's own city; distances to places of all
+                other drives are unknown.
             overlaps: (Q,) how much of the query's scan the best of its matches
                 shows, see `overlap_truth`; NaN without a match.
             radius: radius of a match [m].
@@ -135,9 +138,11 @@ def faults(
         radius: radius of a match [m].
 
     Returns:
-        (Q,) "" if it is right; `no_place` if the query has no match;
-        `no_candidate` if the method has no place, or rejects all; `other_city`;
-        `too_far` if it is within two radii; `elsewhere`.
+        (Q,) the first reason that applies: "" if the best place is right;
+        `no_place` if the query has no match; `no_candidate` if the method finds
+        no place, or rejects all places; `other_city` if the best place is in
+        another city; `too_far` if it is within two radii; otherwise
+        `elsewhere`.
     """
     wrong = [
         ~outcomes.has_match,
@@ -159,7 +164,8 @@ class Number(NamedTuple):
         metric: name of the metric.
         value: its value.
         interval: its 95 % interval.
-        n: number of queries, or other things, that count.
+        n: number of queries, points or other items from which the value is
+            computed.
     """
 
     method: str
@@ -176,7 +182,8 @@ def place_numbers(
     """Yields a method's place recognition results in a condition.
 
     Intervals are by bootstrap over blocks of the route. Each bootstrap sample
-    draws the same blocks in the condition and in the baseline.
+    draws the same blocks in the condition and in the baseline, in which nothing
+    differs between the drives.
 
     Args:
         now: outcome of the method in the condition.
@@ -234,7 +241,8 @@ def pose_numbers(
     Args:
         now: outcome of the method in a condition.
         before: outcome of the method in the baseline, with which the kept share
-            is computed.
+            (success in the condition divided by success in the baseline) is
+            computed; None to leave it out.
     """
     errors = now.pose_errors
     value = pose_success(errors, now.outcomes)
@@ -264,7 +272,7 @@ def kept_share(
 
 
 def _areas(outcomes: QueryOutcomes) -> dict[str, float]:
-    """Returns the metrics of which `own_samples` returns samples."""
+    """Returns AUC, R@1 and strict AUC, by their names in tables."""
     curve = pr_curve(outcomes)
     return {
         "auc": curve.auc,

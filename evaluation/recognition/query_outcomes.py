@@ -10,7 +10,7 @@ import numpy as np
 
 @dataclass(frozen=True, eq=False)
 class QueryOutcomes:
-    """Whether each of Q queries found its place, and how surely.
+    """Whether the best place of each of Q queries is right, and its score.
 
     Attributes:
         best_scores: (Q,) score of the best place; NaN without a candidate.
@@ -76,12 +76,13 @@ class QueryOutcomes:
 
     @property
     def match_auroc(self) -> float:
-        """AUROC of the best score as a sign that a query has a match.
+        """How well the best score shows whether a query has a match (AUROC).
 
-        It is the area under the receiver operating characteristic: the
+        The AUROC is the area under the receiver operating characteristic: the
         probability that a query with a match has a higher best score than a
-        query without. Equal scores count half, and a query without a candidate
-        has the lowest score. NaN if all or none of the queries have a match.
+        query without a match. Equal scores count half, and a query without a
+        candidate has the lowest score. NaN if all or none of the queries have a
+        match.
         """
         return auroc(self.best_scores, self.has_match)
 
@@ -108,8 +109,8 @@ def judge(
             is a block of its own.
 
     Raises:
-        ValueError: scores are complex, masked or not numbers, or the two shapes
-            differ.
+        ValueError: scores are complex, masked or not numbers, or scores and
+            matches differ in shape.
 
     Example:
         from evaluation import judge, retrieve

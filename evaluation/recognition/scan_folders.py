@@ -123,7 +123,10 @@ def _columns(
 
 
 def _first_of_each_kind(on_note: OnNote) -> OnNote:
-    """Returns a function that drops notes like earlier ones on other files."""
+    """Returns a function that passes on only the first note of each kind.
+
+    Notes are of one kind if they differ only in the name of the file.
+    """
     seen: set[str] = set()
 
     def pass_on(note: str) -> None:
