@@ -165,7 +165,7 @@ class _Seen:
         self._clouds: dict[tuple, np.ndarray] = {}
 
     def sensor(self, protocol: RetrievalProtocol) -> QuerySensor | None:
-        """Returns the sensor of the frame's query; None if as recorded."""
+        """Returns the sensor of the frame's query; None if it is unchanged."""
         if protocol not in self._sensors:
             self._sensors[protocol] = protocol.query_sensor(self.frame)
         return self._sensors[protocol]

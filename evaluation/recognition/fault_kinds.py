@@ -49,7 +49,7 @@ class PairEvidence:
             the points counted in `changed`; "" if there are none.
         right_fits: (Q,) share of the upright points of the query and its right
             place that coincide at the best alignment of the two scans; NaN if
-            every method found a right place.
+            `fits` is NaN for every method.
         fits: method -> (Q,) the same share for the query and its wrong best
             place; NaN if the best place is right, or less than two radii away.
         unchanged: (Q,) `overlaps` of the control, which is the same comparison
@@ -66,7 +66,7 @@ class PairEvidence:
 
     @property
     def visible_changes(self) -> np.ndarray:
-        """(Q,) share of each query's scan that the right place lacks."""
+        """(Q,) share of a query's scan that its right place does not show."""
         return 1.0 - self.overlaps
 
     @property

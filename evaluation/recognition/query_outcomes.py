@@ -51,7 +51,7 @@ class QueryOutcomes:
 
     @property
     def own_blocks(self) -> np.ndarray:
-        """(Q,) block of each query; each is its own block if there are none."""
+        """(Q,) block of each query; without `blocks`, one for each query."""
         return np.arange(len(self)) if self.blocks is None else self.blocks
 
     @property
@@ -62,7 +62,10 @@ class QueryOutcomes:
         ]
 
     def recall_at(self, rank: int) -> float:
-        """Returns the recall R@N; NaN if no query has a match."""
+        """Returns the recall R@N for N = `rank`.
+
+        It is NaN if no query has a match.
+        """
         return _mean(self.first_right_ranks[self.has_match] <= rank)
 
     @property

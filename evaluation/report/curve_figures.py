@@ -80,7 +80,9 @@ def _draw_curve(
 
 
 def draw_track(rows: np.ndarray, stem: Path) -> None:
-    """Draws errors along the path, and the share without a map.
+    """Draws, along a tracked drive, position errors and unmapped points.
+
+    The unmapped points are the share of each scan's points that the map lacks.
 
     The rows are of the type `TRACKED`.
     """

@@ -1,10 +1,10 @@
 """The table of results, one number per row; and the table of queries.
 
 `results.csv` and `queries.csv` begin with the same columns: where and under
-which condition something was measured. All columns that are not named here are
-factors of an experiment, named by their place in its file, such as
-`query.transient.snow`; their values are numbers, text or truth values, and a
-cell is empty where a factor does not apply.
+which condition something was measured. All further columns are factors of an
+experiment. They are named by the path of the field in the experiment's file,
+such as `query.transient.snow`. Their values are numbers, text or truth values;
+a cell is empty where a factor does not apply.
 """
 
 from __future__ import annotations
@@ -117,7 +117,7 @@ class Key:
         database: name of the drive that makes the database.
         query: name of the drive whose scans are the queries.
         seed: seed of everything that is random.
-        factors: column -> value of those that apply.
+        factors: name -> value of each factor of the condition that applies.
         task: `place`, `pose`, `localise`, `map`, `change`, `cost` or another.
         method: method, estimator or baseline; "" for the task `change`.
         gate: whether places were rejected by the method's own pose.
@@ -136,7 +136,7 @@ class Key:
     protocol: str
 
     def __getitem__(self, column: str) -> object:
-        """Returns the value of a column, or `label`; None without one."""
+        """Returns the value of a column, or `label`; None if it is unknown."""
         if column in _NAMED:
             return getattr(self, column, None)
         return self.factors.get(column)
@@ -153,10 +153,10 @@ class Key:
         return ", ".join((self.method, *settings))
 
     def but(self, *names: str) -> tuple[object, ...]:
-        """Returns the key without some columns.
+        """Returns the values of the key without those of some columns.
 
-        The settings of a method, such as `methods.ring++.crop`, are left out
-        with `method`.
+        If `method` is left out, so are the method's settings, such as
+        `methods.ring++.crop`.
         """
         known = [name for name in KEYS if name not in names]
         without_settings = "method" in names
@@ -213,15 +213,15 @@ class Answers(Key):
 
     Attributes:
         columns: name -> (Q,) values, of the columns of `queries.csv`. NaN
-            stands for an empty number, -1 (or NaN, or infinity) for an empty
-            whole one.
+            stands for an empty cell with a real number; -1, NaN or infinity for
+            an empty cell with a whole number.
     """
 
     columns: Mapping[str, np.ndarray]
 
     @cached_property
     def outcomes(self) -> QueryOutcomes:
-        """Outcome of each query; without the number of places."""
+        """Outcome of each query; the number of places is unknown."""
         columns = self.columns
         is_right = np.asarray(columns["correct"], dtype=bool)
         ranks = np.full(len(is_right), math.inf)
@@ -263,12 +263,13 @@ class Results:
     def read(cls, path: str | Path) -> Results:
         """Returns the table in a file `results.csv`, or in a folder with one.
 
-        Columns can have any order; unknown ones are factors.
+        Columns can have any order; unknown columns are factors.
 
         Raises:
             InputError: the file cannot be read, is a table of an earlier
-                version, lacks a column, has one twice, or has a value that
-                cannot be. The line, the column and the fault are named.
+                version, lacks a column, has a column twice, or contains an
+                impossible value. The error names the line, the column and the
+                fault.
         """
         table = _Cells.read(path, RESULTS, (*KEYS, *_MEASURED))
         rows: list[Row] = []
@@ -303,8 +304,8 @@ class Results:
     ) -> Results:
         """Returns the rows that have given values in given columns.
 
-        A tuple, list or set stands for any of its values. Names of factors with
-        dots go into `columns`.
+        If the given value is a tuple, list or set, a row needs any one of its
+        values. Give the names of factors that contain dots in `columns`.
         """
         wanted = {
             name: value if isinstance(value, tuple | list | set) else (value,)
@@ -422,7 +423,7 @@ def _answer_cell(value: Any, kind: type) -> str:
 def _answered(
     lines: Sequence[_Line], names: Iterable[str], task: str
 ) -> dict[str, np.ndarray]:
-    """Returns column -> values of a key's lines, after checking them."""
+    """Returns column -> checked values of all lines with the same key."""
     columns: dict[str, np.ndarray] = {}
     for name in names:
         kind = _ANSWERS[name]
@@ -464,7 +465,7 @@ def _range(metric: str) -> tuple[float, float]:
 
 
 def _measured(one: _Line) -> dict[str, Any]:
-    """Returns a row's values that follow the columns of its key."""
+    """Returns a row's values in the columns after those of its key."""
     metric = one.text("metric")
     value, low, high = (
         one.value(name, float) for name in ("value", "low", "high")
@@ -589,7 +590,7 @@ class _Cells:
         needed: Iterable[str],
         known: Iterable[str] = (),
     ) -> _Cells:
-        """Reads a file, or the file of the usual name in a folder."""
+        """Reads a file or, in a folder, the file with the usual name."""
         path = Path(path)
         file = path / usual if path.is_dir() else path
         try:

@@ -146,8 +146,7 @@ class Jobs:
     def elsewhere(
         self, pair: Pair, needs: list[str]
     ) -> tuple[tuple[Part, ...], ...]:
-        """Returns descriptions of drives through other cities, as distractors.
-        """
+        """Returns a pair's distractors: described drives in other cities."""
         if not pair.distractors:
             return ()
         found = []
