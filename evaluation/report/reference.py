@@ -113,7 +113,11 @@ class Reference:
         return self.protocols[method]
 
     def covers(self, result: PlaceRecognition) -> bool:
-        """Returns whether map, method and protocol are the source's."""
+        """Returns whether the source has results like this one.
+
+        The map must be in the source, and the method must have been run by the
+        same protocol.
+        """
         return result.pair[0] in self.city_names and self._ran(result)
 
     def mode(self, method: str) -> Mode:

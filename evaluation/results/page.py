@@ -57,7 +57,7 @@ def write_page(
     notes: Iterable[str] = (),
     on_note: Callable[[str], None] = lambda text: None,
 ) -> Path:
-    """Writes `index.html`, which needs no other file.
+    """Writes an experiment's page, `index.html`, which needs no other file.
 
     Next to it, the function writes the charts for print and, if there are
     numbers behind the charts (see `summarised`), `summaries.csv`.
