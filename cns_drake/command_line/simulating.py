@@ -233,9 +233,9 @@ def film(
 ) -> None:
     """Film a drive through all stages of its city.
 
-    The film shows the street from behind the car and the points that the LiDAR
-    measures: the same place in one stage after the other. Then it shows the
-    city from above.
+    The same part of the drive is filmed once in each stage, from behind the
+    car, together with the points that the LiDAR measures. At the end, the film
+    shows the city from above.
 
     Args:
         scenario: Name of a shipped drive, or a scenario file of your own.
@@ -243,8 +243,8 @@ def film(
             needs ffmpeg. By default NAME.webp.
         seconds: Length of the film [s].
         size: Width and height of the film in pixels, each from 32 to 1920.
-        start: Time in the drive at which each shot begins [s]; by default the
-            moment when the road ahead is straightest.
+        start: Time in the drive at which the filmed part begins [s]. By default
+            it begins where the road ahead is straightest.
         traffic: Number of moving vehicles. The same number of walkers is added.
             By default as the scenario says; if it has no traffic, 60 of each,
             provided that the streets have room.

@@ -22,7 +22,8 @@ Align = Annotated[
     When,
     typer.Option(
         help="Whether to align the drives to each other before they are "
-        "compared. With auto, they are aligned if their world frames differ."
+        "compared. With auto, they are aligned only if their world frames "
+        "differ."
     ),
 ]
 Json = Annotated[

@@ -1,10 +1,10 @@
 """The numbers of a report as rows of a table of results, and conclusions.
 
 The conclusions are the ranking of the methods, and the share of its result that
-each method keeps under structural change. Each pair of drives has a control:
-the same two routes, both driven in one stage of the city. What a method loses
-from the control to the pair is therefore due to the change alone, and not to
-the routes.
+each method keeps under structural change. Each pair of drives can have a
+control: the same two routes, both driven in one stage of the city. What a
+method loses from the control to the pair is therefore due to the change alone,
+and not to the routes.
 """
 
 from collections import Counter

@@ -74,7 +74,10 @@ class Run:
 
     @property
     def repeats(self) -> bool:
-        """Whether the run repeats another run, by the published protocol."""
+        """Whether the run repeats another run by the source's protocol.
+
+        The source is that of published numbers, see `City.runs`.
+        """
         return self.queries != self.method.key
 
     @property

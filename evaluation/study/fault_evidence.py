@@ -216,7 +216,7 @@ class _Shown:
         return None if self.instances is None else sampled(self.instances)
 
     def seen_from(self, other: _Shown) -> np.ndarray:
-        """Returns some points in the frame of another scan's sensor."""
+        """Returns the points `some` in the frame of another scan's sensor."""
         X_OS = inverse(other.X_WS) @ self.X_WS
         return transform(X_OS, self.some)
 

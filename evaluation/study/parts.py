@@ -312,7 +312,7 @@ class Part:
             stream.write(data)
 
     def is_current(self, inputs: Mapping) -> bool:
-        """Returns whether the part is complete and was made of these inputs."""
+        """Returns whether the file is complete and made from these inputs."""
         try:
             return self.identity() == fingerprint(inputs)
         except InputError:
@@ -503,6 +503,6 @@ class StudyFiles:
         return SurveyFiles(folder / file_name(recording))
 
     def part(self, kind: str, *names: str) -> Part:
-        """Returns the part of a kind, such as `changes`, for some drives."""
+        """Returns the file of some drives for a kind, such as `changes`."""
         name = ",".join(map(file_name, names))
         return Part(self.output / "parts" / kind / f"{name}.data")

@@ -315,7 +315,7 @@ class Study:
         return Job(name, step, _survey_names(pair), cost)
 
     def _cost_job(self, pair: Pair, needs: tuple[str, ...]) -> Job:
-        """Returns the job that measures costs, after all others and alone."""
+        """Returns the job that measures costs, after all other jobs."""
         places, queries = (self._files.survey(one.name) for one in pair)
         described = tuple(
             (places.described(one.key), queries.described(one.key))
