@@ -83,7 +83,10 @@ class Compared:
     asked: Changes = field(default_factory=dict)
 
     def fingerprint(self) -> str:
-        """Returns a hash of both drives, names included."""
+        """Returns a hash of the database drive and the query drive.
+
+        Drives that differ only in their names have different hashes.
+        """
         return fingerprint(
             {
                 "database": self.database.model_dump(mode="json"),
@@ -215,7 +218,7 @@ class PairOfDrives:
         """Returns those fields of a case that are possible on the map.
 
         Raises:
-            MissingError: none of them is possible.
+            MissingError: none of the fields is possible.
         """
         missing: MissingError | None = None
         found: dict[str, Changes] = {}

@@ -269,7 +269,7 @@ def distracting_drives(
         spacing: distance between two places [m].
         output: folder for cities that are drawn anew.
         cluster: runs the jobs.
-        on_note: takes notes for the user.
+        on_note: is called with each note for the user.
 
     Raises:
         InputError: a shipped map cannot be used.

@@ -1,4 +1,4 @@
-"""The pictures of a map: its drives, and how its streets change."""
+"""Draws pictures of a map: its drives, and how its streets change."""
 
 from dataclasses import dataclass
 from pathlib import Path

@@ -119,14 +119,17 @@ _MOST_ROWS = 200
 
 @dataclass(frozen=True)
 class Survey:
-    """One of the two drives, recorded or simulated, with its simulation."""
+    """A drive whose map is labelled, with the simulation of its world."""
 
     drive: Drive
     simulated: SimulatedDrive
     scenario: Scenario
 
     def still(self) -> RayCastingScene:
-        """Returns the drive's world without the vehicle and moving objects."""
+        """Returns the drive's world for ray casting, without moving objects.
+
+        The recording vehicle is left out, too.
+        """
         if self.scenario.traffic.is_off:
             # The LiDAR does not see its own vehicle.
             return self.simulated.look(0)[0]
@@ -173,7 +176,7 @@ def open_survey(place: str | Path) -> Survey:
 
 
 def simulate_survey(scenario: Scenario) -> Survey:
-    """Returns a drive that is simulated when its scans are read.
+    """Returns a drive that is simulated only when its scans are read.
 
     Raises:
         InputError: the scenario cannot be run.

@@ -84,7 +84,10 @@ def write_overlap_table(
     protocol: RetrievalProtocol,
     track: Track = silent,
 ) -> Path:
-    """Writes `<output>/overlaps.csv`: the overlap of queries with places.
+    """Writes the exact overlap of each query with each place, as CSV.
+
+    The overlap is the share of a query's points that the LiDAR at the place
+    sees. The file is `<output>/overlaps.csv`.
 
     Args:
         database: the drive of the places, in whose city rays are cast.
@@ -94,7 +97,8 @@ def write_overlap_table(
         track: reports progress.
 
     Raises:
-        InputError: the drives are of two maps, or cannot be simulated.
+        InputError: the drives are through different maps, or cannot be
+            simulated.
     """
     # Before minutes of work.
     make_folder(output)
@@ -126,7 +130,7 @@ def export_pairs(
         output: the folder of the set.
         options: format and spacing of the exported clouds.
         cluster: runs the work.
-        on_note: takes notes on missing parts of the set.
+        on_note: is called with notes on missing parts of the set.
 
     Raises:
         InputError: there is no drive to learn from, two drives have the same
@@ -185,7 +189,7 @@ def export_run(
     folder: Path,
     options: ExportOptions,
 ) -> np.ndarray:
-    """Writes the clouds of a drive; returns (N, 4, 4) poses X_WS."""
+    """Simulates a drive and writes its clouds; returns poses X_WS (N, 4, 4)."""
     drive = simulation()
     frames = sample_frames(drive.X_WS[:, :3, 3], options.spacing)
     make_folder(folder)

@@ -216,7 +216,7 @@ def redrawn_inputs(map_folder: Path, stage: str, seed: int) -> dict[str, bytes]:
 
 
 def to_yaml(title: str, values: dict) -> bytes:
-    """Returns an input of a redrawn city, with its mark and a title."""
+    """Returns values as YAML, with a title in comments."""
     comment = (
         f"{_MARK.decode()} {__version__}: {title}.\n"
         "# `cns-drake generate --vary` writes it anew when the map changes.\n"
@@ -242,7 +242,7 @@ class Version:
 
 
 def fresh_versions() -> list[Version]:
-    """Returns the frozen list of freshly drawn versions."""
+    """Returns the versions of shipped maps in `worlds/fresh.csv`."""
     rows = read_records(worlds_folder() / "fresh.csv", _COLUMNS)
     return [
         Version(
@@ -261,7 +261,7 @@ def draw_fresh_cities(
     """Draws fresh cities; returns their map folders, `<output>/<map>_fNN`.
 
     Raises:
-        InputError: there is no such version, or it could not be drawn.
+        InputError: a version is unknown or could not be drawn.
     """
     versions = fresh_versions()
     for what, given, known in (
@@ -329,9 +329,10 @@ class DrawFreshCity(RedrawCity):
 
 
 def turned(values: Any, turn_deg: float) -> Any:
-    """Returns the content of `roads.yaml` or `city.yaml`, turned about W.
+    """Returns the content of `roads.yaml` or `city.yaml`, with a turned city.
 
-    The turn is anticlockwise [deg].
+    All positions and headings are turned anticlockwise about the world's origin
+    [deg].
     """
     if isinstance(values, list):
         return [turned(one, turn_deg) for one in values]

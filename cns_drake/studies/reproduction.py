@@ -59,7 +59,7 @@ def reproduce_maps(
         own_methods: Python files of further methods.
         settings: settings of methods, each `METHOD.NAME=VALUE`.
         with_costs: whether times are measured.
-        on_note: takes notes for the user.
+        on_note: is called with each note for the user.
 
     Raises:
         InputError: a map is unknown, the folder cannot be made, or a step
@@ -122,7 +122,11 @@ def _drives(folder: Path) -> list[Scenario]:
 
 
 def control_drives(drives: Sequence[Scenario]) -> list[Scenario]:
-    """Returns the control drives of a map's drives, see `control_drive`."""
+    """Returns the control drives of a map's drives.
+
+    A control drive follows the route of one drive through the stage of another,
+    so that a comparison with the latter contains no change of the city.
+    """
     last = max(drives, key=lambda drive: drive.stage or "")
     return [
         control_drive(drive, str(last.stage))

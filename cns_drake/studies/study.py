@@ -150,8 +150,8 @@ def run_study(
         cluster: does the work.
         maps: maps that replace those of the experiment.
         source: file of the experiment, for errors.
-        on_note: takes notes on what is left out, and on how long the study
-            takes.
+        on_note: is called with notes on what is left out, and on how long the
+            study takes.
 
     Returns:
         The path of the page.
@@ -172,7 +172,7 @@ def run_study(
 
 @dataclass
 class Study:
-    """An experiment that is being measured; see `run_study`."""
+    """An experiment that is being measured on maps."""
 
     experiment: Experiment
     output: Path

@@ -1,11 +1,11 @@
 """Trains the method `learned` on scans of drawn cities.
 
 In a batch, scans of one drive are queries for places of another drive through
-the same city. Scores are those of the method. The loss is the cross entropy
-between a softmax over all places of the batch and the weights of the right
-places. These weights grow with the exact overlap of two scans, or fall with
-their distance, so that the best place ranks first and less similar ones after
-it.
+the same city. Queries and places are compared as the method does. The loss is
+the cross entropy between a softmax over all places of the batch and the weights
+of the right places. These weights grow with the exact overlap of two scans, or
+fall with their distance, so that the best place ranks first and less similar
+ones after it.
 """
 
 from collections.abc import Callable, Mapping, Sequence
@@ -120,7 +120,7 @@ class Batch:
 
 
 class Sampler:
-    """Draws batches; each depends only on the seed and its step."""
+    """Draws batches; each depends only on the seed and the step's number."""
 
     def __init__(self, scans: TrainingScans, seed: int):
         """Finds the pairs of drives that meet.
@@ -316,7 +316,7 @@ def train(
     whose best place is right, (steps, 2).
 
     Args:
-        scans: images of scans and which of them are of one place.
+        scans: images of the scans, and which scans show the same place.
         steps: number of batches.
         seed: seed of all draws.
         state: file from which an interrupted training goes on.

@@ -76,14 +76,15 @@ class DrawnCity:
 
     @property
     def city_seed(self) -> int:
-        """The seed of the city itself."""
+        """Seed of the city without its drives."""
         return _FIRST_SEED + self.seed * _MOST_CITIES + self.number
 
     def write(self, folder: Path) -> None:
         """Writes the map folder of the city.
 
         Raises:
-            InputError: it cannot be made or written.
+            InputError: the city cannot be drawn, or the folder cannot be
+                written.
         """
         with draft_folder(folder, replaces=True) as draft:
             if self.map_name == DRAWN_STREETS:
@@ -205,7 +206,7 @@ def _few(points: np.ndarray) -> np.ndarray:
 
 
 def _overlaps(scans: Sequence[_Taken], reporter: Reporter) -> np.ndarray:
-    """Returns the share of each scan that is seen from each other scan.
+    """Returns which share of each scan is visible from every other scan.
 
     The share is exact (see `exact_overlap`). It is 0 for two scans of one drive
     and for scans over 50 m apart.

@@ -192,8 +192,8 @@ def align(
             because other drives are already aligned to it.
 
     Raises:
-        InputError: if the two have too little in common, or a scan cannot
-            be read.
+        InputError: if the drives have too little in common, or a scan cannot be
+            read.
     """
     if hold_first:
         target, held = Submaps(first), 0.0

@@ -1,4 +1,4 @@
-"""Errors of an estimated trajectory, such as that of a LiDAR odometry.
+"""Errors of an estimated trajectory, such as the result of a LiDAR odometry.
 
 Two figures are in common use. X_i are true poses, Y_i the estimated poses at
 the same times, p_i and q_i their positions:
@@ -137,13 +137,14 @@ def trajectory_errors(
     Args:
         drive: drive with the true poses.
         estimate: poses of the frame in any world.
-        frame: the frame whose poses are estimated: that of the LiDAR or that of
-            the vehicle.
-        time_offset: time to add to the estimate's [s].
+        frame: the frame whose poses are estimated: the LiDAR's or the
+            vehicle's.
+        time_offset: time to add to the times of the estimate [s].
 
     Raises:
-        InputError: if the drive has no such poses, or if fewer than three of
-            the estimate's times lie within the drive.
+        InputError: if the estimate is of the vehicle but the drive has no poses
+            of it, or if fewer than three of the estimate's times lie within the
+            drive.
     """
     truth = _true_poses(drive, frame)
     if not abs(time_offset) <= 1e9:

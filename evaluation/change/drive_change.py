@@ -194,7 +194,7 @@ def survey_in_one_world(
 
 
 def survey_drive(drive: Drive, voxels: VoxelMap) -> Surveyed:
-    """Returns a drive with a map in cells of `CELL_SIZE`."""
+    """Returns a drive and its voxel map as input for `compare`."""
     return Surveyed(
         drive.name, voxels, drive.X_WS[:, :3, 3], drive, drive.notes
     )
@@ -267,7 +267,7 @@ def open_source(
     """Returns an opened drive, or the path of a point cloud.
 
     Raises:
-        InputError: if it cannot be read.
+        InputError: if the path cannot be read as a drive or point cloud.
     """
     path = Path(path)
     if path.is_file() and is_cloud(path):
@@ -291,7 +291,10 @@ def _survey(
 def _same_stage_partner(
     source: Surveyed, target: Surveyed, control: Surveyed
 ) -> Surveyed:
-    """Returns the drive in the control's stage, which has the other route."""
+    """Returns which of two drives is in the control's stage.
+
+    It is the drive whose route the control does not follow.
+    """
     if (
         source.drive is None
         or control.drive is None

@@ -184,7 +184,10 @@ class TemporalChange:
 
     @property
     def num_in_hull(self) -> int:
-        """Number of points inside the other map's hull: |H(S, T) u H(T, S)|."""
+        """Number of points of both maps in the hull of the opposite map.
+
+        In the paper's notation, it is |H(S, T) u H(T, S)|.
+        """
         return (
             self.source_to_target.num_in_hull
             + self.target_to_source.num_in_hull
@@ -192,7 +195,7 @@ class TemporalChange:
 
     @property
     def num_unchanged(self) -> int:
-        """Number of unchanged points: |O(S, T) u O(T, S)|."""
+        """Number of unchanged points of both maps: |O(S, T) u O(T, S)|."""
         return (
             self.source_to_target.num_unchanged
             + self.target_to_source.num_unchanged

@@ -163,7 +163,8 @@ def compare_drives(first: Drive, second: Drive) -> DriveComparison:
         second: drive B, in the same world, with its LiDAR mounted as on A.
 
     Raises:
-        InputError: the two drives are not in one world, or one never moves.
+        InputError: the drives are not in the same world, or a drive never
+            moves.
 
     Example:
         from evaluation import compare_drives, open_drive

@@ -50,7 +50,7 @@ class StructureChange:
 def verdicts(
     instances: np.ndarray, labels: np.ndarray, side: str
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Returns whether each structure of a map is kept, gone or new.
+    """Returns a verdict on each structure of a map: kept, gone or new.
 
     Args:
         instances: (N,) number of the structure of each point; 0 for none.

@@ -30,7 +30,7 @@ from evaluation.methods.overlap_maps import (
 
 
 def _moves(turn: int, shift: int) -> np.ndarray:
-    """Returns (K, 3) changes of heading, row and column within reach."""
+    """Returns all changes (K, 3) of heading, row and column up to a limit."""
     near = range(-shift, shift + 1)
     return np.array([*itertools.product(range(-turn, turn + 1), near, near)])
 
@@ -340,7 +340,7 @@ def _overlaps(
 def _maps_of_places(
     places: Sequence[LayeredScan], halvings: int, margin: int
 ) -> CoarseMaps:
-    """Returns maps of places at their own heading, with a margin of rows."""
+    """Returns coarse maps of places as recorded, with a margin of rows."""
     maps = [_draw(place, turns(1), halvings) for place in places]
     bits = np.concatenate([one.bits for one in maps])
     return CoarseMaps(

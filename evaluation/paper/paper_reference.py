@@ -208,7 +208,7 @@ def trend(change: Sequence[float], auc: Sequence[float]) -> Trend:
 
 
 def paper_trend(method: str) -> Trend:
-    """Returns the trend in the paper's own Table II."""
+    """Returns a method's trend of AUC over TCR_sym in the paper's Table II."""
     return trend(*zip(*paper().auc_over_change(method), strict=True))
 
 

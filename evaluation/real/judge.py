@@ -367,7 +367,10 @@ def judge_draws(
     draws: int,
     track: Track = silent,
 ) -> dict:
-    """Returns the result of `judge`, averaged over draws of patches."""
+    """Returns how well a classifier tells real from simulated scans.
+
+    The result is that of `judge`, averaged over several draws of patches.
+    """
     results = []
     for seed in track(range(draws), "judging", draws):
         sets = Features(real, seed), Features(simulated, seed)

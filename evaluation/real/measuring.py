@@ -62,7 +62,7 @@ _DRAWS = 1
 
 
 class _Part(NamedTuple):
-    """Places, with descriptions, from one data set or one recording."""
+    """Described places from one data set or one recording."""
 
     name: str
     world: str
@@ -85,7 +85,7 @@ class Measuring:
             names: names of methods and estimators, or Python files with your
                 own methods; if empty, all shipped ones.
             track: reports progress.
-            on_note: takes notes.
+            on_note: is called with each note for the user.
 
         Raises:
             InputError: a method is not known, or its file cannot be used.

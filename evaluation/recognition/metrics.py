@@ -169,7 +169,7 @@ def recall_of(tp: np.ndarray, fn: np.ndarray) -> np.ndarray:
 
 @dataclass(frozen=True)
 class Interval:
-    """A confidence interval; NaN if it is unknown."""
+    """A 95 % confidence interval; its limits are NaN if it is unknown."""
 
     low: float = math.nan
     high: float = math.nan

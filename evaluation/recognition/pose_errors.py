@@ -72,7 +72,8 @@ def pose_error(
     """Returns the error of an estimated pose, in metres and in degrees.
 
     Args:
-        X_PQ: (4, 4) estimated pose of the query's sensor in that of the place.
+        X_PQ: (4, 4) estimated pose of the query's sensor in the frame of the
+            place's sensor.
         X_WP: (4, 4) true pose of the place's sensor in the world.
         X_WQ: (4, 4) true pose of the query's sensor in the world.
     """

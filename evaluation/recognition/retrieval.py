@@ -107,7 +107,7 @@ def retrieve(
             overlap.
 
     Raises:
-        InputError: if a drive cannot be read, the two are not of the same
+        InputError: if a drive cannot be read, the drives are not in the same
             world, or the method returns an invalid result.
 
     Example:

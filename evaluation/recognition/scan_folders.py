@@ -50,7 +50,8 @@ def write_scores(
             gate.
         columns: number of columns of `.bin` files; by default guessed for each
             folder from the values.
-        on_note: takes notes on how scans were read, one note of each kind.
+        on_note: is called with notes on how scans were read, one note of each
+            kind.
 
     Returns:
         The number of points left out because they are not finite.

@@ -113,7 +113,7 @@ class Report:
 
     @functools.cached_property
     def results(self) -> Results:
-        """The table of the pairs and of their controls."""
+        """The results of all pairs and of their controls as one table."""
         return Results.of(
             [
                 *rows.place_rows(self.pairs, self.tracks, self.evidence),
@@ -238,10 +238,10 @@ def write_report(report: Report, folder: Path) -> Path:
 
 
 def write_page(path: Path, report: Report) -> None:
-    """Writes the page.
+    """Writes the web page of a report.
 
     Raises:
-        InputError: it cannot be written.
+        InputError: the page cannot be written.
     """
     data = None
     if report.recognitions:

@@ -83,7 +83,6 @@ class Reference:
 
         In the reverse pair, the last stage is the database and the earlier
         stage the query.
-
         """
         pair = (map_name, last, earlier)
         return any(key[:3] == pair for key in self.recognitions)

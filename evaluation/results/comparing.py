@@ -72,7 +72,7 @@ class _Table:
 
 
 class Compared(NamedTuple):
-    """The mean AUC of one method minus that of another.
+    """The mean AUC of one method minus the mean AUC of another.
 
     The p-value is corrected, by Holm's method, for all differences of the
     comparison.

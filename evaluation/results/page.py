@@ -1,4 +1,4 @@
-"""One page of an experiment: what it found, its charts, numbers and file."""
+"""Writes the page of an experiment: findings, charts, numbers and its file."""
 
 from __future__ import annotations
 
@@ -75,7 +75,7 @@ def write_page(
             left out, with a note.
         experiment_text: the experiment as YAML.
         notes: further sentences for the page, such as on settings.
-        on_note: takes a note on each chart that is left out.
+        on_note: is called with a note on each chart that is left out.
 
     Returns:
         The path of the page.

@@ -143,7 +143,7 @@ class Key:
 
     @property
     def label(self) -> str:
-        """Name of the method, with those of its settings that are factors."""
+        """Name of the method, with its settings that are factors."""
         start = f"{SETTINGS}{self.method}."
         settings = (
             f"{name.removeprefix(start)} {value}"

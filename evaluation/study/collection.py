@@ -204,8 +204,8 @@ def find_recordings(
     A recording without map and stage is left out, with a note.
 
     Raises:
-        InputError: if no recording has a map and a stage, or one cannot be
-            read.
+        InputError: if no recording has a map and a stage, or a recording cannot
+            be read.
     """
     folder = Path(folder)
     if not folder.is_dir():

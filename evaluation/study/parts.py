@@ -217,7 +217,7 @@ def _decode(tree: Any, arrays: list[np.ndarray]) -> Any:
 
 
 def _find(module: str, name: str) -> Any:
-    """Returns a type; imports nothing but modules of this package."""
+    """Returns a type by its name; imports only modules of this package."""
     if module not in sys.modules and _OWN_MODULE.fullmatch(module):
         importlib.import_module(module)
     found: Any = sys.modules[module]

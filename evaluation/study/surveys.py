@@ -76,7 +76,10 @@ class MappedDrive(RecentScans):
 
 
 class DriveSource(Protocol):
-    """A picklable object that opens a drive when it is called."""
+    """A picklable function that opens a drive.
+
+    A job in another process gets this function instead of the drive.
+    """
 
     def __call__(self) -> Drive:
         """Opens the drive.
@@ -85,7 +88,7 @@ class DriveSource(Protocol):
         therefore be simulated while it is read.
 
         Raises:
-            InputError: if it cannot be opened.
+            InputError: if the drive cannot be opened.
         """
 
     def identity(self) -> object:

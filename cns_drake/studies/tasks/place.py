@@ -1,4 +1,4 @@
-"""Place recognition, its poses, and the costs of both."""
+"""The tasks `place`, `pose` and `cost`, on place recognition."""
 
 from __future__ import annotations
 
@@ -115,8 +115,8 @@ def measure_costs(
 ) -> dict[str, tuple[int, dict[str, float]]]:
     """Returns key of a method -> number of places, and times [ms].
 
-    `query_ms` is the median CPU time of some queries, `build_ms` that of a
-    database from descriptions.
+    `query_ms` is the median CPU time of some queries, and `build_ms` the CPU
+    time to build a database from descriptions.
 
     Args:
         reporter: reports progress.
