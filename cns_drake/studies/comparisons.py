@@ -528,7 +528,7 @@ def frozen_drives(table: str) -> dict[tuple[str, int], str]:
     strength of its change.
 
     Args:
-        table: a file of the shipped worlds.
+        table: name of a file in the folder of the shipped worlds.
 
     Raises:
         InputError: there is no such file.

@@ -82,7 +82,8 @@ def sights(drive: SimulatedDrive) -> Callable[[int], Sight]:
 class VisibleSurfaces:
     """The surfaces that a LiDAR sees from a place.
 
-    Points with a coordinate beyond `max_range` [m] in its frame are left out.
+    Points with a coordinate beyond `max_range` [m] in the LiDAR's frame do not
+    count as seen.
     """
 
     sight: Sight

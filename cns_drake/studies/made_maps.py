@@ -109,8 +109,9 @@ class ImportCity(MakeMap):
 class MadeMaps:
     """The maps that the conditions of an experiment need, in one folder.
 
-    Ask for all maps first; `make` then makes them together, so that an aged
-    city is one map with a stage for each of the years.
+    First call `want_age` and `want_redrawn` for all maps; `make` then makes
+    them together. In this way, a city that is aged by several numbers of years
+    becomes one map with a stage for each number.
     """
 
     folder: Path
@@ -256,11 +257,11 @@ def distracting_drives(
 ) -> list[Scenario]:
     """Returns drives through other cities, whose places distract a method.
 
-    Together, the drives have about the wanted number of places. The first ones
-    are the shipped drives of other maps, each through its own stage. If the
-    query's map is shipped, drives along its streets between other buildings
-    follow. Then come the drives of other maps through their other stages, and
-    at last the same drives through those cities drawn anew.
+    Together, the drives have about the wanted number of places. They come in
+    this order: the shipped drives of other maps, each through its own stage; if
+    the query's map is shipped, drives along its streets between other
+    buildings; the drives of other maps through their other stages; and the
+    drives of other maps through their cities drawn anew.
 
     Args:
         query: the query drive. The returned drives have its LiDARs, and do not

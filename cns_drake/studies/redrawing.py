@@ -60,13 +60,13 @@ def redraw_cities(
 ) -> dict[int, Path]:
     """Draws the city of a map anew with several seeds.
 
-    Shows progress on stderr. An existing city of the same inputs and program is
-    kept.
+    Shows progress on stderr. A city that exists is kept if its inputs and the
+    program have not changed.
 
     Args:
         map_folder: folder of the map, with `roads.yaml` and `city.yaml`.
         stage: the stage that is drawn.
-        seeds: one for each city.
+        seeds: a seed for each city.
         output: folder for the cities.
         cluster: runs the jobs.
 

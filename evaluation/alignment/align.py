@@ -10,9 +10,11 @@ robust:
 3. Submaps are registered along the source's path, outwards from where the guess
    holds. Each registration starts from its neighbour's result, so that drift
    does not add up.
-4. The source gets one rigid pose if the loops agree on one; otherwise a pose
-   graph bends it. The target stays fixed.
-5. Heights are counted from the target's ground, as the grid of the TCR needs.
+4. The source is moved as a rigid whole if the loops (registered pairs of
+   submaps) agree on one pose; otherwise a pose graph bends its path. The target
+   stays fixed.
+5. Heights are measured from the target's ground, as the measure of change (TCR)
+   needs.
 """
 
 from dataclasses import asdict, dataclass

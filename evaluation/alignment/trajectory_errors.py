@@ -4,17 +4,16 @@ Two figures are in common use. X_i are true poses, Y_i the estimated poses at
 the same times, p_i and q_i their positions:
 
 - ATE, the absolute trajectory error: the root mean square of |p_i - R q_i - t|
-  over all i. The rigid motion R, t is the one that minimises it; there is no
-  change of scale. J. Sturm et al., A benchmark for the evaluation of RGB-D SLAM
+  over all i. R and t are the rigid motion that minimises this error; the scale
+  is not changed. J. Sturm et al., A benchmark for the evaluation of RGB-D SLAM
   systems, IROS 2012; S. Umeyama, Least-squares estimation of transformation
   parameters between two point patterns, PAMI 13(4), 1991. `evo_ape --align`
   prints it as `rmse`.
-- Drift over 100 m: the length and the angle of
-  (Y_i^-1 Y_j)^-1 (X_i^-1 X_j), where i is every tenth pose, and j the first
-  pose that follows more than 100 m of true path later. A. Geiger et al., Are we
-  ready for autonomous driving?, CVPR 2012, and the development kit of KITTI
-  odometry, which divides by the 100 m and calls the mean the translation error
-  [%].
+- Drift over 100 m: the length and the angle of (Y_i^-1 Y_j)^-1 (X_i^-1 X_j),
+  for every tenth pose i. Pose j is the first one that lies more than 100 m of
+  true path after pose i. A. Geiger et al., Are we ready for autonomous
+  driving?, CVPR 2012, and the development kit of KITTI odometry, which divides
+  by the 100 m and calls the mean the translation error [%].
 """
 
 from collections.abc import Iterator
@@ -190,7 +189,9 @@ def aligned_offsets(p: np.ndarray, q: np.ndarray) -> np.ndarray:
 def segment_errors(
     X: np.ndarray, Y: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Returns the errors of the motion over 100 m, from each pose on.
+    """Returns the errors of the motion over segments of 100 m of path.
+
+    A segment begins at every tenth pose.
 
     Args:
         X: (N, 4, 4) true poses.

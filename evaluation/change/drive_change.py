@@ -134,7 +134,7 @@ class ChangeReport:
 
 
 def survey(path: Path, track: Track = silent) -> Surveyed:
-    """Returns the map of a drive, or of a map file.
+    """Reads a drive or map file, and returns its voxel map.
 
     Raises:
         InputError: if the path can be read neither as a drive nor as a map.

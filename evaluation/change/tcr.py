@@ -153,7 +153,10 @@ class DirectedChange:
 
     @property
     def ratio(self) -> float:
-        """TCR of the NSS benchmark, 1 - |O| / |H|; NaN if H is empty."""
+        """Temporal change ratio (TCR), 1 - |O| / |H|; NaN if H is empty.
+
+        It is the TCR of the NSS benchmark.
+        """
         return _ratio(self.num_unchanged, self.num_in_hull)
 
     def restricted(self, kept: np.ndarray) -> DirectedChange:

@@ -47,7 +47,7 @@ class BoreasDrive(FileDrive):
     """The scans of the Alpha Prime on a drive of Boreas."""
 
     def __init__(self, path: Path, columns: int | None = None):
-        """Opens a drive, whose scans have a fixed layout.
+        """Opens a drive; `columns` is ignored, because the layout is fixed.
 
         Raises:
             InputError: there is no such drive, or its poses cannot be used.

@@ -411,8 +411,8 @@ def map_drive(
 ) -> VoxelMap:
     """Returns the voxel map of scans of a drive, in the world frame.
 
-    Scans are read once, one at a time. The default voxel size is the one for
-    which structural change is defined; by default all frames are mapped.
+    Each scan is read once. The default voxel size is that of the measure of
+    structural change (TCR). By default all frames are mapped.
 
     Raises:
         InputError: if a scan or a pose cannot be read.

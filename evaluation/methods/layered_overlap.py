@@ -71,15 +71,16 @@ class LayeredOverlapConfig(MethodConfig):
     Attributes:
         cell: side of a cell of the finest maps [m]. These maps have 256 x 256
             cells.
-        min_points: number of points from which on a cell is occupied.
+        min_points: least number of points in an occupied cell.
         poses: number of candidate poses (a place and a heading) that the second
             search compares.
         refined: number of candidate poses that the third search compares.
         candidates: number of places that the last search compares cell by cell.
         weights: weights of a common cell in the score, by layer: low, middle
             and high points, poles, kerbs.
-        least_cells: weighted number of cells that is added to that of each scan
-            in the score, so that two nearly empty scans do not look alike.
+        least_cells: number that is added to the weighted number of filled cells
+            of each scan in the score, so that two nearly empty scans do not
+            look alike.
     """
 
     cell: PositiveFloat = 0.5
@@ -206,7 +207,7 @@ class LayeredOverlap(Method[LayeredScan, LayeredDatabase]):
     ) -> list[np.ndarray | None]:
         """Returns poses with the query's heading and horizontal translation.
 
-        A pose is None if one of the two scans shows nothing.
+        A pose is None if one of the two scans has no filled cell.
         """
         scans = [database.places[place] for place in places]
         poses: list[np.ndarray | None] = [None] * len(scans)

@@ -136,7 +136,11 @@ class LearnedConfig(MethodConfig):
     @computed_field  # type: ignore[prop-decorator]
     @property
     def digest(self) -> str:
-        """Digest of the weights' file; its name alone would not identify it."""
+        """Digest of the file of weights.
+
+        Results depend on it, because the file's name alone does not identify
+        the weights.
+        """
         load_weights(self.path)
         return hashlib.sha256(self.path.read_bytes()).hexdigest()[:16]
 
@@ -146,8 +150,8 @@ class LearnedScan:
     """Descriptor of one scan.
 
     Attributes:
-        features: (TURNS, FEATURES) float32 of unit length; all zero without a
-            point in reach.
+        features: (TURNS, FEATURES) float32 of unit length; all zero if the scan
+            has no points within range.
     """
 
     features: np.ndarray
@@ -168,7 +172,7 @@ class LearnedDatabase:
 
 @register("learned")
 class Learned(Method[LearnedScan, LearnedDatabase]):
-    """The network; the score of a pair is the cosine at the best turn."""
+    """The network; the score of two scans is their cosine at the best turn."""
 
     Config = LearnedConfig
     skips_places = True
@@ -245,7 +249,7 @@ class Learned(Method[LearnedScan, LearnedDatabase]):
 
 
 def seen_part(image: np.ndarray) -> float:
-    """Returns the share of a polar image's sectors that have a point."""
+    """Returns the share of a polar image's sectors with at least one point."""
     return float(image.any(axis=(0, 2)).mean())
 
 

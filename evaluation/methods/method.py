@@ -32,18 +32,18 @@ PlaceScan = Literal["middle", "first"]
 class MethodConfig(BaseModel):
     """The parameters that all methods share.
 
-    A method with further parameters derives its own class from this one.
+    If your method has further parameters, derive its class of parameters from
+    this class.
 
     Attributes:
         sensor_height: height of the LiDAR above the ground [m]. The default is
             that of the CNS vehicle.
-        place: which of the merged scans gives a place its pose: the one in the
-            `middle`, or the `first`. By default the protocol decides. Methods
-            that describe single scans do not use it.
+        place: which of several merged scans gives a place its pose: the scan in
+            the `middle`, or the `first`. By default the protocol decides.
+            Methods that describe single scans do not use this parameter.
         sequence: length of the path before a query [m]. Earlier queries on this
-            path also vote for the place of the query, as in SeqSLAM (see
-            `sequences.along_the_way`). With 0, each query is recognised by
-            itself.
+            path also vote for the place of the query, as in SeqSLAM. With 0,
+            each query is recognised by itself.
 
     Example:
         from evaluation import MethodConfig

@@ -334,7 +334,9 @@ def dpa_net(weights: Weights, cloud: np.ndarray) -> np.ndarray:
 
 
 def farthest_points(points: np.ndarray, number: int) -> np.ndarray:
-    """Returns indices of points, each the farthest from all before it.
+    """Returns indices of points that are far apart from each other.
+
+    Each point is the one that is farthest from all points chosen before.
 
     The first index is 0.
     """
@@ -403,7 +405,11 @@ class NetworkConfig(MethodConfig):
     @computed_field  # type: ignore[prop-decorator]
     @property
     def digest(self) -> str:
-        """Digest of the weights' file; its name alone would not identify it."""
+        """Digest of the file of weights.
+
+        Results depend on it, because the file's name alone does not identify
+        the weights.
+        """
         content = read_bytes(self.weights, MOST_BYTES)
         return hashlib.sha256(content).hexdigest()[:16]
 

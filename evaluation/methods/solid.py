@@ -33,11 +33,11 @@ class SolidConfig(MethodConfig):
 
     Attributes:
         voxel_size: side of the voxels to which each cloud is first thinned [m];
-            [P] 1.0. ([C] has 0.4, but only [P] is for LiDARs with this field of
-            view.)
+            [P] 1.0. ([C] has 0.4, but only [P] is for LiDARs with a field of
+            view like that of `cns`.)
         min_range: smallest range of a point that is used [m]; [P] 3.
         max_range: largest range of a point that is used [m]; [P] 80, for a
-            LiDAR with this field of view.
+            LiDAR with a field of view like that of `cns`.
         ranges: number of equal cells of range, up to `max_range`; [P], [C] 40.
         azimuths: number of equal cells of azimuth in a turn; [P], [C] 60.
         elevations: number of equal cells of elevation over the field of view;
@@ -107,7 +107,7 @@ class SolidDatabase:
 
 @register("solid")
 class SolidMethod(Method[Solid, SolidDatabase]):
-    """SOLiD; the score of a pair is the cosine of its range descriptors.
+    """SOLiD; the score of two scans is the cosine of their range descriptors.
 
     Where it differs from the authors' programs:
 

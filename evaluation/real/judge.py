@@ -1,4 +1,4 @@
-"""Can a classifier tell real scans from simulated ones?
+"""Tests whether a classifier can tell real scans from simulated scans.
 
 Of each scan, sixteen patches of 8 m within 30 m of the LiDAR are described by
 features. Boosted trees then learn to tell the patches of the two sets apart; a
@@ -9,10 +9,11 @@ As a control, the classifier tells the first half of the simulated places from
 the second half. All AUCs are means over random draws of patches; single draws
 differ by up to 0.04.
 
-Rings come from recordings, or from files with one ring after the other, as
-KITTI's. Features that need rings are left out if one of the sets has none.
+Some features need the ring (laser) of each point. Rings are read from
+recordings, or from files that store one ring after the other, like KITTI's. If
+one of the two sets has no rings, these features are left out.
 
-Needs the extra `judge`.
+The module needs the optional packages of the extra `judge`.
 """
 
 from __future__ import annotations

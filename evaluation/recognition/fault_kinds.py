@@ -135,12 +135,12 @@ def fault_kinds(result: PlaceRecognition, evidence: PairEvidence) -> list[str]:
         For each of Q queries, the first reason that applies: "" if the best
         place is right; `no_place` if the query has no match; `no_candidate` if
         the method finds no place or rejects all places; `too_far` if the best
-        place is within two radii; `hidden` if the right place shows less than
-        half of the query's scan, and most of the rest is hidden from its
-        sensor; `no_overlap` if it shows less than half for another reason;
-        `changed` if at least a quarter of the surroundings is new or gone;
-        `twin` if the best place fits the query as well as the right place does;
-        otherwise `elsewhere`.
+        place is less than two radii away, but not a match; `hidden` if the
+        right place shows less than half of the query's scan, and most of the
+        rest is hidden from its sensor; `no_overlap` if it shows less than half
+        for another reason; `changed` if at least a quarter of the surroundings
+        is new or gone; `twin` if the best place fits the query as well as the
+        right place does; otherwise `elsewhere`.
     """
     retrieval = result.retrieval
     little = evidence.overlaps < _ENOUGH

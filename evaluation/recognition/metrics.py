@@ -49,7 +49,9 @@ MAX_RANK = 25
 
 @dataclass(frozen=True)
 class PrCurve:
-    """Precision and recall at every distinct score, from the best score down.
+    """The precision-recall curve: a point for every distinct score.
+
+    The first point is that of the best score.
 
     Attributes:
         thresholds: (K,) least accepted scores, decreasing.
@@ -87,7 +89,7 @@ class PrCurve:
 
     @property
     def auc(self) -> float:
-        """Area under the curve, by trapezoids over the recalls it reaches.
+        """Area under the curve by trapezoids, up to its greatest recall.
 
         From recall 0 to its first point, the curve has that point's precision.
         The area is 0 if nothing is ever accepted.
@@ -184,6 +186,9 @@ UNKNOWN = Interval()
 
 def route_blocks(positions: np.ndarray, frames: np.ndarray) -> np.ndarray:
     """Returns the block (Q,) of the route in which each query lies.
+
+    A block is a stretch of the route; the bootstrap draws whole blocks, because
+    neighbouring queries tend to be right or wrong together.
 
     Args:
         positions: (N, 3) positions of the sensor along the drive [m].

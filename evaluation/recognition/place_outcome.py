@@ -40,8 +40,8 @@ class PlaceOutcome:
         is_gated: whether the gate was used, which rejects places that lie too
             far away by the method's own pose estimate.
         outcomes: outcomes of Q queries.
-        columns: columns of `queries.csv`, (Q,) each. An index that is unknown
-            is -1, other numbers are NaN or infinite.
+        columns: columns of `queries.csv`, (Q,) each. If unknown, an index is -1
+            and any other number NaN or infinite.
         pose_errors: errors of the poses at the best places.
         radius: radius of a match [m].
     """
@@ -141,8 +141,8 @@ def faults(
         (Q,) the first reason that applies: "" if the best place is right;
         `no_place` if the query has no match; `no_candidate` if the method finds
         no place, or rejects all places; `other_city` if the best place is in
-        another city; `too_far` if it is within two radii; otherwise
-        `elsewhere`.
+        another city; `too_far` if the best place is less than two radii away,
+        but not a match; otherwise `elsewhere`.
     """
     wrong = [
         ~outcomes.has_match,

@@ -70,7 +70,7 @@ class QueryOutcomes:
 
     @property
     def mean_reciprocal_rank(self) -> float:
-        """Mean of 1 / rank of the best true match, over queries with one.
+        """Mean of 1 / rank of the best true match, over queries with a match.
 
         A query without a match among its candidates counts 0. NaN if no query
         has a match.

@@ -71,13 +71,16 @@ class Retrieval:
 
     @property
     def best_frames(self) -> np.ndarray:
-        """(Q,) frame of each query's best place; -1 for none."""
+        """(Q,) frame of each query's best place; -1 without a candidate."""
         best = self.best_places
         return np.where(best < 0, -1, self.database_frames[best])
 
     @property
     def best_distances(self) -> np.ndarray:
-        """(Q,) distance of each query to its best place [m]; NaN for none."""
+        """(Q,) distance of each query to its best place [m].
+
+        It is NaN for a query without a candidate.
+        """
         best = self.best_places
         distances = self.distances[np.arange(len(best)), best]
         return np.where(best < 0, np.nan, distances)

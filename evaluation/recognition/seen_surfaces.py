@@ -38,11 +38,12 @@ _UNKNOWN, _SHOWN, _BEHIND = range(3)
 
 
 class Shares(NamedTuple):
-    """Shares of the points of another scan; NaN without points.
+    """How much of other points a scan shows and hides; NaN without points.
 
     Attributes:
         shown: share of points on surfaces that this scan shows.
-        hidden: share of points behind all returns around their directions.
+        hidden: share of points that lie behind all returns of this scan around
+            their direction.
     """
 
     shown: float

@@ -1,4 +1,4 @@
-"""Curves: precision over recall, and the errors along a track."""
+"""Draws curves: precision over recall, and errors along a tracked drive."""
 
 from collections.abc import Sequence
 from pathlib import Path

@@ -143,7 +143,7 @@ class Report:
 
 
 def chart_illustrations(report: Report, folder: Path) -> list[Illustration]:
-    """Draws the charts over all cities; returns those that have data.
+    """Draws charts of the results of all cities; returns those with data.
 
     Charts of published numbers stand next to the charts of the report.
     """

@@ -90,8 +90,8 @@ class Drawn:
     Attributes:
         message: sentence that says what the chart shows.
         figure: the drawing.
-        legend: name -> colour, line style and marker; empty where the drawing
-            has the names.
+        legend: name -> colour, line style and marker; empty if the names stand
+            in the drawing.
     """
 
     message: str
@@ -221,7 +221,7 @@ def check(chart: Mapping[str, Any]) -> dict[str, str]:
 
 
 def styles(labels: Sequence[str]) -> dict[str, tuple[str, str, str]]:
-    """Returns title -> colour, line style and marker of each method."""
+    """Returns the colour, line style and marker of each method, by title."""
     others = [name for name in labels if name not in METHOD_STYLES]
     return {
         title(name): METHOD_STYLES.get(name)

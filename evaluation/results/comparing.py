@@ -74,8 +74,8 @@ class _Table:
 class Compared(NamedTuple):
     """The mean AUC of one method minus the mean AUC of another.
 
-    The p-value is corrected, by Holm's method, for all differences of the
-    comparison.
+    The p-value is corrected by Holm's method for the number of differences in
+    the comparison.
     """
 
     first: str
@@ -87,9 +87,9 @@ class Compared(NamedTuple):
 class Agreement(NamedTuple):
     """How similarly two tables rank the methods that both of them name.
 
-    `tau` is Kendall's tau-b (Kendall, Biometrika 33, 1945): 1 if every two
-    methods have the same order in both tables, -1 if every two have the
-    opposite order. It is NaN if all values of a table are equal.
+    `tau` is Kendall's tau-b (Kendall, Biometrika 33, 1945): 1 if the two tables
+    rank the methods in the same order, -1 if they rank them in opposite orders.
+    It is NaN if all values of a table are equal.
     """
 
     first: str

@@ -120,7 +120,7 @@ class Table:
         )
 
     def without_empty(self, name: str) -> Table:
-        """Returns the table, without a named column if that has no values."""
+        """Returns the table without a given column if the column is empty."""
         column = self.header.index(name)
         if not all(_is_missing(row[column]) for row in self.rows):
             return self

@@ -103,7 +103,10 @@ class City:
     reference: Reference = NO_REFERENCE
 
     def change_pairs(self) -> list[Pair]:
-        """Returns pairs of every earlier stage with the last one."""
+        """Returns the pairs of drives between which change is measured.
+
+        Each drive of an earlier stage is paired with that of the last stage.
+        """
         *earlier, last = (self.stages[key] for key in sorted(self.stages))
         return [(recording, last) for recording in earlier]
 

@@ -78,12 +78,12 @@ _FORMS: dict[str, type] = {
 
 
 def encode(value: object) -> bytes:
-    """Returns a value as bytes without code; equal values give equal bytes.
+    """Returns a value as bytes; equal values give equal bytes.
 
-    Unpickling can run any code that the bytes name. Here a tree of JSON
-    contains the values, and arrays follow it as NumPy stores them. A value is
-    None, a number, text, bytes, an array of no objects, or a list, tuple, dict,
-    named tuple or dataclass of such values.
+    Unlike a pickle, which can run any code when it is read, the bytes contain a
+    tree of JSON, followed by the arrays as NumPy stores them. A value is None,
+    a number, text, bytes, an array without Python objects, or a list, tuple,
+    dict, named tuple or dataclass of such values.
 
     Raises:
         TypeError: if the value contains anything else.
@@ -99,9 +99,9 @@ def encode(value: object) -> bytes:
 
 
 def decode(data: bytes) -> Any:
-    """Returns the value in bytes that `encode` returned.
+    """Returns the value that `encode` turned into bytes.
 
-    Dataclasses are those of this package, or of modules that have been
+    Dataclasses must belong to this package, or to modules that have been
     imported.
 
     Raises:

@@ -190,7 +190,7 @@ class KeptDrive:
     scans: dict[int, np.ndarray] = field(default_factory=dict)
 
     def keep(self, frame: int, scan: np.ndarray, max_range: float) -> None:
-        """Keeps a scan, without the points beyond a range."""
+        """Keeps the scan of a frame, without the points beyond a range."""
         names = [one for one in scan.dtype.names or () if one in _KEPT_FIELDS]
         kept = within_range(xyz(scan), max_range)
         # A view would hold all fields.
@@ -331,11 +331,11 @@ def _described(
 
 @dataclass(frozen=True)
 class Survey(Step):
-    """Writes the survey of a drive, or its missing parts.
+    """A job step that surveys a drive and writes the files that are missing.
 
-    It calls `survey_recording`, or `describe_recording` if the drive needs no
-    map. If the drive has places or queries, `further` requests descriptions by
-    a second protocol.
+    A survey consists of the drive's map and the descriptions of its places and
+    queries; without a map, only the places and queries are read. If the drive
+    has places or queries, `further` requests descriptions by a second protocol.
     """
 
     source: DriveSource

@@ -86,7 +86,10 @@ def map_city(
 def measure_change(
     reporter: Reporter, first: Part, second: Part
 ) -> dict[str, tuple[float, int]]:
-    """Returns metric -> value and number of voxels, for two mapped drives."""
+    """Returns how much changed between two mapped drives.
+
+    The result is metric -> value and number of voxels.
+    """
     a, b = (
         Surveyed(name, *part.read())
         for name, part in (("database", first), ("query", second))

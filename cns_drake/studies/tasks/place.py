@@ -63,7 +63,7 @@ class PlaceTask(Task):
 
 
 class PoseTask(PlaceTask):
-    """Measures the errors of query poses, estimated from the best place."""
+    """Measures the errors of the poses of queries at their best places."""
 
     name = "pose"
 
