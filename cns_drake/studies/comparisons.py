@@ -1,4 +1,4 @@
-"""The two drives of each condition of an experiment."""
+"""Makes the two drives of each condition of an experiment."""
 
 from __future__ import annotations
 

@@ -487,7 +487,7 @@ def _split(
 
 
 class _Values(list):
-    """The values of a factor."""
+    """The values of a factor, as a type of its own."""
 
 
 def _leaves(

@@ -156,13 +156,13 @@ class MadeMaps:
     def aged(
         self, drive: Scenario, years: int, rates: Any, seed: int
     ) -> tuple[str, str]:
-        """Returns map folder and stage of a drive's aged city."""
+        """Returns the map folder and stage of a drive's aged city."""
         key = self._key(drive, rates, seed)
         number = sorted(self._ages[key]).index(years)
         return str(self._aged_folder(*key)), f"{number + 2:02d}"
 
     def redrawn(self, drive: Scenario, seed: int) -> tuple[str, str]:
-        """Returns map folder and stage of a drive's city, drawn anew."""
+        """Returns the map folder and stage of a drive's city, drawn anew."""
         source = map_folder(drive).path.resolve()
         return str(self.folder / f"{source.name}_c{seed}"), _STAGE
 

@@ -236,7 +236,11 @@ def compare_runs(
     database: DriveSimulation,
     options: ExportOptions,
 ) -> np.ndarray:
-    """Returns the exact overlap of each query with each place, (Q, D)."""
+    """Returns the exact overlap of each query with each place, (Q, D).
+
+    The overlap is the share of a query's points that the LiDAR at the place
+    sees.
+    """
     protocol = RetrievalProtocol(
         query_spacing=options.spacing,
         place_spacing=options.spacing,
@@ -267,7 +271,7 @@ class Run:
 
     @property
     def files(self) -> list[str]:
-        """The cloud files."""
+        """File names of the drive's clouds, relative to the data set."""
         return [f"{self.folder}/{k:06d}.bin" for k in range(len(self.X_WS))]
 
 

@@ -1,4 +1,4 @@
-"""Recordings as jobs, side by side, one process each."""
+"""Records drives as jobs that run side by side, each in its own process."""
 
 from collections import Counter
 from collections.abc import Iterator, Mapping, Sequence

@@ -172,7 +172,7 @@ class RedrawCity(MakeMap):
             finish(draft)
 
     def inputs(self) -> dict[str, bytes]:
-        """Returns name -> content of the inputs of the city."""
+        """Returns name -> content of the files from which the city is drawn."""
         return redrawn_inputs(self.map_folder, self.stage, self.seed)
 
     def finish_inputs(self, draft: Path) -> None:
@@ -292,7 +292,7 @@ def draw_fresh_cities(
 
 @dataclass(frozen=True)
 class DrawFreshCity(RedrawCity):
-    """Draws a version of a map, with its stages and drives."""
+    """Draws a fresh version of a map, with its stages and drives."""
 
     turn_deg: float = 0.0
 

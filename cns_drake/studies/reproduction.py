@@ -1,4 +1,4 @@
-"""The experiments on maps, from simulation to report."""
+"""Records the drives of maps, evaluates them and writes a report."""
 
 from collections.abc import Callable, Sequence
 from dataclasses import replace

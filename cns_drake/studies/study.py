@@ -1,4 +1,4 @@
-"""A study: an experiment on maps, from its conditions to its table and page."""
+"""Runs a study: an experiment on maps, from conditions to tables and page."""
 
 from __future__ import annotations
 

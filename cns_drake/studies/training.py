@@ -93,7 +93,7 @@ class TrainingScans:
 
     @classmethod
     def of(cls, parts: Sequence["TrainingScans"]) -> "TrainingScans":
-        """Joins scans of several cities, which are numbered in order."""
+        """Joins scans of several cities; numbers the cities in their order."""
         overlaps = [part.overlaps for part in parts]
         return cls(
             np.concatenate([part.images for part in parts]),

@@ -93,7 +93,10 @@ class ChangeReport:
     alignment: AlignmentReport | None = None
 
     def to_json(self) -> dict:
-        """Returns all numbers for JSON; NaN becomes None, with a reason."""
+        """Returns all numbers as a dictionary for JSON.
+
+        NaN becomes None, with a reason in words.
+        """
         change = self.change
         sides = {
             "source": change.source_to_target,
@@ -352,7 +355,7 @@ class ChangeResult:
 def symmetric_changes(
     changes: Iterable[ChangeResult],
 ) -> dict[tuple[str, str, str], float]:
-    """Returns (map, stage, stage) -> TCR_sym, with stages in both orders."""
+    """Returns TCR_sym by map and two stages, in either order of the stages."""
     values = {}
     for result in changes:
         value = result.report.change.symmetric

@@ -160,7 +160,7 @@ class DirectedChange:
         return _ratio(self.num_unchanged, self.num_in_hull)
 
     def restricted(self, kept: np.ndarray) -> DirectedChange:
-        """Returns the change, counted over the points of a mask (N,)."""
+        """Returns the change, counted only over the points in a mask (N,)."""
         return DirectedChange(
             self.in_hull & kept, self.unchanged & kept, self.distances
         )

@@ -58,7 +58,7 @@ class BinLayout:
 
     @property
     def dtype(self) -> np.dtype:
-        """The type of a point: x y z intensity column_5 and so on."""
+        """NumPy type of a point: x, y, z, intensity, column_5, column_6 ..."""
         more = [f"column_{k + 1}" for k in range(len(_NAMES), self.columns)]
         names = [*_NAMES[: self.columns], *more]
         return np.dtype([(name, "<f4") for name in names])

@@ -449,7 +449,7 @@ def _read_ply_header(path: Path) -> tuple[str, list[_Element], int]:
 
 
 def no_note(note: str) -> None:
-    """Ignores a note for the user."""
+    """Does nothing with a note for the user."""
 
 
 def read_cloud(

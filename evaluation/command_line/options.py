@@ -95,7 +95,7 @@ def open_noted(
 def aligned(
     drives: Sequence[Drive], when: When, *, across_maps: bool = False
 ) -> tuple[Drive, Drive]:
-    """Returns two drives in one world, with a note if one was moved."""
+    """Returns two drives in one world; shows a note if a drive was moved."""
     from evaluation.alignment import in_one_world
 
     first, second = drives

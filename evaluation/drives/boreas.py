@@ -44,7 +44,7 @@ _ORIGIN = (620_000.0, 4_845_000.0, 0.0)
 
 
 class BoreasDrive(FileDrive):
-    """The scans of the Alpha Prime on a drive of Boreas."""
+    """A drive of Boreas, with the scans of its LiDAR, an Alpha Prime."""
 
     def __init__(self, path: Path, columns: int | None = None):
         """Opens a drive; `columns` is ignored, because the layout is fixed.

@@ -123,7 +123,7 @@ class DriveComparison:
     reverse_95: float
 
     def to_json(self) -> dict:
-        """Returns all numbers; NaN becomes None."""
+        """Returns all numbers as a dictionary for JSON; NaN becomes None."""
 
         def plain(fields: list[tuple[str, Any]]) -> dict:
             return {

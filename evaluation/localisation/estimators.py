@@ -216,7 +216,10 @@ def _scans(
 def map_of(
     points: np.ndarray, name: str, settings: Settings
 ) -> LocalisationMap:
-    """Returns the map of points (M, 3) in W, M >= FEWEST_POINTS [m]."""
+    """Returns a localisation map of points (M, 3) in W [m].
+
+    M must be at least `FEWEST_POINTS`.
+    """
     surface = make_surface(points, settings.neighbours)
     return LocalisationMap(name, surface)
 
@@ -264,7 +267,7 @@ class Fit:
 
 
 def judge(surface: Surface, scan: np.ndarray, X_WS: np.ndarray) -> Fit:
-    """Returns the `Fit` of a scan (N, 3) in S to a map at a pose."""
+    """Returns how well a scan (N, 3) in S fits a map at a given pose."""
     p_W = poses.transform(X_WS, scan)
     found, squares = surface.tree.batch_nearest_neighbor_search(p_W)
     is_pair = np.asarray(squares) < _PAIR**2

@@ -135,7 +135,7 @@ class Starts:
 
 
 class OneScan(FileDrive):
-    """A cloud as a drive of one scan, at the origin of its world."""
+    """A point cloud as a drive of one scan, at the origin of its world."""
 
     def __init__(self, path: Path, columns: int | None = None):
         """Reads the cloud, with its columns if it is a `.bin` file."""
@@ -357,7 +357,7 @@ def is_right(
     translation: float = RIGHT_TRANSLATION,
     rotation_deg: float = RIGHT_ROTATION_DEG,
 ) -> np.ndarray:
-    """Returns which results have at most these errors, (K,) bool."""
+    """Returns which results are within limits of the error, (K,) bool."""
     return (rows["translation_error"] <= translation) & (
         rows["rotation_error_deg"] <= rotation_deg
     )
@@ -433,7 +433,7 @@ class Localisation:
         return found
 
     def numbers(self, method: str) -> Iterator[Number]:
-        """Yields the numbers of the summary that go into tables of results."""
+        """Yields the numbers of the summary as rows for tables of results."""
         found = self.to_json()
         for name in _SHOWN:
             if (value := found[name]) is not None:
@@ -458,7 +458,7 @@ class Localisation:
 
 
 def write_rows(rows: np.ndarray, path: Path) -> None:
-    """Writes results by query as CSV; an unknown number is empty."""
+    """Writes the result of each query as CSV; unknown numbers are empty."""
     cells = (
         [
             ""

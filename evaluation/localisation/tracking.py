@@ -1,4 +1,4 @@
-"""Tracking: each scan of a drive is registered from the last estimate."""
+"""Tracks a drive in a map: each scan is registered from the last estimate."""
 
 from dataclasses import dataclass
 
@@ -160,7 +160,7 @@ def track_drive(
 
 @dataclass(frozen=True)
 class TrackSummary:
-    """The results of a track.
+    """The results of a drive that was tracked in a map.
 
     Attributes:
         rows: (K,) of `TRACKED`.

@@ -80,7 +80,7 @@ def run_baseline(name: str, pair: Pair, track: Track = silent) -> Labels:
 def by_distance(
     mine: Session, theirs: Session, track: Track = silent
 ) -> np.ndarray:
-    """Returns labels (N,) of a map by its distance from the other map."""
+    """Returns labels (N,) of a map's points by distance from the other map."""
     _, kept, changed = SIDES[mine.side]
     far = np.isinf(nearest(mine.points, theirs.points, _APART))
     return np.where(far, changed, kept).astype(np.uint8)
@@ -177,7 +177,7 @@ def _slopes(p_S: np.ndarray) -> np.ndarray:
 def by_m3c2(
     mine: Session, theirs: Session, track: Track = silent
 ) -> np.ndarray:
-    """Returns labels (N,) of a map by the method M3C2, from py4dgeo."""
+    """Returns labels (N,) of a map by the method M3C2 of py4dgeo."""
     py4dgeo = _py4dgeo()
     unobserved, kept, changed = SIDES[mine.side]
     epochs = [py4dgeo.Epoch(one.points) for one in (mine, theirs)]

@@ -1,4 +1,4 @@
-"""How much of each structure changed, and a verdict on each structure."""
+"""Computes how much of each structure changed, and a verdict on each."""
 
 from collections.abc import Collection, Mapping, Sequence
 from dataclasses import astuple, dataclass, fields

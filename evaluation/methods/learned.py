@@ -128,7 +128,7 @@ class LearnedConfig(MethodConfig):
 
     @property
     def path(self) -> Path:
-        """The file of the weights."""
+        """Path of the file with the weights."""
         return (
             self.weights or {"radius": SHIPPED, "graded": GRADED}[self.variant]
         )

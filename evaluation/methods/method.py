@@ -137,7 +137,7 @@ class Method(abc.ABC, Generic[Descriptor, Database]):
 
     @property
     def describes_alike(self) -> bool:
-        """Whether places and queries are described in the same way."""
+        """Whether the method describes places and queries in the same way."""
         return type(self).describe_place is Method.describe_place
 
     @abc.abstractmethod

@@ -458,7 +458,7 @@ class _Network(Method[np.ndarray, np.ndarray]):
 
 @register("svt-net")
 class SvtNet(_Network):
-    """SVT-Net."""
+    """The place-recognition method SVT-Net."""
 
     shapes = _SVT_NET
     infer = staticmethod(svt_net)
@@ -466,7 +466,7 @@ class SvtNet(_Network):
 
 @register("dpa-net")
 class DpaNet(_Network):
-    """DPA-Net."""
+    """The place-recognition method DPA-Net."""
 
     shapes = _DPA_NET
     infer = staticmethod(dpa_net)

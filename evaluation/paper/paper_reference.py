@@ -189,7 +189,10 @@ def findings(
 
 
 def trend(change: Sequence[float], auc: Sequence[float]) -> Trend:
-    """Returns the trend of AUC over TCR_sym over three or more pairs."""
+    """Returns the trend of AUC over TCR_sym.
+
+    There must be three or more pairs of drives.
+    """
     x, y = np.asarray(change), np.asarray(auc)
     spread = float(np.ptp(y))
     if np.ptp(x) == 0.0 or spread == 0.0:

@@ -70,7 +70,7 @@ def scan_table(scan: np.ndarray) -> np.ndarray:
 
 
 def places_of(drive: Drive) -> list[list[np.ndarray]]:
-    """Returns the scans of each place of a drive, at most 40 in all."""
+    """Returns the scans of a drive by place, at most 40 scans in all."""
     step = -(-len(drive) // _MOST_SCANS)
     places: list[list[np.ndarray]] = []
     first = np.full(3, np.inf)
@@ -84,7 +84,7 @@ def places_of(drive: Drive) -> list[list[np.ndarray]]:
 
 
 def patches(scan: np.ndarray, rng: np.random.Generator) -> Iterator[np.ndarray]:
-    """Yields small pieces of a scan."""
+    """Yields small pieces of a scan, at random places."""
     ranges = np.linalg.norm(scan[:, :3], axis=1)
     near = np.flatnonzero((ranges > _NEAREST) & (ranges < _FARTHEST))
     found = 0
@@ -276,7 +276,7 @@ class Features:
         self.place = np.array(numbers)
 
     def of(self, names: list[str]) -> np.ndarray:
-        """Returns (N, F) features; NaN where a patch has none."""
+        """Returns features (N, F) by their names; NaN if a patch lacks one."""
         return np.array(
             [[row.get(name, np.nan) for name in names] for row in self.rows]
         )
@@ -292,7 +292,10 @@ class Features:
 
 
 def common_names(sets: list[Features]) -> list[str]:
-    """Returns the features that at least a tenth of each set's patches have."""
+    """Returns the names of features that at least a tenth of patches have.
+
+    That must be so in each of the sets.
+    """
     names = list(dict.fromkeys(n for s in sets for row in s.rows for n in row))
     shares = [np.isfinite(one.of(names)).mean(axis=0) for one in sets]
     kept = np.min(shares, axis=0) >= 0.1

@@ -1,4 +1,4 @@
-"""Costs of a method: time to describe and query, and memory per place."""
+"""Measures a method's cost: time to describe and query, memory per place."""
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass

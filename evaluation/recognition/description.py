@@ -1,4 +1,4 @@
-"""Descriptions of a drive's places and queries, by methods."""
+"""Lets place-recognition methods describe a drive's places and queries."""
 
 from collections.abc import Callable, Iterable, Mapping, Sequence, Set
 from dataclasses import dataclass, field
@@ -173,7 +173,10 @@ class _Seen:
     def cloud(
         self, sensor: QuerySensor | None, kind: _Kind, max_range: float
     ) -> np.ndarray:
-        """Returns a cloud, the same array for the same arguments."""
+        """Returns the frame's cloud as a sensor sees it.
+
+        Equal arguments return the same array.
+        """
         key = sensor, kind, max_range
         if key not in self._clouds:
             number, before, fields = kind
@@ -190,7 +193,7 @@ class _Seen:
 
     @property
     def most_points(self) -> int:
-        """Size of the greatest cloud."""
+        """Number of points of the frame's largest cloud."""
         return max(map(len, self._clouds.values()), default=0)
 
 
@@ -204,7 +207,7 @@ def _frames(
 
 
 class _Describing:
-    """The descriptions of one drive by one method, in progress."""
+    """Collects the descriptions of one drive by one method."""
 
     def __init__(
         self,

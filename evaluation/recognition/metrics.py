@@ -67,14 +67,14 @@ class PrCurve:
 
     @property
     def precision(self) -> np.ndarray:
-        """(K,) precision; every threshold accepts at least one query."""
+        """(K,) precision TP / (TP + FP) at each threshold."""
         return self.true_positives / (
             self.true_positives + self.false_positives
         )
 
     @property
     def recall(self) -> np.ndarray:
-        """(K,) recall at each threshold; 0 if there is nothing to recall."""
+        """(K,) recall TP / (TP + FN) at each threshold; 0 if TP + FN is 0."""
         return recall_of(self.true_positives, self.false_negatives)
 
     @property
@@ -155,7 +155,7 @@ def weighted_counts(
 
 
 def areas_under(precision: np.ndarray, recall: np.ndarray) -> np.ndarray:
-    """Returns the areas (B,) under curves (B, K); K can be 0."""
+    """Returns the areas (B,) under B precision-recall curves; K can be 0."""
     if precision.shape[1] == 0:
         return np.zeros(len(precision))
     start = precision[:, 0] * recall[:, 0]
@@ -165,7 +165,7 @@ def areas_under(precision: np.ndarray, recall: np.ndarray) -> np.ndarray:
 
 
 def recall_of(tp: np.ndarray, fn: np.ndarray) -> np.ndarray:
-    """Returns TP / (TP + FN), 0 if there is nothing to recall."""
+    """Returns the recall TP / (TP + FN); 0 if TP + FN is 0."""
     return tp / np.maximum(tp + fn, 1)
 
 

@@ -1,4 +1,4 @@
-"""The outcome of a method on two drives, query by query."""
+"""The answers of a method on two drives, query by query, as numbers."""
 
 from __future__ import annotations
 
@@ -116,7 +116,10 @@ class PlaceOutcome:
         interval: Interval = UNKNOWN,
         n: int | None = None,
     ) -> Number:
-        """Returns a metric of the outcome, by default over all queries."""
+        """Returns a metric as a row of results; by default, n is Q.
+
+        Method and gate are those of the outcome.
+        """
         count = len(self.outcomes) if n is None else n
         return Number(
             self.method, self.is_gated, metric, value, interval, count
@@ -265,7 +268,10 @@ def pose_numbers(
 def kept_share(
     changed: np.ndarray | float, unchanged: np.ndarray | float
 ) -> np.ndarray:
-    """Returns changed / unchanged; NaN where `unchanged` is 0 or NaN."""
+    """Returns the share of a result that is kept: changed / unchanged.
+
+    It is NaN where `unchanged` is 0 or NaN.
+    """
     with np.errstate(invalid="ignore", divide="ignore"):
         share = np.divide(changed, unchanged)
     return np.where(np.asarray(unchanged) > 0.0, share, math.nan)

@@ -1,4 +1,4 @@
-"""One method on one pair of drives, from scans to numbers."""
+"""Measures one method on one pair of drives, from scans to numbers."""
 
 from __future__ import annotations
 
@@ -64,11 +64,13 @@ class PlaceRecognition:
 
     @property
     def metrics(self) -> PlaceRecognitionMetrics:
-        """The metrics in mode `mode`."""
+        """The metrics in the result's own mode, `mode`."""
         return self.by_mode[self.mode]
 
     def auc_over_radius(self) -> dict[float, float]:
-        """Returns radius of a match [m] -> AUC in mode all.
+        """Returns the AUC for several radii of a match: radius [m] -> AUC.
+
+        All queries count.
 
         The AUC is NaN if no query has a match within the radius.
         """
@@ -83,7 +85,7 @@ class PlaceRecognition:
         return found
 
     def to_json(self) -> dict:
-        """Returns all numbers; NaN becomes None."""
+        """Returns all numbers as a dictionary for JSON; NaN becomes None."""
         metrics = self.metrics
         true_positives = counted = 0
         if metrics.f1_max_index is not None:

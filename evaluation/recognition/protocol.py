@@ -218,7 +218,7 @@ class RetrievalProtocol:
         return values
 
     def to_json(self) -> dict[str, object]:
-        """Returns all options of the protocol by their names."""
+        """Returns name -> value of all options of the protocol."""
         return asdict(self)
 
     def to_text(self) -> str:

@@ -1,4 +1,4 @@
-"""The scores of a method: their checks, the gate, and the order of places."""
+"""Checks a method's scores, applies the gate and ranks places."""
 
 from collections.abc import Sequence
 import contextlib

@@ -108,7 +108,10 @@ class Picture:
         return left, left + width / scale, bottom, bottom + height / scale
 
     def project(self, points: np.ndarray) -> np.ndarray:
-        """Returns points (N, 3) as coordinates right and up (N, 2) [m]."""
+        """Projects points (N, 3) onto the image plane; returns (N, 2) [m].
+
+        The two coordinates point right and up.
+        """
         return points @ self.view.axes()[:2].T
 
 

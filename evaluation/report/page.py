@@ -137,7 +137,7 @@ class Report:
 
     @property
     def compared(self) -> list[PlaceRecognition]:
-        """Results for which the reference has published numbers."""
+        """Results with which published numbers can be compared."""
         known = filter(self.reference.covers, self.recognitions)
         return [*known, *self.repeated]
 

@@ -404,7 +404,7 @@ _POSE_ERRORS: Columns[PlaceRecognition] = {
 
 
 def pose_table(results: Sequence[PlaceRecognition]) -> Table:
-    """Returns the errors of estimated poses for print."""
+    """Returns a table of the errors of estimated poses, for print."""
     names: list[str | tuple[str, str]] = [
         *(("translation [m]", part) for part in ("median", "90 %")),
         *(("rotation [deg]", part) for part in ("median", "90 %")),
@@ -419,7 +419,7 @@ def pose_table(results: Sequence[PlaceRecognition]) -> Table:
 
 
 def pose_numbers(results: Sequence[PlaceRecognition]) -> Table:
-    """Returns the errors of estimated poses, for `poses.csv`."""
+    """Returns a table of the errors of estimated poses, for `poses.csv`."""
     return Table.of(
         results,
         {

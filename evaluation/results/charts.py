@@ -101,7 +101,7 @@ class Drawn:
 
 @dataclass(frozen=True)
 class _Chart:
-    """The inputs of a chart."""
+    """The inputs from which a chart is drawn."""
 
     keys: Mapping[str, str]
     results: Results
@@ -510,7 +510,10 @@ def smooth(
 def smooth_band(
     x: np.ndarray, y: np.ndarray, grid: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Returns the 95 % band of `smooth` by resampling points."""
+    """Returns the 95 % band of the regression `smooth`, by bootstrap.
+
+    The bootstrap resamples points.
+    """
     draws = np.random.default_rng(0).integers(len(x), size=(_RESAMPLES, len(x)))
     counts = np.stack([np.bincount(d, minlength=len(x)) for d in draws])
     curves = smooth(x, y, grid, counts)

@@ -127,7 +127,10 @@ class Comparison:
     notes: Sequence[str]
 
     def to_json(self) -> dict[str, Any]:
-        """Returns the whole comparison for JSON; NaN becomes None."""
+        """Returns the whole comparison as a dictionary for JSON.
+
+        NaN becomes None.
+        """
         return {
             "metric": self.metric,
             "task": self.task,

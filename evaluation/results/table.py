@@ -195,7 +195,7 @@ class Row(Key):
 
     @classmethod
     def of(cls, number: Number, **key: Any) -> Row:
-        """Returns the row of a task's result, with the condition's key."""
+        """Returns a task's result as a row; `key` describes its condition."""
         named = {"method": number.method, "gate": number.gate, **key}
         return cls(
             **named,
@@ -241,7 +241,7 @@ class Answers(Key):
 
 @dataclass(frozen=True)
 class Results:
-    """A table of results: the ordered names of its factors, and its rows.
+    """A table of results: its rows, and the names of its factors in order.
 
     Example:
         from evaluation import Results
@@ -255,7 +255,11 @@ class Results:
 
     @classmethod
     def of(cls, rows: Iterable[Row]) -> Results:
-        """Returns a table of rows, with factors in order of appearance."""
+        """Returns a table of rows.
+
+        The names of its factors are in the order in which they appear in the
+        rows.
+        """
         rows = tuple(rows)
         return cls(_factor_names(rows), rows)
 
@@ -321,7 +325,7 @@ class Results:
         )
 
     def distinct(self, column: str) -> list[Any]:
-        """Returns the different values of a column in order, without None."""
+        """Returns the distinct values of a column in order, without None."""
         found = dict.fromkeys(row[column] for row in self.rows)
         return [value for value in found if value is not None]
 
@@ -342,7 +346,11 @@ class QueryRows:
 
     @classmethod
     def of(cls, answers: Iterable[Answers]) -> QueryRows:
-        """Returns a table of rows, with factors in order of appearance."""
+        """Returns a table of answers.
+
+        The names of its factors are in the order in which they appear in the
+        answers.
+        """
         answers = tuple(answers)
         return cls(_factor_names(answers), answers)
 
@@ -519,7 +527,10 @@ class _Line:
         return cell
 
     def value(self, column: str, kind: type) -> Any:
-        """Returns a cell as a value of a type; an empty cell has a stand-in."""
+        """Returns a cell as a value of a type.
+
+        For an empty cell, the value is that in `_EMPTY`.
+        """
         cell = self.cells[self.columns[column]]
         if kind is bool:
             if cell.lower() not in _TRUTH:
@@ -538,7 +549,7 @@ class _Line:
         return int(whole)
 
     def factor(self, column: str) -> object:
-        """Returns the number, truth value or text of a factor, or None."""
+        """Returns the value of a factor: number, truth value, text or None."""
         cell = self.cells[self.columns[column]]
         if _NUMBER.fullmatch(cell) and not _NAME_OF_DIGITS.fullmatch(cell):
             value = float(cell)
@@ -550,7 +561,7 @@ class _Line:
         return cell or None
 
     def key(self, factors: Iterable[str]) -> dict[str, Any]:
-        """Returns the attributes of a `Key`."""
+        """Returns the attributes of the line's `Key`."""
         values: dict[str, Any] = {
             name: self.text(name) for name in ("experiment", "map", "task")
         }

@@ -104,7 +104,7 @@ class Table:
     def of(
         cls, items: Iterable[_Item], columns: Columns[_Item], caption: str = ""
     ) -> Table:
-        """Returns a table with a row, or several, for each item."""
+        """Returns a table that has one or several rows for each item."""
         names = [n if isinstance(n, tuple) else ("", n) for n in columns]
         groups = groupby(group for group, _ in names)
         spans = tuple((group, len(list(same))) for group, same in groups)
@@ -312,7 +312,7 @@ def by_pair_and_method(items: Sequence[Any]) -> list[Any]:
 
 
 def to_text(value: object) -> str:
-    """Returns a value as tables show it."""
+    """Returns a value as the text that tables show."""
     if _is_missing(value):
         return MISSING
     if isinstance(value, bool):

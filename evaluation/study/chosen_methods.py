@@ -1,4 +1,4 @@
-"""The methods that a study runs: those of the package, and the user's own."""
+"""Chooses the methods that a study runs: shipped ones and your own."""
 
 from collections.abc import Iterable
 from dataclasses import dataclass, replace

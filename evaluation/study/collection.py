@@ -46,7 +46,7 @@ class RecordingInfo:
 
     @property
     def source(self) -> DriveSource:
-        """The function that opens the drive."""
+        """Function that opens the drive, see `DriveSource`."""
         return self.made_by or RecordedDrive(self.path.absolute())
 
     def drives_like(self, other: RecordingInfo) -> bool:
@@ -227,7 +227,7 @@ def find_recordings(
 
 
 def nothing_to_compare(cities: Iterable[City]) -> list[str]:
-    """Returns a sentence for each city that has no pair of stages."""
+    """Returns a note for the user on each city without two stages."""
     return [
         f"{city.name}: nothing to compare: all drives are through stage"
         f" {', '.join(city.stages)}. A report compares drives through two"

@@ -207,12 +207,12 @@ class _Shown:
 
     @cached_property
     def some(self) -> np.ndarray:
-        """(M, 3) some of the points, drawn at random."""
+        """(M, 3) a random sample of the scan's points."""
         return sampled(self.points)
 
     @cached_property
     def some_instances(self) -> np.ndarray | None:
-        """(M,) instances of the points in `some`."""
+        """(M,) number of the structure of each point in `some`."""
         return None if self.instances is None else sampled(self.instances)
 
     def seen_from(self, other: _Shown) -> np.ndarray:

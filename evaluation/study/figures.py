@@ -1,4 +1,4 @@
-"""The figures that a study draws of its cities, and their file names."""
+"""Draws the figures of a study's cities, and names their files."""
 
 from pathlib import Path
 
@@ -99,7 +99,7 @@ def compare_stages(
 
 
 def figure_files(*stems: Path) -> tuple[Path, ...]:
-    """Returns the files of drawn figures."""
+    """Returns the files that figures are drawn to."""
     return tuple(
         stem.with_name(f"{stem.name}.{kind}")
         for stem in stems
@@ -108,7 +108,10 @@ def figure_files(*stems: Path) -> tuple[Path, ...]:
 
 
 def routes_stem(city: City) -> str:
-    """Returns the name of the figure of a city's routes, without ending."""
+    """Returns the file name of the figure of a city's routes.
+
+    The name is without ending.
+    """
     return file_name(f"routes_{city.name}")
 
 
@@ -133,7 +136,7 @@ def change_stems(
 
 
 def curves_stem(city: City) -> str:
-    """Returns the name of the figure of a city's precision and recall."""
+    """Returns the file name of the figure of a city's precision and recall."""
     return file_name(f"pr_{city.name}")
 
 

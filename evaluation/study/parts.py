@@ -488,7 +488,7 @@ class SurveyFiles:
 
 @dataclass(frozen=True)
 class StudyFiles:
-    """The files of a study."""
+    """The paths of all files of a study."""
 
     output: Path
 

@@ -223,7 +223,10 @@ class RecordingSurvey:
 
 
 def described_key(method: str, protocol: RetrievalProtocol) -> str:
-    """Returns the key of a method's descriptions by a second protocol."""
+    """Returns the key of a method's descriptions by a second protocol.
+
+    It consists of the method's key and the name of the protocol.
+    """
     return f"{method},{protocol.name}"
 
 

@@ -1,4 +1,4 @@
-"""Localisation of scans in the map of a database, from random starts."""
+"""The task `localise`: scans are localised in a map of the database."""
 
 from __future__ import annotations
 

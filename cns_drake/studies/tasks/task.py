@@ -1,4 +1,4 @@
-"""The interface of tasks, and what the jobs of a study share."""
+"""The interface of a study's tasks, and the jobs that tasks share."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Map update: scores of labels that say which points have changed."""
+"""The task `map`: scores of change detectors on the maps of two drives."""
 
 from __future__ import annotations
 
