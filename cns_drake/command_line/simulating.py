@@ -244,7 +244,7 @@ def film(
         seconds: Length of the film [s]. All shots together have this length.
         size: Width and height of the film in pixels, each from 32 to 1920.
         start: Time in the drive at which the stretch begins [s]. By default,
-            the stretch is the straightest part of the drive.
+            it begins where the road ahead is straightest.
         traffic: Number of moving vehicles. The same number of walkers is added.
             By default as the scenario says; if it has no traffic, 60 of each,
             provided that the streets have room.

@@ -4,9 +4,10 @@ For simulated drives, rays cast in the world decide which points of a query's
 scan the place's sensor sees (see `evaluation.recognition.overlap_truth`). A
 point is seen if
 
-- it is within the ranges of the LiDAR and of the protocol, - the place's beams
-cover its direction, - nothing hides it, and a surface lies within `TOLERANCE`
-of it on the line of sight.
+- it is within the ranges of the LiDAR and of the protocol,
+- the place's beams cover its direction,
+- nothing hides it, and a surface lies within `TOLERANCE` of it on the line of
+  sight.
 
 The place's sensor sees the world of its own drive, with that drive's stage and
 traffic.
@@ -49,8 +50,8 @@ class Sight:
             p_S: (N, 3) points in the LiDAR's frame [m].
 
         Returns:
-            (K,) rows of these points; (K, 3) directions to them in S, and (K,)
-            distances [m].
+            (K,) row numbers of these points; (K, 3) directions to these points
+            in S; and (K,) their distances [m].
         """
         distances = np.linalg.norm(p_S, axis=1)
         rows = np.flatnonzero(
@@ -81,7 +82,8 @@ def sights(drive: SimulatedDrive) -> Callable[[int], Sight]:
 class VisibleSurfaces:
     """The surfaces that a LiDAR sees from a place.
 
-    Points with a coordinate beyond `max_range` [m] in its frame are left out.
+    Points with a coordinate beyond `max_range` [m] in the LiDAR's frame do not
+    count as seen.
     """
 
     sight: Sight
@@ -121,10 +123,11 @@ def exact_overlaps(
 ) -> np.ndarray:
     """Returns the exact overlap of every query with every place, (Q, D).
 
-    NaN for a query without a point.
+    The overlap is the share of the query's points that the LiDAR at the place
+    sees. It is NaN for a query without points.
 
     Raises:
-        InputError: the two are of different maps.
+        InputError: the drives are through different maps.
     """
     check_same_world(database, query)
     look = sights(database)

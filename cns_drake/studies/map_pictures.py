@@ -1,4 +1,4 @@
-"""The pictures of a map: its drives, and how its streets change."""
+"""Draws pictures of a map: its drives, and how its streets change."""
 
 from dataclasses import dataclass
 from pathlib import Path
@@ -18,7 +18,7 @@ _STAGE_COST = 10.0
 
 @dataclass(frozen=True)
 class _ReadFile:
-    """An input of a job: the content of a file and of the files it names."""
+    """Input of a job: the content of a file and of all files it refers to."""
 
     path: Path
 
@@ -28,7 +28,7 @@ class _ReadFile:
 
 @dataclass(frozen=True)
 class _ShownDrive:
-    """An input of a job: a scenario and the content of its files."""
+    """Input of a job: a scenario and the content of its files."""
 
     scenario: Scenario
 

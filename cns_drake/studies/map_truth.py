@@ -10,7 +10,7 @@ Rays that are cast in the worlds of both drives decide.
   lies more than `_SKIN` behind, measured perpendicular to the surface. A wall
   that has moved a little therefore does not hide its old position.
 - A surface is **there** if it passes within `NEAR` of the point, measured
-perpendicular to the surface. Moving objects do not count.
+  perpendicular to the surface. Moving objects do not count.
 
 A point of the older map A is `kept` if B's drive observes it and a surface of
 B's world is there, `gone` if B's drive observes it and none is there, and
@@ -18,8 +18,8 @@ B's world is there, `gone` if B's drive observes it and none is there, and
 A's world decide whether a point of the newer map B is `kept`, `new` or `newly
 seen`.
 
-The poses are those of the sessions' scans. Surfaces are ideal: glass and leaves
-count as solid geometry.
+The poses of a drive are those of the scans that make its map. Surfaces are
+ideal: glass and leaves count as solid geometry.
 """
 
 from collections import Counter
@@ -119,14 +119,17 @@ _MOST_ROWS = 200
 
 @dataclass(frozen=True)
 class Survey:
-    """One of the two drives, recorded or simulated, with its simulation."""
+    """A drive whose map is labelled, with the simulation of its world."""
 
     drive: Drive
     simulated: SimulatedDrive
     scenario: Scenario
 
     def still(self) -> RayCastingScene:
-        """Returns the drive's world without the vehicle and moving objects."""
+        """Returns the drive's world for ray casting, without moving objects.
+
+        The recording vehicle is left out, too.
+        """
         if self.scenario.traffic.is_off:
             # The LiDAR does not see its own vehicle.
             return self.simulated.look(0)[0]
@@ -144,8 +147,9 @@ def open_survey(place: str | Path) -> Survey:
     """Opens a recording, or simulates a shipped drive or a scenario's file.
 
     Raises:
-        InputError: it cannot be used, the points have no instances, or the
-            files of its world have changed since it was recorded.
+        InputError: the drive cannot be used, its points do not name their
+            structures, or the files of its world have changed since it was
+            recorded.
     """
     path = Path(place)
     if not path.exists() or not holds_mcap(path):
@@ -172,7 +176,7 @@ def open_survey(place: str | Path) -> Survey:
 
 
 def simulate_survey(scenario: Scenario) -> Survey:
-    """Returns a drive that is simulated when its scans are read.
+    """Returns a drive that is simulated only when its scans are read.
 
     Raises:
         InputError: the scenario cannot be run.
@@ -202,7 +206,8 @@ def write_truth(
             aged map has.
 
     Returns:
-        Side -> label -> number of points; and the change of each structure.
+        The number of points with each label, for A and for B; and the change of
+        each structure.
 
     Raises:
         InputError: the drives are of different worlds, or the folder cannot be
@@ -252,7 +257,8 @@ def label_points(
 ) -> np.ndarray:
     """Returns a label for each point of a map, (N,) uint8.
 
-    The other drive observes the points from its frames (K,).
+    A point counts as observed if the drive `other` sees it from one of its
+    frames `frames` (K,).
     """
     unobserved, kept, changed = SIDES[session.side]
     labels = np.full(len(session.points), unobserved, np.uint8)
@@ -271,7 +277,7 @@ def observed(
 ) -> np.ndarray:
     """Returns which points (N, 3) in W [m] a drive observes, (N,) bool.
 
-    The drive observes them from its frames (K,).
+    Only the drive's frames `frames` (K,) count.
     """
     result = np.zeros(len(points), bool)
     look = sights(drive)
@@ -354,7 +360,7 @@ def _spiral() -> np.ndarray:
 def is_there(points: np.ndarray, scene: RayCastingScene) -> np.ndarray:
     """Returns which points (N, 3) in W [m] lie on a surface, (N,) bool.
 
-    They are within `NEAR` of it.
+    A point lies on a surface if it is at most `NEAR` away from it.
     """
     result = np.zeros(len(points), bool)
     left = np.arange(len(points))
@@ -424,7 +430,8 @@ def _check_unchanged(drive: McapDrive, path: Path, scenario: Scenario) -> None:
 def _check_same_map(a: Survey, b: Survey) -> None:
     """Refuses drives of different map folders, even of the same name.
 
-    For worlds without a map, the user must know that they show one place.
+    For worlds without a map folder this cannot be checked; the user must make
+    sure that both show the same place.
     """
     if (a.scenario.map is None) != (b.scenario.map is None):
         raise InputError(

@@ -1,4 +1,4 @@
-"""A study: an experiment on maps, from its conditions to its table and page."""
+"""Runs a study: an experiment on maps, from conditions to tables and page."""
 
 from __future__ import annotations
 
@@ -96,7 +96,7 @@ _FORMER = (
 
 @dataclass(frozen=True)
 class _Measured:
-    """A pair of drives in a condition, with the parts that tasks write."""
+    """A pair of drives in a condition, with the files of its results."""
 
     map_name: str
     names: tuple[str, str]
@@ -110,7 +110,7 @@ class _Measured:
 
 @dataclass(frozen=True)
 class _Drives:
-    """The pairs of drives of one map, before any condition."""
+    """The pairs of drives of one map, before a condition changes them."""
 
     map_name: str
     factors: Mapping[str, Any]
@@ -150,8 +150,8 @@ def run_study(
         cluster: does the work.
         maps: maps that replace those of the experiment.
         source: file of the experiment, for errors.
-        on_note: takes notes on what is left out, and on how long the study
-            takes.
+        on_note: is called with notes on what is left out, and on how long the
+            study takes.
 
     Returns:
         The path of the page.
@@ -172,7 +172,7 @@ def run_study(
 
 @dataclass
 class Study:
-    """An experiment that is being measured; see `run_study`."""
+    """An experiment that is being measured on maps."""
 
     experiment: Experiment
     output: Path
@@ -265,7 +265,7 @@ class Study:
         return found
 
     def _drives(self, maps: Sequence[str]) -> Iterator[_Drives]:
-        """Yields the drives of all maps; makes maps that are named by files."""
+        """Yields the drives of all maps; makes aged and imported maps."""
         made = {
             one.name: one
             for one in self.experiment.maps or ()
@@ -410,7 +410,7 @@ class Study:
     ) -> Iterator[_Measured]:
         """Yields the pairs of a map in all conditions that it allows.
 
-        Without `made`, the maps that conditions need are only noted.
+        If `made` is false, the maps that conditions need are only noted.
         """
         noted: dict[str, None] = {}
         age, redraw = self._made.want_age, self._made.want_redrawn
@@ -519,7 +519,7 @@ class Study:
                 )
 
     def _check_recordable(self, city: City) -> None:
-        """Checks that no condition changes more than recordings can have."""
+        """Checks that conditions vary only the stage, as recordings require."""
         for condition in self._conditions:
             sides = {n: condition.changes.get(n, {}) for n in SIDES}
             given = [f"{side}.{name}" for side in sides for name in sides[side]]

@@ -60,9 +60,9 @@ _OVERLAP_POINTS = 1000
 class DrawnCity:
     """A city with its drives, all drawn from a seed.
 
-    `map_name` is the shipped map that has its streets, or `DRAWN_STREETS`. With
-    `graded`, the overlap of each scan with the places of the other scans is
-    computed.
+    `map_name` is the shipped map whose streets the city has, or
+    `DRAWN_STREETS`. With `graded`, the overlap of each scan with the places of
+    the other scans is computed.
     """
 
     map_name: str
@@ -76,14 +76,15 @@ class DrawnCity:
 
     @property
     def city_seed(self) -> int:
-        """The seed of the city itself."""
+        """Seed of the city without its drives."""
         return _FIRST_SEED + self.seed * _MOST_CITIES + self.number
 
     def write(self, folder: Path) -> None:
         """Writes the map folder of the city.
 
         Raises:
-            InputError: it cannot be made or written.
+            InputError: the city cannot be drawn, or the folder cannot be
+                written.
         """
         with draft_folder(folder, replaces=True) as draft:
             if self.map_name == DRAWN_STREETS:
@@ -205,7 +206,7 @@ def _few(points: np.ndarray) -> np.ndarray:
 
 
 def _overlaps(scans: Sequence[_Taken], reporter: Reporter) -> np.ndarray:
-    """Returns the share of each scan that is seen from each other scan.
+    """Returns which share of each scan is visible from every other scan.
 
     The share is exact (see `exact_overlap`). It is 0 for two scans of one drive
     and for scans over 50 m apart.
@@ -287,10 +288,12 @@ def draw_streets(rng: np.random.Generator) -> dict[str, Any]:
 
 
 def draw_stages(city: City, rng: np.random.Generator) -> dict[str, dict]:
-    """Returns random stages of a city: absent or lower buildings, small trees.
+    """Returns random stages: buildings are missing or lower, trees smaller.
+
+    The last stage is the whole city.
 
     Returns:
-        The content of `stages.yaml`, in which the last one is the whole city.
+        The content of `stages.yaml`.
     """
     buildings = [s for s in city.structures if s.semantic_class == "building"]
     trees = [s for s in city.structures if s.name.startswith("tree_")]

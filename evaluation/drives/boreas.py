@@ -4,11 +4,11 @@
     SEQ/applanix/lidar_poses.csv     us, x y z [m], velocity, roll pitch yaw
                                      [rad], angular velocity
 
-The time of a scan is that of its middle; the time of a point is in seconds
-relative to it. Angles describe the rotation of the world in the LiDAR's frame
-S, as in the data set's development kit: Rz(yaw) Ry(pitch) Rx(roll) is R_SW. All
-drives share W, with its axes east, north and up. In the first releases W was
-the UTM grid.
+The time of a scan is the middle of the scan; the time of a point is relative to
+this time, in seconds. Angles describe the rotation of the world in the LiDAR's
+frame S, as in the data set's development kit: Rz(yaw) Ry(pitch) Rx(roll) is
+R_SW. All drives share W, with its axes east, north and up. In the first
+releases W was the UTM grid.
 """
 
 from pathlib import Path
@@ -44,10 +44,10 @@ _ORIGIN = (620_000.0, 4_845_000.0, 0.0)
 
 
 class BoreasDrive(FileDrive):
-    """The scans of the Alpha Prime on a drive of Boreas."""
+    """A drive of Boreas, with the scans of its LiDAR, an Alpha Prime."""
 
     def __init__(self, path: Path, columns: int | None = None):
-        """Opens a drive, whose scans have a fixed layout.
+        """Opens a drive; `columns` is ignored, because the layout is fixed.
 
         Raises:
             InputError: there is no such drive, or its poses cannot be used.

@@ -118,7 +118,7 @@ def read_scan(lidar: str, path: Path, stamp_ns: int = 2**63) -> np.ndarray:
 
     Raises:
         ValueError: if the file is not of that LiDAR.
-        InputError: if it cannot be read.
+        InputError: if the file cannot be read.
     """
     dtype = _RECORDS[lidar]
     if lidar == "Aeva" and stamp_ns <= _AEVA_CHANGE_NS:

@@ -33,8 +33,9 @@ def to_world(X_UB: np.ndarray, path: Path) -> np.ndarray:
 
     W has its axes east, north and up, and its origin at a fixed point of that
     grid near the drives of MulRan and HeLiPR. Coordinates in W are at most a
-    few kilometres, which float32 resolves to under a millimetre. It would
-    resolve easting and northing, thousands of kilometres, only to 0.25 m.
+    few kilometres, which float32 resolves to under a millimetre. UTM
+    coordinates can be thousands of kilometres, which float32 resolves only to
+    0.25 m.
 
     Raises:
         InputError: if a position cannot be in UTM metres.
@@ -79,9 +80,9 @@ class FileDrive(Drive):
             files: N scans.
             stamps_ns: (N,) int64 [ns], strictly increasing.
             X_WS: (N, 4, 4) poses of the LiDAR in the world.
-            read: returns the points of a scan's file, by its stamp [ns], as
-                they are in the file. A ValueError says that it is not of its
-                format.
+            read: function that returns the points in the file of a scan,
+                unchanged. Its arguments are the file and the time of the scan
+                [ns]. It raises ValueError if the file has another format.
             notes: see `Drive.notes`.
             datum: see `Drive.datum`.
             scenario: see `Drive.scenario`.

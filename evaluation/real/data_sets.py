@@ -37,12 +37,12 @@ class DataSet(NamedTuple):
         origin: repository of the data set, and the path in it.
         licence: terms of use.
         digest: SHA-256 of all scans, concatenated in the order of their names.
-        poses: where poses come from: `drive` for a folder that `open_drive`
-            reads; `matrices` for a `poses.txt` whose rows are the upper 3 x 4
-            of X_WS; `named` for a `poses.txt` whose rows are a scan's name, x y
-            z and quat_xyzw; "" for none.
+        poses: where the poses are: `drive` for a folder that `open_drive`
+            reads; `matrices` for a file `poses.txt` with the upper 3 x 4 part
+            of X_WS in each row; `named` for a `poses.txt` with a scan's name, x
+            y z and quat_xyzw in each row; "" for a data set without poses.
         read: function that reads a scan.
-        whole: whether the scans contain all points that the unit measured.
+        whole: whether the scans contain all points that the LiDAR measured.
     """
 
     folder: str
@@ -217,7 +217,7 @@ def _open(folder: Path, one: DataSet, files: Sequence[Path]) -> Drive:
 
 
 def _named_poses(table: Path, files: Sequence[Path]) -> np.ndarray:
-    """Returns the pose of each file by the number that is its name."""
+    """Returns the poses of files, whose names are numbers in a table."""
     try:
         numbers = np.array([int(file.stem) for file in files])
     except ValueError as error:
@@ -231,7 +231,7 @@ def simulated_drives(folder: Path, unit: str) -> list[Drive]:
     """Returns the drives in a folder that were simulated with a LiDAR unit.
 
     Raises:
-        InputError: one cannot be opened.
+        InputError: a drive cannot be opened.
     """
     if not folder.is_dir():
         raise InputError(f"{folder}: no such folder")

@@ -1,11 +1,12 @@
 """The tasks of a study, measured on public data sets of few scans.
 
-Each scan of a data set with poses is a query. Its candidates are all other
-scans of the same LiDAR unit: from its data set, other data sets and simulated
-recordings. A place is a single scan; queries are turned and tilted as in the
-protocol `fair`. Each scan is also localised, from a random start, in a map of
-the scans around it. The judge, a classifier, tells each data set from simulated
-scans of the same unit.
+Each scan of a data set with poses is a query. The places among which it is
+searched are all other scans of the same model of LiDAR: from its data set, from
+other data sets and from simulated recordings. A place is a single scan; queries
+are turned and tilted as in the protocol `fair`. Each scan is also localised,
+from a random start, in a map of the scans around it. A classifier (see `judge`)
+also tries to tell each data set from simulated scans of the same model of
+LiDAR.
 """
 
 from collections.abc import Iterable, Mapping, Sequence
@@ -61,7 +62,7 @@ _DRAWS = 1
 
 
 class _Part(NamedTuple):
-    """Places, with descriptions, from one data set or one recording."""
+    """Described places from one data set or one recording."""
 
     name: str
     world: str
@@ -84,7 +85,7 @@ class Measuring:
             names: names of methods and estimators, or Python files with your
                 own methods; if empty, all shipped ones.
             track: reports progress.
-            on_note: takes notes.
+            on_note: is called with each note for the user.
 
         Raises:
             InputError: a method is not known, or its file cannot be used.
@@ -117,11 +118,12 @@ class Measuring:
 
         Args:
             folder: see `open_data_sets`.
-            simulated: folder of simulated recordings. They add places, and the
-                judge tells real scans from theirs.
+            simulated: folder of simulated recordings. Their scans are added as
+                places, and a classifier tries to tell the real scans from them.
 
         Raises:
-            InputError: no data set is there, or one cannot be read.
+            InputError: the folder contains no data set, or a data set cannot be
+                read.
         """
         found = open_data_sets(folder, self._note)
         for unit in dict.fromkeys(one.data_set.unit for one in found):
@@ -213,7 +215,7 @@ class Measuring:
         parts: Sequence[_Part],
         methods: Sequence[Method],
     ) -> None:
-        """Adds the rows of `place` and `pose` of a data set."""
+        """Adds a data set's results of the tasks `place` and `pose`."""
         world, drive = one.data_set.world, one.drive
         # The data set itself comes first, then other sets of the same world.
         parts = sorted(
@@ -269,7 +271,10 @@ class Measuring:
                 self._add(one, "pose", method.name, poses, gate=gate)
 
     def _localise(self, one: RealScans) -> None:
-        """Adds the rows of `localise`: each scan in a map of the rest."""
+        """Adds a data set's results of the task `localise`.
+
+        Each scan is localised in a map of the other scans.
+        """
         drive, X_WS = one.drive, one.drive.X_WS
         R_WT = localise.way_axes(X_WS[:, :3, 3], X_WS)
         found: dict[str, list[np.ndarray]] = {n: [] for n in self._estimators}
@@ -298,7 +303,10 @@ class Measuring:
                 self._add(one, "localise", name, numbers, columns=columns)
 
     def _judge(self, one: RealScans, made: Sequence[Drive]) -> None:
-        """Adds the rows of `judge`, by groups of features."""
+        """Adds how well a classifier tells a data set from simulated scans.
+
+        There is a result for each group of features.
+        """
         if not one.data_set.whole:
             self._note(f"{one.name}: thinned scans, not judged")
             return

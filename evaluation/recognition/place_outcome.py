@@ -1,4 +1,4 @@
-"""The outcome of a method on two drives, query by query."""
+"""The answers of a method on two drives, query by query, as numbers."""
 
 from __future__ import annotations
 
@@ -33,14 +33,15 @@ _HALF = 0.5
 
 @dataclass(frozen=True)
 class PlaceOutcome:
-    """The outcome of a method on two drives.
+    """The answers of a method to the queries of a drive, and their truth.
 
     Attributes:
         method: name of the method.
-        is_gated: whether the gate was used.
+        is_gated: whether the gate was used, which rejects places that lie too
+            far away by the method's own pose estimate.
         outcomes: outcomes of Q queries.
-        columns: columns of `queries.csv`, (Q,) each. An index that is unknown
-            is -1, other numbers are NaN or infinite.
+        columns: columns of `queries.csv`, (Q,) each. If unknown, an index is -1
+            and any other number NaN or infinite.
         pose_errors: errors of the poses at the best places.
         radius: radius of a match [m].
     """
@@ -67,11 +68,13 @@ class PlaceOutcome:
 
         Args:
             method: method that made the scores.
-            is_gated: whether they were gated.
+            is_gated: whether the scores are those after the gate.
             retrieval: retrieval of Q queries and D places.
-            query: (Q,) stamps [ns] and (Q, 3) places [m] of the queries.
-            drives: D names of the drives of the places; that of the query's
-                own city comes first. Distances to others are unknown.
+            query: time stamps (Q,) [ns] and positions (Q, 3) [m] of the
+                queries.
+            drives: name of each place's drive (D names). The first one is the
+                drive through the query's own city; distances to places of all
+                other drives are unknown.
             overlaps: (Q,) how much of the query's scan the best of its matches
                 shows, see `overlap_truth`; NaN without a match.
             radius: radius of a match [m].
@@ -113,7 +116,10 @@ class PlaceOutcome:
         interval: Interval = UNKNOWN,
         n: int | None = None,
     ) -> Number:
-        """Returns a metric of the outcome, by default over all queries."""
+        """Returns a metric as a row of results; by default, n is Q.
+
+        Method and gate are those of the outcome.
+        """
         count = len(self.outcomes) if n is None else n
         return Number(
             self.method, self.is_gated, metric, value, interval, count
@@ -135,9 +141,11 @@ def faults(
         radius: radius of a match [m].
 
     Returns:
-        (Q,) "" if it is right; `no_place` if the query has no match;
-        `no_candidate` if the method has no place, or rejects all; `other_city`;
-        `too_far` if it is within two radii; `elsewhere`.
+        (Q,) the first reason that applies: "" if the best place is right;
+        `no_place` if the query has no match; `no_candidate` if the method finds
+        no place, or rejects all places; `other_city` if the best place is in
+        another city; `too_far` if the best place is less than two radii away,
+        but not a match; otherwise `elsewhere`.
     """
     wrong = [
         ~outcomes.has_match,
@@ -159,7 +167,8 @@ class Number(NamedTuple):
         metric: name of the metric.
         value: its value.
         interval: its 95 % interval.
-        n: number of queries, or other things, that count.
+        n: number of queries, points or other items from which the value is
+            computed.
     """
 
     method: str
@@ -176,7 +185,8 @@ def place_numbers(
     """Yields a method's place recognition results in a condition.
 
     Intervals are by bootstrap over blocks of the route. Each bootstrap sample
-    draws the same blocks in the condition and in the baseline.
+    draws the same blocks in the condition and in the baseline, in which nothing
+    differs between the drives.
 
     Args:
         now: outcome of the method in the condition.
@@ -234,7 +244,8 @@ def pose_numbers(
     Args:
         now: outcome of the method in a condition.
         before: outcome of the method in the baseline, with which the kept share
-            is computed.
+            (success in the condition divided by success in the baseline) is
+            computed; None to leave it out.
     """
     errors = now.pose_errors
     value = pose_success(errors, now.outcomes)
@@ -257,14 +268,17 @@ def pose_numbers(
 def kept_share(
     changed: np.ndarray | float, unchanged: np.ndarray | float
 ) -> np.ndarray:
-    """Returns changed / unchanged; NaN where `unchanged` is 0 or NaN."""
+    """Returns the share of a result that is kept: changed / unchanged.
+
+    It is NaN where `unchanged` is 0 or NaN.
+    """
     with np.errstate(invalid="ignore", divide="ignore"):
         share = np.divide(changed, unchanged)
     return np.where(np.asarray(unchanged) > 0.0, share, math.nan)
 
 
 def _areas(outcomes: QueryOutcomes) -> dict[str, float]:
-    """Returns the metrics of which `own_samples` returns samples."""
+    """Returns AUC, R@1 and strict AUC, by their names in tables."""
     curve = pr_curve(outcomes)
     return {
         "auc": curve.auc,
