@@ -52,6 +52,11 @@ def town(tmp_path_factory):
 
 
 @pytest.fixture(scope="module")
+def world(town):
+    return OldWorld(MapFolder(town))
+
+
+@pytest.fixture(scope="module")
 def long(town):
     output = town.parent / "long"
     age_map(town, [3, 8], 5, _BUSY, output)
@@ -197,9 +202,8 @@ def test_replacements_are_of_another_kind(long):
 
 @pytest.mark.slow
 @pytest.mark.parametrize("seed", [1, 2])
-def test_rates_come_about(town, seed):
+def test_rates_come_about(world, seed):
     """Numbers of 30 years are Poisson's, at one in a thousand for each."""
-    world = OldWorld(MapFolder(town))
     city = City(world, DEFAULT_RATES, seed, shapely.Polygon())
     for _ in range(30):
         city.live()
@@ -220,9 +224,9 @@ def test_rates_come_about(town, seed):
 
 
 @pytest.mark.slow
-def test_nothing_happens_at_rate_zero(town):
+def test_nothing_happens_at_rate_zero(world):
     city = City(
-        OldWorld(MapFolder(town)),
+        world,
         dict.fromkeys(DEFAULT_RATES, 0.0),
         1,
         shapely.Polygon(),
@@ -235,13 +239,12 @@ def test_nothing_happens_at_rate_zero(town):
 @pytest.mark.parametrize(
     ("farthest", "least"), [(0.0, 0.0), (0.1, 0.1), (0.2, 0.2), (5.0, 0.2)]
 )
-def test_furniture_moves_as_far_as_allowed(town, farthest, least):
+def test_furniture_moves_as_far_as_allowed(world, farthest, least):
     rates = {
         **dict.fromkeys(DEFAULT_RATES, 0.0),
         "lamps": 1.0,
         "moved": farthest,
     }
-    world = OldWorld(MapFolder(town))
     city = City(world, rates, 1, shapely.Polygon())
     city.live()
     moves = [e for e in city.events if e.event == "furniture"]
@@ -445,8 +448,7 @@ def test_each_stage_is_what_the_history_tells(long):
 
 
 @pytest.mark.slow
-def test_a_scaffold_stands_before_its_building(town):
-    world = OldWorld(MapFolder(town))
+def test_a_scaffold_stands_before_its_building(world):
     city = City(world, _BUSY, 3, shapely.Polygon())
     seen = 0
     for _ in range(8):
@@ -468,8 +470,8 @@ def test_a_scaffold_stands_before_its_building(town):
 
 @pytest.mark.slow
 @pytest.mark.parametrize(("offset", "stands"), [(-0.03, False), (0.03, True)])
-def test_a_scaffold_stands_in_nothing_however_thin(town, offset, stands):
-    city = City(OldWorld(MapFolder(town)), _BUSY, 3, shapely.Polygon())
+def test_a_scaffold_stands_in_nothing_however_thin(world, offset, stands):
+    city = City(world, _BUSY, 3, shapely.Polygon())
     # The canopies of another building are not in the way of this one's.
     first, *_, other = (lot for lot in city._lots if lot.building)
     parts = []

@@ -164,7 +164,6 @@ def test_a_member_is_a_scenario_file_of_its_own(tmp_path):
         ({"seed": [1]}, r"seed: Extra inputs"),
         ({"stage": "09"}, r"stage: map 'metropolis' has no stage '09'"),
         ({"towards": "07"}, r"stage: map 'metropolis' has no stage '07'"),
-        ({"towards": "04"}, r"towards: stage 04 lacks nothing of stage 04"),
         ({"base": "nowhere"}, r"nowhere: no such scenario file"),
         ({"lidars": ["sonar"]}, r"unknown preset 'sonar'"),
         ({"city_seeds": []}, r"city_seeds: "),
@@ -187,6 +186,15 @@ def test_faults_are_named(tmp_path, values, fault):
         # Errors are found before any long work.
         family(tmp_path, redraw=lambda *_: pytest.fail("drawn"), **values)
     assert "\n" not in str(error.value)
+
+
+def test_a_stage_that_lacks_nothing_is_no_aim(small_map, tmp_path):
+    base = tmp_path / "base.yaml"
+    base.write_text(yaml.safe_dump(scenario_values(small_map)))
+    with pytest.raises(
+        InputError, match="towards: stage 04 lacks nothing of stage 04"
+    ):
+        family(tmp_path, base=str(base), towards="04")
 
 
 def test_a_city_needs_a_table_with_places(tmp_path):
