@@ -88,6 +88,7 @@ IMPORTED = (
     "cns_drake.simulation.simulation",
     "cns_drake.command_line.simulating",
     "evaluation.drives",
+    "stages",
 )
 
 

@@ -90,6 +90,7 @@ def test_another_seed_is_another_history(town, long):
     assert _rows(other) != [r for r in _rows(long) if int(r["year"]) <= 3]
 
 
+@pytest.mark.slow
 def test_today_is_the_last_stage_of_the_map(town, long):
     today = (town / "stage_02.sdf").read_bytes()
     assert (long / "stage_01.sdf").read_bytes() == today
@@ -109,6 +110,7 @@ _ADDS_SUCCESSOR = {
 }
 
 
+@pytest.mark.slow
 def test_stages_follow_from_the_history(long):
     """The rows alone turn the list of one stage into that of the next."""
 
@@ -134,6 +136,7 @@ def test_stages_follow_from_the_history(long):
     }
 
 
+@pytest.mark.slow
 def test_drives_of_an_aged_map(long):
     drives = MapFolder(long).recordable_drives()
     assert [path.stem for path in drives] == [
@@ -175,6 +178,7 @@ def test_nothing_stands_in_another_or_on_a_street(long):
             )
 
 
+@pytest.mark.slow
 def test_new_things_stand_on_the_ground(long):
     world = OldWorld(MapFolder(long))
     checked = 0
@@ -191,6 +195,7 @@ def test_new_things_stand_on_the_ground(long):
     assert checked > 3
 
 
+@pytest.mark.slow
 def test_replacements_are_of_another_kind(long):
     events = [r for r in _rows(long) if r["event"] == "replaced"]
     for row in events:
@@ -422,6 +427,7 @@ def names_in(folder, stage):
     return set(re.findall('visual name="([^/"]+)/', text))
 
 
+@pytest.mark.slow
 def test_each_stage_is_what_the_history_tells(long):
     """Scaffolds, uses of empty plots and annexes have rows as well."""
     standing, rows = names_in(long, "01"), _rows(long)
