@@ -70,6 +70,7 @@ folder, *modules = sys.argv[1:]
 sys.path.insert(0, folder)
 for module in modules:
     importlib.import_module(module)
+sys.modules["cns_drake.base.compiled"].start_compiler()
 gc.freeze()
 for line in sys.stdin:
     *outputs, words = json.loads(line)
@@ -87,6 +88,7 @@ IMPORTED = (
     "cns_drake.simulation.simulation",
     "cns_drake.command_line.simulating",
     "evaluation.drives",
+    "stages",
 )
 
 

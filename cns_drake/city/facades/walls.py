@@ -412,19 +412,18 @@ def _quads_mesh(
     quads_of: Callable[[WallCells, tuple[float, ...]], Quads],
 ) -> Mesh:
     points = np.asarray(points, dtype=float)
-    vertices: list[np.ndarray] = []
-    faces: list[tuple[int, ...]] = []
+    parts = [np.zeros((0, 3))]
     for edge in range(len(points)):
         grid, place = _panel(points, edge, facade)
-        for quad in quads_of(grid, facade.glass):
-            faces.append(tuple(range(len(vertices), len(vertices) + 4)))
-            for corner in quad:
-                x, y = place(corner)
-                vertices.append(np.array([x, y, z0 + corner.z]))
-    return _welded(np.array(vertices).reshape(-1, 3), faces)
+        corners = list(itertools.chain(*quads_of(grid, facade.glass)))
+        if corners:
+            z = [z0 + corner.z for corner in corners]
+            parts.append(np.column_stack([place(corners), z]))
+    vertices = np.concatenate(parts)
+    return _welded(vertices, np.arange(len(vertices)).reshape(-1, 4).tolist())
 
 
-def _welded(vertices: np.ndarray, faces: list[tuple[int, ...]]) -> Mesh:
+def _welded(vertices: np.ndarray, faces: Sequence[Sequence[int]]) -> Mesh:
     """Returns the mesh with vertices merged that coincide within 1 um."""
     keys = np.round(vertices, 6)
     unique, inverse = np.unique(keys, axis=0, return_inverse=True)
@@ -434,8 +433,10 @@ def _welded(vertices: np.ndarray, faces: list[tuple[int, ...]]) -> Mesh:
 
 def _panel(
     points: np.ndarray, edge: int, facade: Facade
-) -> tuple[WallCells, Callable[[Corner], np.ndarray]]:
+) -> tuple[WallCells, Callable[[Sequence[Corner]], np.ndarray]]:
     """Returns the cells of one wall, and a function that places their corners.
+
+    The function takes N corners and returns their positions (N, 2).
 
     At the ends of the wall, its corners meet those of the neighbouring walls.
     """
@@ -467,18 +468,20 @@ def _panel(
     bands = () if is_plain else facade.bands
     grid = WallCells.painted(length, zs, rows, bands, reliefs)
 
-    def place(corner: Corner) -> np.ndarray:
-        x, _, depth, row = corner
-        if x == 0.0:
-            x = _shift(directions[0], along, depth, ends[0, row + 1])
-        elif x == grid.xs[-1]:
-            x -= _shift(along, directions[2], depth, ends[1, row + 1])
-        return points[edge] + x * along + depth * inward
+    def place(corners: Sequence[Corner]) -> np.ndarray:
+        x, _, depth, row = np.array(corners).T
+        start, end = ends[:, row.astype(int) + 1]
+        first = _shift(directions[0], along, depth, start)
+        last = x - _shift(along, directions[2], depth, end)
+        x = np.where(x == 0.0, first, np.where(x == grid.xs[-1], last, x))
+        return points[edge] + np.outer(x, along) + np.outer(depth, inward)
 
     return grid, place
 
 
-def _shift(a: np.ndarray, b: np.ndarray, depth: float, other: float) -> float:
+def _shift(
+    a: np.ndarray, b: np.ndarray, depth: np.ndarray, other: np.ndarray
+) -> np.ndarray | float:
     """Returns how much a wall at `depth` is shortened at a corner [m].
 
     `a` and `b` are the directions of the two walls. Two lines that leave the

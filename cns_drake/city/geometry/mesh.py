@@ -79,16 +79,16 @@ class Mesh:
         """
         thousandths = np.rint(self.vertices * 10**_DECIMALS).astype(np.int64)
         unique, inverse = np.unique(thousandths, axis=0, return_inverse=True)
+        corners = inverse.reshape(-1)[self._corners] + 1
+        is_new = corners != np.roll(corners, 1, axis=1)
+        number = is_new.sum(axis=1)
+        is_new[number < 3] = False
         # 15 digits are exact here, and leave out zeros at the end.
-        lines = [
-            f"v {x:.15g} {y:.15g} {z:.15g}\n"
-            for x, y, z in (unique / 10**_DECIMALS).tolist()
-        ]
-        for face in (inverse.reshape(-1)[self._corners] + 1).tolist():
-            corners = [c for k, c in enumerate(face) if c != face[k - 1]]
-            if len(corners) > 2:
-                lines.append(f"f {' '.join(map(str, corners))}\n")
-        return "".join(lines)
+        vertices = "v %.15g %.15g %.15g\n" * len(unique)
+        faces = ["", "", "", "f %d %d %d\n", "f %d %d %d %d\n"]
+        return vertices % tuple((unique / 10**_DECIMALS).ravel().tolist()) + (
+            "".join(faces[k] for k in number) % tuple(corners[is_new].tolist())
+        )
 
 
 def merge_meshes(*meshes: Mesh) -> Mesh:

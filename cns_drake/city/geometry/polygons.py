@@ -35,8 +35,10 @@ def triangulate(polygon: Polygon) -> np.ndarray:
     rings = [_ring(ring) for ring in (polygon.exterior, *polygon.interiors)]
     if len(rings[0]) < 3:
         return np.zeros((0, 3, 2))
-    corners = sorted({corner for ring in rings for corner in ring})
-    outer, *holes = (_with_corners_on_edges(ring, corners) for ring in rings)
+    outer, *holes = rings
+    if holes:
+        corners = sorted({corner for ring in rings for corner in ring})
+        outer, *holes = (_with_corners_on_edges(one, corners) for one in rings)
     fixed = {
         frozenset(edge) for ring in (outer, *holes) for edge in _edges(ring)
     }

@@ -52,6 +52,11 @@ def town(tmp_path_factory):
 
 
 @pytest.fixture(scope="module")
+def world(town):
+    return OldWorld(MapFolder(town))
+
+
+@pytest.fixture(scope="module")
 def long(town):
     output = town.parent / "long"
     age_map(town, [3, 8], 5, _BUSY, output)
@@ -85,6 +90,7 @@ def test_another_seed_is_another_history(town, long):
     assert _rows(other) != [r for r in _rows(long) if int(r["year"]) <= 3]
 
 
+@pytest.mark.slow
 def test_today_is_the_last_stage_of_the_map(town, long):
     today = (town / "stage_02.sdf").read_bytes()
     assert (long / "stage_01.sdf").read_bytes() == today
@@ -104,6 +110,7 @@ _ADDS_SUCCESSOR = {
 }
 
 
+@pytest.mark.slow
 def test_stages_follow_from_the_history(long):
     """The rows alone turn the list of one stage into that of the next."""
 
@@ -129,6 +136,7 @@ def test_stages_follow_from_the_history(long):
     }
 
 
+@pytest.mark.slow
 def test_drives_of_an_aged_map(long):
     drives = MapFolder(long).recordable_drives()
     assert [path.stem for path in drives] == [
@@ -170,6 +178,7 @@ def test_nothing_stands_in_another_or_on_a_street(long):
             )
 
 
+@pytest.mark.slow
 def test_new_things_stand_on_the_ground(long):
     world = OldWorld(MapFolder(long))
     checked = 0
@@ -186,6 +195,7 @@ def test_new_things_stand_on_the_ground(long):
     assert checked > 3
 
 
+@pytest.mark.slow
 def test_replacements_are_of_another_kind(long):
     events = [r for r in _rows(long) if r["event"] == "replaced"]
     for row in events:
@@ -197,9 +207,8 @@ def test_replacements_are_of_another_kind(long):
 
 @pytest.mark.slow
 @pytest.mark.parametrize("seed", [1, 2])
-def test_rates_come_about(town, seed):
+def test_rates_come_about(world, seed):
     """Numbers of 30 years are Poisson's, at one in a thousand for each."""
-    world = OldWorld(MapFolder(town))
     city = City(world, DEFAULT_RATES, seed, shapely.Polygon())
     for _ in range(30):
         city.live()
@@ -220,9 +229,9 @@ def test_rates_come_about(town, seed):
 
 
 @pytest.mark.slow
-def test_nothing_happens_at_rate_zero(town):
+def test_nothing_happens_at_rate_zero(world):
     city = City(
-        OldWorld(MapFolder(town)),
+        world,
         dict.fromkeys(DEFAULT_RATES, 0.0),
         1,
         shapely.Polygon(),
@@ -235,13 +244,12 @@ def test_nothing_happens_at_rate_zero(town):
 @pytest.mark.parametrize(
     ("farthest", "least"), [(0.0, 0.0), (0.1, 0.1), (0.2, 0.2), (5.0, 0.2)]
 )
-def test_furniture_moves_as_far_as_allowed(town, farthest, least):
+def test_furniture_moves_as_far_as_allowed(world, farthest, least):
     rates = {
         **dict.fromkeys(DEFAULT_RATES, 0.0),
         "lamps": 1.0,
         "moved": farthest,
     }
-    world = OldWorld(MapFolder(town))
     city = City(world, rates, 1, shapely.Polygon())
     city.live()
     moves = [e for e in city.events if e.event == "furniture"]
@@ -419,6 +427,7 @@ def names_in(folder, stage):
     return set(re.findall('visual name="([^/"]+)/', text))
 
 
+@pytest.mark.slow
 def test_each_stage_is_what_the_history_tells(long):
     """Scaffolds, uses of empty plots and annexes have rows as well."""
     standing, rows = names_in(long, "01"), _rows(long)
@@ -445,8 +454,7 @@ def test_each_stage_is_what_the_history_tells(long):
 
 
 @pytest.mark.slow
-def test_a_scaffold_stands_before_its_building(town):
-    world = OldWorld(MapFolder(town))
+def test_a_scaffold_stands_before_its_building(world):
     city = City(world, _BUSY, 3, shapely.Polygon())
     seen = 0
     for _ in range(8):
@@ -468,8 +476,8 @@ def test_a_scaffold_stands_before_its_building(town):
 
 @pytest.mark.slow
 @pytest.mark.parametrize(("offset", "stands"), [(-0.03, False), (0.03, True)])
-def test_a_scaffold_stands_in_nothing_however_thin(town, offset, stands):
-    city = City(OldWorld(MapFolder(town)), _BUSY, 3, shapely.Polygon())
+def test_a_scaffold_stands_in_nothing_however_thin(world, offset, stands):
+    city = City(world, _BUSY, 3, shapely.Polygon())
     # The canopies of another building are not in the way of this one's.
     first, *_, other = (lot for lot in city._lots if lot.building)
     parts = []

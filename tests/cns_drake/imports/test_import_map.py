@@ -149,6 +149,7 @@ def test_points_have_their_building(blocks, tmp_path):
     assert len(seen) > 4
 
 
+@pytest.mark.usefixtures("overviews")
 def test_the_same_file_gives_the_same_map(blocks, tmp_path):
     folder, _ = blocks
     source = folder.parent / "blocks.json"
@@ -241,6 +242,7 @@ def test_years_that_change_nothing(tmp_path, dates):
     assert f"{dated} of 2 buildings have a year" in warnings[0]
 
 
+@pytest.mark.usefixtures("overviews")
 def test_the_picture_shows_both_drives_where_they_share_a_street(tmp_path):
     triangle = np.array([[[0.0, 0, 0], [40.0, 0, 0], [0, 40.0, 0]]])
     house = make_imported(
@@ -266,6 +268,7 @@ def test_the_picture_shows_both_drives_where_they_share_a_street(tmp_path):
     assert blue[int(0.85 * height) :].any()
 
 
+@pytest.mark.usefixtures("overviews")
 def test_no_street_and_no_drive(tmp_path):
     city = CityWriter()
     city.box("a", 0, 0, (10, 10, 5))

@@ -8,7 +8,6 @@ from helpers.eval_program import run_program
 from helpers.map_pairs import GROUND, WALL, survey, wall_at
 from helpers.small_map import box_visual, scenario_values
 import numpy as np
-import open3d
 import pytest
 import yaml
 
@@ -145,6 +144,8 @@ def test_glass_is_a_surface(tmp_path):
 
 
 def test_labels_are_those_of_another_caster_but_at_edges(tmp_path):
+    import open3d
+
     boxes = {
         "before": [(0, 15.5, 3, 30, 1, 6), (12, -4, 1.5, 3, 3, 3)],
         "after": [(0, 15.65, 3, 30, 1, 6), (-6, 12, 2, 4, 0.5, 4)],

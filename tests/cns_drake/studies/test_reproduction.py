@@ -157,7 +157,7 @@ class Counting(Method):
 """
 
 
-@pytest.mark.usefixtures("few_methods", "unrendered_figures")
+@pytest.mark.usefixtures("few_methods")
 def test_quick_gives_the_same_tables(tmp_path, monkeypatch):
     """The tables include controls, and come from simulation alone."""
     # Other tests do not find the method registered.

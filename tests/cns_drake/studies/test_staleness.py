@@ -13,9 +13,8 @@ from cns_drake.studies import reproduction
 
 pytestmark = [
     pytest.mark.slow,
-    # The tests ask which figures are made, not what they show.
     # One of two methods changes.
-    pytest.mark.usefixtures("unrendered_figures", "few_methods"),
+    pytest.mark.usefixtures("few_methods"),
 ]
 
 DRIVES = {"town_01", "town_04", "town_01_stage_04"}
@@ -47,7 +46,7 @@ def code(tmp_path, monkeypatch):
 def reproduce(tmp_path, monkeypatch):
     """Reproduces a town; returns the names of the jobs that ran."""
     routes = {"01": "metropolis_04", "04": "metropolis_04"}
-    town = write_town(tmp_path / "town", routes, 30)
+    town = write_town(tmp_path / "town", routes, 12)
     done = []
     monkeypatch.setattr(
         reproduction,

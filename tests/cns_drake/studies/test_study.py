@@ -297,6 +297,7 @@ def test_protocols_are_factors(town, tmp_path, jobs_done):
         assert own["kept"] == pytest.approx(own["auc"] / last["auc"], abs=1e-6)
 
 
+@pytest.mark.slow
 def test_queries_are_scored_once_for_all_radii(town, tmp_path, jobs_done):
     """The numbers are those of a study of each radius alone."""
     fields = {"tasks": ["place", "pose", "cost"], "methods": ["ring++"]}

@@ -108,6 +108,17 @@ def test_jax_scores_as_the_method_does(tmp_path):
 
 @pytest.mark.slow
 def test_the_same_seed_and_an_interruption(tmp_path, monkeypatch):
+    import jax
+
+    # The compilation of a step takes longest, and all three have the same one.
+    steps = []
+    jit = jax.jit
+
+    def once(step):
+        steps.append(jit(step))
+        return steps[0]
+
+    monkeypatch.setattr(jax, "jit", once)
     monkeypatch.setattr(training, "_KEPT_EVERY", 2)
     monkeypatch.setattr(training, "_CLUSTERS", 1)
     monkeypatch.setattr(training, "_WARM_UP", 1)

@@ -18,6 +18,7 @@ def judge():
 
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(judge, "_TREES", 25)
+        patch.setattr(judge, "_NEIGHBOURHOODS", 40)
         yield judge
 
 

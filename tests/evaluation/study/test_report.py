@@ -15,7 +15,7 @@ from cns_drake.base.errors import InputError
 from cns_drake.base.jobs.cluster import Cluster, choose_cluster
 from cns_drake.base.jobs.running import run_jobs
 from evaluation.drives import open_drive
-from evaluation.methods import make_method, method, shipped_methods
+from evaluation.methods import make_method, method
 from evaluation.paper import reference_for
 from evaluation.recognition.place_recognition import run
 from evaluation.recognition.protocol import FAIR_PROTOCOL, PAPER_PROTOCOL
@@ -341,7 +341,9 @@ def test_finished_jobs_start_no_process(recordings, report, monkeypatch):
 
 
 @pytest.mark.usefixtures("unrendered_figures")
-def test_own_method_beside_the_others(recordings, tmp_path, monkeypatch):
+def test_own_method_beside_the_others(
+    recordings, few_methods, tmp_path, monkeypatch
+):
     # Other tests do not find the method registered.
     monkeypatch.setattr(method, "_METHODS", dict(method._METHODS))
     path = tmp_path / "counting.py"
@@ -350,7 +352,7 @@ def test_own_method_beside_the_others(recordings, tmp_path, monkeypatch):
     studies.report(recordings, tmp_path / "out", choices)
     rows = read_csv(tmp_path / "out" / "place_recognition.csv")
     methods = list(dict.fromkeys(row["method"] for row in rows))
-    assert methods == [*shipped_methods(), "counting"]
+    assert methods == [*few_methods, "counting"]
     for name in ("report.md", "report.html"):
         assert "counting" in (tmp_path / "out" / name).read_text()
 
