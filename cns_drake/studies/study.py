@@ -281,14 +281,22 @@ class Study:
             wanted = self.experiment.maps or recordable_maps()
         known: set[str] = set()
         for one in wanted:
+            # A wrong name is found before any map is made.
+            if isinstance(one, str) and not Path(one).is_dir():
+                try:
+                    recordable_map(one)
+                except InputError as error:
+                    place = "" if maps else f"{self.source}: maps: "
+                    raise InputError(f"{place}{error}") from None
+        for one in wanted:
             for some in self._drives_of(one):
                 names = {some.map_name, *some.drive_names}
                 if some.factors:
                     names.remove(some.map_name)
                 for name in sorted(names & known):
                     raise InputError(
-                        f"{one}: another map, or a drive of one, has the name"
-                        f" {name}, too"
+                        f"{getattr(one, 'name', one)}: another map, or a drive"
+                        f" of one, has the name {name}, too"
                     )
                 known |= names
                 yield some
