@@ -291,9 +291,12 @@ def resumable() -> Iterator[None]:
     """Says, when work is interrupted, that the same command goes on with it."""
     try:
         yield
-    except KeyboardInterrupt:
-        note("What is finished is kept; the same command goes on from there.")
-        raise
+    except KeyboardInterrupt as error:
+        told = "What is finished is kept; the same command goes on from there."
+        # Work that goes on may be a part of other such work.
+        if told not in error.args:
+            note(told)
+        raise KeyboardInterrupt(told) from None
 
 
 def next_command(*words: object) -> None:
