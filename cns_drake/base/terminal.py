@@ -187,6 +187,9 @@ def run(app: typer.Typer, program: str) -> NoReturn:
     except SystemExit as error:
         # Drake's C++ raises SystemExit when one of its own checks fails.
         status = error.code if isinstance(error.code, int) else 2
+        # Typer takes a closed pipe for a failure.
+        if isinstance(error.__context__, BrokenPipeError):
+            status = 0
         if isinstance(error.code, str):
             message = f"error: {error.code}"
     except UnicodeError as error:
