@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 
 from cns_drake.base.errors import InputError, did_you_mean
-from cns_drake.base.files import make_folder
+from cns_drake.base.files import is_there, make_folder
 from cns_drake.base.jobs.cluster import Cluster
 from cns_drake.base.jobs.fingerprint import fingerprint
 from cns_drake.base.jobs.processes import nothing_left
@@ -214,6 +214,8 @@ class Study:
             for _ in self._simulated(some, made=False):
                 pass
         make_folder(self.output)
+        for name in (RESULTS, QUERIES, "index.html"):
+            is_there(self.output / name)  # Nothing else may have its name.
         self._made.make(self.cluster)
         jobs, measured = self._plan(drives)
         if not measured:

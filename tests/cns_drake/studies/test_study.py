@@ -709,6 +709,16 @@ def test_faults_before_anything_is_made(
     assert not list((tmp_path / "out").glob("*"))
 
 
+@pytest.mark.parametrize("name", ["results.csv", "queries.csv", "index.html"])
+def test_a_folder_with_the_name_of_a_result(town, tmp_path, monkeypatch, name):
+    monkeypatch.setattr(
+        study_module, "run_jobs", lambda *_: pytest.fail("a job runs")
+    )
+    (tmp_path / name).mkdir()
+    with pytest.raises(InputError, match=f"{name}: Is a directory"):
+        run_study(experiment(town), tmp_path, Cluster())
+
+
 def test_two_maps_of_one_name(town, tmp_path):
     shutil.copytree(town, tmp_path / "town")
     both = experiment(town, maps=[str(town), str(tmp_path / "town")])
