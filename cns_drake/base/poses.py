@@ -16,6 +16,18 @@ def make_pose(R: np.ndarray, p: np.ndarray) -> np.ndarray:
     return X
 
 
+def is_pose(X: np.ndarray) -> bool:
+    """Returns whether a matrix is one rigid pose, but for rounding."""
+    if X.shape != (4, 4) or not np.isfinite(X).all():
+        return False
+    R = X[:3, :3]
+    return bool(
+        np.allclose(R @ R.T, np.eye(3), atol=1e-3)
+        and np.linalg.det(R) > 0.0
+        and np.allclose(X[3], [0.0, 0.0, 0.0, 1.0], atol=1e-6)
+    )
+
+
 def rotation_from_quaternion(quat_xyzw: np.ndarray) -> np.ndarray:
     """Returns the rotation matrices (..., 3, 3) of quaternions (..., 4).
 

@@ -187,6 +187,9 @@ def run(app: typer.Typer, program: str) -> NoReturn:
     except SystemExit as error:
         # Drake's C++ raises SystemExit when one of its own checks fails.
         status = error.code if isinstance(error.code, int) else 2
+        # Typer takes a closed pipe for a failure.
+        if isinstance(error.__context__, BrokenPipeError):
+            status = 0
         if isinstance(error.code, str):
             message = f"error: {error.code}"
     except UnicodeError as error:
@@ -291,9 +294,12 @@ def resumable() -> Iterator[None]:
     """Notes on an interrupt that the same command will resume the work."""
     try:
         yield
-    except KeyboardInterrupt:
-        note("What is finished is kept; the same command goes on from there.")
-        raise
+    except KeyboardInterrupt as error:
+        told = "What is finished is kept; the same command goes on from there."
+        # Work that goes on may be a part of other such work.
+        if told not in error.args:
+            note(told)
+        raise KeyboardInterrupt(told) from None
 
 
 def next_command(*words: object) -> None:

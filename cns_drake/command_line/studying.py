@@ -8,7 +8,7 @@ import typer
 from cns_drake.base import commands
 from cns_drake.base.errors import InputError
 from cns_drake.base.interrupts import uninterrupted
-from cns_drake.base.terminal import next_command, note
+from cns_drake.base.terminal import next_command, note, resumable
 from cns_drake.command_line import options
 from evaluation.recognition.protocol import RetrievalProtocol
 from evaluation.recognition.protocol_options import with_protocol
@@ -48,18 +48,19 @@ def reproduce(
         raise InputError(
             "--quick and --pages exclude each other; give one of them"
         )
-    report = reproduction.reproduce_maps(
-        maps,
-        output,
-        cluster,
-        with_pages=pages is not False,
-        quick=quick,
-        protocol=protocol,
-        own_methods=method or (),
-        settings=parameter or (),
-        with_costs=costs,
-        on_note=note,
-    )
+    with resumable():
+        report = reproduction.reproduce_maps(
+            maps,
+            output,
+            cluster,
+            with_pages=pages is not False,
+            quick=quick,
+            protocol=protocol,
+            own_methods=method or (),
+            settings=parameter or (),
+            with_costs=costs,
+            on_note=note,
+        )
     typer.echo(report)
     next_command("cns-eval", "compare", report.parent)
 
@@ -141,13 +142,14 @@ def study(
         from cns_drake.base.jobs.cluster import choose_cluster
         from cns_drake.studies.study import run_study
 
-    page = run_study(
-        experiment,
-        output,
-        choose_cluster(jobs, scheduler),
-        maps or (),
-        source=name,
-        on_note=note,
-    )
+    with resumable():
+        page = run_study(
+            experiment,
+            output,
+            choose_cluster(jobs, scheduler),
+            maps or (),
+            source=name,
+            on_note=note,
+        )
     typer.echo(page)
     next_command("cns-eval", "compare", output)

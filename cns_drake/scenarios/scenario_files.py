@@ -91,7 +91,14 @@ def read_scenario_file(path: Path) -> Scenario:
         values = read_yaml(file)
         if not isinstance(values, dict):
             raise InputError(f"{file}: not a mapping of scenario fields")
-        values.setdefault("name", drive_name(file))
+        name = values.setdefault("name", drive_name(file))
+        if name == drive_name(file) and not re.fullmatch(
+            r"[A-Za-z0-9]\w*", name, re.ASCII
+        ):
+            raise InputError(
+                f"{file}: name: {name!r}, from its path, has more than letters,"
+                " digits and underscores; give a name"
+            )
         find_files(values, file)
         files[file] = values
         file = _find_base(values.pop("base", None), file, files)

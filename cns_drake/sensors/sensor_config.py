@@ -7,9 +7,15 @@ which is slow to import.
 from __future__ import annotations
 
 import abc
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import TYPE_CHECKING, Annotated, Any, get_args
 
-from pydantic import BaseModel, ConfigDict, Field
+from pydantic import (
+    BaseModel,
+    ConfigDict,
+    Field,
+    ValidationInfo,
+    field_validator,
+)
 
 if TYPE_CHECKING:
     from pydrake.geometry import SceneGraph
@@ -33,6 +39,17 @@ class Section(BaseModel):
     """A section of a scenario file: known fields, finite values, immutable."""
 
     model_config = ConfigDict(extra="forbid", frozen=True, allow_inf_nan=False)
+
+    @field_validator("*", mode="before")
+    @classmethod
+    def _check_number(cls, value: Any, info: ValidationInfo) -> Any:
+        """Refuses YAML's `yes` for a number; pydantic would take it for 1."""
+        if isinstance(value, bool) and info.field_name is not None:
+            kind = cls.model_fields[info.field_name].annotation
+            kinds = {kind, *get_args(kind)}
+            if kinds & {int, float} and bool not in kinds:
+                raise ValueError(f"{value} is no number")
+        return value
 
     def replaced(self, **fields: Any) -> Self:
         """Returns a copy with some fields replaced, without checks."""

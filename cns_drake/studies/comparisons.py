@@ -329,7 +329,13 @@ class PairOfDrives:
                     f"{self.source}: years: stage {LAST} ages, not the stage"
                     f" {drive.stage} of the {side}"
                 )
-            drive = self._elsewhere(side, drive, self.age, *age, seed)
+            older = "query" if side == "database" else "database"
+            if "version" in left:
+                raise InputError(
+                    f"{self.source}: {side}.version: a city drawn anew does not"
+                    f" age by {older}.years; give one of them"
+                )
+            drive = self._elsewhere(older, drive, self.age, *age, seed)
         if "version" in left:
             version = left.pop("version")
             drive = self._elsewhere(side, drive, self.redraw, version)

@@ -8,7 +8,7 @@ product of all factors.
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence, Set
 import contextlib
 from dataclasses import dataclass, field, replace
 import itertools
@@ -66,7 +66,14 @@ Case = dict[str, dict[str, Any]]
 
 def _in_a_tuple(value: Any) -> Any:
     value = [value] if isinstance(value, str | int | dict) else value
-    _check_once(value)
+    if isinstance(value, list):
+        # A map to make has a name.
+        _check_once(
+            [
+                one.get("name", one) if isinstance(one, dict) else one
+                for one in value
+            ]
+        )
     return value
 
 
@@ -240,14 +247,14 @@ class Experiment(Section):
         Name, Annotated[Any, PlainValidator(_case, json_schema_input_type=dict)]
     ] = Field(default_factory=dict)
     levels: Annotated[
-        tuple[Annotated[int, Field(ge=1, le=100)], ...] | None,
+        tuple[Annotated[int, Field(ge=1, le=100, strict=True)], ...] | None,
         BeforeValidator(_in_a_tuple),
     ] = Field(default=None, min_length=1)
     design: Literal["product", "one-at-a-time"] = "product"
     tasks: _Settings = Field(default={"place": {}}, min_length=1)
     methods: _Settings | None = Field(default=None, min_length=1)
     seeds: Annotated[
-        tuple[Annotated[int, Field(ge=0, lt=2**31)], ...],
+        tuple[Annotated[int, Field(ge=0, lt=2**31, strict=True)], ...],
         BeforeValidator(_in_a_tuple),
     ] = Field(default=(1,), min_length=1)
     protocol: Annotated[dict[str, Any], BeforeValidator(_base)] = Field(
@@ -409,6 +416,10 @@ def conditions(experiment: Experiment) -> list[Condition]:
     if wanted:
         raise ValueError(f"baseline.{next(iter(wanted))}: this is no factor")
     cases = list(_cases(experiment))
+    taken = _changed("", factors.items(), set())
+    for name, case in experiment.cases.items():
+        if isinstance(case, dict):
+            _changed(f"cases.{name}.", _leaves(case, ()), taken)
     lengths = [len(values) for values in factors.values()]
     number = 1 + sum(lengths) - len(lengths)
     if experiment.design == "product":
@@ -462,6 +473,22 @@ def _factors(
                 fixed = merged(fixed, _nested(path, value))
         factors |= {n: some for n, some in varied.items() if n != FRESH}
     return fixed, factors
+
+
+def _changed(
+    place: str, fields: Iterable[tuple[str, Any]], taken: Set[str]
+) -> set[str]:
+    """Returns the paths that factors change; refuses those that are taken."""
+    found = set(taken)
+    for path, values in fields:
+        some = values if isinstance(values, list) else [values]
+        # A mapping as a value changes several fields.
+        paths = {leaf for one in some for leaf, _ in _leaves({path: one}, ())}
+        if paths & found:
+            path = min(paths & found)
+            raise ValueError(f"{place}{path}: another factor changes it, too")
+        found |= paths
+    return found
 
 
 def _split(

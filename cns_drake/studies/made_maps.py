@@ -226,7 +226,8 @@ def made_map_step(
         path = Path(shipped.get(made.age, made.age))
         if not MapFolder(path).recordable_drives():
             raise InputError(
-                f"maps: {made.name}: no map {made.age!r} with drives"
+                f"{experiment.name}: maps: {made.name}: no map {made.age!r}"
+                " with drives"
             )
         rates = tuple(sorted(DEFAULT_RATES.items()))
         return AgeCity(folder, path.resolve(), (made.years,), made.seed, rates)

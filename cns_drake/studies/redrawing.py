@@ -266,7 +266,7 @@ def draw_fresh_cities(
     versions = fresh_versions()
     for what, given, known in (
         ("map", maps, [one.map_name for one in versions]),
-        ("number", numbers, [one.number for one in versions]),
+        ("both.fresh", numbers, [one.number for one in versions]),
     ):
         for one in given:
             if one not in known:

@@ -7,8 +7,10 @@ from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
+import numpy as np
+
 from cns_drake.base.errors import InputError, did_you_mean, errors_at
-from cns_drake.base.files import make_folder
+from cns_drake.base.files import is_there, make_folder
 from cns_drake.base.jobs.cluster import Cluster
 from cns_drake.base.jobs.fingerprint import fingerprint
 from cns_drake.base.jobs.processes import nothing_left
@@ -209,6 +211,8 @@ class Study:
             for _ in self._simulated(some, made=False):
                 pass
         make_folder(self.output)
+        for name in (RESULTS, QUERIES, "index.html"):
+            is_there(self.output / name)  # Nothing else may have its name.
         self._made.make(self.cluster)
         jobs, measured = self._plan(drives)
         if not measured:
@@ -276,14 +280,22 @@ class Study:
             wanted = self.experiment.maps or recordable_maps()
         known: set[str] = set()
         for one in wanted:
+            # A wrong name is found before any map is made.
+            if isinstance(one, str) and not Path(one).is_dir():
+                try:
+                    recordable_map(one)
+                except InputError as error:
+                    place = "" if maps else f"{self.source}: maps: "
+                    raise InputError(f"{place}{error}") from None
+        for one in wanted:
             for some in self._drives_of(one):
                 names = {some.map_name, *some.drive_names}
                 if some.factors:
                     names.remove(some.map_name)
                 for name in sorted(names & known):
                     raise InputError(
-                        f"{one}: another map, or a drive of one, has the name"
-                        f" {name}, too"
+                        f"{getattr(one, 'name', one)}: another map, or a drive"
+                        f" of one, has the name {name}, too"
                     )
                 known |= names
                 yield some

@@ -6,6 +6,7 @@ from typing import Annotated
 import typer
 
 from cns_drake.base import terminal
+from cns_drake.base.errors import InputError
 
 
 def real(
@@ -41,6 +42,11 @@ def real(
     measuring = Measuring(method or (), terminal.track, terminal.note)
     make_folder(output)
     measuring.run(folder, simulated)
+    if not measuring.rows:
+        raise InputError(
+            f"{folder}: no data set that these methods can measure; the notes"
+            " say why"
+        )
     measuring.queries().write_csv(output / QUERIES)
     measuring.results().write_csv(output / RESULTS)
     print(output / RESULTS)

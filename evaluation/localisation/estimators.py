@@ -410,23 +410,12 @@ def _by_own(
             f"{path}: returned {type(answer).__name__} instead of a pose"
             " (4, 4) and a score"
         ) from error
-    if X is not None and not _is_pose(X):
+    if X is not None and not poses.is_pose(X):
         raise InputError(
             f"{path}: returned no pose: (4, 4) with a rotation and a last row"
             " 0 0 0 1"
         )
     return Estimate(X, score if score == score else -math.inf)
-
-
-def _is_pose(X: np.ndarray) -> bool:
-    if X.shape != (4, 4) or not np.isfinite(X).all():
-        return False
-    R = X[:3, :3]
-    return bool(
-        np.allclose(R @ R.T, np.eye(3), atol=1e-3)
-        and np.linalg.det(R) > 0.0
-        and np.allclose(X[3], [0.0, 0.0, 0.0, 1.0], atol=1e-6)
-    )
 
 
 _KINDS = {

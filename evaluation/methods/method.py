@@ -215,7 +215,9 @@ class Method(abc.ABC, Generic[Descriptor, Database]):
         """
         if type(self).relative_poses is Method.relative_poses:
             return None
-        return self.relative_poses(query, database, [place])[0]
+        found = self.relative_poses(query, database, [place])
+        check_number(self, "relative_poses", found, 1)
+        return found[0]
 
     def relative_poses(
         self, query: Descriptor, database: Database, places: Sequence[int]
@@ -226,6 +228,22 @@ class Method(abc.ABC, Generic[Descriptor, Database]):
         than one by one.
         """
         return [self.relative_pose(query, database, one) for one in places]
+
+
+def check_number(
+    method: Method, function: str, found: object, number: int
+) -> None:
+    """Checks that a method has returned as many values as it was asked for.
+
+    Raises:
+        InputError: it has returned something else.
+    """
+    count = len(found) if isinstance(found, Sequence | np.ndarray) else None
+    if count != number:
+        raise InputError(
+            f"{method.name}: {function} returned {type(found).__name__} of"
+            f" length {count} instead of {number}"
+        )
 
 
 def yaw_pose(
@@ -251,7 +269,7 @@ _OPTIONAL = {
 _CALLED = (
     *("__init__", "describe", "describe_place", "describe_batch"),
     *("build_database", "score", "score_in_drive", "rerank"),
-    *("relative_pose", "relative_poses"),
+    *("relative_pose", "relative_poses", "for_lidar", "assumption"),
 )
 
 _MethodClass = TypeVar("_MethodClass", bound=type[Method])
@@ -261,7 +279,7 @@ def register(name: str) -> Callable[[_MethodClass], _MethodClass]:
     """Returns a decorator that registers a Method under a name.
 
     Raises:
-        ValueError: if another method has that name.
+        ValueError: if another method has that name, or it cannot be printed.
 
     Example:
         from evaluation import Method, register
@@ -270,6 +288,9 @@ def register(name: str) -> Callable[[_MethodClass], _MethodClass]:
         class Mine(Method):
             ...
     """
+
+    if not (name.isprintable() and name.strip()):
+        raise ValueError(f"{name!r} is no name of a method")
 
     def enter(method: _MethodClass) -> _MethodClass:
         other = _METHODS.get(name, method)
@@ -384,6 +405,11 @@ def load_method(path: Path) -> type[Method]:
     if inspect.isabstract(method):
         missing = ", ".join(sorted(method.__abstractmethods__))
         raise InputError(f"{path}: {method.__name__}: lacks {missing}")
+    kind = method.Config
+    if not (isinstance(kind, type) and issubclass(kind, MethodConfig)):
+        raise InputError(
+            f"{path}: {method.__name__}: Config: {kind!r} is no MethodConfig"
+        )
     scans = method.scans_per_place
     if not isinstance(scans, int) or scans < 1:
         raise InputError(

@@ -10,7 +10,7 @@ from cns_drake.base.drives.drive import Drive
 from cns_drake.base.errors import InputError
 from cns_drake.base.progress import Track, silent
 from evaluation.drives.sampling import QuerySensor, gather, sample_frames
-from evaluation.methods.method import Method
+from evaluation.methods.method import Method, check_number
 from evaluation.recognition.metrics import route_blocks
 from evaluation.recognition.protocol import DEFAULT_PROTOCOL, RetrievalProtocol
 
@@ -222,6 +222,8 @@ class _Describing:
             tuple(method.point_fields),
         )
         self._method = method.for_lidar(drive.lidar_field)
+        if not isinstance(self._method, Method):
+            raise InputError(f"{method.name}: for_lidar returned no method")
         self._protocol = protocol
         self._waiting: list[_Waiting] = []
         self._members: dict[Role, set[int]] = {}
@@ -300,11 +302,7 @@ class _Describing:
             found = self._method.describe_batch(
                 list(asked.values()), of_places=role == "places"
             )
-        if len(found) != len(asked):
-            raise InputError(
-                f"{self._method.name}: describe_batch returned {len(found)}"
-                f" descriptors of {len(asked)} clouds"
-            )
+        check_number(self._method, "describe_batch", found, len(asked))
         described = {**known, **dict(zip(asked, found, strict=True))}
         drive = self._drive
         scans = drive.places if role == "places" else drive.queries

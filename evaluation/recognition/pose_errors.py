@@ -99,9 +99,10 @@ def checked_pose(method: Method, X_PQ: object) -> np.ndarray | None:
             f"{method.name}: relative_pose returned {type(X_PQ).__name__} of"
             f" shape {pose.shape} instead of (4, 4) floats or None"
         )
-    if not np.isfinite(pose).all():
+    if not poses.is_pose(pose):
         raise InputError(
-            f"{method.name}: relative_pose returned a pose that is not finite"
+            f"{method.name}: relative_pose returned no pose: a rotation, and a"
+            " last row 0 0 0 1"
         )
     return pose
 

@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 
 from cns_drake.base.errors import InputError
-from evaluation.methods.method import Method
+from evaluation.methods.method import Method, check_number
 from evaluation.recognition.pose_errors import checked_pose
 
 # These values were chosen on development worlds, see docs/notes/fitting.md.
@@ -84,11 +84,7 @@ def gated(
     if len(best) == 0 or not radii:
         return [scores for _ in radii]
     found = method.relative_poses(query, database, best.tolist())
-    if len(found) != len(best):
-        raise InputError(
-            f"{method.name}: relative_poses returned {len(found)} poses of"
-            f" {len(best)} places"
-        )
+    check_number(method, "relative_poses", found, len(best))
     poses = [checked_pose(method, X_PQ) for X_PQ in found]
     if all(X_PQ is None for X_PQ in poses):
         return [scores for _ in radii]

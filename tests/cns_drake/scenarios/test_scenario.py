@@ -447,3 +447,16 @@ def test_a_driver_without_lanes_comes_with_a_note(
         with pytest.raises(InputError, match=r"wander 0\.35"):
             run_drive(tmp_path / f"{name}.yaml", tmp_path, driver="real")
         assert capsys.readouterr().err.count("no lanes") == notes
+
+
+@pytest.mark.parametrize("folder", ["my town", "städtchen", "a..b", "-a"])
+def test_the_name_of_a_folder_may_be_no_name(small_map, tmp_path, folder):
+    file = tmp_path / folder / "sequence_01.yaml"
+    file.parent.mkdir()
+    values = scenario_values(small_map)
+    del values["name"]
+    file.write_text(yaml.safe_dump(values))
+    with pytest.raises(InputError, match=f"name: '{folder}_01', from its"):
+        load_scenario(file)
+    file.write_text(yaml.safe_dump({**values, "name": "mine"}))
+    assert load_scenario(file).name == "mine"

@@ -593,6 +593,10 @@ FAULTS = [
     ("database: {stage: earlier 5}", "database.stage: 'earlier 5'"),
     ("cases: {a: {query: {stage: next}}}", "query.stage: 'next'"),
     ("{database: {stage: '01'}, query: {years: 5}}", "years: stage last ages"),
+    (
+        "{database: {version: 3}, query: {years: 5}}",
+        "database.version: a city drawn anew does not age by query.years",
+    ),
     ("database: {rates: 2}", "database.rates: those of no years"),
     ("both: {rates: 2}", "both.rates: those of no years"),
     (

@@ -111,6 +111,20 @@ def test_one_at_a_time(read):
     ]
 
 
+def test_factors_and_cases_of_different_fields_of_a_section(read):
+    experiment = read(
+        """
+        query: {a: [{b: 1}, {}], a.c: [2, 3]}
+        database: {d: [5, 6]}
+        cases:
+          e: {query: {a: {f: [4]}, d: [7]}, both: {d: [8]}}
+          g: {query: {d: [9]}}
+          both: [e, g]
+        """
+    )
+    assert len(conditions(experiment)) == 2 * 2 * 2 * (1 + 1 + 1 + 1)
+
+
 @pytest.mark.parametrize(
     ("value", "found"),
     [
@@ -347,6 +361,25 @@ FAULTS = [
     ("database: {a: [null, {}]}", "database.a: 'none' is there twice"),
     ("database: {a: [1, '1']}", "database.a: '1' is there twice"),
     ("database: {a.b: 1, a: {b: [2, 3]}}", "database.a.b: it is there twice"),
+    (
+        "query: {a: [{b: 1}, {}], a.b: [2, 3]}",
+        "query.a.b: another factor changes it, too",
+    ),
+    (
+        "query: {a: {b: [1, 2]}}\ncases: {c: {query: {a: {b: [3]}}}}",
+        "cases.c.query.a.b: another factor changes it, too",
+    ),
+    (
+        "query: {a: [{b: 1}, {}]}\ncases: {c: {query: {a: {b: [3]}}}}",
+        "cases.c.query.a.b: another factor changes it, too",
+    ),
+    ("cases: {c: {query: {a: {b: 3}, a.b: 4}}}", "cases.c.query.a.b: another"),
+    ("seeds: true", "seeds.0: "),
+    ("levels: true\ncases: {a: {query: {x: 1}}}", "levels.0: "),
+    (
+        "maps: [town, {name: town, age: town, years: 2, seed: 1}]",
+        "maps: 'town' is there twice",
+    ),
     ("database: {missing: .nan}", "database.missing: nan is not finite"),
     ("query: {a: {b: [0, .inf]}}", "query.a.b: .*inf.* is not finite"),
     ("query: {viewpoint: [[.nan, 0]]}", "query.viewpoint: .* not finite"),

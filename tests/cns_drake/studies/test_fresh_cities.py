@@ -131,7 +131,7 @@ def test_a_version_of_a_small_city(tmp_path, turn_deg):
 def test_versions_that_are_none(tmp_path):
     for maps, numbers, fault in (
         (("atlantis",), (), "map: no fresh version 'atlantis'"),
-        ((), (6,), "number: no fresh version 6"),
+        ((), (6,), "both.fresh: no fresh version 6"),
     ):
         with pytest.raises(InputError, match=fault):
             draw_fresh_cities(maps, numbers, tmp_path / "out", Cluster())

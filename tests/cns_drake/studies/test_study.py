@@ -600,10 +600,9 @@ def test_maps_of_conditions_are_made_first(town, tmp_path, monkeypatch):
     monkeypatch.setattr(study_module, "run_jobs", stop)
     wanted = experiment(
         town,
-        database={"version": [3, 8]},
-        query={"years": [0, 5]},
+        database={"version": [3, 8], "years": [0, 5]},
         both={"rates": 2},
-        cases={"old": {"query": {"years": 20, "rates": 1}}},
+        cases={"slow": {"database": {"rates": 1}}},
         seeds=[1, 2],
     )
     with pytest.raises(PlannedError):
@@ -681,7 +680,18 @@ def test_faults_before_any_work(town, tmp_path, fields, fault):
             {"database": {"years": [0, 5], "foo": 1}},
             "mine: database: foo: Extra",
         ),
-        ({"maps": ["atlantis"]}, "unknown map 'atlantis'"),
+        ({"maps": ["atlantis"]}, "mine: maps: unknown map 'atlantis'"),
+        (
+            {
+                "maps": [
+                    {"name": "a", "age": "suburbia", "years": 1, "seed": 1},
+                    "atlantis",
+                ]
+            },
+            "mine: maps: unknown map 'atlantis'",
+        ),
+        ({"database": {"years": 1.5}}, "mine: database.years: 1.5 is not"),
+        ({"query": {"years": 0.5}}, "mine: query.years: 0.5 is not"),
         ({"both": {"fresh": 1}}, "mine: both.fresh: .*town: no shipped map"),
         (
             {"database": {"stage": "earlier 1"}},
@@ -698,6 +708,16 @@ def test_faults_before_anything_is_made(
     with pytest.raises(InputError, match=f"^{fault}"):
         run_study(experiment(town, **fields), tmp_path / "out", Cluster())
     assert not list((tmp_path / "out").glob("*"))
+
+
+@pytest.mark.parametrize("name", ["results.csv", "queries.csv", "index.html"])
+def test_a_folder_with_the_name_of_a_result(town, tmp_path, monkeypatch, name):
+    monkeypatch.setattr(
+        study_module, "run_jobs", lambda *_: pytest.fail("a job runs")
+    )
+    (tmp_path / name).mkdir()
+    with pytest.raises(InputError, match=f"{name}: Is a directory"):
+        run_study(experiment(town), tmp_path, Cluster())
 
 
 def test_two_maps_of_one_name(town, tmp_path):

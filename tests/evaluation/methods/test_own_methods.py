@@ -66,6 +66,11 @@ def test_the_shown_method_finds_turned_places(tmp_path, monkeypatch):
             "register('btc')(type('A', (Method,), {}))",
             "there is another method 'btc'",
         ),
+        (
+            "from evaluation.methods import Method, register\n"
+            "register('a\\nb')(type('A', (Method,), {}))",
+            "no name of a method",
+        ),
     ],
 )
 def test_files_that_are_no_method(capsys, towns, tmp_path, text, fault):
@@ -124,6 +129,7 @@ class Own(Method):
             "    def desc",
             "line 10: SystemExit",
         ),
+        ("    def desc", "    Config = dict\n    def desc", "Config: <class"),
     ],
 )
 @pytest.mark.parametrize("command", ["pr", "scores"])
@@ -163,3 +169,38 @@ def test_a_relative_path_has_line_and_traceback(
         assert (status, out) == (2, "")
         assert 'own.py", line 10, in describe\n    return 1 / 0\n' in err
         assert err.endswith(f"\ncns-eval: error: {line}\n")
+
+
+@pytest.mark.parametrize(
+    ("function", "body", "fault"),
+    [
+        ("for_lidar(self, field)", "pass", "own_c: for_lidar returned no"),
+        ("for_lidar(self, field)", "1 / 0", "line 18: ZeroDivisionError"),
+        (
+            "describe_batch(self, clouds, *, of_places)",
+            "pass",
+            "own_c: describe_batch returned NoneType of length None",
+        ),
+        ("relative_poses(self, *three)", "return []", "list of length 0"),
+        ("relative_poses(self, *three)", "pass", "NoneType of length None"),
+        ("relative_pose(self, *three)", "return 5", "int of shape ()"),
+        ("relative_pose(self, *three)", "return np.ones((4, 4))", "no pose"),
+        ("relative_pose(self, *three)", "return np.nan * np.eye(4)", "no pose"),
+        (
+            "relative_pose(self, *three)",
+            "return np.diag([1.0, 1.0, -1.0, 1.0])",
+            "no pose",
+        ),
+    ],
+)
+def test_results_of_the_other_functions(
+    capsys, towns, tmp_path, monkeypatch, function, body, fault
+):
+    monkeypatch.setattr(method, "_METHODS", dict(method._METHODS))
+    path = tmp_path / "own.py"
+    path.write_text(
+        _WHOLE.replace("{number}", "c")
+        + f"    def {function}:\n        {body}\n"
+    )
+    words = ["pr", towns / "town_01", towns / "town_02", "--method", path]
+    assert_refused(capsys, words, fault)

@@ -187,7 +187,7 @@ def test_faults_are_one_line(tmp_path, capsys):
     assert "no method 'nothing'" in err
 
 
-def test_other_formats_without_poses(tmp_path):
+def test_other_formats_without_poses(tmp_path, capsys):
     (tmp_path / "nclt").mkdir()
     hits = struct.pack("<HHHBB", 20400, 19800, 20040, 31, 0)
     (tmp_path / "nclt" / "1326652795280148.bin").write_bytes(hits)
@@ -206,6 +206,10 @@ def test_other_formats_without_poses(tmp_path):
     measuring = Measuring(("solid",), silent, lambda note: None)
     measuring.run(tmp_path, None)
     assert measuring.rows == []
+    status, _, err = ask(capsys, tmp_path, tmp_path / "out", methods=["solid"])
+    assert status == 2
+    assert "no data set that these methods can measure" in err
+    assert not (tmp_path / "out" / "results.csv").exists()
 
 
 @pytest.mark.slow
