@@ -3,8 +3,6 @@
 Also drives through other cities, for a crowded database.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, field
 import hashlib

@@ -4,8 +4,6 @@ Nothing is recorded in between. Drives through one city are one another's
 places. Cities lie `CITY_DISTANCE` apart, which keeps them apart by any radius.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 import itertools

@@ -1,7 +1,5 @@
 """A study: an experiment on maps, from its conditions to its table and page."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path

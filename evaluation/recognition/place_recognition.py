@@ -1,7 +1,5 @@
 """One method on one pair of drives, from scans to numbers."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from dataclasses import asdict, dataclass
 import math

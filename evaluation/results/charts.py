@@ -14,8 +14,6 @@ is 0. Methods keep their colours, and the
 title is what the chart shows, in words.
 """
 
-from __future__ import annotations
-
 from collections import Counter
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass

@@ -1,7 +1,5 @@
 """Anybody's tables of results beside the shipped ones, on what all have."""
 
-from __future__ import annotations
-
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 import itertools

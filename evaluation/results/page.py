@@ -1,7 +1,5 @@
 """One page of an experiment: what it found, its charts, numbers and file."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Iterable, Mapping, Sequence
 import math
 from pathlib import Path

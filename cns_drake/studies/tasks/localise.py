@@ -1,7 +1,5 @@
 """Localisation of scans in the map of a database, from drawn starts."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Any, ClassVar

@@ -1,7 +1,5 @@
 """Place recognition, the poses that come with it, and what both cost."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator, Sequence
 from dataclasses import replace
 from typing import Any

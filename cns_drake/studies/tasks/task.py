@@ -1,7 +1,5 @@
 """The interface of tasks, and what the jobs of a study share."""
 
-from __future__ import annotations
-
 import abc
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field

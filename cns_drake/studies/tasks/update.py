@@ -1,7 +1,5 @@
 """What of a map must be updated: labels of its points, scored."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator, Mapping
 from importlib.util import find_spec
 from pathlib import Path
