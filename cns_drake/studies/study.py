@@ -37,7 +37,6 @@ from cns_drake.studies.experiment import (
     Condition,
     Experiment,
     MadeMap,
-    MethodVariant,
     base_protocol,
     conditions,
     method_variants,
@@ -232,8 +231,10 @@ class Study:
             on_note=self.on_note,
         )
 
-    def _choose_methods(self) -> dict[str, tuple[MethodChoice, MethodVariant]]:
-        """Returns key -> method of the experiment, with its variant."""
+    def _choose_methods(
+        self,
+    ) -> dict[str, tuple[MethodChoice, Mapping[str, Any]]]:
+        """Returns key -> method, with columns of its varied settings."""
         wanted = self.experiment.methods
         files = [Path(one) for one in wanted or () if one.endswith(".py")]
         known = {one.name: one for one in choose_methods(files)}
@@ -241,8 +242,7 @@ class Study:
             wanted = {name: {} for name in known}
         known |= {name: MethodChoice(name) for name in optional_methods()}
         found = {}
-        for variant in method_variants(wanted):
-            name = variant.name
+        for name, settings, varied in method_variants(wanted):
             place = f"methods.{name}."
             if name.endswith(".py"):
                 path = Path(name).absolute()
@@ -252,14 +252,13 @@ class Study:
                     f"no method {name!r} (known: {', '.join(known)})"
                     f"{did_you_mean(name, known)}"
                 )
-            choice = replace(known[name], settings=variant.settings)
+            choice = replace(known[name], settings=settings)
             choice.make()  # A wrong setting is found before anything slow.
             columns = {
                 f"methods.{name}.{column.removeprefix(place)}": one
-                for column, one in variant.factors.items()
+                for column, one in varied.items()
             }
-            variant = replace(variant, name=name, factors=columns)
-            found[choice.key] = choice, variant
+            found[choice.key] = choice, columns
         return found
 
     def _drives(self, maps: Sequence[str]) -> Iterator[_Drives]:
@@ -591,9 +590,9 @@ class Study:
     ) -> dict[str, Any]:
         factors = dict(one.factors)
         if method in self._variants:
-            _, variant = self._variants[method]
-            method = variant.name
-            factors |= variant.factors
+            choice, columns = self._variants[method]
+            method = choice.name
+            factors |= columns
         database, query = one.names
         return {
             "experiment": self.experiment.name,

@@ -24,11 +24,12 @@ _COST, _COSTS_COST = 60.0, 30.0
 Outcomes = Sequence[PlaceOutcome]
 
 
-class PlaceTask(Task):
-    """Which place of the database a query shows."""
+class PoseTask(Task):
+    """Where a query lies, by the method's pose relative to the best place."""
 
-    name = "place"
+    name = "pose"
     asks = True
+    _numbers = staticmethod(pose_numbers)
 
     def measure(self, pair: Pair, jobs: Jobs) -> Part:
         needs: list[str] = []
@@ -42,6 +43,7 @@ class PlaceTask(Task):
             replace(pair.protocol, radius=radii[0]),
             radii,
         )
+        # The task `place` reads the same part.
         part = jobs.files.part("place", pair.name)
         return jobs.add(part, measure_places, arguments, needs, _COST)
 
@@ -53,27 +55,18 @@ class PlaceTask(Task):
         self, found: Outcomes, before: Outcomes | None
     ) -> Iterator[Number]:
         for now in found:
-            yield from place_numbers(now, _same(before, now))
+            yield from self._numbers(now, _same(before, now))
+
+
+class PlaceTask(PoseTask):
+    """Which place of the database a query shows."""
+
+    name = "place"
+    _numbers = staticmethod(place_numbers)
 
     def answers(self, found: Outcomes) -> Iterator[Answered]:
         for now in found:
             yield now.method, now.is_gated, now.columns
-
-
-class PoseTask(PlaceTask):
-    """Where a query lies, by the method's pose relative to the best place."""
-
-    name = "pose"
-
-    def numbers(
-        self, found: Outcomes, before: Outcomes | None
-    ) -> Iterator[Number]:
-        for now in found:
-            yield from pose_numbers(now, _same(before, now))
-
-    def answers(self, found: Outcomes) -> Iterator[Answered]:
-        # Those of `place` have the errors of poses.
-        yield from ()
 
 
 class CostTask(Task):
