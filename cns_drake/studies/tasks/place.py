@@ -1,4 +1,4 @@
-"""Place recognition, the poses that come with it, and what both cost."""
+"""Place recognition, its poses, and the costs of both."""
 
 from collections.abc import Iterator, Sequence
 from dataclasses import replace
@@ -70,7 +70,7 @@ class PlaceTask(PoseTask):
 
 
 class CostTask(Task):
-    """What a query costs, and a database made of descriptions."""
+    """The cost of a query, and of building a database from descriptions."""
 
     name = "cost"
     asks = True

@@ -1,4 +1,4 @@
-"""What of a map must be updated: labels of its points, scored."""
+"""Map update: scores of labels that say which points have changed."""
 
 from collections.abc import Iterator, Mapping
 from importlib.util import find_spec
@@ -31,7 +31,7 @@ _SCORES = (
     "called_structures",
     "right_structures",
 )
-# The true labels, as those of a method.
+# Name under which the true labels are scored, like a method's labels.
 TRUTH = "truth"
 _COST = 60.0
 
@@ -93,7 +93,7 @@ def measure_maps(
         reporter: reports progress.
         database, query: the older and the newer drive.
         methods: names of change detectors.
-        spacing: way between two scans [m].
+        spacing: distance driven between two scans [m].
     """
     a, b = (
         map_truth.simulate_survey(source.scenario)
