@@ -651,7 +651,7 @@ def method_variants(
     Raises:
         ValueError: a setting has no value, or one twice.
     """
-    found = []
+    found: Any = []
     for name, settings in methods.items():
         place = f"methods.{name}"
         fixed, varied = _split(settings, (place,))

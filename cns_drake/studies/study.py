@@ -233,7 +233,7 @@ class Study:
 
     def _choose_methods(
         self,
-    ) -> dict[str, tuple[MethodChoice, Mapping[str, Any]]]:
+    ) -> Mapping[str, tuple[MethodChoice, Mapping[str, Any]]]:
         """Returns key -> method, with columns of its varied settings."""
         wanted = self.experiment.methods
         files = [Path(one) for one in wanted or () if one.endswith(".py")]

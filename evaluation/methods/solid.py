@@ -117,8 +117,9 @@ class SolidMethod(Method[Solid, SolidDatabase]):
     - Coordinates that are exactly zero stay zero; the programs replace them
       by 1 mm.
     - If all elevations have the same number of points, all weights are 1 (the
-    programs divide by zero). - A place without points within range is never a
-    candidate, and a query without such points has no candidates.
+      programs divide by zero).
+    - A place without points within range is never a candidate, and a query
+      without such points has no candidates.
     """
 
     Config = SolidConfig
