@@ -193,13 +193,6 @@ def survey_in_one_world(
     ], reports
 
 
-def survey_drive(drive: Drive, voxels: VoxelMap) -> Surveyed:
-    """Returns a drive with a map in cells of `CELL_SIZE`."""
-    return Surveyed(
-        drive.name, voxels, drive.X_WS[:, :3, 3], drive, drive.notes
-    )
-
-
 def compare(
     source: Surveyed,
     target: Surveyed,
@@ -280,7 +273,8 @@ def _survey(
 ) -> Surveyed:
     if isinstance(source, Drive):
         voxels = map_drive(source, CELL_SIZE, track)
-        return survey_drive(source, voxels)
+        positions = source.X_WS[:, :3, 3]
+        return Surveyed(source.name, voxels, positions, source, source.notes)
     accumulator = VoxelAccumulator(CELL_SIZE)
     notes: list[str] = []
     for points in read_blocks(source, columns, notes.append):
