@@ -16,7 +16,7 @@ import numpy as np
 from scipy.spatial import cKDTree
 
 from cns_drake.base.errors import InputError
-from cns_drake.base.json_text import json_number
+from cns_drake.base.json_text import json_values
 from cns_drake.base.progress import Track, silent
 from evaluation.change.tcr import (
     COVERAGE_RADIUS,
@@ -102,11 +102,11 @@ class ChangeReport:
         values: dict[str, object] = {
             "source": self.source,
             "target": self.target,
-            "tcr_sym": json_number(change.symmetric),
-            "tcr_sym_least": json_number(self.spread[0]),
-            "tcr_sym_greatest": json_number(self.spread[1]),
-            "tcr_source_to_target": json_number(sides["source"].ratio),
-            "tcr_target_to_source": json_number(sides["target"].ratio),
+            "tcr_sym": change.symmetric,
+            "tcr_sym_least": self.spread[0],
+            "tcr_sym_greatest": self.spread[1],
+            "tcr_source_to_target": sides["source"].ratio,
+            "tcr_target_to_source": sides["target"].ratio,
             "in_hull": change.num_in_hull,
             "unchanged": change.num_unchanged,
             "voxels": {k: len(one.in_hull) for k, one in sides.items()},
@@ -130,7 +130,7 @@ class ChangeReport:
             values["control"] = _summary(self.control) | {"between": names}
         if self.alignment is not None:
             values["alignment"] = self.alignment.to_json()
-        return values
+        return json_values(values)
 
 
 def survey(path: Path, track: Track = silent) -> Surveyed:
@@ -318,7 +318,7 @@ def _route_distance(first: np.ndarray, second: np.ndarray) -> float:
 
 def _summary(change: TemporalChange) -> dict:
     values: dict[str, float | str | None] = {
-        "tcr_sym": json_number(change.symmetric),
+        "tcr_sym": change.symmetric,
         "in_hull": change.num_in_hull,
         "unchanged": change.num_unchanged,
     }

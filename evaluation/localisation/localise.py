@@ -21,7 +21,7 @@ from cns_drake.base import poses
 from cns_drake.base.csv_files import write_csv
 from cns_drake.base.drives.drive import Drive
 from cns_drake.base.errors import InputError, errors_at
-from cns_drake.base.json_text import json_number
+from cns_drake.base.json_text import json_values
 from cns_drake.base.progress import Track, silent
 from evaluation.clouds.cloud_files import read_cloud
 from evaluation.drives.sampling import cropped, sample_frames
@@ -403,8 +403,8 @@ def summary(rows: np.ndarray) -> dict[str, float | int | None]:
         ("residual", -rows["residual"]),
         ("hessian", -deviation),
     ):
-        found[f"auroc_{name}"] = json_number(auroc(scores, right))
-    found["believed_from"] = json_number(least)
+        found[f"auroc_{name}"] = auroc(scores, right)
+    found["believed_from"] = least
     found["confident_wrong"] = float(np.mean(believed & ~right))
     wrong = np.count_nonzero(~right)
     found["confident_of_wrong"] = (
@@ -414,7 +414,7 @@ def summary(rows: np.ndarray) -> dict[str, float | int | None]:
     )
     found["unmapped_mean"] = float(rows["unmapped"].mean())
     found["seconds_mean"] = float(rows["seconds"].mean())
-    return found
+    return json_values(found)
 
 
 def numbers(rows: np.ndarray, method: str) -> Iterator[Number]:

@@ -12,7 +12,7 @@ import numpy as np
 from scipy.stats import kendalltau
 
 from cns_drake.base.errors import InputError
-from cns_drake.base.json_text import json_number
+from cns_drake.base.json_text import json_values
 from evaluation.recognition.metrics import (
     Difference,
     Interval,
@@ -143,7 +143,7 @@ class Comparison:
                     "second": one.second,
                     "difference": one.difference.value,
                     "interval_95": one.difference.interval.to_json(),
-                    "p": json_number(one.p_value),
+                    "p": json_values(one.p_value),
                 }
                 for one in self.differences
             ],
@@ -152,7 +152,7 @@ class Comparison:
                     "first": one.first,
                     "second": one.second,
                     "methods": list(one.methods),
-                    "kendall_tau": json_number(one.tau),
+                    "kendall_tau": json_values(one.tau),
                     "interval_95": one.interval.to_json(),
                 }
                 for one in self.agreements
