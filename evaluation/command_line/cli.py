@@ -286,7 +286,8 @@ def scores(
         gate: Reject top-ranked places that lie, by the method's own pose
             estimate, beyond the radius. It has no effect on methods that
             estimate no pose.
-        radius: Radius that --gate uses [m].
+        radius: Distance from the query beyond which --gate rejects a place
+            [m]. Without --gate it has no effect.
     """
     from evaluation.recognition import scan_folders
 

@@ -250,9 +250,10 @@ def _larger_than_real(changes: Sequence[ChangeResult]) -> Finding:
         f"The change meets or surpasses that of four years at KAIST"
         f" ({real:.4f}).",
         FITTED,
-        f"First stage against last, TCR_sym: {values};"
-        f" {len(reached)} of {len(widest)} do. These values were fitted to the"
-        " paper's, of which only Suburbia (0.1840) and Metropolis (0.2920) do.",
+        f"TCR_sym between the first and the last stage: {values}. It reaches"
+        f" KAIST's in {len(reached)} of {len(widest)} cities. The cities were"
+        " fitted to the paper's values, which reach KAIST's only in Suburbia"
+        " (0.1840) and Metropolis (0.2920).",
         "Table I",
     )
 
@@ -262,13 +263,13 @@ def _ring_is_best(
 ) -> Finding:
     best = _best_methods(results)
     evidence = (
-        "By AUC in the table beside the paper's numbers (protocol paper), on"
-        f" {len(best)} pairs of the paper's cities, the best of the paper's"
-        f" methods is {_listed(best)}. {_counted_alike(results)}"
+        "In the table beside the paper's numbers (protocol paper), the paper's"
+        f" method with the greatest AUC on {len(best)} pairs is"
+        f" {_listed(best)}. {_counted_alike(results)}"
     )
     asked = shown[0].protocol.name
     if asked != "paper":
-        words = f"By the protocol {asked} of the tables of all methods"
+        words = f"With the protocol {asked}, as in the other tables"
         evidence += f" {_counted_alike(shown, words)}"
     return Finding(
         "RING++ is the best of the paper's methods on every pair, as the paper"
@@ -281,13 +282,13 @@ def _ring_is_best(
 
 def _counted_alike(
     results: Sequence[PlaceRecognition],
-    words: str = "When all methods are counted alike",
+    words: str = "If all queries count for every method",
 ) -> str:
     """Returns a sentence on which methods are best if all are in mode all."""
     best = _best_methods(results, "all")
     number = sum(_RING in methods for methods in best)
     return (
-        f"{words}, on all queries, {_RING} is best on {number} of {len(best)}"
+        f"{words}, {_RING} is best on {number} of {len(best)} pairs"
         f" ({_listed(best)})."
     )
 

@@ -182,8 +182,8 @@ def _headline(
         return text
     lead = np.percentile(samples[:, 0] - samples[:, 1], 2.5)
     if lead > 0.0:
-        return f"{text} Its lead is beyond chance (95 %)."
-    return f"{text} With other pairs, the two might change places (95 %)."
+        return f"{text} The difference is significant (95 %)."
+    return f"{text} The difference is not significant (95 %)."
 
 
 class Survival(NamedTuple):
@@ -331,7 +331,7 @@ def survival_summary(survivals: Sequence[Survival]) -> str:
         number = len(groups) - without
         over = f"median of {number} pairs" if number > 1 else "one pair"
         parts.append(
-            f"Each method keeps part of its AUC without change ({over}):"
+            f"Share of its AUC without change that each method keeps ({over}):"
             f" {listed}."
         )
     if without:
