@@ -2,7 +2,6 @@
 
 import itertools
 import json
-import math
 import re
 from typing import Any
 
@@ -14,9 +13,16 @@ _NO_BRACKET = re.compile(rb"[^][{}]+")
 _SUSPECT = re.compile(rb"\\u(?:0000|[dD][89a-fA-F])")
 
 
-def json_number(value: float) -> float | None:
-    """Returns a number for JSON: None instead of NaN, which JSON lacks."""
-    return None if math.isnan(value) else value
+def json_values(value: Any) -> Any:
+    """Returns a value for JSON, with None for each NaN.
+
+    A dictionary or a list is copied, with all that is in it.
+    """
+    if isinstance(value, dict):
+        return {name: json_values(one) for name, one in value.items()}
+    if isinstance(value, list):
+        return [json_values(one) for one in value]
+    return None if value != value else value
 
 
 def parse_json(data: bytes) -> Any:

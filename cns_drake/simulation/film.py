@@ -1,7 +1,5 @@
 """A film of a drive through all stages of its city."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from pathlib import Path

@@ -1,7 +1,5 @@
 """Makes the two drives of each condition of an experiment."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 import math

@@ -10,7 +10,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Mapping, Sequence, Set
 import contextlib
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
 import itertools
 import json
 import math
@@ -676,24 +676,18 @@ def base_protocol(
         raise InputError(f"{source}: {place}.{name}:{fault}") from None
 
 
-@dataclass(frozen=True)
-class MethodVariant:
-    """A method with settings; each varied setting is a column of tables."""
-
-    name: str
-    settings: tuple[tuple[str, str | tuple[str, ...]], ...] = ()
-    factors: Changes = field(default_factory=dict)
-
-
 def method_variants(
     methods: Mapping[str, Mapping[str, Any]],
-) -> list[MethodVariant]:
+) -> list[tuple[str, tuple[tuple[str, str | tuple[str, ...]], ...], Changes]]:
     """Returns each method with each combination of its varied settings.
+
+    Returns:
+        Name, settings, and the varied ones as columns of a table.
 
     Raises:
         ValueError: a setting has no values, or the same value twice.
     """
-    found = []
+    found: Any = []
     for name, settings in methods.items():
         place = f"methods.{name}"
         fixed, varied = _split(settings, (place,))
@@ -704,7 +698,7 @@ def method_variants(
                 for path, one in {**fixed, **chosen}.items()
             )
             columns = {path: _shown(one) for path, one in chosen.items()}
-            found.append(MethodVariant(name, given, columns))
+            found.append((name, given, columns))
     return found
 
 

@@ -4,8 +4,6 @@ The module also makes drives through other cities, whose places are added to a
 database to make recognition harder.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, field
 import hashlib

@@ -5,8 +5,6 @@ same city can match each other. Cities are put `CITY_DISTANCE` apart, so that
 their scans never match.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 import itertools

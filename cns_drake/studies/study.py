@@ -1,13 +1,9 @@
 """Runs a study: an experiment on maps, from conditions to tables and page."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
-
-import numpy as np
 
 from cns_drake.base.errors import InputError, did_you_mean, errors_at
 from cns_drake.base.files import is_there, make_folder
@@ -41,7 +37,6 @@ from cns_drake.studies.experiment import (
     Condition,
     Experiment,
     MadeMap,
-    MethodVariant,
     base_protocol,
     conditions,
     method_variants,
@@ -238,8 +233,10 @@ class Study:
             on_note=self.on_note,
         )
 
-    def _choose_methods(self) -> dict[str, tuple[MethodChoice, MethodVariant]]:
-        """Returns key -> method of the experiment, with its variant."""
+    def _choose_methods(
+        self,
+    ) -> Mapping[str, tuple[MethodChoice, Mapping[str, Any]]]:
+        """Returns key -> method, with columns of its varied settings."""
         wanted = self.experiment.methods
         files = [Path(one) for one in wanted or () if one.endswith(".py")]
         known = {one.name: one for one in choose_methods(files)}
@@ -247,8 +244,7 @@ class Study:
             wanted = {name: {} for name in known}
         known |= {name: MethodChoice(name) for name in optional_methods()}
         found = {}
-        for variant in method_variants(wanted):
-            name = variant.name
+        for name, settings, varied in method_variants(wanted):
             place = f"methods.{name}."
             if name.endswith(".py"):
                 path = Path(name).absolute()
@@ -258,14 +254,13 @@ class Study:
                     f"no method {name!r} (known: {', '.join(known)})"
                     f"{did_you_mean(name, known)}"
                 )
-            choice = replace(known[name], settings=variant.settings)
+            choice = replace(known[name], settings=settings)
             choice.make()  # A wrong setting is found before anything slow.
             columns = {
                 f"methods.{name}.{column.removeprefix(place)}": one
-                for column, one in variant.factors.items()
+                for column, one in varied.items()
             }
-            variant = replace(variant, name=name, factors=columns)
-            found[choice.key] = choice, variant
+            found[choice.key] = choice, columns
         return found
 
     def _drives(self, maps: Sequence[str]) -> Iterator[_Drives]:
@@ -606,9 +601,9 @@ class Study:
     ) -> dict[str, Any]:
         factors = dict(one.factors)
         if method in self._variants:
-            _, variant = self._variants[method]
-            method = variant.name
-            factors |= variant.factors
+            choice, columns = self._variants[method]
+            method = choice.name
+            factors |= columns
         database, query = one.names
         return {
             "experiment": self.experiment.name,

@@ -16,7 +16,7 @@ import numpy as np
 from scipy.spatial import cKDTree
 
 from cns_drake.base.errors import InputError
-from cns_drake.base.json_text import json_number
+from cns_drake.base.json_text import json_values
 from cns_drake.base.progress import Track, silent
 from evaluation.change.tcr import (
     COVERAGE_RADIUS,
@@ -105,11 +105,11 @@ class ChangeReport:
         values: dict[str, object] = {
             "source": self.source,
             "target": self.target,
-            "tcr_sym": json_number(change.symmetric),
-            "tcr_sym_least": json_number(self.spread[0]),
-            "tcr_sym_greatest": json_number(self.spread[1]),
-            "tcr_source_to_target": json_number(sides["source"].ratio),
-            "tcr_target_to_source": json_number(sides["target"].ratio),
+            "tcr_sym": change.symmetric,
+            "tcr_sym_least": self.spread[0],
+            "tcr_sym_greatest": self.spread[1],
+            "tcr_source_to_target": sides["source"].ratio,
+            "tcr_target_to_source": sides["target"].ratio,
             "in_hull": change.num_in_hull,
             "unchanged": change.num_unchanged,
             "voxels": {k: len(one.in_hull) for k, one in sides.items()},
@@ -133,7 +133,7 @@ class ChangeReport:
             values["control"] = _summary(self.control) | {"between": names}
         if self.alignment is not None:
             values["alignment"] = self.alignment.to_json()
-        return values
+        return json_values(values)
 
 
 def survey(path: Path, track: Track = silent) -> Surveyed:
@@ -194,13 +194,6 @@ def survey_in_one_world(
         _survey(drives.get(i, one), track, columns)
         for i, one in enumerate(opened)
     ], reports
-
-
-def survey_drive(drive: Drive, voxels: VoxelMap) -> Surveyed:
-    """Returns a drive and its voxel map as input for `compare`."""
-    return Surveyed(
-        drive.name, voxels, drive.X_WS[:, :3, 3], drive, drive.notes
-    )
 
 
 def compare(
@@ -283,7 +276,8 @@ def _survey(
 ) -> Surveyed:
     if isinstance(source, Drive):
         voxels = map_drive(source, CELL_SIZE, track)
-        return survey_drive(source, voxels)
+        positions = source.X_WS[:, :3, 3]
+        return Surveyed(source.name, voxels, positions, source, source.notes)
     accumulator = VoxelAccumulator(CELL_SIZE)
     notes: list[str] = []
     for points in read_blocks(source, columns, notes.append):
@@ -334,7 +328,7 @@ def _route_distance(first: np.ndarray, second: np.ndarray) -> float:
 
 def _summary(change: TemporalChange) -> dict:
     values: dict[str, float | str | None] = {
-        "tcr_sym": json_number(change.symmetric),
+        "tcr_sym": change.symmetric,
         "in_hull": change.num_in_hull,
         "unchanged": change.num_unchanged,
     }

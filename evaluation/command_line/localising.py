@@ -82,7 +82,10 @@ def localise(
     starts = queries.Starts(start, start_turn, seed)
     if not (math.isfinite(query_spacing) and query_spacing > 0.0):
         raise InputError(f"--query-spacing: {query_spacing:g} is not above 0")
-    tracking.check_drift(odometry_drift)
+    if not 0.0 <= odometry_drift <= 1.0:
+        raise InputError(
+            f"--odometry-drift: {odometry_drift:g} is not from 0 to 1"
+        )
     settings = estimators.default_settings(method).with_values(
         map(parse_setting, parameter or [])
     )
@@ -118,7 +121,7 @@ def localise(
             localiser, drive, is_mapped, starts, odometry_drift, terminal.track
         )
         values |= {"odometry_drift": odometry_drift}
-        values |= tracking.TrackSummary(rows).to_json()
+        values |= tracking.summary(rows)
         if output is not None:
             from evaluation.report.curve_figures import draw_track
 
@@ -133,7 +136,7 @@ def localise(
             num_jobs,
             terminal.track,
         )
-    values |= queries.Localisation(rows).to_json()
+    values |= queries.summary(rows)
     if output is not None:
         queries.write_rows(rows, output / "localisation.csv")
         terminal.note(f"wrote {output / 'localisation.csv'}")

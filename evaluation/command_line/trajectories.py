@@ -70,10 +70,14 @@ def trajectory(
             differs from that of the drive.
     """
     from evaluation.alignment.trajectory_errors import trajectory_errors
-    from evaluation.drives.text_tables import read_tum
+    from evaluation.drives.text_tables import (
+        parse_seconds,
+        read_quaternions,
+    )
 
     (truth,) = options.open_noted(drive, lidar=lidar, columns=columns)
-    errors = trajectory_errors(truth, read_tum(estimate), frame, time_offset)
+    found = read_quaternions(estimate, None, parse_seconds)
+    errors = trajectory_errors(truth, found, frame, time_offset)
     if errors.num_outside:
         terminal.note(
             f"{estimate}: {errors.num_outside} poses before or after the drive,"

@@ -6,14 +6,13 @@ serve to compare real drives with simulated ones.
 
 from dataclasses import asdict, dataclass
 import math
-from typing import Any
 
 import numpy as np
 from scipy.spatial import cKDTree
 
 from cns_drake.base.drives.drive import Drive, check_same_world
 from cns_drake.base.errors import InputError
-from cns_drake.base.json_text import json_number
+from cns_drake.base.json_text import json_values
 from evaluation.drives.sampling import travelled
 
 # Distance between the stations at which two drives are compared [m]; the code
@@ -123,15 +122,8 @@ class DriveComparison:
     reverse_95: float
 
     def to_json(self) -> dict:
-        """Returns all numbers as a dictionary for JSON; NaN becomes None."""
-
-        def plain(fields: list[tuple[str, Any]]) -> dict:
-            return {
-                name: json_number(one) if isinstance(one, float) else one
-                for name, one in fields
-            }
-
-        return asdict(self, dict_factory=plain)
+        """Returns all numbers; NaN becomes None."""
+        return json_values(asdict(self))
 
 
 @dataclass(frozen=True)

@@ -286,15 +286,6 @@ def read_matrices(path: Path, separator: str | None) -> Trajectory:
     return _in_order(path, stamps_ns, pose_matrices(path, values))
 
 
-def read_tum(path: Path) -> Trajectory:
-    """Reads a trajectory in the TUM format; its times are seconds.
-
-    Raises:
-        InputError: like `read_matrices`.
-    """
-    return read_quaternions(path, None, parse_seconds)
-
-
 def read_quaternions(
     path: Path,
     separator: str | None,

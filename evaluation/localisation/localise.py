@@ -21,7 +21,7 @@ from cns_drake.base import poses
 from cns_drake.base.csv_files import write_csv
 from cns_drake.base.drives.drive import Drive
 from cns_drake.base.errors import InputError, errors_at
-from cns_drake.base.json_text import json_number
+from cns_drake.base.json_text import json_values
 from cns_drake.base.progress import Track, silent
 from evaluation.clouds.cloud_files import read_cloud
 from evaluation.drives.sampling import cropped, sample_frames
@@ -363,98 +363,87 @@ def is_right(
     )
 
 
-@dataclass(frozen=True)
-class Localisation:
-    """The results of one method for the scans of one drive in one map.
+def _believed_from(rows: np.ndarray) -> float:
+    """Returns the score that 95 % of the right results reach, or NaN."""
+    scores = rows["own_score"][is_right(rows)]
+    if len(scores) == 0:
+        return math.nan
+    return float(np.quantile(scores, 1.0 - _BELIEVED, method="lower"))
 
-    Attributes:
-        rows: (K,) of `QUERY`.
+
+def summary(rows: np.ndarray) -> dict[str, float | int | None]:
+    """Returns a summary of results (K,) of `QUERY`, for JSON.
+
+    Success rates count all queries; quantiles count queries with a pose.
     """
+    right = is_right(rows)
+    posed = rows[~np.isnan(rows["translation_error"])]
 
-    rows: np.ndarray
+    def quantile(name: str, part: float) -> float | None:
+        values = np.abs(posed[name])
+        return float(np.quantile(values, part)) if len(values) else None
 
-    @property
-    def believed_from(self) -> float:
-        """Score that 95 % of correct results reach; NaN if none is correct."""
-        scores = self.rows["own_score"][is_right(self.rows)]
-        if len(scores) == 0:
-            return math.nan
-        return float(np.quantile(scores, 1.0 - _BELIEVED, method="lower"))
+    least = _believed_from(rows)
+    believed = rows["own_score"] >= least
+    near = is_right(rows, SUCCESS_TRANSLATION, SUCCESS_ROTATION_DEG)
+    found: dict[str, float | int | None] = {
+        "queries": len(rows),
+        "without_pose": len(rows) - len(posed),
+        "success_03m_1deg": float(right.mean()),
+        "success_2m_5deg": float(near.mean()),
+        "translation_median": quantile("translation_error", 0.5),
+        "translation_95": quantile("translation_error", 0.95),
+        "rotation_median_deg": quantile("rotation_error_deg", 0.5),
+        "rotation_95_deg": quantile("rotation_error_deg", 0.95),
+    }
+    for name in ("along", "across", "up"):
+        found[f"{name}_median"] = quantile(name, 0.5)
+        found[f"std_{name}_median"] = quantile(f"std_{name}", 0.5)
+    # A small residual, or a small deviation, is a high score.
+    deviation = np.max(
+        [rows[f"std_{name}"] for name in ("along", "across", "up")], axis=0
+    )
+    for name, scores in (
+        ("own_score", rows["own_score"]),
+        ("fit", rows["fit"]),
+        ("residual", -rows["residual"]),
+        ("hessian", -deviation),
+    ):
+        found[f"auroc_{name}"] = auroc(scores, right)
+    found["believed_from"] = least
+    found["confident_wrong"] = float(np.mean(believed & ~right))
+    wrong = np.count_nonzero(~right)
+    found["confident_of_wrong"] = (
+        float(np.count_nonzero(believed & ~right) / wrong)
+        if wrong and right.any()
+        else None
+    )
+    found["unmapped_mean"] = float(rows["unmapped"].mean())
+    found["seconds_mean"] = float(rows["seconds"].mean())
+    return json_values(found)
 
-    def to_json(self) -> dict[str, float | int | None]:
-        """Returns the summary for JSON.
 
-        Success rates count all queries; quantiles count queries with a pose.
-        """
-        rows = self.rows
-        right = is_right(rows)
-        posed = rows[~np.isnan(rows["translation_error"])]
+def numbers(rows: np.ndarray, method: str) -> Iterator[Number]:
+    """Yields the numbers of the summary that go into tables of results."""
+    found = summary(rows)
+    for name in _SHOWN:
+        if (value := found[name]) is not None:
+            yield Number(method, False, name, float(value), n=len(rows))
 
-        def quantile(name: str, part: float) -> float | None:
-            values = np.abs(posed[name])
-            return float(np.quantile(values, part)) if len(values) else None
 
-        believed = rows["own_score"] >= self.believed_from
-        near = is_right(rows, SUCCESS_TRANSLATION, SUCCESS_ROTATION_DEG)
-        found: dict[str, float | int | None] = {
-            "queries": len(rows),
-            "without_pose": len(rows) - len(posed),
-            "success_03m_1deg": float(right.mean()),
-            "success_2m_5deg": float(near.mean()),
-            "translation_median": quantile("translation_error", 0.5),
-            "translation_95": quantile("translation_error", 0.95),
-            "rotation_median_deg": quantile("rotation_error_deg", 0.5),
-            "rotation_95_deg": quantile("rotation_error_deg", 0.95),
-        }
-        for name in ("along", "across", "up"):
-            found[f"{name}_median"] = quantile(name, 0.5)
-            found[f"std_{name}_median"] = quantile(f"std_{name}", 0.5)
-        # A small residual, or a small deviation, is a high score.
-        deviation = np.max(
-            [rows[f"std_{name}"] for name in ("along", "across", "up")], axis=0
-        )
-        for name, scores in (
-            ("own_score", rows["own_score"]),
-            ("fit", rows["fit"]),
-            ("residual", -rows["residual"]),
-            ("hessian", -deviation),
-        ):
-            found[f"auroc_{name}"] = json_number(auroc(scores, right))
-        found["believed_from"] = json_number(self.believed_from)
-        found["confident_wrong"] = float(np.mean(believed & ~right))
-        wrong = np.count_nonzero(~right)
-        found["confident_of_wrong"] = (
-            float(np.count_nonzero(believed & ~right) / wrong)
-            if wrong and right.any()
-            else None
-        )
-        found["unmapped_mean"] = float(rows["unmapped"].mean())
-        found["seconds_mean"] = float(rows["seconds"].mean())
-        return found
-
-    def numbers(self, method: str) -> Iterator[Number]:
-        """Yields the numbers of the summary as rows for tables of results."""
-        found = self.to_json()
-        for name in _SHOWN:
-            if (value := found[name]) is not None:
-                yield Number(
-                    method, False, name, float(value), n=len(self.rows)
-                )
-
-    def columns(self) -> dict[str, np.ndarray]:
-        """Returns the columns of `queries.csv`."""
-        rows = self.rows
-        scores = rows["own_score"]
-        return {
-            "query_frame": rows["frame"],
-            "query_stamp_ns": rows["stamp_ns"],
-            "correct": is_right(rows),
-            # Queries are where the map is.
-            "has_match": np.ones(len(rows), bool),
-            "score": np.where(np.isfinite(scores), scores, np.nan),
-            "translation_error": rows["translation_error"],
-            "rotation_error_deg": rows["rotation_error_deg"],
-        }
+def columns(rows: np.ndarray) -> dict[str, np.ndarray]:
+    """Returns the columns of `queries.csv` of results (K,) of `QUERY`."""
+    scores = rows["own_score"]
+    return {
+        "query_frame": rows["frame"],
+        "query_stamp_ns": rows["stamp_ns"],
+        "correct": is_right(rows),
+        # Queries are where the map is.
+        "has_match": np.ones(len(rows), bool),
+        "score": np.where(np.isfinite(scores), scores, np.nan),
+        "translation_error": rows["translation_error"],
+        "rotation_error_deg": rows["rotation_error_deg"],
+    }
 
 
 def write_rows(rows: np.ndarray, path: Path) -> None:

@@ -1,7 +1,5 @@
 """Tracks a drive in a map: each scan is registered from the last estimate."""
 
-from dataclasses import dataclass
-
 import numpy as np
 from scipy.spatial.transform import Rotation
 
@@ -33,12 +31,6 @@ _DRIFT_SEED = 5
 TRACKED = np.dtype(
     [("stretch", "<i8"), ("way", "<f8"), ("step", "<f8"), *QUERY.descr]
 )
-
-
-def check_drift(drift: float) -> None:
-    """Raises an error if a drift is not from 0 to 1."""
-    if not 0.0 <= drift <= 1.0:
-        raise InputError(f"--odometry-drift: {drift:g} is not from 0 to 1")
 
 
 def drifting_steps(
@@ -158,48 +150,39 @@ def track_drive(
     return rows
 
 
-@dataclass(frozen=True)
-class TrackSummary:
-    """The results of a drive that was tracked in a map.
+def losses(tracked: np.ndarray) -> list[tuple[float, bool]]:
+    """Returns, for each loss, its length [m] and whether it ended.
 
-    Attributes:
-        rows: (K,) of `TRACKED`.
+    The length is that of the path from the loss to the next scan with an error
+    of at most `LOST`, or else to the end of the mapped section.
     """
+    found = []
+    for stretch in np.unique(tracked["stretch"]):
+        rows = tracked[tracked["stretch"] == stretch]
+        lost = rows["translation_error"] > LOST
+        begins = np.flatnonzero(np.diff(lost.astype(int), prepend=0) == 1)
+        for begin in begins.tolist():
+            back = np.flatnonzero(~lost[begin:])
+            end = begin + int(back[0]) if len(back) else len(rows) - 1
+            way = float(rows["way"][end] - rows["way"][begin])
+            found.append((way, bool(len(back))))
+    return found
 
-    rows: np.ndarray
 
-    def losses(self) -> list[tuple[float, bool]]:
-        """Returns, for each loss, its length [m] and whether it ended.
-
-        The length is that of the path from the loss to the next scan with an
-        error of at most `LOST`, or else to the end of the mapped section.
-        """
-        found = []
-        for stretch in np.unique(self.rows["stretch"]):
-            rows = self.rows[self.rows["stretch"] == stretch]
-            lost = rows["translation_error"] > LOST
-            begins = np.flatnonzero(np.diff(lost.astype(int), prepend=0) == 1)
-            for begin in begins.tolist():
-                back = np.flatnonzero(~lost[begin:])
-                end = begin + int(back[0]) if len(back) else len(rows) - 1
-                way = float(rows["way"][end] - rows["way"][begin])
-                found.append((way, bool(len(back))))
-        return found
-
-    def to_json(self) -> dict[str, float | int | None]:
-        """Returns the summary, weighted by path length instead of scans."""
-        way = float(self.rows["step"].sum())
-        within = self.rows["translation_error"] <= RIGHT_TRANSLATION
-        losses = self.losses()
-        back = [length for length, is_back in losses if is_back]
-        return {
-            "way": way,
-            "stretches": int(self.rows["stretch"][-1]) + 1,
-            "within_03m": (
-                float(self.rows["step"][within].sum()) / way if way else None
-            ),
-            "lost": len(losses),
-            "lost_per_km": 1000.0 * len(losses) / way if way else None,
-            "lost_for_good": len(losses) - len(back),
-            "back_after_median": float(np.median(back)) if back else None,
-        }
+def summary(tracked: np.ndarray) -> dict[str, float | int | None]:
+    """Returns a summary of records of `TRACKED`, weighted by path length."""
+    way = float(tracked["step"].sum())
+    within = tracked["translation_error"] <= RIGHT_TRANSLATION
+    found = losses(tracked)
+    back = [length for length, is_back in found if is_back]
+    return {
+        "way": way,
+        "stretches": int(tracked["stretch"][-1]) + 1,
+        "within_03m": (
+            float(tracked["step"][within].sum()) / way if way else None
+        ),
+        "lost": len(found),
+        "lost_per_km": 1000.0 * len(found) / way if way else None,
+        "lost_for_good": len(found) - len(back),
+        "back_after_median": float(np.median(back)) if back else None,
+    }

@@ -29,7 +29,7 @@ import numpy as np
 from scipy.spatial import KDTree
 
 from cns_drake.base.errors import InputError
-from cns_drake.base.json_text import json_number
+from cns_drake.base.json_text import json_values
 from evaluation.map_update.sessions import SIDES, Label, Pair
 from evaluation.map_update.structures import verdicts
 
@@ -83,7 +83,7 @@ def score(
         for number in classes.tolist()
     }
     result["by_distance"] = _by_distance(both)
-    return _as_json(result)
+    return json_values(result)
 
 
 class _Labelled(NamedTuple):
@@ -263,12 +263,3 @@ def _by_distance(both: _Labelled) -> dict:
 
 def _ratio(numerator: float, denominator: float) -> float:
     return float(numerator / denominator) if denominator else math.nan
-
-
-def _as_json(scores: dict) -> dict:
-    found = {}
-    for name, value in scores.items():
-        if isinstance(value, dict):
-            value = _as_json(value)
-        found[name] = json_number(value) if isinstance(value, float) else value
-    return found

@@ -297,9 +297,9 @@ class Measuring:
                 found[name].append(row)
         for name, rows in found.items():
             if rows:
-                result = localise.Localisation(np.array(rows))
-                numbers = result.numbers(name)
-                columns = result.columns()
+                found_rows = np.array(rows)
+                numbers = localise.numbers(found_rows, name)
+                columns = localise.columns(found_rows)
                 self._add(one, "localise", name, numbers, columns=columns)
 
     def _judge(self, one: RealScans, made: Sequence[Drive]) -> None:

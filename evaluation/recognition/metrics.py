@@ -33,7 +33,7 @@ from typing import Any, Literal
 import numpy as np
 from scipy.special import stdtr, stdtrit
 
-from cns_drake.base.json_text import json_number
+from cns_drake.base.json_text import json_values
 from evaluation.drives.sampling import travelled
 from evaluation.recognition.query_outcomes import QueryOutcomes
 
@@ -178,7 +178,7 @@ class Interval:
 
     def to_json(self) -> list[float | None]:
         """Returns the lower and upper limit; NaN becomes None."""
-        return [json_number(self.low), json_number(self.high)]
+        return [json_values(self.low), json_values(self.high)]
 
 
 UNKNOWN = Interval()

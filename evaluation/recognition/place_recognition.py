@@ -1,7 +1,5 @@
 """Measures one method on one pair of drives, from scans to numbers."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from dataclasses import asdict, dataclass
 import math
@@ -10,7 +8,7 @@ import numpy as np
 
 from cns_drake.base.drives.drive import Drive
 from cns_drake.base.errors import InputError
-from cns_drake.base.json_text import json_number
+from cns_drake.base.json_text import json_values
 from cns_drake.base.progress import Track, silent
 from evaluation.methods.method import Method
 from evaluation.recognition.metrics import (
@@ -91,8 +89,7 @@ class PlaceRecognition:
         if metrics.f1_max_index is not None:
             true_positives = metrics.curve.true_positives[metrics.f1_max_index]
             counted = metrics.curve.counted[metrics.f1_max_index]
-        pose = asdict(self.pose)
-        return {
+        values = {
             "method": self.method,
             "mode": metrics.mode,
             "database": self.database,
@@ -100,11 +97,11 @@ class PlaceRecognition:
             "auc": metrics.auc,
             "auc_strict": metrics.auc_strict,
             "auc_interval_95": metrics.auc_interval.to_json(),
-            "recall_at_1": json_number(metrics.recall_at_1),
-            "r1": json_number(metrics.recall_at_1),
+            "recall_at_1": metrics.recall_at_1,
+            "r1": metrics.recall_at_1,
             "recall_at_1_interval_95": metrics.recall_at_1_interval.to_json(),
-            "recall_at_n": list(map(json_number, metrics.recall_at_n.tolist())),
-            "recall_at_1_percent": json_number(metrics.recall_at_1_percent),
+            "recall_at_n": metrics.recall_at_n.tolist(),
+            "recall_at_1_percent": metrics.recall_at_1_percent,
             "f1_max": metrics.f1_max,
             "f1_max_true_positives": int(true_positives),
             "f1_max_counted": int(counted),
@@ -113,18 +110,17 @@ class PlaceRecognition:
             "true_positives": metrics.num_right,
             "places": len(self.retrieval.database_frames),
             "recall_at_full_precision": metrics.curve.recall_at_full_precision,
-            "mean_reciprocal_rank": json_number(
-                self.outcomes.mean_reciprocal_rank
-            ),
-            "match_auroc": json_number(self.outcomes.match_auroc),
+            "mean_reciprocal_rank": self.outcomes.mean_reciprocal_rank,
+            "match_auroc": self.outcomes.match_auroc,
             "auc_over_radius": {
-                f"{radius:g}": json_number(auc)
+                f"{radius:g}": auc
                 for radius, auc in self.auc_over_radius().items()
             },
-            "pose": {key: json_number(value) for key, value in pose.items()},
+            "pose": asdict(self.pose),
             "parameters": self.parameters,
             "protocol": self.protocol.to_json(),
         }
+        return json_values(values)
 
 
 def run(

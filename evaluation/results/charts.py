@@ -17,8 +17,6 @@ and the gate is 0. Each method has the same colour in all charts. The title says
 in words what the chart shows.
 """
 
-from __future__ import annotations
-
 from collections import Counter
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass

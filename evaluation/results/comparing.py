@@ -1,7 +1,5 @@
 """Compares your tables of results with the shipped tables."""
 
-from __future__ import annotations
-
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 import itertools
@@ -14,7 +12,7 @@ import numpy as np
 from scipy.stats import kendalltau
 
 from cns_drake.base.errors import InputError
-from cns_drake.base.json_text import json_number
+from cns_drake.base.json_text import json_values
 from evaluation.recognition.metrics import (
     Difference,
     Interval,
@@ -149,7 +147,7 @@ class Comparison:
                     "second": one.second,
                     "difference": one.difference.value,
                     "interval_95": one.difference.interval.to_json(),
-                    "p": json_number(one.p_value),
+                    "p": json_values(one.p_value),
                 }
                 for one in self.differences
             ],
@@ -158,7 +156,7 @@ class Comparison:
                     "first": one.first,
                     "second": one.second,
                     "methods": list(one.methods),
-                    "kendall_tau": json_number(one.tau),
+                    "kendall_tau": json_values(one.tau),
                     "interval_95": one.interval.to_json(),
                 }
                 for one in self.agreements

@@ -1,7 +1,5 @@
 """Writes the page of an experiment: findings, charts, numbers and its file."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Iterable, Mapping, Sequence
 import math
 from pathlib import Path

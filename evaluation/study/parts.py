@@ -6,8 +6,6 @@ its format and a line of JSON with its inputs. The result follows (see
 50 MB of spectra, which hardly shrink, it takes a tenth of a second.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable, Iterator, Mapping
 import contextlib
 from dataclasses import asdict, dataclass, fields, is_dataclass

@@ -1,7 +1,5 @@
 """The task `change`: how much the city changed between two drives."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator, Mapping
 import math
 from typing import Any, ClassVar

@@ -1,7 +1,5 @@
 """The task `localise`: scans are localised in a map of the database."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Any, ClassVar
@@ -105,7 +103,7 @@ class LocaliseTask(Task):
     def numbers(self, found: Any, before: Any | None) -> Iterator[Number]:
         then = dict(self._runs(before)) if before is not None else {}
         for method, rows in self._runs(found):
-            yield from localise.Localisation(rows).numbers(method)
+            yield from localise.numbers(rows, method)
             if method in then:
                 share = kept_share(
                     float(localise.is_right(rows).mean()),
@@ -115,7 +113,7 @@ class LocaliseTask(Task):
 
     def answers(self, found: Any) -> Iterator[Answered]:
         for method, rows in self._runs(found):
-            yield method, False, localise.Localisation(rows).columns()
+            yield method, False, localise.columns(rows)
 
 
 def measure_localisation(

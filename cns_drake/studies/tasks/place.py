@@ -1,7 +1,5 @@
 """The tasks `place`, `pose` and `cost`, on place recognition."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator, Sequence
 from dataclasses import replace
 from typing import Any
@@ -26,11 +24,12 @@ _COST, _COSTS_COST = 60.0, 30.0
 Outcomes = Sequence[PlaceOutcome]
 
 
-class PlaceTask(Task):
-    """Measures how well methods find a query's place in the database."""
+class PoseTask(Task):
+    """Measures the errors of the poses of queries at their best places."""
 
-    name = "place"
+    name = "pose"
     asks = True
+    _numbers = staticmethod(pose_numbers)
 
     def measure(self, pair: Pair, jobs: Jobs) -> Part:
         needs: list[str] = []
@@ -44,6 +43,7 @@ class PlaceTask(Task):
             replace(pair.protocol, radius=radii[0]),
             radii,
         )
+        # The task `place` reads the same part.
         part = jobs.files.part("place", pair.name)
         return jobs.add(part, measure_places, arguments, needs, _COST)
 
@@ -55,27 +55,18 @@ class PlaceTask(Task):
         self, found: Outcomes, before: Outcomes | None
     ) -> Iterator[Number]:
         for now in found:
-            yield from place_numbers(now, _same(before, now))
+            yield from self._numbers(now, _same(before, now))
+
+
+class PlaceTask(PoseTask):
+    """Which place of the database a query shows."""
+
+    name = "place"
+    _numbers = staticmethod(place_numbers)
 
     def answers(self, found: Outcomes) -> Iterator[Answered]:
         for now in found:
             yield now.method, now.is_gated, now.columns
-
-
-class PoseTask(PlaceTask):
-    """Measures the errors of the poses of queries at their best places."""
-
-    name = "pose"
-
-    def numbers(
-        self, found: Outcomes, before: Outcomes | None
-    ) -> Iterator[Number]:
-        for now in found:
-            yield from pose_numbers(now, _same(before, now))
-
-    def answers(self, found: Outcomes) -> Iterator[Answered]:
-        # The results of `place` contain the errors of poses.
-        yield from ()
 
 
 class CostTask(Task):

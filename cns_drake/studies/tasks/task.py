@@ -1,7 +1,5 @@
 """The interface of a study's tasks, and the jobs that tasks share."""
 
-from __future__ import annotations
-
 import abc
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field

@@ -1,7 +1,5 @@
 """The task `map`: scores of change detectors on the maps of two drives."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator, Mapping
 from importlib.util import find_spec
 from pathlib import Path

@@ -237,17 +237,17 @@ def test_settings_of_methods_are_factors():
             "ring++": {"crop": 3.5},
         }
     )
-    assert (plain.name, plain.settings, plain.factors) == ("btc", (), {})
+    assert plain == ("btc", (), {})
     *solid, ring = varied
-    assert [one.settings for one in solid] == [
+    assert [settings for _, settings, _ in solid] == [
         (("place", "first"), ("ranges", "20")),
         (("place", "first"), ("ranges", "40")),
     ]
-    assert [one.factors for one in solid] == [
+    assert [factors for *_, factors in solid] == [
         {"methods.solid.ranges": 20},
         {"methods.solid.ranges": 40},
     ]
-    assert (ring.settings, ring.factors) == ((("crop", "3.5"),), {})
+    assert ring == ("ring++", (("crop", "3.5"),), {})
 
 
 def test_overrides_replace_single_fields(read):

@@ -13,10 +13,10 @@ from evaluation.localisation.estimators import (
 )
 from evaluation.localisation.localise import (
     COLUMNS,
-    Localisation,
     Localiser,
     Starts,
     localise,
+    summary,
 )
 from evaluation.study.surveys import RecordedDrive
 
@@ -54,7 +54,7 @@ def test_numbers_of_a_pair(found):
     assert list(dict.fromkeys(n.method for n in numbers)) == names
     for name, rows in zip(names, found, strict=True):
         mine = {n.metric: n.value for n in numbers if n.method == name}
-        alone = Localisation(rows).to_json()
+        alone = summary(rows)
         assert mine == {
             metric: alone[metric]
             for metric in mine

@@ -31,12 +31,12 @@ from evaluation.localisation.estimators import (
 from evaluation.localisation.localise import (
     COLUMNS,
     QUERY,
-    Localisation,
     Localiser,
     Starts,
     is_right,
     localise,
     mapped_frames,
+    summary,
     way_axes,
 )
 from evaluation.localisation.robust import _step
@@ -420,7 +420,7 @@ def with_scores(scores, wrong):
     rows = np.zeros(len(scores), QUERY)
     rows["own_score"], rows["fit"] = scores, scores
     rows["translation_error"] = np.where(wrong, 5.0, 0.0)
-    return Localisation(rows).to_json()
+    return summary(rows)
 
 
 def test_whether_an_estimator_knows():
@@ -458,7 +458,7 @@ def test_an_end_without_a_pose_is_a_failure():
         EXACT,
     )
     row = one_query(found, a_pose(0, 0, 1.7), street(), *np.zeros((2, 3)))
-    values = Localisation(np.array([row])).to_json()
+    values = summary(np.array([row]))
     assert values["without_pose"] == 1
     assert values["success_2m_5deg"] == 0.0
     assert values["translation_median"] is None

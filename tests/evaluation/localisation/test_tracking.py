@@ -14,8 +14,9 @@ from evaluation.drives.sampling import travelled
 from evaluation.localisation.estimators import Estimate, Settings, map_of
 from evaluation.localisation.localise import Localiser, Starts
 from evaluation.localisation.tracking import (
-    TrackSummary,
     drifting_steps,
+    losses,
+    summary,
     track_drive,
 )
 
@@ -61,7 +62,7 @@ def test_an_exact_odometry_keeps_the_first_error():
     rows = follow(Line(40), stay)
     assert rows["translation_error"] == pytest.approx(0.5)
     assert rows["rotation_error_deg"] == pytest.approx(0.0, abs=1e-6)
-    values = TrackSummary(rows).to_json()
+    values = summary(rows)
     assert values["way"] == pytest.approx(78.0, abs=0.2)
     assert values["within_03m"] == 0.0
     assert values["lost_per_km"] == 0.0
@@ -112,8 +113,7 @@ def test_losses_and_returns():
 
     rows = follow(line, wavering)
     assert rows["translation_error"][50] == pytest.approx(0.0, abs=1e-9)
-    summary = TrackSummary(rows)
-    (one, two), values = summary.losses(), summary.to_json()
+    (one, two), values = losses(rows), summary(rows)
     assert one == (pytest.approx(10.0, abs=0.02), True)
     assert two == (pytest.approx(18.0, abs=0.02), False)
     assert values["lost"] == 2
@@ -132,7 +132,7 @@ def test_each_stretch_has_a_start_of_its_own():
     assert rows["translation_error"] == pytest.approx(0.5)
     first = [rows[f"start_{axis}"][[0, 20]] for axis in "xyz"]
     assert not np.allclose(*np.transpose(first))
-    assert TrackSummary(rows).to_json()["way"] == pytest.approx(86.0, abs=0.2)
+    assert summary(rows)["way"] == pytest.approx(86.0, abs=0.2)
 
 
 def test_drift_moves_the_start_and_not_the_truth():
