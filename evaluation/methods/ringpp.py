@@ -129,10 +129,11 @@ class RingPlusPlus(Method[Ring, RingDatabase]):
     Where it differs from the authors' program:
 
     - For neighbours that lie in a plane, omnivariance and entropy are the
-      limits of their formulas. In the program's single precision, rounding
-      makes about one in ten of these values NaN, and it skips such points.
-    - Rays sample the map from above until it is zero. The program's rays end
-      at the edge of the map, where rounding adds or drops a sample.
+      limits of their formulas. In the authors' program, which has single
+      precision, rounding makes about one in ten of these values NaN, and such
+      points are skipped.
+    - Rays sample the map from above until it is zero. The program's rays end at
+      the edge of the map, where rounding adds or drops a sample.
     - If there are fewer points than `neighbours`, all points are neighbours.
     - A place with an empty map is never a candidate, and a query with an empty
       map has no candidates.

@@ -59,7 +59,7 @@ class PoseTask(Task):
 
 
 class PlaceTask(PoseTask):
-    """Which place of the database a query shows."""
+    """Measures how well methods find a query's place in the database."""
 
     name = "place"
     _numbers = staticmethod(place_numbers)
