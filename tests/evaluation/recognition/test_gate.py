@@ -128,7 +128,7 @@ def test_too_few_poses_are_refused():
             return [None]
 
     with pytest.raises(
-        InputError, match="relative_poses returned 1 poses of 2"
+        InputError, match="returned list of length 1 instead of 2"
     ):
         gated(Few(), None, [1.0, 1.0], np.array([0.5, 0.5]), [RADIUS])
 
