@@ -107,33 +107,34 @@ def pages() -> dict[str, str]:
     return {
         "scenario.md": _fields_page(
             "Fields of a drive",
-            "[Drives](../scenarios.md) explains them with examples. Paths are "
-            "relative to the file.",
+            "[Drives](../scenarios.md) explains these fields with examples. "
+            "Relative paths start at the folder of the file.",
             SCENARIO,
         ),
         "family.md": _fields_page(
             "Fields of a family of drives",
-            "[Families](../scenarios.md#families) shows one. All fields but "
-            "`ride` and `imu` multiply: every part, seed, city, route and "
-            "LiDAR with every other.",
+            "[Families](../scenarios.md#families) shows an example. A family "
+            "has a member for every combination of the values of `missing`, "
+            "`seeds`, `city_seeds`, `routes` and `lidars`. The fields `ride` "
+            "and `imu` apply to all members.",
             FAMILY | {"Ride": RideConfig, "IMU": ImuSection},
         ),
         "city.md": _fields_page(
             "Fields of a city",
-            "[Files of a city](../city.md) says which file is for what, and "
-            "lists archetypes and objects.",
+            "[Files of a city](../city.md) says what each file is for, and "
+            "lists the archetypes of buildings and the objects.",
             CITY,
         ),
         "experiment.md": _fields_page(
             "Fields of an experiment",
-            "[Studies](../studies.md) explains them with examples, and lists "
-            "what can vary and the settings of tasks. Paths are relative to "
-            "the working folder.",
+            "[Studies](../studies.md) explains these fields with examples. It "
+            "also lists what can vary, and the settings of tasks. Relative "
+            "paths start at the working folder.",
             EXPERIMENT,
         ),
         "methods.md": _fields_page(
             "Settings of the methods",
-            "[Methods](../methods.md) shows how to set them.",
+            "[Methods](../methods.md) shows how to change these settings.",
             METHODS,
         ),
         "commands.md": _commands_page(),
@@ -244,7 +245,7 @@ def _kind(schema: dict[str, Any], models: dict[str, Any]) -> str:
         # What a name stands for, whatever the name.
         inner = schema.get("additionalProperties", {})
         kind = _kind(inner, models) if isinstance(inner, dict) and inner else ""
-        return f"name: {kind}" if kind else "names and values"
+        return f"by name: {kind}" if kind else "values by name"
     words = {"string": "text", "boolean": "`true` or `false`", "null": ""}
     kind = words.get(schema["type"], schema["type"])
     return " ".join(part for part in (kind, _limits(schema)) if part)
@@ -291,10 +292,11 @@ def models_in(annotation: Any) -> Iterator[type[BaseModel]]:
 def _commands_page() -> str:
     parts = [
         _heading("Commands"),
-        "Results go to stdout, progress and messages to stderr. The exit "
-        "status is 0 on success; 2, with one line, for bad input; 1 if some "
-        "of many jobs could not be done. `--traceback` with any command shows "
-        "where an error comes from.",
+        "Commands print results to stdout, and progress and messages to "
+        "stderr. The exit status is 0 on success, 2 for bad input (with an "
+        "error of one line), and 1 if some of many jobs failed. Add "
+        "`--traceback` to any command to see where in the code an error comes "
+        "from.",
     ]
     for program, app in (
         ("cns-drake", cli.app),
@@ -318,7 +320,10 @@ def _commands_page() -> str:
 
 def _option(parameter: Any) -> str:
     """Returns the names of a parameter and what stands for its value."""
-    metavar = parameter.metavar or kind_of(parameter).upper()
+    kind = getattr(parameter, "type", None) or parameter.type_descriptor
+    choices = map(_plain, getattr(kind, "choices", None) or ())
+    metavar = parameter.metavar or "|".join(choices)
+    metavar = metavar or kind_of(parameter).upper()
     if parameter.param_type_name == "argument":
         return f"`{metavar}`"
     names = " / ".join([*parameter.opts, *parameter.secondary_opts])
@@ -340,7 +345,9 @@ def _option_default(parameter: Any) -> str:
     if parameter.required:
         return "required"
     default = parameter.default
-    if default in (None, False, (), [], "") or callable(default):
+    if isinstance(default, bool):
+        return "on" if default else "off"
+    if default in (None, (), [], "") or callable(default):
         return "none"
     return f"`{_plain(default)}`"
 

@@ -3,17 +3,17 @@
 Independent of the simulator: this package imports neither Drake nor any part of
 `cns_drake` except `cns_drake.base`.
 
-The public names are in `__all__`; a name is imported when it is first used,
-from where `__init__.pyi` says.
-`evaluation.drives` and `evaluation.methods` are public as well.
+`__all__` lists the public names. Each is imported when it is first used, from
+the module that `__init__.pyi` names. `evaluation.drives` and
+`evaluation.methods` are public as well.
 """
 
 from pkgutil import extend_path
 
 from cns_drake.base.public_names import attach
 
-# Python prefers a package to a folder without `__init__`. A user's folder of
-# the same name stays importable behind ours.
+# Python prefers a package to a folder without `__init__`. With this line,
+# modules in a user's folder of the same name can be imported as well.
 __path__ = extend_path(__path__, __name__)
 
 __getattr__, __dir__, __all__ = attach(__name__, __file__)

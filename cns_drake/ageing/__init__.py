@@ -1,1 +1,1 @@
-"""A city that lives on, year by year, from rates of real cities."""
+"""Ages a city year by year, at the rates of change of real cities."""

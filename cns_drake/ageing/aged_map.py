@@ -1,4 +1,4 @@
-"""The map folder of a city that ages: a stage for today and for each year."""
+"""Writes the map folder of an ageing city: stages for today and each year."""
 
 from collections import Counter
 from collections.abc import Callable, Iterable, Mapping, Sequence
@@ -39,20 +39,24 @@ from cns_drake.scene.semantics import CLASS_IDS
 HISTORY_NAME = "history.csv"
 RATES_NAME = "rates.csv"
 _MAX_SEED = 2**63
-# The car and its mirrors need this from its line [m].
+# Half the width of the car with its mirrors, and some room [m].
 _HALF_CAR = 1.3
 _SPACING = 0.5
-# In the past a tree was lower by this each year, at least so high [m].
+# In each past year, a tree was lower by the first number, but never below the
+# second [m].
 _GROWTH, _LEAST_TREE = 0.4, 2.0
 
 
 @dataclass(frozen=True)
 class AgedMap:
-    """The stages that ageing a map made, and what happened in between.
+    """The stages of an aged map, and what happened in between.
 
-    It has the year of each stage, where year 0 is today, and its number of
-    structures; how often each event occurred; and the places (N, 3) of changed
-    buildings [m].
+    Attributes:
+        years: stage -> its year; 0 is today.
+        structures: stage -> number of structures.
+        events: event -> how often it happened.
+        changed: (N, 3) places of changed buildings [m].
+        trajectory: the trajectory of the map's last drive.
     """
 
     years: Mapping[str, int]
@@ -73,17 +77,19 @@ def age_map(
 ) -> AgedMap:
     """Writes the map folder of a city after years of change.
 
-    It returns the aged stages and what happened.
-
     Args:
         source: the folder of the map; its last stage is today.
-        years: ascending years from today, at most 200; years before today
-            need buildings with years (column `built` of `structures.csv`).
-        seed: the seed of all draws, not negative.
+        years: ascending years from today, at most 200. Negative years, before
+            today, need the years in which buildings were built (column `built`
+            of `structures.csv`).
+        seed: the seed of all random draws, not negative.
         rates: event -> rate per year, see `read_rates`.
         output: the folder to write, which must not exist yet.
-        progress: takes one line at a time.
-        finish: completes the folder before it gets its name.
+        progress: is called with one line at a time.
+        finish: completes the folder before it gets its final name.
+
+    Returns:
+        The aged stages and what happened.
 
     Raises:
         InputError: an argument or the map cannot be used.
@@ -109,7 +115,7 @@ def age_map(
         )
     progress("looking for lots")
     city = City(world, rates, seed, shapely.union_all([*map(_swept, ways)]))
-    # Today comes first.
+    # Today is the first stage.
     others = [year for year in wanted if year != 0]
     stages = {f"{k:02d}": year for k, year in enumerate([0, *others], start=1)}
     with draft_folder(output) as draft:
@@ -144,14 +150,14 @@ def age_map(
             _changed(city),
             ways[-1],
         )
-        # Pictures need the memory.
+        # Frees memory that the pictures need.
         del world, city, writing, events
         finish(draft, aged)
     return aged
 
 
 def _swept(trajectory: Trajectory) -> BaseGeometry:
-    """Returns the way of a drive, as wide as the car, in W [m]."""
+    """Returns the area that the car covers on a drive, in W [m]."""
     number = max(2, int(trajectory.length / _SPACING))
     times = np.linspace(0.0, trajectory.duration, number)
     _, p_WB = trajectory.poses(times)
@@ -161,10 +167,10 @@ def _swept(trajectory: Trajectory) -> BaseGeometry:
 def past(
     world: OldWorld, year: int
 ) -> tuple[dict[str, Structure | None], list[Event]]:
-    """Returns the structures of some years ago, and the events since.
+    """Returns the structures in a year before today, and the events since.
 
-    Buildings of later years were not there, and their lots had another use.
-    Trees were younger. The year is negative.
+    The year is negative. Buildings of later years did not exist, and their lots
+    had another use. Trees were younger.
     """
     assert world.today is not None  # The caller has checked it.
     standing: dict[str, Structure | None] = dict.fromkeys(world.visuals)
@@ -195,7 +201,7 @@ def past(
 
 
 class _Writing:
-    """Writes stages, the meshes they need, and the table of structures."""
+    """Writes stages, the meshes they need, and the structure table."""
 
     def __init__(self, world: OldWorld, draft: Path, seed: int):
         self._world, self._draft, self._seed = world, draft, seed
@@ -232,7 +238,7 @@ class _Writing:
         self.finish(stage, text, meshes)
 
     def finish(self, stage: str, text: str, meshes: Mapping[str, Mesh]) -> None:
-        """Writes the meshes of a stage that are not there yet; counts it."""
+        """Writes a stage's meshes that are not there yet, and counts it."""
         for uri in ElementTree.fromstring(text).iter("uri"):
             place = str(uri.text)
             if place not in self._triangles:
@@ -249,10 +255,10 @@ class _Writing:
         return meshes[Path(place).stem].to_obj().encode()
 
     def table(self, new: Mapping[str, Structure]) -> None:
-        """Writes the table of structures: today's, then the others.
+        """Writes the structure table: today's structures, then new ones.
 
-        The structures of a shorter history have the same instance ids in a
-        longer one.
+        Therefore, a longer history gives the structures of a shorter one the
+        same instance ids.
         """
         world = self._world
         rows: list[Mapping[str, object]] = [*world.rows.values()]
@@ -284,7 +290,7 @@ class _Writing:
 def _copy_inputs(
     folder: MapFolder, drives: Iterable[Path], draft: Path
 ) -> None:
-    """Copies roads, views and ways of drives."""
+    """Copies roads, views and the waypoints of drives."""
     for path in drives:
         way = load_scenario(path).waypoints
         if way is not None:
@@ -299,9 +305,9 @@ def _copy_inputs(
 
 
 def _way_name(drive: Path) -> str:
-    """Returns the name of the copy of a drive's waypoints.
+    """Returns a name for the copy of a drive's waypoints.
 
-    Two drives may have files of one name, or of that of the map's own.
+    It differs between drives, and from the map's own waypoint file.
     """
     return f"waypoints_{drive.stem.removeprefix('sequence_')}.csv"
 
@@ -315,8 +321,8 @@ def _write_drives(
 ) -> None:
     """Writes a drive through each stage.
 
-    Today's is on the route of the map's first drive, the others on that of its
-    last, which asks.
+    The drive through today's stage has the route of the map's first drive. All
+    others have the route of its last drive, which is the query.
     """
     for stage, year in stages.items():
         path = drives[0] if stage == "01" else drives[-1]
@@ -324,7 +330,7 @@ def _write_drives(
         if "base" in values:
             scenario = load_scenario(path)
             values = describe_scenario(scenario, folder.path)
-        # Other files, such as recorded traffic, stay where they are.
+        # Other files, such as recorded traffic, are not copied.
         find_files(values, path)
         kept = {
             key: value
@@ -347,7 +353,7 @@ def _write_drives(
 
 
 def _changed(city: City) -> np.ndarray:
-    """Returns the (N, 3) places of new buildings and additions [m]."""
+    """Returns the places (N, 3) of new buildings and additions [m]."""
     places = [
         one.xyz
         for one in city.new.values()

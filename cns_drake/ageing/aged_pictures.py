@@ -1,4 +1,4 @@
-"""Pictures of a city that ages, from the air and from three streets."""
+"""Draws pictures of an ageing city, from the air and from three streets."""
 
 from collections.abc import Callable
 from pathlib import Path
@@ -14,16 +14,17 @@ from cns_drake.pictures.stage_scene import StageScene, View
 PICTURES = "pictures"
 _WIDTH, _HEIGHT = 480, 270
 _STREETS = 3
-# Height of the camera on the street, and distance of its target [m].
+# Height of the camera above the street, and distance to its target [m].
 _EYE, _AHEAD = 2.4, 30.0
-# Stations along the drive are this far apart, and chosen ones three times [m].
+# Possible views along the drive are this far apart, and chosen ones three times
+# as far [m].
 _SPACING = 25.0
-# Changes within this distance ahead are seen [m].
+# A change counts if it is within this distance ahead [m].
 _SEEN = 60.0
 
 
 def street_views(aged: AgedMap) -> dict[str, View]:
-    """Returns views along the last drive, where most has been built."""
+    """Returns the views along the last drive where most has been built."""
     way = aged.trajectory
     times = np.linspace(0.0, way.duration, int(way.length / _SPACING) + 2)[:-1]
     R_WBs, p_WBs = way.poses(times)
@@ -50,7 +51,7 @@ def street_views(aged: AgedMap) -> dict[str, View]:
 
 
 def air_view(aged: AgedMap) -> View:
-    """Returns a view of the last drive's surroundings from the air."""
+    """Returns a view from the air, on the surroundings of the last drive."""
     _, p = aged.trajectory.poses(np.linspace(0.0, aged.trajectory.duration, 99))
     x, y, z = (p.min(axis=0) + p.max(axis=0)) / 2
     half = float(np.ptp(p, axis=0)[:2].max()) / 2
@@ -63,7 +64,7 @@ def draw_pictures(
     aged: AgedMap,
     progress: Callable[[str], None] = lambda line: None,
 ) -> None:
-    """Writes a picture of each view for each year, and a film strip of all.
+    """Writes a picture of each view for each year, and a film strip.
 
     They are `pictures/year_<y>_<view>.jpg` and `film.jpg` in the map's folder.
     """

@@ -1,8 +1,8 @@
 """The history of a city: what happens to it, year after year.
 
-The city of a year follows from that of the year before. Each thing has random
-numbers of its own for each year and event, so that a longer history begins as
-a shorter one does.
+The city of a year follows from the city of the year before. Each object has
+random numbers of its own for each year and event, so that a longer history
+begins with the same events as a shorter one.
 """
 
 from collections.abc import Iterator, Mapping, Sequence
@@ -37,43 +37,47 @@ from cns_drake.city.plants.vegetation import SPECIES
 from cns_drake.imports.foreign_city import random_generator, random_share
 from cns_drake.transient import world_structures
 
-# Part of the demolished buildings that others replace.
+# Share of the demolished buildings that are replaced by others.
 _REPLACED = 0.85
-# Part of the sites that take two years, and of those of one year.
+# Share of the sites that take two years; all others take one year.
 _TWO_YEARS = 0.7
-# Part of the renewed fronts that stand behind a scaffold on the day of a stage.
+# Shares of the renewed fronts: with a scaffold in front in the year of the
+# renewal, with new insulation, and with balconies.
 _SCAFFOLDED = 0.4
 _INSULATED, _WITH_BALCONIES = 0.5, 0.35
-# Heights of buildings that get another storey, or balconies [m].
+# Greatest height of buildings that get another storey, and least height of
+# those that get balconies [m].
 _HIGHEST_RAISED, _LEAST_BALCONIES = 40.0, 8.0
-# Listed buildings stay as they are.
+# Listed buildings, which never change.
 _LISTED = re.compile(
     "church|chapel|museum|town_hall|observation_tower|station|mill"
 )
 _DWELLING = re.compile("flats|block|house|terrace|walk_up|slab|building")
-# Trees: growth a year and height when planted [m], and age that counts as old.
+# Trees: growth per year and height when planted, as ranges [m]; years after
+# which a tree is old; least height [m].
 _GROWTH = (0.3, 0.5)
 _PLANTED = (2.6, 3.6)
 _YOUNG_YEARS = 10
 _LEAST_TREE = 3.0
-# A crown keeps this part of its reach off walls.
+# A crown keeps this share of its reach away from walls.
 _CROWN_PART = 0.8
-# Furniture that moves does so by at least this [m], and turns by up to [rad].
+# Street furniture that moves does so by at least this distance, and turns by at
+# most this angle [m, rad].
 _NEAREST, _TURN = 0.2, 0.1
 _TRIES = 6
 _KERB = 0.1
-# Sizes of new plots along streets: width, depth and setback [m].
+# Sizes of new plots along streets: widths, depth, range of setbacks [m].
 _PLOT_WIDTHS, _PLOT_DEPTH, _SETBACKS = (22.0, 16.0, 11.0), 14.0, (3.0, 22.0)
 _STEEPEST = 0.6
-# On small plots no towers are built [m].
+# No building on a small plot is higher than this [m].
 _HIGHEST_NEW = 20.0
-# Free plots farther from all buildings are open country [m].
+# Free plots farther than this from all buildings are open country [m].
 _IN_TOWN = 30.0
 _GROUND = ("road", "parking", "sidewalk", "other-ground", "terrain")
 _PASSING = ("car", "truck", "bus", "bicycle", "other-vehicle")
 
 
-# Events of structures that no other event names.
+# Events that put up or remove structures as a consequence of another event.
 PUT_UP, TAKEN_DOWN = "put_up", "taken_down"
 
 
@@ -81,7 +85,8 @@ PUT_UP, TAKEN_DOWN = "put_up", "taken_down"
 class Event:
     """A row of `history.csv`: what happened to a structure in a year.
 
-    Year 0 is today. The successor is the structure in its place, if any.
+    Year 0 is today. The successor is the structure that takes its place, if
+    any.
     """
 
     year: int
@@ -95,9 +100,9 @@ class Event:
 class _Lot:
     """A plot and what stands on it.
 
-    The height is that of the buildings usual there [m]; parts are annexes,
-    storeys, balconies. The coming building is finished in that year, and
-    replaces the old one, if any.
+    `height` is the usual height of buildings there [m]. `parts` are annexes,
+    storeys and balconies. If `coming` is a building, it is finished in the year
+    `finished`, and replaces the building `old`, if any.
     """
 
     number: int
@@ -114,9 +119,9 @@ class _Lot:
 class _Tree:
     """A tree that stands or was felled.
 
-    It has its name of today. The tree is `whole` at the height `full`; its
-    present height is 0 if felled, and its greatest is `size` [m]. Its successor
-    is `replanted` in that year.
+    `name` is its present name. `whole` is the tree at the height `full`. Its
+    present height is 0 if it was felled, and `size` is the greatest height it
+    can reach [m]. It is planted again in the year `replanted`.
     """
 
     name: str
@@ -137,8 +142,8 @@ class City:
     """A city at the end of a year.
 
     `standing` maps names to structures; the value is None for a structure that
-    is as today. `new` contains the structures that do not stand today, in the
-    order in which they were built.
+    is the same as today. `new` has the structures that do not stand today, in
+    the order in which they were built.
     """
 
     def __init__(
@@ -148,9 +153,10 @@ class City:
         seed: int,
         kept_free: BaseGeometry,
     ):
-        """Begins today.
+        """Begins with the city of today.
 
-        Nothing is put up where drives lead, the area kept free in W [m].
+        No structure is put up on the area `kept_free` in W [m], where drives
+        lead.
 
         Raises:
             InputError: the city has no lots.
@@ -216,7 +222,11 @@ class City:
         *,
         event: str = "",
     ) -> None:
-        """Adds a structure; an event that does not name it is told."""
+        """Adds a structure.
+
+        If `event` is given, the history records that the structure was put up
+        because of this event, whose own record does not name it.
+        """
         self.standing[one.name] = one
         self.new.setdefault(one.name, one)
         self._added[one.name] = one.footprint_W if foot is None else foot
@@ -224,7 +234,7 @@ class City:
             self._tell(PUT_UP, one.name, detail=event)
 
     def _remove(self, name: str, *, event: str = "") -> None:
-        """Takes a structure away; see `_put`."""
+        """Removes a structure; for `event`, see `_put`."""
         is_there = name in self.standing
         self.standing.pop(name, None)
         self._added.pop(name, None)
@@ -234,7 +244,7 @@ class City:
     def near(
         self, area: BaseGeometry, ignored: Sequence[str] = ()
     ) -> list[str]:
-        """Returns names of the structures on an area in W, without ground."""
+        """Returns the names of structures on an area in W, without ground."""
         rows = sorted(self._tree.query(area, predicate="intersects"))
         found = [
             name
@@ -282,7 +292,7 @@ class City:
             yield _Lot(number, replace(plot, z=z), one.top - z, one.name, [])
 
     def _front_height(self, plot: Plot, default: float) -> float:
-        """Returns the height of the ground before the front of a plot [m].
+        """Returns the height of the ground in front of a plot [m].
 
         A building may reach into the ground.
         """
@@ -293,9 +303,9 @@ class City:
         return round(float(z), 3) if is_known else default
 
     def _free_lots(self) -> list[_Lot]:
-        """Returns rectangles of open ground along streets.
+        """Returns rectangles of open ground along streets as lots.
 
-        Trees and furniture may stand there.
+        Trees and furniture may stand on them.
         """
         world = self._world
         taken: list[BaseGeometry] = []
@@ -403,7 +413,7 @@ class City:
                 return
 
     def _clear(self, area: BaseGeometry) -> None:
-        """Takes away what stands on a plot."""
+        """Removes what stands on a plot."""
         for name in self.near(area):
             kind, foot = self._class(name), self._foot(name)
             inside = foot.intersection(area).area > 0.5 * foot.area
@@ -443,7 +453,7 @@ class City:
         rng: np.random.Generator,
         old: str = "",
     ) -> None:
-        """Opens a site on a lot, if a building fits there."""
+        """Opens a building site on a lot, if a new building fits there."""
         plot = lot.plot
         near = [
             self._foot(name)
@@ -486,7 +496,7 @@ class City:
                 lot.parts.append(one.name)
 
     def _go_on(self, lot: _Lot) -> None:
-        """Builds on, or finishes the coming building."""
+        """Continues the building site of a lot, or finishes the building."""
         coming = lot.coming
         assert coming is not None
         self._empty(lot)
@@ -515,7 +525,7 @@ class City:
         rng = self._rng("scaffold", name)
         one = plots.scaffold_before(plot, height, f"scaffold_{name}", rng)
         area = one.footprint_W.buffer(-0.02)
-        # Canopies and porches of its own building may be in the way.
+        # Canopies and porches of the building itself may be in the way.
         own = self._triangles(name)
         own = own[own[:, :, 2].min(axis=1) < plot.z + height]
         blocked = shapely.intersects(from_above(own), area).any()
@@ -652,7 +662,7 @@ class City:
         self._tell("planted", old, tree.name, f"{tree.height:g} m")
 
     def _move(self, place: str) -> None:
-        """Replaces a thing of the street near by, at the same kerb."""
+        """Replaces street furniture nearby, on the same side of the kerb."""
         old = self._places[place]
         rng, foot = self._rng("moved", place), self._foot(old)
         middle = np.array(foot.centroid.coords[0])
@@ -691,7 +701,7 @@ class City:
         self._tell("furniture", old, name, f"moved by {by:.1f} m")
 
     def _rebuild_junction(self, name: str, area: BaseGeometry) -> None:
-        """Gives a junction new kerb stones, poles and signs."""
+        """Replaces the kerb stones, poles and signs of a junction."""
         around = area.buffer(8.0)
         for place in self._furniture:
             old = self._places[place]
@@ -746,7 +756,7 @@ _STONE = (0.8, 0.8, 0.78)
 
 
 def _furniture_kind(one: world_structures.Structure) -> str | None:
-    """Returns the event that replaces a thing of the street."""
+    """Returns the event that replaces a piece of street furniture, or None."""
     name = one.name.lower()
     if one.semantic_class == "traffic-sign":
         return "signs"
@@ -776,7 +786,7 @@ def _fitting_plot(
     within: BaseGeometry,
     taken: Sequence[BaseGeometry],
 ) -> Polygon | None:
-    """Returns the widest rectangle along a line that is free."""
+    """Returns the widest free rectangle along a line; None if none fits."""
     for width in _PLOT_WIDTHS:
         lot = lot_at(line, start, width, min(_PLOT_DEPTH, width))
         if lot is None or not within.contains(lot.footprint_W):

@@ -1,4 +1,4 @@
-"""The city of today: a stage of a map, with all that ageing must see of it."""
+"""The city of today: a stage of a map, read as ageing needs it."""
 
 from collections.abc import Callable, Sequence
 from functools import cached_property
@@ -28,27 +28,30 @@ from cns_drake.scene.surfaces import LARGEST_SIZE
 from cns_drake.scene.world import load_world
 from cns_drake.transient import world_structures
 
-# The ground is known this far around buildings [m].
+# The height of the ground is known this far around buildings [m].
 _AROUND = 40.0
 _NO_POSE = "0 0 0 0 0 0"
-# The only files that a stage may name: the aged map gets copies of them.
+# The only files that a stage may name, since only these are copied to the aged
+# map.
 _OWN_MESH = re.compile(rf"{MESH_FOLDER}/[^/]+\.obj")
 
 
 class OldWorld:
-    """A stage of a map.
+    """The last stage of a map, which is today.
 
-    Rows and columns are those of the map's table of structures. `things` in W,
-    SDF texts of `visuals` and years in which they were `built`, if the table
-    has them, go by name. `today` is the year of the stage if there are any.
+    `columns` and `rows` are those of the map's structure table. Three
+    dictionaries go by the name of a structure: `things` are the structures in
+    W, `visuals` the SDF texts of their visuals, and `built` the years in which
+    they were built, as far as the table has them. `today` is the year of the
+    stage; None if there are no such years.
     """
 
     def __init__(self, folder: MapFolder):
         """Reads the last stage of a map.
 
         Raises:
-            InputError: there is none, it cannot be loaded, or it is no world
-                of one link with visuals <structure>/<part>.
+            InputError: there is no stage, it cannot be loaded, or it is not a
+                world of one link with visuals named <structure>/<part>.
         """
         stages = list(folder.stages().values())
         if not stages:
@@ -85,7 +88,7 @@ class OldWorld:
         self.rows = {row["name"]: row for _, row in records}
 
     def of_class(self, *classes: str) -> list[world_structures.Structure]:
-        """Returns the structures of the given classes, sorted by name."""
+        """Returns the structures of some classes, sorted by name."""
         return [t for t in self.things.values() if t.semantic_class in classes]
 
     def structure(self, name: str) -> structures.Structure:
@@ -94,8 +97,8 @@ class OldWorld:
         Its footprint is the convex hull of its parts near the ground.
 
         Raises:
-            InputError: a shape or a mesh is of another kind, or the table lacks
-                the structure.
+            InputError: a shape or a mesh is of a kind that cannot be used, or
+                the table does not contain the structure.
         """
         row = self.rows.get(name)
         if row is None:
@@ -134,7 +137,7 @@ class OldWorld:
         return structures.Structure(name, row["class"], model, xyz, yaw, tags)
 
     def triangles(self, name: str) -> np.ndarray:
-        """Returns the (M, 3, 3) triangles of a structure in the world [m]."""
+        """Returns the triangles (M, 3, 3) of a structure in W [m]."""
         found = [
             world_structures.triangle_corners(part)
             for part in self._seen[name].parts
@@ -157,13 +160,13 @@ class OldWorld:
 
     @cached_property
     def open_ground(self) -> BaseGeometry:
-        """Ground beside streets that is neither park nor water, in W [m]."""
+        """Ground beside streets except parks and water, in W [m]."""
         return self.area(_is_open).difference(self.streets)
 
     def area(
         self, wanted: Callable[[world_structures.Structure], bool]
     ) -> BaseGeometry:
-        """Returns the area of some structures, seen from above [m]."""
+        """Returns the area in W of structures that `wanted` selects [m]."""
         found = [
             from_above(world_structures.triangle_corners(part))
             for one in self._seen.values()

@@ -37,7 +37,8 @@ from cns_drake.city.growth.stage_structures import (
 from cns_drake.city.placement.objects import OBJECTS
 from cns_drake.transient.putting_up import scaffold
 
-# What is built today, by its relative share among what fits.
+# Archetypes that are built today -> their weight in the random choice among
+# those that fit.
 _BUILT_TODAY = {
     "balcony_flats": 4,
     "gallery_flats": 2,
@@ -57,9 +58,9 @@ _BUILT_TODAY = {
     "slab_tower": 1,
     "podium_tower": 1,
 }
-# Neighbours closer than this get a blank wall between them [m].
+# Neighbours closer than this have blank walls towards each other [m].
 PARTY_WALL = 3.1
-# A frame stands a storey or more [m].
+# A frame is at least this high, about one storey [m].
 _LEAST_FRAME = 4.0
 _STOREY = 3.0
 # Greatest length and height of a scaffold [m].
@@ -84,10 +85,10 @@ _INSULATION = 0.15
 
 @dataclass(frozen=True)
 class Plot:
-    """The ground of one building: its area in W and height z [m].
+    """The ground of one building: its area in W and its height z [m].
 
-    Its frame S is at `xy` and `yaw` [m, rad]. Its x axis runs along the street,
-    and its y axis points away from it.
+    Its frame S is at `xy` with the heading `yaw` [m, rad]. The x axis of S runs
+    along the street, and the y axis points away from it.
     """
 
     area: BaseGeometry
@@ -99,7 +100,7 @@ class Plot:
     def facing(
         cls, area: BaseGeometry, streets: BaseGeometry, z: float
     ) -> Plot:
-        """Returns the plot of an area, its front to the nearest street."""
+        """Returns the plot on an area, with its front to the nearest street."""
         rectangle = shapely.orient_polygons(area.minimum_rotated_rectangle)
         corners = shapely.get_coordinates(rectangle)
         middles = shapely.points((corners[:-1] + corners[1:]) / 2)
@@ -112,7 +113,7 @@ class Plot:
         return cls(area, xy, yaw, round(z, 3))
 
     def place(self, x: float, y: float) -> tuple[float, float]:
-        """Returns a point given in S as a point in W, in millimetres."""
+        """Returns the place in W of a point in S, in whole millimetres [m]."""
         c, s = math.cos(self.yaw), math.sin(self.yaw)
         return (
             round(self.xy[0] + c * x - s * y, 3),
@@ -120,12 +121,12 @@ class Plot:
         )
 
     def inside(self, area: BaseGeometry) -> BaseGeometry:
-        """Returns an area given in W, expressed in S."""
+        """Returns an area in S that is given in W."""
         moved = affinity.translate(area, -self.xy[0], -self.xy[1])
         return affinity.rotate(moved, -self.yaw, (0, 0), use_radians=True)
 
     def triangles(self, p_W: np.ndarray) -> np.ndarray:
-        """Returns triangles (M, 3, 3) given in W, expressed in S [m].
+        """Returns triangles (M, 3, 3) in S that are given in W [m].
 
         Heights are above the plot's ground.
         """
@@ -138,7 +139,7 @@ class Plot:
         return largest_rectangle(self.inside(self.area))
 
     def thing(self, name: str, kind: str, model: Model) -> Structure:
-        """Returns a structure that stands on the plot, with the frame S."""
+        """Returns a structure on the plot; the frame of its model is S."""
         return Structure(name, kind, model, (*self.xy, self.z), self.yaw)
 
 
@@ -150,11 +151,11 @@ def new_building(
     rng: np.random.Generator,
     ending: str,
 ) -> Structure | None:
-    """Draws another building for a plot; None if none fits.
+    """Returns a random new building for a plot; None if none fits.
 
     Args:
         plot: plot on which the building stands.
-        height: height of the building, about [m].
+        height: approximate height of the building [m].
         banned: archetype that the building must not have.
         neighbours: footprints of its neighbours in W.
         rng: draws the building.
@@ -165,7 +166,7 @@ def new_building(
     weights = np.array([_BUILT_TODAY[name] for name in names], float)
     order = rng.choice(len(names), len(names), False, weights / weights.sum())
     near = [plot.inside(one) for one in neighbours]
-    # A tower's ground may have room for a lower building only.
+    # The ground of a tower may have room for a lower building only.
     for name, height in (
         (names[k], part * height) for part in (1.0, 0.7, 0.45) for k in order
     ):
@@ -177,7 +178,8 @@ def new_building(
         h = round(float(np.clip(height, *kind.heights)), 1)
         if min(w, d) < kind.widths[0] or not 0.75 < h / height < 1.3:
             continue
-        # Its front stays where the street expects it.
+        # The front of the new building is at the street, like that of the old
+        # one.
         middle = ((x0 + x1) / 2, y0 + d / 2)
         footprint = box(-w / 2, -d / 2, w / 2, d / 2)
         blind = _blind_edges(placed(footprint, middle, 0.0), near)
@@ -192,7 +194,10 @@ def new_building(
 
 
 def _blind_edges(footprint: Polygon, near: Sequence[BaseGeometry]) -> set[int]:
-    """Returns the edges of a rectangle, from the front on, with neighbours."""
+    """Returns the edges of a rectangle that have neighbours.
+
+    They are numbered from the front on.
+    """
     x0, y0, x1, y1 = footprint.bounds
     g, e = PARTY_WALL, 0.5
     strips = (
@@ -207,13 +212,13 @@ def _blind_edges(footprint: Polygon, near: Sequence[BaseGeometry]) -> set[int]:
 
 
 def building_plot(building: Structure) -> Plot:
-    """Returns the ground that a new building needs."""
+    """Returns the plot that a building needs."""
     area = building.footprint_W
     return Plot(area, building.xyz[:2], building.yaw, building.xyz[2])
 
 
 def site(plot: Plot, name: str, rng: np.random.Generator) -> list[Structure]:
-    """Returns a fenced building site: machines, cabins and materials."""
+    """Returns a building site: fences, machines, cabins and materials."""
     inner = plot.inside(plot.area.buffer(-0.4))
     lot = largest_rectangle(max(polygons_of(inner), key=lambda one: one.area))
     x0, y0, x1, y1 = lot.bounds
@@ -241,19 +246,19 @@ def site(plot: Plot, name: str, rng: np.random.Generator) -> list[Structure]:
 
 
 def frame(building: Structure, seed: int) -> Model:
-    """Returns a building's unfinished frame, as while it is built."""
+    """Returns the unfinished frame of a building under construction."""
     model, name = building.model, building.name
     height = max(0.55 * top_of(model), _LEAST_FRAME)
     try:
         return building_site(model, height, name, seed)
-    except ValueError:  # Its plot is too small for a crane.
+    except ValueError:  # The plot is too small for a crane.
         return lowered(model, height, f"{name}_frame", seed)
 
 
 def scaffold_before(
     plot: Plot, height: float, name: str, rng: np.random.Generator
 ) -> Structure:
-    """Returns a scaffold before the front of a building of a height [m]."""
+    """Returns a scaffold in front of a building of some height [m]."""
     x0, y0, x1, _ = plot.inside(plot.area).bounds
     length = min(x1 - x0, _LONGEST)
     xy = plot.place((x0 + x1) / 2, y0)
@@ -265,7 +270,7 @@ def scaffold_before(
 def storey_on(
     plot: Plot, triangles: np.ndarray, name: str, rng: np.random.Generator
 ) -> Structure | None:
-    """Returns a storey set on a flat roof; None if the roof is not flat.
+    """Returns an additional storey; None if the roof is not flat.
 
     The building on the plot has triangles (M, 3, 3) in W [m].
     """
@@ -313,9 +318,9 @@ def annex_to(
 
     Args:
         plot: plot of the building.
-        triangles: (M, 3, 3) of the building in W [m].
+        triangles: (M, 3, 3) triangles of the building in W [m].
         name: name of the annex.
-        is_free: whether an area in W may be built on.
+        is_free: returns whether an area in W may be built on.
         rng: draws its size.
     """
     cut = section(plot.triangles(triangles), 1.3)
@@ -325,7 +330,7 @@ def annex_to(
         d = float(rng.uniform(2.8, 4.5))
         x = float(rng.uniform(x0 + w / 2, max(x1 - w / 2, x0 + w / 2 + 0.01)))
         walls = [last(cut, x + part * w) for part in (-0.48, -0.2, 0.2, 0.48)]
-        if not np.ptp(walls) < 0.5:  # No wall, or no plane one.
+        if not np.ptp(walls) < 0.5:  # There is no wall, or no plane one.
             continue
         y = min(walls) - 0.05
         area = placed(
@@ -349,7 +354,7 @@ def annex_to(
 def balconies_on(
     plot: Plot, triangles: np.ndarray, name: str, rng: np.random.Generator
 ) -> Structure | None:
-    """Returns new balconies on the front; None if it is not plane.
+    """Returns new balconies on the front; None if the front is not plane.
 
     The building on the plot has triangles (M, 3, 3) in W [m].
     """
@@ -362,7 +367,7 @@ def balconies_on(
     for k, z in enumerate(
         np.arange(_STOREY + 0.2, inside[:, :, 2].max() - 3.5, _STOREY)
     ):
-        # A balcony that is there already, or a bay, shows at one of these.
+        # Existing balconies or bays show at one of these heights.
         cuts = [section(inside, z + up) for up in (-0.3, 0.4, 1.0, 1.8)]
         for j, x in enumerate(xs):
             walls = [
@@ -389,7 +394,7 @@ def renewed(
 ) -> Structure:
     """Returns a building with a new colour.
 
-    If `moves`, new insulation also shifts its walls outwards by 15 cm.
+    If `moves`, new insulation also moves its walls outwards by 15 cm.
     """
     model = building.model
     walls = [p for p in model.parts if "glass" not in p.name and p.rgb]
@@ -421,8 +426,8 @@ def _widened(part: Part, middle: np.ndarray, share: float) -> Part:
 
 
 def section(triangles: np.ndarray, z: float) -> np.ndarray:
-    """Returns the segments (N, 2, 2) in which triangles cut a height z."""
-    z += 1e-4  # Not at a vertex, whose heights are in millimetres.
+    """Returns segments (N, 2, 2) in which triangles cut the height z [m]."""
+    z += 1e-4  # Not exactly at a vertex, whose heights are whole millimetres.
     a, b = triangles, np.roll(triangles, -1, axis=1)
     rise = b[..., 2] - a[..., 2]
     cut = (a[..., 2] - z) * (b[..., 2] - z) < 0
@@ -433,7 +438,7 @@ def section(triangles: np.ndarray, z: float) -> np.ndarray:
 
 
 def last(segments: np.ndarray, x: float) -> float:
-    """Returns the greatest y at x of segments (N, 2, 2); NaN without any."""
+    """Returns the greatest y of segments (N, 2, 2) at x; NaN if none."""
     a, b = segments[:, 0], segments[:, 1]
     meets = (a[:, 0] - x) * (b[:, 0] - x) < 0
     a, b = a[meets], b[meets]
@@ -442,7 +447,7 @@ def last(segments: np.ndarray, x: float) -> float:
 
 
 def structure_triangles(structure: Structure) -> np.ndarray:
-    """Returns the (M, 3, 3) triangles of a structure in W [m]."""
+    """Returns the triangles (M, 3, 3) of a structure in W [m]."""
     found = [np.zeros((0, 3, 3))]
     for part in structure.model.parts:
         vertices, triangles = part_triangles(part, structure.model.meshes)

@@ -1,4 +1,4 @@
-"""The rates of a city's events, and how often these came about."""
+"""The rates of a city's events, and how often the events happened."""
 
 from collections import Counter, defaultdict
 from collections.abc import Iterable, Mapping
@@ -11,9 +11,10 @@ from scipy.stats import poisson
 from cns_drake.base.errors import InputError
 from cns_drake.base.yaml_files import parse_yaml, read_yaml
 
-# Not a rate: how far street furniture moves at most, and the limit of that [m].
+# Not a rate: the greatest distance that street furniture moves, and its upper
+# limit [m].
 MOVED, _FARTHEST = "moved", 20.0
-# The events that a seed draws -> their rate a year, see rates.yaml.
+# Events that are drawn at random -> their rate per year, see rates.yaml.
 DEFAULT_RATES: Mapping[str, float] = {
     event: values["metres" if event == MOVED else "rate"]
     for event, values in parse_yaml(
@@ -24,16 +25,16 @@ LAST_YEAR = 200
 
 
 def read_rates(path: Path | None, factor: float = 1.0) -> dict[str, float]:
-    """Returns event -> rate a year.
+    """Returns event -> rate per year.
 
     Args:
-        path: a YAML file with rates from 0 to 1 by event, and with `moved` in
+        path: a YAML file that maps events to rates from 0 to 1, and `moved` to
             metres. Events that it does not name keep their default rates.
         factor: factor by which all rates are multiplied.
 
     Raises:
-        InputError: the file cannot be read; it names an unknown event, or a
-            rate, or the factor, is out of range.
+        InputError: the file cannot be read; it names an unknown event; or a
+            rate or the factor is out of range.
     """
     found = check_rates({} if path is None else read_yaml(path), path)
     rates = {
@@ -50,7 +51,7 @@ def read_rates(path: Path | None, factor: float = 1.0) -> dict[str, float]:
 
 
 def check_rates(found: object, source: object) -> dict[str, float]:
-    """Returns rates by event, after checking that they are rates.
+    """Returns rates by event, after checking them.
 
     Raises:
         InputError: an event is unknown, or a rate is not from 0 to 1.
@@ -76,7 +77,7 @@ def check_years(years: Iterable[int]) -> tuple[int, ...]:
     """Returns years, after checking that they ascend and are in range.
 
     Raises:
-        InputError: they do not, or one is beyond 200.
+        InputError: they do not ascend, or one is beyond 200.
     """
     found = tuple(years)
     text = " ".join(map(str, found))
@@ -91,10 +92,11 @@ def check_years(years: Iterable[int]) -> tuple[int, ...]:
 
 @dataclass
 class Tally:
-    """Counts how often events met the things of a city.
+    """Counts how often events happened to the objects of a city.
 
-    For each event these are its rate per year, its expected number, its true
-    number, and the number of things at risk, summed over the years.
+    For each event: `rates` has its rate per year, `expected` the expected
+    number of events, `number` the actual number, and `exposure` the number of
+    objects at risk, summed over the years.
     """
 
     rates: Mapping[str, float]
@@ -113,8 +115,8 @@ class Tally:
     def to_csv(self) -> str:
         """Returns a CSV table of the wanted and the observed rates.
 
-        `p` is the probability that a Poisson number is at least as far from its
-        expectation.
+        `p` is the probability that a Poisson variable is at least as far from
+        its expectation as the observed number.
         """
         lines = ["event,rate,exposure,expected,events,rate_came_about,p\n"]
         for event, rate in self.rates.items():
@@ -131,6 +133,6 @@ class Tally:
 
 
 def poisson_p(number: int, expected: float) -> float:
-    """Returns the two-sided p-value of a Poisson number."""
+    """Returns the two-sided p-value of a number of events (Poisson)."""
     tails = poisson.cdf(number, expected), poisson.sf(number - 1, expected)
     return min(1.0, 2.0 * float(min(tails)))

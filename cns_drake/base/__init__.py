@@ -1,1 +1,1 @@
-"""Code that simulator and evaluation share: errors, files, jobs, formats."""
+"""Code that simulator and evaluation have in common: errors, files, jobs."""

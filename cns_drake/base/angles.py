@@ -8,5 +8,5 @@ Angle = TypeVar("Angle", float, np.ndarray)
 
 
 def wrapped(angle: Angle) -> Angle:
-    """Returns an angle, or each of an array, in [-pi, pi) [rad]."""
+    """Wraps an angle, or every angle of an array, to [-pi, pi) [rad]."""
     return (angle + np.pi) % (2 * np.pi) - np.pi

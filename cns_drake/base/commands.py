@@ -1,4 +1,4 @@
-"""How both programs make commands of functions, and the options they share."""
+"""Commands made from functions, and options that both programs share."""
 
 from collections.abc import Callable, Mapping
 import functools
@@ -17,16 +17,17 @@ Jobs = Annotated[
     typer.Option(
         metavar="N",
         help="Number of jobs that run at once on this machine; by default one "
-        "for each core.",
+        "per core. Give fewer if memory runs out.",
     ),
 ]
 Scheduler = Annotated[
     str | None,
     typer.Option(
         metavar="ADDRESS",
-        help="Address of a Dask scheduler, such as tcp://10.0.0.1:8786, whose "
-        "cluster runs the jobs. Its machines must share this file system. By "
-        "default the variable DASK_SCHEDULER_ADDRESS, if set.",
+        help="Address of a Dask scheduler, such as tcp://10.0.0.1:8786, to run "
+        "the jobs on several machines. They must all see the output folder "
+        "under the same path. By default the environment variable "
+        "DASK_SCHEDULER_ADDRESS, if it is set.",
     ),
 ]
 SessionSpacing = Annotated[
@@ -34,7 +35,8 @@ SessionSpacing = Annotated[
     typer.Option(
         metavar="METRES",
         min=0.01,
-        help="Distance driven between two scans of a map [m].",
+        help="Distance that the car drives between two scans of a map [m]. "
+        "A smaller distance makes a denser map.",
     ),
 ]
 MethodSettings = Annotated[
@@ -42,21 +44,20 @@ MethodSettings = Annotated[
     typer.Option(
         "--set",
         metavar="METHOD.NAME=VALUE",
-        help="Setting of a method, such as btc.candidates=20; may be repeated. "
-        "Separate several numbers by commas.",
+        help="Change a setting of a method, such as btc.candidates=20. "
+        "Separate the numbers of a list by commas. May be repeated.",
     ),
 ]
 Costs = Annotated[
     bool,
     typer.Option(
         "--costs/--no-costs",
-        help="Also measure the time and memory that each method needs. These "
-        "numbers differ from run to run.",
+        help="Whether to measure the time and memory that each method needs, "
+        "too. These numbers differ from run to run.",
     ),
 ]
 
-# The name of an option's parameter -> its type with the option, and its
-# default.
+# Parameter name -> its type, annotated with the option, and its default.
 Options = Mapping[str, tuple[Any, Any]]
 
 
@@ -64,11 +65,12 @@ class Command(TyperCommand):
     """A command whose docstring explains its options to the user.
 
     The section `Args` of the docstring contains the help of options and
-    arguments. An option without an entry already has a help of its own.
+    arguments. An option without an entry there keeps the help of its own
+    declaration.
     """
 
     def __init__(self, *args: Any, help: str, params: list, **settings: Any):
-        """Gives each parameter its help."""
+        """Copies each parameter's help from the docstring."""
         text, _, entries = help.partition("\n\nArgs:\n")
         helps = {}
         for entry in re.split(r"\n(?! )", textwrap.dedent(entries)):
@@ -80,8 +82,9 @@ class Command(TyperCommand):
 
     def invoke(self, ctx: Any) -> Any:
         """Runs the command, after checking that its numbers are finite."""
-        # Others are checked where they are used. Until typer 0.28 the limits of
-        # an option were those of its type.
+        # Only options with a lower limit are checked here; others are checked
+        # where they are used. Before typer 0.28, the limits belonged to the
+        # option's type.
         check_finite(
             {
                 str(one.name): ctx.params[str(one.name)]
@@ -95,7 +98,7 @@ class Command(TyperCommand):
 def with_options(
     keyword: str, options: Options, make: Callable[..., Any]
 ) -> Callable[[Callable[..., None]], Callable[..., None]]:
-    """Returns a decorator that gives a command a group of options.
+    """Returns a decorator that adds a group of options to a command.
 
     Args:
         keyword: parameter of the command that gets the options as one value.

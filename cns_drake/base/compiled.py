@@ -25,16 +25,16 @@ def compiled(function: _Function) -> _Function:
     folder recompiles all of them. One of several processes side by side
     compiles a function, and the others wait for it.
 
-    Write arrays number by number. Where an array is assigned to a part of
-    another one, numba also compiles a message about shapes, which takes
-    seconds.
+    In such functions, assign array elements one at a time. If an array is
+    assigned to a slice of another, numba also compiles an error message about
+    shapes, which takes seconds.
     """
     # Numba reads the cache folder while it decorates, and only from here.
     before = numba.config.CACHE_DIR
     own_folder = Path(function.__code__.co_filename).parent
     kept = Path(before or cache_folder() / "compiled") / _state_of(own_folder)
     numba.config.CACHE_DIR = str(kept)
-    # Nothing calls these functions as those of C.
+    # No C code calls these functions.
     options = {"nogil": True, "no_cfunc_wrapper": True}
     try:
         dispatcher = numba.njit(cache=True, **options)(function)
@@ -50,17 +50,19 @@ def compiled(function: _Function) -> _Function:
 def _for_all(
     compile_for: Callable[[tuple], object], file: Path
 ) -> Callable[[tuple], object]:
-    """Returns a function that compiles what others need not compile again.
+    """Returns a compiling function that compiles for all, and only once.
 
-    That is, processes side by side, and calls with a number that is written
-    out: numba would compile for that one number.
+    Processes that run side by side wait for the first one's result. A literal
+    number among the arguments counts by its type; numba would compile for that
+    one number.
     """
 
     def compile_once(types: tuple) -> object:
         with contextlib.ExitStack() as stack:
-            # Such a lock binds processes and not threads, which numba lets
-            # compile one by one: theirs could wait for each other. It is not
-            # forked. Where there is none, each process compiles.
+            # This lock excludes other processes but not other threads: numba
+            # compiles one thread at a time already, and a second lock could
+            # deadlock. A forked process does not inherit it. Without locks in
+            # the file system, each process compiles.
             with contextlib.suppress(OSError):
                 file.parent.mkdir(parents=True, exist_ok=True)
                 stream = stack.enter_context(file.open("a"))
@@ -78,7 +80,7 @@ def start_compiler() -> None:
 
 @functools.cache
 def _state_of(folder: Path) -> str:
-    """Returns a short text that changes when a module in a folder does."""
+    """Returns a short hash that changes when a module in the folder changes."""
     files = sorted(folder.glob("*.py"))
     stamps = [(f.name, f.stat().st_size, f.stat().st_mtime_ns) for f in files]
     return hashlib.sha256(repr(stamps).encode()).hexdigest()[:16]

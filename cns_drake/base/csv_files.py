@@ -10,10 +10,10 @@ import re
 from cns_drake.base.errors import InputError
 from cns_drake.base.files import read_text, write_text
 
-# No table has them; a terminal obeys them.
+# Control characters: no table needs them, and a terminal would obey them.
 _CONTROL = re.compile(r"[\x00-\x08\x0e-\x1f\x7f-\x9f]")
 _WHOLE = re.compile(r"[-+]?[0-9]{1,18}")
-# Column of files of earlier versions -> what it is called now.
+# Column name in files of earlier versions -> its present name.
 _FORMER_COLUMNS = {
     "radius_told": "gate",
     "recall_at_100_precision": "recall_at_full_precision",
@@ -74,8 +74,8 @@ def read_records(
         had another name in earlier versions has its present name.
 
     Raises:
-        InputError: as `read_rows`, a column is missing, or a row has not
-            one cell for each column.
+        InputError: `read_rows` raises it, a column is missing, or the number of
+            cells of a row differs from the number of columns.
     """
     (_, names), *rows = read_rows(path) or [(1, [])]
     names = [
@@ -97,8 +97,8 @@ def whole_number(text: str, where: object) -> int:
     """Returns the whole number that a cell or an argument holds.
 
     Raises:
-        InputError: it holds none, or one of more than 18 digits; the message
-            begins with the place.
+        InputError: the text is not a whole number, or has more than 18 digits.
+            The message begins with `where`.
     """
     if not _WHOLE.fullmatch(text):
         raise InputError(
@@ -108,11 +108,11 @@ def whole_number(text: str, where: object) -> int:
 
 
 def number_within(text: str, largest: float, where: object) -> float:
-    """Returns the number in a cell, after checking its size.
+    """Returns the number in a cell, of absolute value `largest` or less.
 
     Raises:
-        InputError: it holds none, or one beyond the largest, of either sign;
-            the message begins with the place.
+        InputError: the text is not a number, or its absolute value exceeds
+            `largest`. The message begins with `where`.
     """
     try:
         value = float(text)

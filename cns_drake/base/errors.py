@@ -1,4 +1,4 @@
-"""Errors that a user can mend."""
+"""Errors that a user can fix."""
 
 from __future__ import annotations
 
@@ -117,11 +117,11 @@ def describe_validation_error(
     error: ValidationError,
     model: type[BaseModel] | None = None,
 ) -> str:
-    """Returns one line for the first of the faults that pydantic found.
+    """Returns one line about the most urgent fault that pydantic found.
 
-    An unknown field is reported before all other faults, and a missing field
-    after them, since the unknown one may be its misspelt name. If the model is
-    given, the line suggests a name.
+    An unknown field comes before all other faults and a missing field after
+    them, because the unknown field may be the missing one, misspelt. If the
+    model is given, the line suggests a name for the unknown field.
     """
     fault = min(error.errors(), key=_urgency)
     field = ".".join(str(part) for part in fault["loc"]) or "(top level)"
@@ -165,7 +165,7 @@ def nearest_field(
 
 
 def did_you_mean(given: object, names: Iterable[str]) -> str:
-    """Returns a similar known name, as the end of a message; "" if none is."""
+    """Returns "; did you mean <name>?" for a similar name, or ""."""
     near = _nearest(given, names)
     return f"; did you mean {near}?" if near else ""
 
@@ -176,7 +176,7 @@ def _nearest(given: object, names: Iterable[str]) -> str | None:
 
 
 def _fields_at(kind: Any, place: Sequence[str | int]) -> Iterator[str]:
-    """Yields the fields of the models at a place in an annotation."""
+    """Yields field names of the models found by following keys from a type."""
     if hasattr(kind, "model_fields"):
         for name, field in kind.model_fields.items():
             if not place:
@@ -197,8 +197,8 @@ def _fields_at(kind: Any, place: Sequence[str | int]) -> Iterator[str]:
 def shows_traceback() -> bool:
     """Returns whether `--traceback` was given on the command line.
 
-    It is the same in the processes of jobs, which have the arguments of their
-    parent.
+    In the process of a job the answer is that of its parent, whose arguments it
+    has.
     """
     return TRACEBACK_OPTION in sys.argv
 
@@ -209,10 +209,10 @@ def has_utf8() -> bool:
 
 
 def missing_library(error: ImportError) -> str | None:
-    """Returns a line about what the system lacks for a failed import.
+    """Returns a line that says what the system lacks for a failed import.
 
-    It is a shared library, or a locale with UTF-8; None if the import failed
-    for another reason.
+    The system may lack a shared library, or a locale with UTF-8. Returns None
+    if the import failed for another reason.
     """
     if "initialization failed" in str(error) and not has_utf8():
         name = locale.setlocale(locale.LC_CTYPE)

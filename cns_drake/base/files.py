@@ -50,8 +50,8 @@ def user_errors(path: Path | str) -> Iterator[None]:
 def completing(path: Path) -> Iterator[Path]:
     """Yields a temporary path to write; it becomes the file `path`.
 
-    When the block ends normally, the file is on the disk and gets its name. On
-    an exception it is removed.
+    When the block ends normally, the temporary file is flushed to the disk and
+    renamed to `path`. On an exception it is removed.
 
     Raises:
         InputError: if it cannot be written, or the name is that of a folder, a
@@ -73,9 +73,9 @@ def completing(path: Path) -> Iterator[Path]:
 def draft_folder(folder: Path, *, replaces: bool = False) -> Iterator[Path]:
     """Yields a temporary folder that replaces `folder` at the end.
 
-    It has the same name, but lies in a folder of its own, since files may name
-    their folder. On an exception it is removed. A folder with files may exist
-    only if the draft `replaces` it.
+    The temporary folder has the same name but another parent folder, because
+    files written to it may contain its name. On an exception it is removed. If
+    `folder` exists and is not empty, `replaces` must be true.
 
     Raises:
         InputError: if it cannot be written.
@@ -100,9 +100,9 @@ def draft_folder(folder: Path, *, replaces: bool = False) -> Iterator[Path]:
 
 
 def remove_folder(folder: Path) -> None:
-    """Removes a folder, which loses its name first.
+    """Renames a folder, then removes it.
 
-    If the process is killed meanwhile, no half of it has the name.
+    If the process is killed meanwhile, no incomplete folder keeps the name.
 
     Raises:
         InputError: if it cannot be removed.
@@ -129,10 +129,10 @@ def check_new_folder(folder: Path) -> None:
 
 
 def check_regular(path: Path) -> None:
-    """Raises an error for paths such as devices and pipes.
+    """Raises an error unless a path is that of a regular file.
 
     Raises:
-        InputError: if the path is something else, or does not exist.
+        InputError: the path does not exist, or is a folder, device or pipe.
     """
     with user_errors(path):
         mode = path.stat().st_mode
@@ -188,14 +188,14 @@ def decode_text(data: bytes) -> str:
     Editors of Windows begin files with such a mark; it is removed.
 
     Raises:
-        UnicodeDecodeError: if it is neither.
+        UnicodeDecodeError: the bytes are in neither encoding.
     """
     is_utf16 = data.startswith((codecs.BOM_UTF16_LE, codecs.BOM_UTF16_BE))
     return data.decode("utf-16" if is_utf16 else "utf-8-sig")
 
 
 def file_name(text: str) -> str:
-    """Returns a text as a file name that cannot lead to another folder.
+    """Turns a text into a file name that cannot lead to another folder.
 
     Names from a recording (its own, its map's, its stage's) pass through here
     before they become parts of paths. Usual names stay as they are. Other names
@@ -207,7 +207,7 @@ def file_name(text: str) -> str:
     )
     if not name or len(name.encode()) > _LONGEST_NAME_BYTES:
         digest = hashlib.sha256(text.encode("utf-8", "surrogatepass"))
-        # Behind a percent sign never else.
+        # An escaped character never has a tilde behind its percent sign.
         name = f"{name[:_KEPT_CHARACTERS]}%~{digest.hexdigest()[:32]}"
     return name
 
@@ -218,10 +218,10 @@ def _escaped(character: str) -> str:
 
 
 def _new_part(path: Path) -> Path:
-    """Returns the part name of a file that can be replaced.
+    """Returns the part name of a file that may be written.
 
     Raises:
-        InputError: if it cannot; see `completing`.
+        InputError: the name is that of a folder, link, device or pipe.
     """
     with user_errors(path):
         mode = path.lstat().st_mode if os.path.lexists(path) else stat.S_IFREG
@@ -230,7 +230,8 @@ def _new_part(path: Path) -> Path:
                 f"{path}: a folder has this name; give another file name"
             )
         if stat.S_ISLNK(mode):
-            # What others linked must not be written, nor the link be lost.
+            # Neither may the link's target be overwritten, nor the link be
+            # replaced.
             raise InputError(f"{path}: a link; give the name of a file")
         if not stat.S_ISREG(mode):
             raise InputError(f"{path}: not a regular file")
@@ -248,7 +249,7 @@ def open_plain(path: Path, flags: int) -> int:
 
 
 def write_part(path: Path, text: str) -> None:
-    """Writes text under the part name of `path`, down to the disk.
+    """Writes text under the part name of `path`, and flushes it to disk.
 
     Raises:
         InputError: if that fails, e.g. on a full disk.
@@ -256,7 +257,7 @@ def write_part(path: Path, text: str) -> None:
     part = _new_part(path)
     # Several files must all be whole before the first gets its name.
     with user_errors(part):
-        if not part.is_char_device():  # A device that is full says so.
+        if not part.is_char_device():  # A full device reports its error.
             part.unlink(missing_ok=True)
     with user_errors(part), open(part, "w", encoding="utf-8") as stream:
         stream.write(text)
@@ -316,7 +317,7 @@ def make_folder(path: Path) -> None:
 
 @contextlib.contextmanager
 def exclusive(path: Path, on_wait: Callable[[], None]) -> Iterator[None]:
-    """Keeps other processes that use the same lock out of the block.
+    """Locks a file, so that one process at a time runs the block.
 
     The file `<path>.lock` is locked meanwhile, also for other machines if the
     file system has locks. It is unlocked however the process ends. Before
@@ -338,7 +339,7 @@ def remove_lock(path: Path) -> None:
     """Removes the lock file of a killed process, unless it is in use."""
     lock = path.with_name(f"{path.name}.lock")
     if lock.is_file():
-        # What cannot be locked is in use, or no lock of ours.
+        # A file that cannot be locked is in use, or is not one of our locks.
         with contextlib.suppress(OSError), contextlib.ExitStack() as stack:
             _lock(lock, stack, _refuse_to_wait)
 
@@ -350,7 +351,7 @@ def _refuse_to_wait() -> None:
 def _lock(
     lock: Path, stack: contextlib.ExitStack, on_wait: Callable[[], None]
 ) -> bool:
-    """Locks a file; returns whether it still has its name then."""
+    """Locks a file; returns whether the name still belongs to it afterwards."""
     descriptor = open_plain(lock, os.O_WRONLY)
     stream = stack.enter_context(os.fdopen(descriptor, "w"))
     try:
@@ -360,7 +361,7 @@ def _lock(
         fcntl.flock(stream, fcntl.LOCK_EX)
     except OSError:
         pass  # Some network file systems have no locks.
-    # Its former owner may have removed it, and another one made it anew.
+    # Its former owner may have removed it, and another process made a new one.
     try:
         if not os.path.samestat(os.stat(lock), os.fstat(stream.fileno())):
             return False

@@ -33,10 +33,10 @@ def interrupt_on_termination(once: bool = False) -> None:
 
 @contextlib.contextmanager
 def _handled_by(handle: _Handler) -> Iterator[dict[int, _Handler]]:
-    """Has a function handle signals meanwhile; yields what did so before.
+    """Sets a handler of `SIGNALS` for the block; yields the former handlers.
 
-    Signals that are ignored, or that end the process, stay so. Handlers can be
-    set, and run, in the main thread only.
+    Signals that are ignored, or have the default action, keep that. Python sets
+    and runs handlers in the main thread only.
     """
     before: dict[int, _Handler] = {
         number: handler
@@ -55,7 +55,7 @@ def _handled_by(handle: _Handler) -> Iterator[dict[int, _Handler]]:
 
 @contextlib.contextmanager
 def uninterrupted() -> Iterator[None]:
-    """Delays interrupts until the block ends; for imports.
+    """Delays interrupts until the block, such as an import, ends.
 
     An extension module that is interrupted while it is initialised fails with
     another error, or crashes the process later. Blocking the signals would not
@@ -74,10 +74,10 @@ def uninterrupted() -> Iterator[None]:
 def interrupts_wait() -> Iterator[Callable[[], None]]:
     """Delays interrupts until the next call of the yielded function.
 
-    Otherwise, the exception of an interrupt can occur while the arguments of a
-    C++ function are converted. The conversion takes it for a wrong type, and
-    raises another error. A second interrupt takes effect at once; later ones do
-    not disturb the closing.
+    Without the delay, KeyboardInterrupt can be raised while the arguments of a
+    C++ function are being converted; the conversion then reports a wrong type
+    instead. A second interrupt takes effect at once. Later ones are ignored, so
+    that files can be closed.
     """
     waiting: list[int] = []
     struck: list[int] = []

@@ -1,4 +1,4 @@
-"""Reading JSON within bounds, with text that can be written; its numbers."""
+"""JSON from untrusted sources, and numbers for JSON."""
 
 import itertools
 import json
@@ -6,7 +6,7 @@ import math
 import re
 from typing import Any
 
-# Real data stay far below this.
+# The deepest nesting; real data stay far below it.
 _DEEPEST = 50
 _STRING = re.compile(rb'"(?:[^"\\]|\\.)*"', re.DOTALL)
 _NO_BRACKET = re.compile(rb"[^][{}]+")
@@ -15,7 +15,7 @@ _SUSPECT = re.compile(rb"\\u(?:0000|[dD][89a-fA-F])")
 
 
 def json_number(value: float) -> float | None:
-    """Returns a number for JSON, which has no NaN: then None."""
+    """Returns a number for JSON: None instead of NaN, which JSON lacks."""
     return None if math.isnan(value) else value
 
 
@@ -44,7 +44,7 @@ def parse_json(data: bytes) -> Any:
 
 
 def _without_doubles(pairs: list[tuple[str, Any]]) -> dict[str, Any]:
-    """Returns an object; refuses a key that is there twice."""
+    """Returns an object's pairs as a dictionary; refuses repeated keys."""
     value = dict(pairs)
     if len(value) < len(pairs):
         keys = [key for key, _ in pairs]

@@ -114,7 +114,8 @@ def check_new_map(output: Path) -> None:
     """Checks the folder of a map that will be written.
 
     Raises:
-        InputError: it is there already, or its name is no name of a map.
+        InputError: the folder exists already, or its name contains more than
+            ASCII letters, digits and underscores.
     """
     if os.path.lexists(output):
         raise InputError(

@@ -9,15 +9,15 @@ import numpy as np
 
 from cns_drake.base.files import read_bytes
 
-# Those that `np.savez` and `np.savez_compressed` write, and whose readers stop
-# at a given size.
+# The compressions that `np.savez` and `np.savez_compressed` write. Their
+# readers stop at the declared size.
 _COMPRESSIONS = (zipfile.ZIP_STORED, zipfile.ZIP_DEFLATED)
 
 
 def read_npz(
     path: Path, names: Iterable[str], most_bytes: int
 ) -> dict[str, np.ndarray]:
-    """Returns the wanted arrays of an .npz file by name, if present.
+    """Returns name -> array, of the wanted arrays that an .npz file has.
 
     The size is limited, and no code is run.
 

@@ -19,13 +19,13 @@ def parse_rows(
         lines: N rows.
         dtype: dtype of a row, with fields; or of each number.
         separator: text between numbers; None for white space.
-        first: the number of rows before these, for errors.
+        first: the number of rows before these; error messages count from it.
 
     Returns:
         (N,) records, or (N, width) numbers.
 
     Raises:
-        ValueError: that names the first row of another form.
+        ValueError: a row has another form; the message names the first one.
     """
     try:
         with warnings.catch_warnings():
@@ -47,7 +47,7 @@ def _fault(
     separator: str | None,
     first: int,
 ) -> str:
-    """Returns what is wrong with the first row of another form."""
+    """Returns text on the first row that has another form."""
     kinds = [
         dtype[name].base.kind
         for name in dtype.names or ()

@@ -25,16 +25,16 @@ def xyz(points: np.ndarray, dtype: DTypeLike = np.float64) -> np.ndarray:
 def check_range(points: np.ndarray, limit: float, first: int = 0) -> None:
     """Raises an error for numbers that cannot be coordinates.
 
-    Such are misread bytes. Values that are not finite pass: many sensors store
-    them for beams without a return.
+    Such numbers come from misread bytes. Values that are not finite are
+    allowed, since many sensors store them for beams without a return.
 
     Args:
         points: (N,) structured array.
-        limit: what no coordinate reaches [m].
-        first: the number that the first point has in its file.
+        limit: absolute value that every coordinate must stay below [m].
+        first: index of the first point in its file, for the message.
 
     Raises:
-        ValueError: if one does.
+        ValueError: a coordinate reaches the limit.
     """
     for name in "xyz":
         # Some limits exceed half precision, which would warn of an overflow.
@@ -113,7 +113,7 @@ def encode_pcd(scan: np.ndarray) -> bytes:
 def encode_labels(scan: np.ndarray) -> bytes:
     """Returns a scan's labels as SemanticKITTI stores them.
 
-    A point is a uint32: its label, and 2^16 times its instance.
+    Each point is a uint32: label + 2^16 * instance.
     """
     label = scan["label"].astype("<u4")
     return (label | scan["instance"].astype("<u4") << 16).tobytes()

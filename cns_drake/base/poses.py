@@ -8,7 +8,7 @@ FARTHEST = 1e8
 
 
 def make_pose(R: np.ndarray, p: np.ndarray) -> np.ndarray:
-    """Returns poses X (..., 4, 4) of R (..., 3, 3) and p (..., 3) [m]."""
+    """Returns poses (..., 4, 4) from R (..., 3, 3) and p (..., 3) [m]."""
     X = np.zeros((*R.shape[:-2], 4, 4))
     X[..., :3, :3] = R
     X[..., :3, 3] = p
@@ -54,7 +54,7 @@ def interpolate(
 
     Args:
         X_0, X_1: (N, 4, 4) poses at both ends.
-        fraction: (N,) share of the way from the one to the other.
+        fraction: (N,) interpolation parameter: 0 at X_0, 1 at X_1.
 
     Returns:
         (N, 4, 4); rotations are made orthonormal.

@@ -1,10 +1,10 @@
-"""What a process may use: processors, and Python's search for garbage."""
+"""Settings of a process: its number of cores, and its garbage collection."""
 
 import gc
 import os
 
-# How many more objects there must be than at the last look; Python's own number
-# is 700 or 2,000.
+# Python collects garbage when so many objects have been added since the last
+# collection. Python's default is 700 or 2,000.
 _OBJECTS = 50_000
 
 

@@ -1,4 +1,4 @@
-"""Progress bars on stderr; each takes one line in any terminal."""
+"""Progress bars on stderr, one line each whatever the terminal's width."""
 
 from collections.abc import Callable, Iterator
 import contextlib
@@ -69,7 +69,7 @@ def print_note(progress: Progress, text: str) -> None:
 
 
 def shown_times(elapsed: float, left: float | None) -> str:
-    """Returns two durations [s] for people; None if one is not known yet."""
+    """Returns elapsed time and, unless None, time left [s] as text."""
     text = f"elapsed {_clock(elapsed)}"
     return text if left is None else f"{text}, about {_clock(left)} left"
 
@@ -80,7 +80,7 @@ def _clock(seconds: float) -> str:
 
 
 class _Times(ProgressColumn):
-    """The times of a task, whose field `left` `count_progress` sets."""
+    """A column with elapsed time and time left, the task's field `left`."""
 
     def render(self, task: Task) -> Text:
         return Text(shown_times(task.elapsed or 0.0, task.fields.get("left")))
@@ -102,12 +102,14 @@ def count_progress(
     """Returns a callback that shows how many frames of how many are done.
 
     On a terminal the bar moves; elsewhere a line is printed every few seconds.
-    The text `after` says what is done after the last frame.
+    After the last frame, the text `after` is shown: it names the work that
+    follows.
     """
     console = progress.console
     interval = 0.5 if console.is_terminal else LINE_INTERVAL
     shown = 0.0
-    # The time left follows neither from loading nor from an earlier run.
+    # The estimate of the time left counts neither the time for loading nor
+    # frames of an earlier run.
     first: tuple[float, int] | None = None
 
     def on_frame(done: int, total: int) -> None:

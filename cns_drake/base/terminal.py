@@ -63,9 +63,10 @@ def make_program(
     when called without arguments.
 
     Args:
-        renamed: command of an earlier version -> command to use now, without
-            the program's name, or with the name of another program. The old
-            command fails as bad usage, and names the new one.
+        renamed: command of an earlier version -> command to use now. The new
+            command is given without the program's name, unless it belongs to
+            another program. Calling the old command is a usage error that names
+            the new one.
         groups: heading in the help -> commands under it; by default all
             commands are under one heading.
     """
@@ -130,11 +131,10 @@ def example(*lines: str) -> str:
 def run(app: typer.Typer, program: str) -> NoReturn:
     """Runs a command line; for bad usage or input it prints one line.
 
-    A traceback is shown only with `--traceback`. Exits with 0 on success; with
-    2 and one line on stderr for bad usage or input, for files that cannot be
-    used, for lack of memory and of libraries of the system; with 1 for jobs
-    that failed; with 130 when interrupted, also by SIGTERM, so that open files
-    are closed.
+    A traceback is shown only with `--traceback`. The exit status is 0 on
+    success, 1 if jobs failed, and 130 after an interrupt or SIGTERM, which
+    closes open files first. It is 2, with one line on stderr, for bad usage or
+    input, unusable files, lack of memory and missing system libraries.
     """
     message: str | None = None
     look_seldom()
@@ -201,10 +201,10 @@ def run(app: typer.Typer, program: str) -> NoReturn:
 
 
 def _open_standard_streams() -> None:
-    """Opens the three standard streams where a process lacks them.
+    """Opens standard streams that a process lacks.
 
-    Otherwise the next opened file would take their place and receive what is
-    printed.
+    Otherwise the next opened file would get the number of a missing stream, and
+    receive the printed text.
     """
     for number, name in enumerate(("stdin", "stdout", "stderr")):
         try:
@@ -288,7 +288,7 @@ def note(message: str) -> None:
 
 @contextlib.contextmanager
 def resumable() -> Iterator[None]:
-    """Says, when work is interrupted, that the same command goes on with it."""
+    """Notes on an interrupt that the same command will resume the work."""
     try:
         yield
     except KeyboardInterrupt:

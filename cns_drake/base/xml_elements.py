@@ -74,7 +74,7 @@ class Element(ElementTree.Element):
 
 # Blanks before the declaration of XML.
 _BLANKS = re.compile(rb"\A([ \t\r\n]+)(<\?xml[^>]*>)")
-# What holds no elements; it may lack its end.
+# Comments and CDATA contain no elements. Their end may be missing.
 _COMMENT = re.compile(
     rb"<!--.*?(?:-->|\Z)|<!\[CDATA\[.*?(?:\]\]>|\Z)", re.DOTALL
 )
@@ -83,8 +83,8 @@ _COMMENT = re.compile(
 def readable_xml(content: bytes) -> bytes:
     """Returns XML content with common errors of other programs repaired.
 
-    Such are two dashes in comments, and blanks before the declaration. Lines
-    keep their numbers.
+    The errors are double dashes inside comments, and blanks before the XML
+    declaration. Line numbers do not change.
     """
 
     def cleared(found: re.Match[bytes]) -> bytes:

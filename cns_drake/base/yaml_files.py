@@ -16,7 +16,7 @@ _WHOLE = "tag:yaml.org,2002:int"
 
 
 def read_yaml(path: Path) -> Any:
-    """Returns what a YAML file holds; None if it is empty.
+    """Returns the content of a YAML file; None if it is empty.
 
     Raises:
         InputError: the file cannot be read, is not YAML, expands to too many
@@ -81,7 +81,7 @@ def _check_depth(text: str | bytes, loader: type) -> None:
 
 
 def _check(node: yaml.Node, sizes: dict[int, int]) -> int:
-    """Returns how many nodes a node stands for when aliases are resolved."""
+    """Returns the number of nodes of a tree when aliases are resolved."""
     line = node.start_mark.line + 1
     if isinstance(node, yaml.ScalarNode):
         # Python cannot print what `0xff...` stands for.

@@ -1,1 +1,1 @@
-"""The city generator: road networks, streets, structures, stages, SDF."""
+"""The city generator: writes a city as SDF from roads, a plan and stages."""

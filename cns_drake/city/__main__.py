@@ -1,4 +1,4 @@
-"""`python -m cns_drake.city` is `cns-drake city`."""
+"""Runs `cns-drake city` as `python -m cns_drake.city`."""
 
 import sys
 

@@ -1,11 +1,12 @@
-"""Formulas of the package's own YAML files, as xacro files have them."""
+"""Evaluates the formulas in the package's own YAML files."""
 
 from collections.abc import Mapping
 from functools import cache
 from types import CodeType
 from typing import Any
 
-# Functions that any formula may use; all others come with its numbers.
+# Functions that any formula may use; the caller of `value_of` supplies all
+# others.
 FUNCTIONS: Mapping[str, Any] = {
     "__builtins__": {},
     **{f.__name__: f for f in (int, len, max, min, range, round)},
@@ -16,7 +17,7 @@ def value_of(given: Any, names: dict[str, Any]) -> Any:
     """Returns the value of a formula, or of each formula in a list.
 
     Formulas are Python expressions as text, which may use the numbers and
-    functions in `names`. Plain values are returned as they are.
+    functions in `names`. Plain values are returned unchanged.
     """
     if isinstance(given, list):
         return [value_of(one, names) for one in given]

@@ -51,7 +51,7 @@ _EXAMPLES: dict[Callable[..., None], tuple[str, ...]] = {
     ),
     city: ("city town --start",),
 }
-# Commands whose names are no names of functions.
+# Commands whose names differ from the names of their functions.
 _NAMES = {list_drives: "list", import_city: "import"}
 
 app = terminal.make_program(

@@ -21,7 +21,7 @@ _Recorded = Annotated[
 
 
 class Part(str, Enum):
-    """What a training can leave out."""
+    """Kinds of variation that a training can leave out."""
 
     CHANGE = "change"
     RETURNS = "returns"
@@ -43,26 +43,33 @@ def train(
 ) -> None:
     """Train the place-recognition method `learned`.
 
-    The training drives run along the streets of Riverside, Suburbia and
-    Downtown, through cities that are drawn at random, at different stages and
-    with different drivers. They are not recorded. On one machine, the same
-    command always gives the same weights. Needs the optional packages of the
-    extra `train` (JAX).
+    The training simulates drives through cities that are drawn at random along
+    the streets of Riverside, Suburbia and Downtown. The drives see different
+    stages and have different drivers; they are not recorded. On one machine,
+    the same command always gives the same weights. Needs the optional packages
+    of the extra `train` (JAX).
 
     Args:
-        output: File for the weights. The training curve goes to FILE.png;
-            FILE.npz.training lets an interrupted training resume.
-        minutes: Rough computing time on one core, in minutes, from which the
-            numbers of cities and steps follow. No clock stops the training.
-        cities: Number of cities; by default it follows from --minutes.
+        output: File for the weights. The training curve goes to FILE.png.
+            FILE.npz.training keeps the state, so that the same command resumes
+            an interrupted training.
+        minutes: Approximate computing time on one core in minutes, which sets
+            the numbers of cities and steps. The training is not stopped when
+            this time is over.
+        cities: Number of cities to train on; by default it follows from
+            --minutes.
         steps: Number of training steps; by default it follows from --minutes.
-        seed: Seed of all random draws.
-        without: Kind of variation to leave out: change between drives,
-            calibrated returns, or the driver's wandering; may be repeated.
-        drawn_streets: Draw the streets at random as well, instead of taking
-            those of the shipped maps.
-        graded: Rank the places of a query by their exact overlap, instead of
-            calling those within 7.5 m right. It takes about half as long again.
+        seed: Seed of all random draws. Another seed gives other cities and
+            other weights.
+        without: Kind of variation to leave out of the training: change between
+            drives, calibrated returns, or the driver's wandering. Use it to
+            measure what each kind contributes. May be repeated.
+        drawn_streets: Draw the streets at random as well, instead of using
+            those of the shipped maps. Use it to test the weights on shipped
+            maps without having trained on their streets.
+        graded: Rank the places of a query by their exact overlap with it,
+            instead of treating every place within 7.5 m as right. The training
+            then takes about half as long again.
     """
     with uninterrupted():
         from cns_drake.base.jobs.cluster import choose_cluster
@@ -107,23 +114,26 @@ def export_pairs(
 ) -> None:
     """Export training data for other programs.
 
-    Simulates the drives without recording them. Positives, negatives and
-    overlaps are exact. To resume after an interruption, run the same command
-    again.
+    Simulates the drives without recording them, and writes point clouds with
+    exact positives, negatives and overlaps for training place recognition. To
+    resume after an interruption, run the same command again.
 
     Args:
-        format: Kind of data to write: pointnetvlad (clouds and pickle files of
-            PointNetVLAD), overlap (scans with exact overlaps) or overlap-table
-            (only the overlaps of a database and a query, for cns-eval pr
-            --exact-overlaps).
+        format: Kind of data to write: pointnetvlad (clouds and pickle files as
+            PointNetVLAD reads them), overlap (scans and the exact overlap of
+            each pair), or overlap-table (only a table of overlaps of a database
+            and a query, for cns-eval pr --exact-overlaps).
         output: Folder for the data; created if it does not exist.
-        vary: File of a family of drives, whose members are exported as well.
-        held_out: Drive to use only for evaluation, even if it is also named as
-            training data; may be repeated.
-        spacing: Distance driven between two clouds [m].
-        scans: Number of consecutive scans merged into each cloud (a submap).
-        max_range: Largest x, y or z of a point in the LiDAR's frame [m];
-            farther points are left out. By default 50, and 100 for the table.
+        vary: File of a family of drives (one drive and what varies in it),
+            whose members are exported in addition to the named drives.
+        held_out: Drive to keep for evaluation only. It is left out of the
+            training data even if you also name it as a training drive. May be
+            repeated.
+        spacing: Distance that the car drives between two clouds [m].
+        scans: Number of consecutive scans that are merged into each cloud (a
+            submap).
+        max_range: Leave out points that are farther than this along x, y or z
+            in the LiDAR's frame [m]. By default 50, or 100 for overlap-table.
     """
     with uninterrupted():
         from cns_drake.base.jobs.cluster import choose_cluster
@@ -178,17 +188,18 @@ def map_truth(
 ) -> None:
     """Label what changed between the maps of two drives.
 
-    A is the older and B the newer drive through one place: recordings of
-    cns-drake, or scenarios, which are simulated. Every point of A's map is
-    labelled kept, gone or unobserved by B; every point of B's map kept, new or
-    newly seen. The labels are exact, because rays are cast in the worlds of
-    both drives. To score labels of your own against them, run cns-eval
-    map-update.
+    Both drives pass through one place; A is the older and B the newer one. Each
+    can be a recording of cns-drake, or a scenario, which is then simulated.
+    Every point of A's map gets a label that says whether B finds it kept, gone
+    or unobserved. Every point of B's map gets a label that says whether it is
+    kept, new or newly seen. The labels are exact, because rays are cast in the
+    worlds of both drives. To score the labels of your own change detector
+    against them, run cns-eval map-update.
 
     Args:
-        a: Older drive: a recording, a shipped drive or a scenario file.
-        b: Newer drive: a recording, a shipped drive or a scenario file.
-        output: Folder to write; it must not exist yet.
+        a: Older drive A: a recording, a shipped drive or a scenario file.
+        b: Newer drive B: a recording, a shipped drive or a scenario file.
+        output: Folder to write the maps and labels to; it must not exist yet.
     """
     with uninterrupted():
         from cns_drake.base.files import check_new_folder

@@ -57,9 +57,9 @@ FirstYear = Annotated[
     typer.Option(
         "--years",
         metavar="YEAR ...",
-        help="Years after today at which stages are made, ascending, at most "
-        "200. Negative years lie before today; they need buildings with "
-        "years of construction.",
+        help="Years for which to make stages, counted from today, in ascending "
+        "order and at most 200. Negative years lie in the past; they need a "
+        "map whose buildings have years of construction.",
     ),
 ]
 
@@ -68,15 +68,17 @@ RateFactor = Annotated[
     typer.Option(
         min=0.0,
         metavar="FACTOR",
-        help="Factor by which all yearly rates are multiplied.",
+        help="Factor by which all yearly rates are multiplied; 2 makes the "
+        "city change twice as fast.",
     ),
 ]
 RatesFile = Annotated[
     Path | None,
     typer.Option(
         metavar="FILE.yaml",
-        help="File of rates of your own, one event: rate per line, with yearly "
-        "rates from 0 to 1. Events that it leaves out keep their rates.",
+        help="File with rates of your own. Each line has the form event: rate, "
+        "with the probability per year, from 0 to 1. Events that it does not "
+        "name keep their rates.",
     ),
 ]
 
@@ -88,12 +90,13 @@ def list_drives(
 ) -> None:
     """List drives with their lengths, times and sizes.
 
-    The columns are the length and duration of each drive, the frames recorded,
-    and the structures and triangles of its stage. A narrow terminal shows fewer
-    columns; a file or pipe gets all of them.
+    The columns are the length and duration of each drive, its number of frames,
+    and the numbers of structures and triangles in its stage. A narrow terminal
+    shows fewer columns; a file or pipe gets all of them.
 
     Args:
-        folders: Folders of maps of your own; by default the shipped maps.
+        folders: Folders of your own maps, whose drives to list; by default the
+            shipped maps.
     """
     with uninterrupted():
         from cns_drake.scenarios.drive_table import drive_rows
@@ -169,34 +172,37 @@ def import_city(
 ) -> None:
     """Make a map from data of a real city.
 
-    Writes the stages of the map, two drives along its streets and a picture
-    from above.
+    Writes the stages of the map, two drives along its streets and a picture of
+    it from above.
 
     Args:
         source: File of the city: CityJSON 1.0 to 2.0 (.json), CityJSONSeq
             (.jsonl), OpenStreetMap (.osm, .pbf) or OpenDRIVE (.xodr).
         output: Folder of the map to write; its name becomes the map's name.
-        years: Years of the stages, ascending. Each stage has the buildings
-            built by then.
-        year_attribute: Name of the attribute with the year in which a building
-            was built; by default one of the usual names.
-        undated: Stage in which buildings without a year first stand: the first,
-            the last or never.
-        lod: Level of detail of the buildings; by default each building's
-            highest.
-        seed: Seed of the random draws: which buildings --grow omits from the
-            first stage or lowers, and the buildings along roads without any
-            (OpenDRIVE).
+        years: Years for which to make stages. Each stage contains the buildings
+            that were built by its year.
+        year_attribute: Name of the attribute of the file that contains each
+            building's year of construction. By default one of the usual names.
+        undated: What to do with buildings without a year: they stand from the
+            first stage on, only in the last stage, or never.
+        lod: Level of detail (LoD) in which to read the buildings of CityJSON,
+            such as 1.2; by default the highest that each building has.
+        seed: Seed of the random draws: which buildings --grow removes or lowers
+            in the first stage, what is added to buildings and streets, and the
+            buildings of an OpenDRIVE file that has none.
         along: CSV file with the path of a drive of your own, x and y in the map
-            [m], to use instead of the two proposed drives.
-        within: Greatest distance of structures from the drives [m]; farther
-            ones are left out to save memory. By default no limit.
+            [m]. It replaces the two proposed drives.
+        within: Leave out structures that are farther than this from the drives
+            [m], to save memory. By default none is left out.
         drive_on: Side of the street on which cars drive; by default as the file
-            says, or else right.
-        grow: Adds a first stage in which this share of the buildings, drawn at
-            random, is missing or lower. By default 0.3, and no such stage with
-            --years, with --plain or from OpenDRIVE.
-        plain: Use only what the file contains; draw nothing at random.
+            says, or right if it does not say.
+        grow: Share of the buildings, from 0.01 to 0.9, that an additional first
+            stage lacks or shows lower. They are drawn at random. By default
+            0.3; but with --years, with --plain or from OpenDRIVE, no such stage
+            is added.
+        plain: Do not add windows, lamps, parked cars and other details that the
+            file does not contain. Buildings along the roads of an OpenDRIVE
+            file are added nevertheless.
     """
     # The years that follow the first of --years come as arguments.
     paths = [word for word in source if not word.isdecimal()]
@@ -266,7 +272,7 @@ def _shortcomings(
 def _report_rows(
     report: ImportReport, output: Path, years: tuple[int, ...]
 ) -> Iterator[tuple[str, str]]:
-    """Yields the most important numbers, and the command that comes next."""
+    """Yields lines with the most important numbers, and the next command."""
     kinds = sorted(report.kinds.items(), key=lambda item: -item[1])
     parts = [f"{number} {kind}" for kind, number in kinds]
     yield "structures", _shortened(parts)
@@ -307,15 +313,21 @@ def city(
 ) -> None:
     """Build the stages of a city from its roads and plan.
 
+    You write the roads, and a plan of what stands along them; the command
+    generates an SDF world for each stage.
+
     Args:
-        folder: Folder with roads.yaml, city.yaml and stages.yaml. The table of
-            its drives is updated too.
-        start: First write the files that are missing, except roads.yaml: a plan
-            with a district for each block, two stages, and a drive for each.
-        seed: Seed of the plan that --start draws.
-        check: Write nothing, and exit with status 1 if a file would change.
-        repair_stages: Update stages.yaml after the plan has grown: structures
-            that are still at their place in structures.csv get their new names.
+        folder: Folder with roads.yaml, city.yaml and stages.yaml. The stages
+            are written to it, and its table of drives is updated.
+        start: First write the files that are missing in a folder with
+            roads.yaml: a plan with a district for each block, two stages, and a
+            drive for each stage.
+        seed: Seed of the random plan that --start writes.
+        check: Write nothing. List the files that would change, and exit with
+            status 1 if there are any.
+        repair_stages: Update the names in stages.yaml after you have added
+            something to the plan, which renumbers structures. Structures are
+            recognised by their place in structures.csv.
     """
     with uninterrupted():
         from cns_drake.city.generation.generate import (
@@ -343,9 +355,9 @@ def city(
 def maps_and_years(
     words: list[str], first: list[int]
 ) -> tuple[list[str], tuple[int, ...]]:
-    """Returns maps and years.
+    """Returns the maps and the years among a command's arguments.
 
-    Years that follow the first come as arguments.
+    The years after the first one of --years come as arguments.
 
     Raises:
         InputError: a word begins like an option.
@@ -372,16 +384,17 @@ def age(
 ) -> None:
     """Simulate years of change in a city.
 
-    Every year, every lot, tree and street object may change, with a given
+    Every year, each lot, tree and street object may change, with a given
     probability: buildings are built, torn down and replaced, trees die, lamps
-    and signs move. Writes a map with a stage for today and one for each year, a
-    table of all events, the rates observed, and pictures.
+    and signs move. Writes a map with a stage for today and one for each given
+    year, a table of all events, the observed rates, and pictures.
 
     Args:
         source: Name of a shipped map, or folder of a map.
         output: Folder of the map to write; its name becomes the map's name.
-        seed: Seed of all events.
-        pictures: Draw the city from the air and from three streets.
+        seed: Seed of all random events. Another seed gives another history of
+            the city.
+        pictures: Draw pictures of the city from the air and of three streets.
     """
     maps, wanted = maps_and_years(source, years)
     if len(maps) != 1:

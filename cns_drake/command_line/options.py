@@ -20,38 +20,44 @@ Frames = Annotated[
     typer.Option(
         min=1,
         metavar="N",
-        help="Number of frames to record, counted from the start of the drive; "
-        "by default a second has 20 frames.",
+        help="Number of frames (LiDAR scans) to record, from the start of the "
+        "drive; by default the whole drive. Usually a second has 20 frames.",
     ),
 ]
 LIDAR_OPTION = typer.Option(
     metavar="PRESET",
-    help="Preset of the LiDAR to simulate: cns, os0-128, os1-32, os1-64,"
-    " os1-128, os1-64-33, os1-128-42, vlp-16, hdl-64e, hdl-32e, alpha-prime,"
-    " hesai-pandar64, hesai-pandar-xt32, hokuyo-ust-20lx, mid-70, avia or"
-    " mid-360.",
+    help="Model of LiDAR to simulate, by the name of its preset: cns, os0-128,"
+    " os1-32, os1-64, os1-128, os1-64-33, os1-128-42, vlp-16, hdl-64e, hdl-32e,"
+    " alpha-prime, hesai-pandar64, hesai-pandar-xt32, hokuyo-ust-20lx, mid-70,"
+    " avia or mid-360.",
 )
 LidarPreset = Annotated[str | None, LIDAR_OPTION]
 Recording = Annotated[
     Path | None,
     typer.Option(
-        help="Web page of the drive to save as well; its name ends in .html."
+        help="File for a web page that replays the drive; its name ends in "
+        ".html. By default no page is written."
     ),
 ]
 Graphviz = Annotated[
     Path | None,
     typer.Option(
-        help="File to which to save Drake's Diagram as well, as Graphviz text."
+        help="File for a graph of Drake's Diagram, which shows how its systems "
+        "are connected, as Graphviz text. By default no graph is written."
     ),
 ]
 Overwrite = Annotated[
-    bool, typer.Option("--overwrite", help="Replace existing recordings.")
+    bool,
+    typer.Option(
+        "--overwrite", help="Record again, and replace existing recordings."
+    ),
 ]
 Maps = Annotated[
     list[str] | None,
     typer.Argument(
         metavar="MAP",
-        help="Names or folders of maps; by default all shipped maps.",
+        help="Names of shipped maps, or folders of your own; by default all "
+        "shipped maps.",
     ),
 ]
 
@@ -59,7 +65,7 @@ Maps = Annotated[
 MethodFiles = Annotated[
     list[Path] | None,
     typer.Option(
-        help="Python file that registers a method of yours, to run in addition "
-        "to the shipped ones; may be repeated."
+        help="Python file that registers a method of your own, to run in "
+        "addition to the shipped methods. May be repeated."
     ),
 ]

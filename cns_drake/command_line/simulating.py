@@ -29,8 +29,9 @@ Kind = Literal["ideal", "calibrated"]
 Returns = Annotated[
     Kind | None,
     typer.Option(
-        help="Model of the LiDAR's returns: ideal, or calibrated with the "
-        "noise, the lost points and the intensities of the unit's data sheet."
+        help="Model of the LiDAR's returns: ideal, or calibrated, which has "
+        "the noise, the lost points and the intensities of the unit's data "
+        "sheet. By default as the scenario says, or else ideal."
     ),
 ]
 DriveNames = Annotated[
@@ -38,24 +39,30 @@ DriveNames = Annotated[
     typer.Argument(
         metavar="NAME",
         help="Names of shipped drives, or scenario files; by default all "
-        "shipped drives.",
+        "shipped drives, or none with --vary.",
     ),
 ]
 Fog = Annotated[
     float | None,
     typer.Option(
         metavar="METRES",
-        help="Visibility in fog [m]. With fog, rain or snowfall, returns are "
-        "calibrated.",
+        help="Visibility in fog [m]; the smaller, the denser the fog. Fog, "
+        "rain and snowfall switch on calibrated returns.",
     ),
 ]
 Rain = Annotated[
-    float, typer.Option(metavar="MM_H", help="Rate of rain [mm/h].")
+    float,
+    typer.Option(
+        metavar="MM_H",
+        help="Rain rate [mm/h]. It switches on calibrated returns.",
+    ),
 ]
 Snowfall = Annotated[
     float,
     typer.Option(
-        metavar="MM_H", help="Rate of snowfall, as melted water [mm/h]."
+        metavar="MM_H",
+        help="Snowfall rate, as melted water [mm/h]. It switches on calibrated "
+        "returns.",
     ),
 ]
 
@@ -65,8 +72,8 @@ def family_members(
 ) -> list[Scenario]:
     """Returns the members of a family.
 
-    Their scenario files go to `<output>/scenarios`, cities of their own to
-    `<output>/cities`.
+    Their scenario files are written to `<output>/scenarios`, and cities drawn
+    for them to `<output>/cities`.
 
     Raises:
         InputError: the family cannot be used.
@@ -89,7 +96,7 @@ def family_members(
 def choose_returns(
     returns: Kind | None, fog: float | None, rain: float, snowfall: float
 ) -> tuple[Kind | None, WeatherConfig | None]:
-    """Returns the returns and the weather of the options; None if not given.
+    """Returns the LiDAR returns and the weather that options name, or None.
 
     Raises:
         InputError: a value is out of range; the message names its option.
@@ -137,22 +144,29 @@ def simulate(
 ) -> None:
     """Simulate a drive and record it.
 
-    Writes a rosbag2 folder: an MCAP file and its metadata.
+    Writes a rosbag2 folder, as ROS 2 tools read it: an MCAP file with the
+    scans, the poses and all other sensor data, and its metadata.
 
     Args:
-        scenario: Name of a shipped drive, or a scenario file of your own.
-        traffic: Number of moving vehicles, and also of walkers; by default the
-            scenario's.
-        transient: Temporary changes to the city and their strengths, from
-            parked_cars, leaves, snow, scaffolds, works, furniture, roadsides
-            and seed; may be repeated.
-        driver: Driver of the car: real wanders and changes lanes as drivers of
-            published data sets do; none keeps to the middle of the lane.
+        scenario: Name of a shipped drive, as cns-drake list shows it, or a
+            scenario file of your own.
+        traffic: Number of moving vehicles. The same number of walkers is added.
+            By default as the scenario says.
+        transient: Temporary changes to the city, such as snow=0.25,leaves=0.15.
+            The switches are parked_cars, leaves, snow, scaffolds, works,
+            furniture and roadsides, with values from 0 to 1, and seed. May be
+            repeated.
+        driver: How the car is driven. With real it wanders in its lane and
+            changes lanes, as drivers of published data sets do; with none it
+            keeps to the middle of the lane. By default as the scenario says.
         ride: Class of the road surface after ISO 8608, from A (new) to E (very
-            poor). The car then moves on its springs; with none it is steady.
-        imu_rate: Rate of the IMU [Hz]; by default the scenario's.
-        camera: Size and rate of a camera that looks ahead, in pixels and images
-            a second, such as 640x480@2. It also records depths and classes.
+            poor), which shakes the car on its springs. With none the car is
+            steady. By default as the scenario says.
+        imu_rate: Samples of the IMU per second [Hz]; by default as the scenario
+            says.
+        camera: Add a camera that looks ahead. Give its width and height in
+            pixels and its images per second, such as 640x480@2. It also records
+            images of the depth and of the classes.
     """
     with uninterrupted():
         from cns_drake.command_line.drive_script import run_drive
@@ -219,19 +233,21 @@ def film(
 ) -> None:
     """Film a drive through all stages of its city.
 
-    The film shows the same place from behind the car in each stage in turn,
-    then from above, with the points of the LiDAR.
+    The film shows the street from behind the car and the points that the LiDAR
+    measures: the same place in one stage after the other. Then it shows the
+    city from above.
 
     Args:
         scenario: Name of a shipped drive, or a scenario file of your own.
-        output: File of the film; its name ends in .webp, or in .mp4, which
+        output: File for the film. Its name ends in .webp, or in .mp4, which
             needs ffmpeg. By default NAME.webp.
         seconds: Length of the film [s].
-        size: Width and height of the film in pixels.
-        start: Time of the drive at which each shot begins [s]; by default where
-            the way ahead is straightest.
-        traffic: Number of moving vehicles, and also of walkers; by default the
-            scenario's, or else 60 if the streets have room.
+        size: Width and height of the film in pixels, each from 32 to 1920.
+        start: Time in the drive at which each shot begins [s]; by default the
+            moment when the road ahead is straightest.
+        traffic: Number of moving vehicles. The same number of walkers is added.
+            By default as the scenario says; if it has no traffic, 60 of each,
+            provided that the streets have room.
     """
     with uninterrupted():
         from cns_drake.scenarios.scenario_files import load_scenario
@@ -288,12 +304,15 @@ def scan(
     """Take one LiDAR scan of an SDF world.
 
     Args:
-        world: SDF file of the world.
-        pose: Pose of the LiDAR in the world [m, rad].
+        world: SDF file of the world to scan.
+        pose: Pose of the LiDAR in the world: position, then roll, pitch and yaw
+            [m, rad].
         output: File for the scan; its name ends in .pcd, .bin or .npy.
-        seed: Seed of the noise and the weather.
-        model_path: Folder in which to look for model:// files, before those of
-            GZ_SIM_RESOURCE_PATH and SDF_PATH; may be repeated.
+        seed: Seed of the random noise and weather. Another seed gives other
+            errors of the same size.
+        model_path: Folder in which to look for model:// files of the world. It
+            is searched before the folders of GZ_SIM_RESOURCE_PATH and SDF_PATH.
+            May be repeated.
     """
     with uninterrupted():
         import numpy as np
@@ -342,12 +361,14 @@ def generate(
 ) -> None:
     """Record many drives.
 
-    Skips finished recordings and resumes interrupted ones.
+    Skips finished recordings and resumes interrupted ones, so after an
+    interruption you can run the same command again.
 
     Args:
-        vary: File of a family of drives, whose members are recorded in addition
-            to the named drives. Their scenario files go to <output>/scenarios,
-            and cities drawn for them to <output>/cities.
+        vary: File of a family of drives (one drive and what varies in it),
+            whose members are recorded in addition to the named drives. Their
+            scenario files go to <output>/scenarios, and the cities drawn for
+            them to <output>/cities.
     """
     with uninterrupted():
         from cns_drake.base.jobs.cluster import choose_cluster
@@ -387,13 +408,15 @@ def export(
         drive: Folder of a recording, or its .mcap file.
         layout: Format to write: cns (the CNS data set), kitti (KITTI odometry),
             mulran (MulRan) or tum (only the trajectory).
-        output: Folder for exported drives: new, empty, or with earlier exports.
+        output: Folder for the exported drive. It can be new or empty, or
+            contain earlier exports.
         sensor: Name of the LiDAR to export, if the recording has several.
-        absent_in: Stage of the map. Points on structures that this stage lacks
-            get SemanticKITTI's labels of moving objects (252 to 259). Only with
-            kitti.
-        sequence: Number of the drive, as in sequences/NN. By default the digits
-            at the end of its name. Only with kitti.
+        absent_in: Another stage of the map, such as 01. Points on structures
+            that this stage lacks get SemanticKITTI's labels of moving objects
+            (252 to 259), as if they had moved. Only with --format kitti.
+        sequence: Number of the exported drive, which names its folder
+            sequences/NN. By default the digits at the end of the drive's name.
+            Only with --format kitti.
     """
     with uninterrupted():
         from cns_drake.export.exporting import export_drive
@@ -425,7 +448,7 @@ def repair(
     """Recover the readable part of a damaged MCAP file.
 
     Args:
-        file: MCAP file, whole or damaged.
+        file: MCAP file to recover. It is not changed.
         output: File to write; by default <name>_repaired.mcap.
     """
     with uninterrupted():

@@ -18,7 +18,7 @@ from evaluation.recognition.protocol_options import with_protocol
 def reproduce(
     maps: options.Maps = None,
     *,
-    output: options.Output,
+    output: options.Results,
     jobs: commands.Jobs = None,
     scheduler: commands.Scheduler = None,
     pages: Annotated[bool | None, typer.Option("--pages/--no-pages")] = None,
@@ -30,14 +30,14 @@ def reproduce(
 ) -> None:
     """Simulate the drives of maps and report on them.
 
-    Records the drives, evaluates place recognition and change on them, and
-    writes a report.
+    Records all drives of the maps, measures place recognition and structural
+    change between them, and writes a report.
 
     Args:
-        pages: Also write a web page of each drive. This is the default without
-            --quick.
-        quick: Write only the report; simulate the drives without recording
-            them.
+        pages: Write a web page of each drive as well. Pages are the default,
+            except with --quick.
+        quick: Write only the report: the drives are simulated but not recorded,
+            which saves time and disk space.
     """
     with uninterrupted():
         from cns_drake.base.jobs.cluster import choose_cluster
@@ -85,24 +85,28 @@ def study(
 
     An experiment is a file that says what differs between two drives, the
     database and the query, and which tasks and methods to measure. The drives
-    are simulated but not recorded. Writes results.csv (one number per row),
-    queries.csv (one query per row) and a page, index.html. To resume after an
-    interruption, run the same command again.
+    are simulated but not recorded. The command writes results.csv (one number
+    per row), queries.csv (one query per row) and a page, index.html. To resume
+    after an interruption, run the same command again.
 
     Args:
-        name: Name of a shipped experiment, or an experiment file of your own.
-        maps: Names or folders of maps to use instead of the experiment's.
+        name: Name of a shipped experiment, as --list shows it, or an experiment
+            file of your own.
+        maps: Maps to use instead of the experiment's: names of shipped maps, or
+            folders of your own.
         output: Folder for the results; created if it does not exist.
-        quick: Measure less, as the section `quick` of the experiment says.
-        task: Task to measure: place, pose, localise, map, change or cost; by
-            default the experiment's; may be repeated.
-        method: Method to run: the name of a shipped one, or the Python file of
-            your own; by default the experiment's; may be repeated.
-        override: Field of the experiment to replace, such as seeds=[1,2];
-            separate nested names by dots, as in database.years=[0,5]; may be
-            repeated.
-        list_all: List the shipped experiments and stop.
-        show: Print the file of the experiment, to copy and change, and stop.
+        quick: Measure less and finish sooner. The section `quick` of the
+            experiment says what is left out.
+        task: Task to measure: place, pose, localise, map, change or cost. By
+            default the tasks of the experiment. May be repeated.
+        method: Method to run: the name of a shipped one, or a Python file with
+            your own. By default the methods of the experiment. May be repeated.
+        override: Replace a field of the experiment, such as seeds=[1,2]. For a
+            field inside another field, join both names by a dot, such as
+            database.years=[0,5]. May be repeated.
+        list_all: List the shipped experiments, and do nothing else.
+        show: Print the file of the experiment, as a start for your own, and do
+            nothing else.
     """
     with uninterrupted():
         from cns_drake.studies.experiment import (
@@ -126,7 +130,7 @@ def study(
     chosen: list[str | tuple[str, Any]] = list(overrides)
     for field, names in (("tasks", task), ("methods", method)):
         if names:
-            # They keep their settings.
+            # Methods of the experiment keep their settings.
             given = getattr(experiment, field) or {}
             chosen.append((field, {one: given.get(one, {}) for one in names}))
     experiment = load_experiment(name, chosen, quick=quick)

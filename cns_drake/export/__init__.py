@@ -1,1 +1,1 @@
-"""Exports of recorded drives to the layouts of existing data sets."""
+"""Exports recorded drives to the layouts of existing data sets."""

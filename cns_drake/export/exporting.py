@@ -1,8 +1,9 @@
-"""Exporting one recording into a folder of drives.
+"""Exports one recording into a folder of drives.
 
-The folder may hold several drives of one format. The file `export.yaml`, which
-describes its files, marks it as ours. A drive's own folder grows under a
-`.part` name and gets its final one when all of it is there.
+The folder may contain several drives of one format. The file `export.yaml`,
+which describes its files, marks it as written by an export. A drive's own
+folder is written under a name ending in `.part`, and gets its final name when
+it is complete.
 """
 
 from collections.abc import Callable, Iterator
@@ -40,26 +41,27 @@ def export_drive(
     on_note: Callable[[str], None] = lambda note: None,
     on_frame: Callable[[int, int], None] = lambda done, total: None,
 ) -> Path:
-    """Exports a recording.
+    """Exports a recording, and returns the folder of the drive.
 
     Args:
+        recording: path of the recording.
+        format_name: name of the format.
         output: the folder of drives: a new or empty folder, or one to which
             this function has already written drives of the same format.
         lidar: name of the LiDAR to export, if the recording has several.
-        absent_in: another stage of the recording's map; points of structures
+        absent_in: another stage of the recording's map; points on structures
             that are absent there get the labels of `MarkedDrive`.
         sequence: number of the drive in KITTI's layout; by default the digits
             at the end of its name.
-        on_note: takes notes on how the recording was read and written.
-        on_frame: takes the number of written frames and of all frames.
-
-    Returns:
-        The folder of the drive.
+        on_note: is called with notes about how the recording was read and
+            written.
+        on_frame: is called with the number of written frames, and of all
+            frames.
 
     Raises:
-        InputError: if the recording cannot be read, the folder was not made by
-            an export or has this drive already, the files cannot be written, or
-            labels are asked for and impossible.
+        InputError: if the recording cannot be read, the folder was not written
+            by an export or has this drive already, the files cannot be written,
+            or labels are requested but not possible.
     """
     layout = _LAYOUTS[format_name]
     if absent_in is not None and not layout.has_labels:
@@ -71,7 +73,7 @@ def export_drive(
     if absent_in is None:
         drive = McapDrive(recording, lidar)
     else:
-        # Drake takes a while to load, and only marks need it.
+        # Loading Drake takes a while, and only marks need it.
         from cns_drake.export.marked_drive import MarkedDrive
 
         drive = MarkedDrive(recording, lidar, absent_in)
@@ -112,7 +114,7 @@ def export_drive(
 
 
 def _notes(drive: McapDrive, layout: Layout) -> Iterator[str]:
-    """Yields notes on how a drive is read and written."""
+    """Yields notes about how a drive is read and written."""
     if layout.scan_files is None:
         return
     for note in drive.notes:
@@ -124,7 +126,7 @@ def _notes(drive: McapDrive, layout: Layout) -> Iterator[str]:
         yield note
     scan = drive.scan(0)
     if (
-        layout.has_labels  # KITTI's.
+        layout.has_labels  # Only KITTI's has them.
         and not drive.lidar_section
         and "intensity" in (scan.dtype.names or ())
         and scan["intensity"].max(initial=0.0) > 1.0
@@ -136,13 +138,13 @@ def _notes(drive: McapDrive, layout: Layout) -> Iterator[str]:
 
 
 def _claim(output: Path, format_name: str) -> None:
-    """Makes the folder of drives, or checks that it is one of ours."""
+    """Makes the folder of drives, or checks that an export has written it."""
     marker = output / _MARKER
     with files.user_errors(output):
         if marker.is_file():
             values = read_yaml(marker)
             found = values.get("format") if isinstance(values, dict) else None
-            # A list of YAML is no key.
+            # A YAML list cannot be a key.
             if not isinstance(found, str) or found not in _LAYOUTS:
                 raise InputError(
                     f"{marker}: not written by an export of cns-drake; give "
@@ -175,7 +177,7 @@ def _write_drive(
     on_frame: Callable[[int, int], None],
 ) -> None:
     with files.user_errors(folder):
-        # Left behind by an export that was killed.
+        # An interrupted export may have left it behind.
         shutil.rmtree(folder, ignore_errors=True)
         folder.mkdir(parents=True)
         for name, text in layout.inner_files(drive).items():

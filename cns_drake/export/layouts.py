@@ -1,6 +1,7 @@
-"""The layouts of existing data sets, and the common part of their exporters.
+"""The layouts of existing data sets, and what their exporters share.
 
-Frames: world W, vehicle B on the ground, LiDAR S, IMU I."""
+Frames: world W, vehicle B on the ground, LiDAR S, IMU I.
+"""
 
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
@@ -20,7 +21,7 @@ from cns_drake.base.points import encode_bin, encode_labels, encode_pcd
 from cns_drake.base.poses import FARTHEST
 from cns_drake.recording.rosbag2_metadata import to_yaml
 
-# Text that may become the name of a folder: it cannot lead out of it.
+# Text that may become the name of a folder; it cannot lead out of its parent.
 _NAME = re.compile(r"\w[\w.-]*")
 _ROUNDING = 1e-9
 _X_CS = np.array(
@@ -36,19 +37,20 @@ _PROJECTION = np.eye(4)
 
 @dataclass(frozen=True)
 class Layout:
-    """How one format lays out a drive.
+    """How one format arranges the files of a drive.
 
     Paths are relative to the folder of all drives.
 
     Attributes:
         drive_folder: drive -> folder of the drive.
-        inner_files: drive -> path -> text of the files in that folder, relative
-            to it, without the scans.
-        outer_files: drive -> path -> text of the files outside that folder.
-        scan_files: drive, frame number, stamp [ns] and scan -> its files: path
-            in the drive's folder -> content. None for layouts without scans.
+        inner_files: drive -> texts of the files inside that folder by their
+            paths in it, without the scans.
+        outer_files: drive -> texts of the files outside that folder by path.
+        scan_files: drive, frame number, stamp [ns] and scan -> contents of the
+            scan's files by their paths in the drive's folder. None for layouts
+            without scans.
         shared_outer_files: whether all drives share the outer files, which must
-            then agree.
+            then be the same.
         has_labels: whether points have labels.
     """
 
@@ -63,10 +65,10 @@ class Layout:
 
 
 def checked_name(drive: McapDrive, text: str) -> str:
-    """Returns a name from a recording, made safe for a path.
+    """Returns a name in a recording if it is safe as part of a path.
 
     Raises:
-        InputError: if the name could lead elsewhere.
+        InputError: if the name could lead to another folder.
     """
     if not _NAME.fullmatch(text):
         raise InputError(
@@ -76,7 +78,7 @@ def checked_name(drive: McapDrive, text: str) -> str:
 
 
 def scenario_files(drive: McapDrive, name: str | None = None) -> dict[str, str]:
-    """Returns `scenario.yaml` under a drive's name, if recorded."""
+    """Returns `scenario.yaml` with the drive's name, if it was recorded."""
     if drive.scenario is None:
         return {}
     scenario = {**drive.scenario, "name": name or drive.name}
@@ -89,7 +91,7 @@ def imu_files(drive: McapDrive) -> dict[str, str]:
 
 
 def structure_files(drive: McapDrive) -> dict[str, str]:
-    """Returns `structures.json`, the table of instances, if recorded."""
+    """Returns `structures.json`, the structure table, if it was recorded."""
     if drive.instances is None:
         return {}
     table = list(drive.instances.values())
@@ -97,9 +99,9 @@ def structure_files(drive: McapDrive) -> dict[str, str]:
 
 
 def unit_quaternions(drive: McapDrive) -> np.ndarray:
-    """Returns the orientations of the odometry, (M, 4) of unit length.
+    """Returns the orientations of the odometry as unit quaternions (M, 4).
 
-    Quaternions of a recording may have any length, but programs that read text
+    Quaternions in a recording may have any length, but programs that read text
     files need unit length.
 
     Raises:
@@ -111,7 +113,7 @@ def unit_quaternions(drive: McapDrive) -> np.ndarray:
         length = np.linalg.norm(quat_xyzw, axis=1, keepdims=True)
     position = drive.odometry["position"]
     bad = ~(np.isfinite(length[:, 0]) & (length[:, 0] > 0.0))
-    bad |= ~(np.abs(position) < FARTHEST).all(axis=1)  # NaN is not.
+    bad |= ~(np.abs(position) < FARTHEST).all(axis=1)  # NaN is False here.
     if bad.any():
         row = int(bad.argmax())
         raise InputError(
@@ -119,20 +121,20 @@ def unit_quaternions(drive: McapDrive) -> np.ndarray:
             f" {drive.odometry['stamp_ns'][row]} ns has the position"
             f" {position[row]} and the quaternion {quat_xyzw[row]}"
         )
-    # A length of one, up to rounding, stays as it is.
+    # A length that is one up to rounding is not changed.
     is_wrong = np.abs(length - 1.0) > _ROUNDING
     return np.where(is_wrong, quat_xyzw / length, quat_xyzw)
 
 
 def seconds(stamp_ns: int) -> str:
-    """Returns a stamp in seconds with all its nanoseconds."""
+    """Returns a stamp as text in seconds, with all its nanoseconds."""
     return f"{stamp_ns // 10**9}.{stamp_ns % 10**9:09d}"
 
 
 def stamped_rows(
     stamps: Iterable[object], columns: Sequence[np.ndarray], separator: str
 ) -> str:
-    """Returns N times and (N, K) numbers as text with all digits."""
+    """Returns N times and numbers (N, K) as rows of text, with all digits."""
     rows = zip(stamps, np.hstack(columns).tolist(), strict=True)
     return "".join(
         f"{separator.join([str(stamp), *map(repr, row)])}\n"
@@ -141,7 +143,7 @@ def stamped_rows(
 
 
 def _cns_folder(drive: McapDrive) -> PurePosixPath:
-    """Returns <Map>/<Sequence>, e.g. Metropolis/04 of metropolis_04."""
+    """Returns <Map>/<Sequence>, e.g. Metropolis/04 for metropolis_04."""
     scenario = drive.scenario or {}
     place = scenario.get("map") or scenario.get("world") or "world"
     name = Path(str(place)).stem
@@ -170,7 +172,7 @@ def _cns_inner_files(drive: McapDrive) -> dict[str, str]:
 
 
 def _mount(X_BC: np.ndarray) -> str:
-    """Returns the pose of a sensor C on the vehicle as YAML."""
+    """Returns X_BC, the pose of a sensor C on the vehicle B, as YAML."""
     quat_xyzw = Rotation.from_matrix(X_BC[:3, :3]).as_quat(canonical=True)
     p_BC, rotation = X_BC[:3, 3].tolist(), quat_xyzw.tolist()
     values = {"translation": p_BC, "rotation": rotation}
@@ -189,10 +191,10 @@ CNS = Layout(
 
 
 def _kitti_number(drive: McapDrive) -> str:
-    """Returns the drive's number: the digits its name ends with, or 00.
+    """Returns the number of a drive: the digits at the end of its name, or 00.
 
-    The second LiDAR of a recording adds 100, the third 200: tools for KITTI
-    want numbers.
+    The second LiDAR of a recording adds 100, and the third 200, since tools for
+    KITTI expect numbers.
     """
     digits = re.findall(r"\d*$", drive.name)[0]
     lidar = drive.lidar_names.index(drive.lidar_name)
@@ -201,13 +203,14 @@ def _kitti_number(drive: McapDrive) -> str:
 
 def _kitti_inner_files(drive: McapDrive) -> dict[str, str]:
     elapsed_ns = drive.stamps_ns - drive.stamps_ns[0]
-    # Later LiDARs add their own name.
+    # LiDARs after the first one add their own name.
     is_first = drive.lidar_name == drive.lidar_names[0]
     name = drive.name if is_first else f"{drive.name}_{drive.lidar_name}"
     calibration = {f"P{camera}": _PROJECTION for camera in range(4)}
     calibration["Tr"] = _X_CS
     return {
-        # Readers of KITTI look in `poses`, those of SemanticKITTI here.
+        # Readers of KITTI look for it in `poses`, and those of SemanticKITTI
+        # here.
         "poses.txt": _kitti_poses(drive),
         "times.txt": "".join(f"{seconds(ns)}\n" for ns in elapsed_ns.tolist()),
         "calib.txt": "".join(
@@ -221,11 +224,11 @@ def _kitti_inner_files(drive: McapDrive) -> dict[str, str]:
 
 
 def _in_kittis_scale(drive: McapDrive, scan: np.ndarray) -> np.ndarray:
-    """Returns a scan whose calibrated intensities have KITTI's scale.
+    """Returns a scan with its intensities in KITTI's scale, if known.
 
-    That is a byte / 256 in hundredths, at most 0.99, as the scans of KITTI
-    odometry 00 show. Ideal intensities, from 0 to 1, stay as they are, and so
-    do those of other recorders, whose unit is not known.
+    Calibrated intensities become a byte / 256 in hundredths, at most 0.99, as
+    in the scans of KITTI odometry 00. Ideal intensities, from 0 to 1, stay as
+    they are, and so do those of other recorders, whose unit is not known.
     """
     if drive.lidar_section.get("returns") != "calibrated":
         return scan
@@ -249,21 +252,21 @@ def _kitti_scan_files(
 
 
 def _kitti_poses(drive: McapDrive) -> str:
-    """Returns X_C0C of each scan as a row of text."""
+    """Returns the poses X_C0C of all scans, one row of text each."""
     X_S0S = poses.inverse(drive.X_WS[0]) @ drive.X_WS
     return _kitti_rows(_X_CS @ X_S0S @ poses.inverse(_X_CS))
 
 
 def _kitti_rows(X: np.ndarray) -> str:
-    """Returns the upper 3 x 4 of each pose (N, 4, 4) as a row of text."""
+    """Returns the upper 3 x 4 of poses (N, 4, 4), one row of text each."""
     rows = X[:, :3].reshape(-1, 12).tolist()
     return "".join(f"{' '.join(map(repr, row))}\n" for row in rows)
 
 
 def kitti_layout(number: str | None = None) -> Layout:
-    """Returns KITTI's file layout for a drive.
+    """Returns KITTI's layout for a drive.
 
-    The number of the sequence is the drive's own unless it is given.
+    The sequence has the given number, or by default the drive's own.
     """
 
     def of(drive: McapDrive) -> str:
@@ -308,7 +311,7 @@ TUM = Layout(
 
 
 def _mulran_inner_files(drive: McapDrive) -> dict[str, str]:
-    # The vehicle stands where MulRan's mount has it below this LiDAR.
+    # The vehicle is where MulRan's mount of the LiDAR has it below this LiDAR.
     X_UB = drive.X_WS @ poses.inverse(mulran_frames.X_BS)
     X_UB[:, :3, 3] += mulran_frames.ORIGIN
     rows = X_UB[:, :3].reshape(-1, 12)

@@ -1,4 +1,4 @@
-"""A recording with marks on points that another stage lacks."""
+"""Reads a recording, and marks points on what another stage lacks."""
 
 from collections import defaultdict
 from collections.abc import Mapping
@@ -20,10 +20,11 @@ from cns_drake.scene.world import load_world, structures_in
 class MarkedDrive(McapDrive):
     """A recording compared with another stage of its map.
 
-    A structure is absent there if no visual of that stage is part of it; a
-    lower building is present. Points on absent structures get SemanticKITTI's
-    labels of moving objects; all other labels are as recorded. In the table of
-    structures, absent ones get `"absent_in": <stage>`.
+    A structure is absent in that stage if none of the stage's visuals is part
+    of it; a lower building is not absent. Points on absent structures get
+    SemanticKITTI's labels of moving objects, and all other labels are as
+    recorded. In the structure table, absent structures get `"absent_in":
+    <stage>`.
     """
 
     def __init__(self, path: Path, lidar: str | None, stage: str):
@@ -31,8 +32,8 @@ class MarkedDrive(McapDrive):
 
         Raises:
             InputError: if the recording cannot be read, was not taken in a
-                map's stage or has no structures, the map is missing, has other
-                structures by now, or lacks that stage.
+                stage of a map, or has no structures; if the map is missing, has
+                other structures by now, or has no such stage.
         """
         super().__init__(path, lidar)
         self._stage = stage
@@ -65,7 +66,7 @@ class MarkedDrive(McapDrive):
         }
 
     def scan(self, index: int) -> np.ndarray:
-        """Reads scan i; its labels are uint16."""
+        """Returns the scan with this index; its labels are uint16."""
         recorded = super().scan(index)
         names = recorded.dtype.names or ()
         if not {"label", "instance"} <= set(names):
@@ -96,7 +97,8 @@ class MarkedDrive(McapDrive):
             raise InputError(f"{self._path}: not recorded in a stage of a map")
         if place in shipped_maps():
             return MapFolder(shipped_maps()[place])
-        # The recording has the map's name; the file beside it has its folder.
+        # The recording has the name of the map, and the file beside it the
+        # map's folder.
         beside = read_scenario(self._path.parent) or {}
         folder = self._path.parent / str(beside.get("map", place))
         if not folder.is_dir():
@@ -106,7 +108,7 @@ class MarkedDrive(McapDrive):
     def _check_structures(
         self, table: Path, recorded: Mapping[int, Mapping]
     ) -> None:
-        """Checks that the names still belong to the recorded structures."""
+        """Checks that names still belong to the recorded structures."""
         for listed in load_structure_table(table):
             entry = recorded.get(listed.instance, {})
             if (entry.get("name"), entry.get("class")) != (

@@ -1,1 +1,1 @@
-"""Imports: real cities and road networks become maps with drives."""
+"""Imports: makes maps with drives from real cities and road networks."""

@@ -1,7 +1,8 @@
-"""Years of construction of a city's objects.
+"""Years in which a city's objects were built and demolished.
 
-Dates as OpenStreetMap has them:
-https://wiki.openstreetmap.org/wiki/Key:start_date"""
+Dates have the formats of OpenStreetMap:
+https://wiki.openstreetmap.org/wiki/Key:start_date
+"""
 
 from collections.abc import Mapping
 import datetime
@@ -11,7 +12,8 @@ from typing import Any
 
 from cns_drake.imports.options import ImportFaults
 
-# Position in a period of "early", "mid", "late" and of no such word.
+# Position within a period that "early", "mid", "late" or none of these words
+# means.
 _PARTS = {"early": 0.2, "mid": 0.5, "late": 0.8, "": 0.5}
 _ABOUT = re.compile(r"^(?:~|ca\.?|circa|about|before|after|by|j:)\s*")
 _PERIOD = re.compile(
@@ -19,10 +21,10 @@ _PERIOD = re.compile(
 )
 _DAY = re.compile(r"jd:(\d{7})(?:\.\d+)?", re.ASCII)
 _YEAR = re.compile(r"(?<!\d)(\d{3,4})(?!\d)", re.ASCII)
-# The Julian day of the day before 1 January of the year 1.
+# The Julian day number of the day before 1 January of the year 1.
 _DAY_ZERO = 1721425
-# The usual attributes, small letters, most reliable first: 3DBAG, CityGML, 3D
-# BAG's forerunners, OpenStreetMap.
+# The usual attributes in lower case, the most reliable first: those of 3DBAG,
+# CityGML, predecessors of 3DBAG, and OpenStreetMap.
 _USUAL = (
     "oorspronkelijkbouwjaar",
     "yearofconstruction",
@@ -36,18 +38,18 @@ _USUAL = (
     "baujahr",
     "start_date",
 )
-# Placeholders for an unknown year; the second one in Dutch registers only.
+# Placeholders for an unknown year; the second one only in Dutch registers.
 _PLACEHOLDER = 9999
 _DUTCH_PLACEHOLDER = 1005
 _DUTCH = ("oorspronkelijkbouwjaar", "bouwjaar")
 
 
 def year_of_date(text: str) -> int | None:
-    """Returns the year of a date in text, None if it has none.
+    """Returns the year that a text means; None if it means none.
 
     For a period, the result is the year in its middle, or an earlier or later
-    year if the text says "early" or "late". For a range (`1914..1918`) it is
-    the last year. For `before 1910` and `~1855` it is the year they name.
+    year if the text says "early" or "late". For a range (`1914..1918`), it is
+    the last year. For `before 1910` and `~1855`, it is the year in the text.
     """
     text = text.strip().lower()[:255].split("..")[-1].strip()
     day = _DAY.fullmatch(text)
@@ -74,11 +76,14 @@ def construction_year(
     name: str = "",
     faults: ImportFaults | None = None,
 ) -> int | None:
-    """Returns the year in which an object was built, if known.
+    """Returns the year in which an object was built; None if unknown.
 
-    The year is read from the attribute; if that is None, from the usual
-    attributes. Values that are not years, and years in the future, are counted
-    as faults of the object with this name.
+    Args:
+        attributes: attributes of the object, as in its file.
+        attribute: the attribute that has the year; if None, the usual
+            attributes are tried.
+        name: name of the object, for the faults.
+        faults: counts values that are not years, and years in the future.
     """
     faults = faults or ImportFaults()
     if attribute is not None:
@@ -109,5 +114,8 @@ def _year(value: object) -> int | None:
 
 
 def stands_today(until: int | None) -> bool:
-    """Returns whether an object still stands, by its year of demolition."""
+    """Returns whether an object demolished in the year `until` still stands.
+
+    It does if the year is None or in the future.
+    """
     return until is None or until > datetime.date.today().year

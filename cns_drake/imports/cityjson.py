@@ -1,9 +1,9 @@
-"""CityJSON 1.0 to 2.0 and CityJSONSeq: a file's objects as structures.
+"""Reads CityJSON 1.0 to 2.0 and CityJSONSeq files as structures.
 
 https://www.cityjson.org/specs/2.0.1/. A file of type CityJSON holds all
-objects; in a sequence (.jsonl) a first line of that type is followed by a
-feature a line, each with vertices of its own. The definition of the file's
-reference system, from pyproj, gives the order, direction and units of its axes.
+objects. In a sequence (.jsonl), a first line of that type is followed by one
+feature per line, each with vertices of its own. The order, direction and units
+of the axes are those of the file's reference system, as pyproj defines it.
 """
 
 from __future__ import annotations
@@ -31,7 +31,7 @@ from cns_drake.imports.faces import face_triangles, joined
 from cns_drake.imports.foreign_city import ForeignCity, Imported, Rgb
 from cns_drake.imports.options import ImportFaults
 
-# Direction of an axis -> row of east, north, up, and its sign.
+# Direction of an axis -> its row among east, north and up, and its sign.
 _ROWS = {
     "east": (0, 1.0),
     "west": (0, -1.0),
@@ -40,18 +40,19 @@ _ROWS = {
     "up": (2, 1.0),
     "down": (2, -1.0),
 }
-# A city is within its system's area of use, or at most this far outside [deg].
+# A city may be at most this far outside its system's area of use [deg].
 _NEAR_AREA_DEG = 0.5
 _PLAIN = ("east [metre]", "north [metre]", "up [metre]")
 
 
 @dataclass(frozen=True, eq=False)
 class ReferenceSystem:
-    """The meaning of a file's three coordinates, each in words.
+    """The meaning of a file's three coordinates.
 
-    A matrix (3, 3) leads from coordinates to metres east, north and up. The
-    name is as the file has it; "" if it has none. Heights are assumed to have
-    the unit of the other coordinates if the system has none.
+    `axes` describes each coordinate in words. The matrix (3, 3) converts
+    coordinates to metres east, north and up. The name is that in the file; ""
+    if it has none. If the system defines no heights, they are assumed to have
+    the unit of the other coordinates.
     """
 
     name: str = ""
@@ -61,7 +62,7 @@ class ReferenceSystem:
 
     @property
     def is_plain(self) -> bool:
-        """Whether the coordinates already are metres east, north and up."""
+        """Whether the coordinates are metres east, north and up already."""
         return self.axes == _PLAIN
 
     @property
@@ -70,7 +71,7 @@ class ReferenceSystem:
         return self.axes[0].startswith(("north", "south"))
 
     def to_metres(self, points: np.ndarray) -> np.ndarray:
-        """Returns coordinates (N, 3) as metres east, north and up (N, 3)."""
+        """Returns coordinates (N, 3) converted to metres east, north and up."""
         if self.is_plain:
             return points
         return points @ self.matrix.T
@@ -78,15 +79,17 @@ class ReferenceSystem:
     def exchanged(self) -> ReferenceSystem:
         """Returns the system with its first two coordinates exchanged.
 
-        Many programs write east first, or north first, against the definition.
+        Many programs write the coordinate east first although the definition of
+        the system says north first, or the other way round.
         """
         axes = (self.axes[1], self.axes[0], self.axes[2])
         return replace(self, axes=axes, matrix=self.matrix[:, [1, 0, 2]])
 
     def has_place(self, first: float, second: float) -> bool:
-        """Returns whether coordinates are in the system's area of use.
+        """Returns whether a place is in or near the system's area of use.
 
-        A system that names no area has none.
+        `first` and `second` are its first two coordinates. The result is False
+        for a system without an area of use.
         """
         system = pyproj.CRS.from_user_input(self.name)
         if system.area_of_use is None:
@@ -104,11 +107,12 @@ class ReferenceSystem:
 def reference_system(name: str, where: str) -> ReferenceSystem:
     """Returns the axes and units of a reference system.
 
-    Its name is an EPSG code, or a URL or URN of one, as the file has it.
+    The name is an EPSG code, or a URL or URN of one, as in the file. `where`
+    names the place in the file.
 
     Raises:
-        InputError: naming place and system, if it is unknown, is in degrees, or
-            has axes that are not east, north and up.
+        InputError: naming the place and the system, if the system is unknown,
+            is in degrees, or has axes that are not east, north and up.
     """
     if not name:
         return ReferenceSystem()
@@ -126,7 +130,7 @@ def reference_system(name: str, where: str) -> ReferenceSystem:
             f"{where}: {name} is in degrees; project it to metres first (for"
             " example with cjio's crs_reproject)"
         )
-    # Direction, unit and metres of it for each axis.
+    # Direction, unit, and length of the unit in metres, for each axis.
     meanings = [
         (axis.direction, axis.unit_name, axis.unit_conversion_factor)
         for axis in axes
@@ -148,21 +152,23 @@ def reference_system(name: str, where: str) -> ReferenceSystem:
     return ReferenceSystem(name, words, matrix, heights_assumed)
 
 
-# What objects have that is read, or that places nothing.
+# Members of objects that are read, or that do not place anything.
 _MEMBERS = {
     "type", "geometry", "attributes", "parents", "children", "children_roles",
     "geographicalExtent", "address", "bbox", "extent", "members",
 }  # fmt: skip
-# A city is mirrored if no more of its solids than this look outwards; of so
-# many, if they enclose enough [m^3, m^2].
+# A city is mirrored if at most this share of its solids look outwards. At most
+# so many solids are looked at, and only those that enclose at least this much
+# [m^3, m^2].
 _MIRRORED, _MOST_VOTES, _LEAST_VOTE = 0.1, 1000, 1e-3
 _BEYOND = "coordinates beyond the area of their reference system"
-# A geometry of a lower level is left out if so much of it has a higher one.
+# A geometry of a lower level of detail is left out if a higher one covers more
+# than this share of it.
 _COVERED = 0.5
 # A face: the corners (N, 3) of its outer ring, then those of its holes.
 Face = list[np.ndarray]
 
-# No place on Earth is farther from the origin of a survey grid [m].
+# No place on Earth is farther than this from the origin of a survey grid [m].
 _FARTHEST = 1e8
 _NESTING = {
     "MultiSurface": 0,
@@ -171,7 +177,8 @@ _NESTING = {
     "MultiSolid": 2,
     "CompositeSolid": 2,
 }
-# Beginning of a type -> class, and a colour if the class's would mislead.
+# Beginning of a type -> its class, and a colour if that of the class would
+# mislead.
 _CLASSES: dict[str, tuple[str, Rgb | None]] = {
     "Building": ("building", None),
     "Bridge": ("other-structure", None),
@@ -195,10 +202,10 @@ _LONGEST_NAME = 80
 
 
 class CityGeometry(NamedTuple):
-    """One geometry of an object; the level of detail is 0 if unknown.
+    """One geometry of an object; its level of detail is 0 if unknown.
 
-    Each face has a type, such as RoofSurface; "" if unknown. The faces of a
-    solid close it.
+    `kinds` has the type of each face, such as RoofSurface; "" if unknown. If
+    the geometry is a solid, its faces enclose it.
     """
 
     lod: float
@@ -208,9 +215,10 @@ class CityGeometry(NamedTuple):
 
 
 class CityObject(NamedTuple):
-    """An object of a city: its id, type, ids of parents, readable geometries.
+    """An object of a city: id, type, attributes, parents' ids, geometries.
 
-    The attributes are as the file has them.
+    The attributes are as in the file. Geometries that cannot be read are left
+    out.
     """
 
     name: str
@@ -222,10 +230,15 @@ class CityObject(NamedTuple):
 
 @dataclass
 class CityFile:
-    """The objects of a file by id, its system, and counts of faulty parts.
+    """The content of a CityJSON file.
 
-    The order of the first two coordinates is uncertain if both orders lead into
-    the system's area.
+    Attributes:
+        objects: id -> object.
+        system: reference system of the coordinates.
+        faults: counts of faulty parts.
+        order_is_open: whether the order of the first two coordinates is
+            uncertain, because both orders lead to places in the system's area
+            of use.
     """
 
     objects: dict[str, CityObject] = field(default_factory=dict)
@@ -251,11 +264,11 @@ class CityFile:
 
 
 def read_cityjson(path: Path) -> CityFile:
-    """Returns the objects of a CityJSON file.
+    """Returns the content of a CityJSON file.
 
     Raises:
-        InputError: if it cannot be read, is no CityJSON, or its coordinates
-            cannot be brought to metres.
+        InputError: if it cannot be read, is not CityJSON, or its coordinates
+            cannot be converted to metres.
     """
     city = CityFile()
     whole: dict = {}
@@ -297,7 +310,7 @@ def read_cityjson(path: Path) -> CityFile:
 
 
 def _documents(path: Path) -> Iterator[tuple[int, dict]]:
-    """Yields line number (0: the whole file) and JSON object."""
+    """Yields each JSON object with its line number, 0 for a whole file."""
     check_regular(path)
     try:
         if path.suffix == ".jsonl":
@@ -384,11 +397,12 @@ def _read_objects(
 
 
 def _settle_axes(city: CityFile, vertices: np.ndarray) -> None:
-    """Settles the order of coordinates, and counts assumptions.
+    """Decides on the order of the first two coordinates, if it can.
 
-    Many programs write east first against a definition with north first. That
-    is assumed if only so a vertex of the middle is in the area of use.
-    Elsewhere the faces will tell, if the other order leads into the area, too.
+    Many programs write east first although the definition says north first.
+    East first is assumed if only then a vertex in the middle of the file is in
+    the area of use. If both orders lead there, the order stays open, and
+    `_check_order` decides by the faces. Assumptions are counted as faults.
     """
     defined = city.system
     if not defined.name:
@@ -413,7 +427,7 @@ def _settle_axes(city: CityFile, vertices: np.ndarray) -> None:
 
 
 def _exchange_axes(city: CityFile) -> None:
-    """Exchanges the first two coordinates, also of faces that are there."""
+    """Exchanges the first two coordinates of the system and of all faces."""
     defined = city.system
     city.system = defined.exchanged()
     turn = city.system.matrix @ np.linalg.inv(defined.matrix)
@@ -428,10 +442,10 @@ def _exchange_axes(city: CityFile) -> None:
 
 
 def _check_order(city: CityFile) -> None:
-    """Exchanges coordinates that would mirror the city, where both may be.
+    """Exchanges the first two coordinates if the city would be mirrored.
 
-    Faces are counter-clockwise seen from outside: those of a mirrored city are
-    inside out.
+    It does so only where both orders are possible. Faces are counter-clockwise,
+    seen from outside; in a mirrored city they are inside out.
     """
     if city.system.name and not city.order_is_open:
         return
@@ -453,7 +467,11 @@ def _check_order(city: CityFile) -> None:
 
 
 def _outward(city: CityFile) -> Iterator[bool]:
-    """Yields whether solids, roofs, floors and terrains look outwards."""
+    """Yields whether the faces of each geometry look outwards.
+
+    Solids tell this by their volume. Roofs, floors and terrains tell it by the
+    direction in which they look.
+    """
     for one in city.objects.values():
         above = {"RoofSurface": 1.0, "GroundSurface": -1.0}
         if one.kind == "TINRelief":
@@ -476,7 +494,7 @@ def _outward(city: CityFile) -> Iterator[bool]:
 
 
 def _vertices(document: dict, transform: object, where: str) -> np.ndarray:
-    """Returns the vertices (N, 3) in coordinates of the file."""
+    """Returns the vertices (N, 3) in the coordinates of the file."""
     points = _numbers(document.get("vertices", []), f"{where}: vertices")
     if transform is not None and not isinstance(transform, dict):
         raise InputError(f"{where}: transform: not an object")
@@ -499,7 +517,7 @@ def _vertices(document: dict, transform: object, where: str) -> np.ndarray:
 
 
 def _numbers(values: Any, where: str) -> np.ndarray:
-    """Returns (N, 3) float64."""
+    """Returns values of a file as an array (N, 3) of float64."""
     try:
         with np.errstate(over="ignore"):
             points = np.array(values, dtype=np.float64).reshape(-1, 3)
@@ -513,7 +531,7 @@ def _numbers(values: Any, where: str) -> np.ndarray:
 
 
 class _Templates:
-    """Geometry templates, which objects place in the world."""
+    """Geometry templates of a file, which objects place in the world."""
 
     def __init__(
         self,
@@ -533,7 +551,7 @@ class _Templates:
         self._system = system
 
     def place(self, instance: dict) -> tuple[Any, np.ndarray]:
-        """Returns a template and its vertices in the world.
+        """Returns a template, and its vertices (N, 3) in the world.
 
         Raises:
             LookupError, TypeError, ValueError: if the instance is faulty.
@@ -593,7 +611,7 @@ def _lod(value: object) -> float:
 
 
 def _face(boundary: Any, vertices: np.ndarray) -> Face | None:
-    """Returns a face; None if an index is none of the vertices."""
+    """Returns a face; None if an index is not that of a vertex."""
     face = []
     try:
         for ring in boundary:
@@ -611,7 +629,7 @@ def _face(boundary: Any, vertices: np.ndarray) -> Face | None:
 
 
 def _surface_kinds(semantics: Any, nesting: int, number: int) -> Sequence[str]:
-    """Returns the type of each face; "" if unknown."""
+    """Returns the type of each of a number of faces; "" if unknown."""
     unknown = [""] * number
     if not isinstance(semantics, dict):
         return unknown
@@ -635,10 +653,10 @@ def _surface_kinds(semantics: Any, nesting: int, number: int) -> Sequence[str]:
 def import_cityjson(
     path: Path, lod: float | None, year_attribute: str | None
 ) -> ForeignCity:
-    """Reads a CityJSON file; its origin is the middle of its city.
+    """Returns the city in a CityJSON file; its origin is in its middle.
 
     Raises:
-        InputError: if it cannot be used.
+        InputError: if the file cannot be used.
     """
     city = read_cityjson(path)
     low, high = city.bounds()
@@ -660,9 +678,9 @@ def import_structures(
 ) -> list[Imported]:
     """Returns a structure for each object that has a surface.
 
-    A building with its parts is one structure. The world has its origin at (3,)
-    in the file's coordinates [m]. If the level of detail is None, each object
-    has its highest one.
+    A building with its parts is one structure. The origin (3,) of the world is
+    given in the file's coordinates [m]. If the level of detail `lod` is None,
+    each object has its highest one.
     """
     groups = _families(city)
     names = _unique_names(groups)
@@ -704,7 +722,7 @@ def import_structures(
 
 
 def _families(city: CityFile) -> dict[str, list[CityObject]]:
-    """Returns id of each topmost object -> the object and its parts."""
+    """Returns id of each object without parents -> the object and its parts."""
     groups: dict[str, list[CityObject]] = {}
     for name, one in city.objects.items():
         root, seen = name, {name}
@@ -713,7 +731,7 @@ def _families(city: CityFile) -> dict[str, list[CityObject]]:
                 p
                 for p in city.objects[root].parents
                 if p in city.objects
-                # A group is not one structure: it may hold half a city.
+                # A group is not one structure: it may contain half a city.
                 and city.objects[p].kind != "CityObjectGroup"
             ]
             if not parents or parents[0] in seen:
@@ -725,7 +743,7 @@ def _families(city: CityFile) -> dict[str, list[CityObject]]:
 
 
 def _unique_names(ids: Iterable[str]) -> dict[str, str]:
-    """Returns id -> name of letters, digits, dots and dashes."""
+    """Returns id -> unique name of letters, digits, dots and dashes."""
     plain = {
         one: re.sub(r"[^\w.-]+", "_", one, flags=re.ASCII)[:_LONGEST_NAME]
         or "object"
@@ -747,9 +765,9 @@ def _unique_names(ids: Iterable[str]) -> dict[str, str]:
 def _geometries(
     members: list[CityObject], lod: float | None, faults: ImportFaults
 ) -> list[CityGeometry]:
-    """Returns the geometry to use of an object and its parts.
+    """Returns the geometries of an object and its parts that are used.
 
-    What a part has in more detail is not used again from its whole, or the
+    What a part shows in more detail is not used again from its whole, or the
     other way round.
     """
     chosen: list[tuple[CityObject, CityGeometry]] = []
@@ -763,7 +781,8 @@ def _geometries(
     kept = []
     for one, geometry in chosen:
         is_whole = not one.parents
-        # Levels of the same number, such as 2 and 2.2, may go together.
+        # Levels with the same integer part, such as 2 and 2.2, may be used
+        # together.
         better = [
             other
             for owner, other in chosen
@@ -780,12 +799,12 @@ def _geometries(
 
 
 def _is_house(one: CityObject) -> bool:
-    """Returns whether it is a whole or a part, not a balcony or a room."""
+    """Returns whether an object is a building or its part, not a balcony."""
     return not one.parents or one.kind.endswith("Part")
 
 
 def _is_covered(one: CityGeometry, others: Sequence[CityGeometry]) -> bool:
-    """Returns whether others stand where a geometry stands, seen from above."""
+    """Returns whether other geometries cover one, seen from above."""
     own = _footprint([one])
     shared = own.intersection(_footprint(others)).area
     return bool(shared > _COVERED * own.area)
@@ -807,7 +826,10 @@ def _surfaces(
     faults: ImportFaults,
     origin: np.ndarray,
 ) -> dict[str, np.ndarray]:
-    """Returns `body` and `roof`, if any -> triangles (M, 3, 3) in the world."""
+    """Returns `body` and `roof` -> triangles (M, 3, 3) in the world [m].
+
+    Surfaces without triangles are left out.
+    """
     found: dict[str, list[np.ndarray]] = {}
     for geometry in geometries:
         faces = [

@@ -1,6 +1,7 @@
-"""Polygons as triangles: faces in space, level areas and solids.
+"""Converts polygons to triangles: faces in space, level areas and solids.
 
-Solids may have the roofs that OpenStreetMap describes."""
+Solids may have the roofs that OpenStreetMap describes.
+"""
 
 from collections.abc import Iterable, Iterator, Sequence
 
@@ -14,41 +15,42 @@ from shapely.validation import make_valid
 from cns_drake.city.geometry import long_normals, quartered, triangulate
 from cns_drake.imports.options import ImportFaults
 
-# Faces of less area are dropped [m^2].
+# Faces with less area are dropped [m^2].
 _LEAST_AREA = 1e-5
 # A face is bent if a corner is farther than this from its plane [m].
 _BENT = 0.05
 # Corners closer than this are the same [m].
 _MM = 1000.0
 _LEAST_PART = 0.01  # [m^2]
-# The angles of a face of four corners; the second and last one fill it.
+# The four corner triangles of a face with four corners. The second and the last
+# one together fill the face.
 _CORNERS_OF_FOUR = np.array([(3, 0, 1), (0, 1, 2), (1, 2, 3), (0, 2, 3)])
 
 
 def joined(some: Iterable[np.ndarray]) -> np.ndarray:
-    """Returns the triangles (M, 3, 3) of several arrays as one array."""
+    """Returns several arrays of triangles (M, 3, 3) as one array."""
     return np.concatenate([np.zeros((0, 3, 3)), *some])
 
 
 def face_triangles(
     rings: Sequence[np.ndarray], name: str, faults: ImportFaults
 ) -> np.ndarray:
-    """Returns a face as (M, 3, 3) triangles [m].
+    """Returns the triangles (M, 3, 3) of a face [m].
 
-    Triangles have the orientation of the outer ring. Rings (N, 3) are the outer
-    one, then holes [m], without repeated corners. Faces that are repaired or
-    left out are counted.
+    They have the orientation of the outer ring. `rings` has the outer ring (N,
+    3) and then the holes [m]; the first corner of a ring is not repeated at its
+    end. Faces that are repaired or left out are counted as faults.
     """
     rings = [_cleaned(ring, name, faults) for ring in rings]
     if len(rings[0]) < 3:
         faults.add("face without area, left out", name)
         return np.zeros((0, 3, 3))
-    # As long as twice the area.
+    # The vector is as long as twice the area.
     first, rest = rings[0][:1], rings[0][1:]
     fan = [np.repeat(first, len(rest) - 1, axis=0), rest[:-1], rest[1:]]
     normal = long_normals(np.stack(fan, axis=1)).sum(axis=0)
     if 0.5 * np.linalg.norm(normal) < _LEAST_AREA:
-        # Both halves of a ring that crosses itself may be equally large.
+        # The two halves of a ring that crosses itself may have the same area.
         _, spread, axes = np.linalg.svd(rings[0] - rings[0].mean(axis=0))
         normal = axes[2] if spread[1] ** 2 >= _LEAST_AREA else np.zeros(3)
     if not normal.any():
@@ -87,7 +89,7 @@ def _filled(
     name: str,
     faults: ImportFaults,
 ) -> np.ndarray:
-    """Returns the triangles of a face, cut as it is seen along an axis."""
+    """Returns the triangles of a face, triangulated as seen along an axis."""
     axis = int(np.abs(normal).argmax())
     axes = [(axis + 1) % 3, (axis + 2) % 3]
     if normal[axis] < 0.0:
@@ -117,7 +119,7 @@ def _filled(
     for row, key, point in zip(
         lifted, np.rint(xy * _MM).tolist(), xy, strict=True
     ):
-        # Corners keep their exact places.
+        # Corners keep their exact coordinates.
         corner = corners.get(tuple(key))
         if corner is not None:
             row[:] = corner
@@ -131,7 +133,7 @@ def _filled(
 def flat_surface(
     polygon: Polygon, z: float, name: str, faults: ImportFaults
 ) -> np.ndarray:
-    """Returns a level area as (M, 3, 3) triangles that look upwards [m]."""
+    """Returns a level area as triangles (M, 3, 3) that look upwards [m]."""
     return face_triangles(_rings(polygon, z), name, faults)
 
 
@@ -144,23 +146,23 @@ def extruded(
     roof: str = "flat",
     roof_height: float = 0.0,
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Returns walls and roof of a footprint, (M, 3, 3) each [m].
+    """Returns the walls and the roof above a footprint, (M, 3, 3) each [m].
 
-    A roof that its footprint does not allow is made flat, and counted as a
-    fault.
+    A roof that the footprint does not allow is replaced by a flat one, and
+    counted as a fault.
 
     Args:
         polygon: the footprint.
         low, high: heights of the lowest and the highest point [m].
         name: name of the object, for faults.
-        faults: counts what was made otherwise.
-        roof: `flat`; `pyramidal`, on any footprint; `gabled` or `hipped`, on
-            one of four corners.
+        faults: counts what could not be made as described.
+        roof: `flat`; `pyramidal`, on any footprint; `gabled` or `hipped`, on a
+            footprint with four corners.
         roof_height: height of the roof above the eaves [m].
     """
     polygon = orient(polygon)
     eaves = high - roof_height
-    # A solid above the ground is seen from below.
+    # A solid that begins above the ground can be seen from below.
     floor = np.zeros((0, 3, 3))
     if low > 0.0:
         floor = flat_surface(polygon, low, name, faults)[:, ::-1]
@@ -201,7 +203,7 @@ def _walls(polygon: Polygon, low: float, high: float) -> np.ndarray:
 def _ridge(
     roof: str, polygon: Polygon, corners: np.ndarray, high: float
 ) -> tuple[list[np.ndarray], list[np.ndarray]] | None:
-    """Returns slopes and gables; None for a roof that cannot be made."""
+    """Returns the slopes and gables of a roof; None if it cannot be made."""
     if roof == "pyramidal" and not polygon.interiors:
         top = np.array([polygon.centroid.x, polygon.centroid.y, high])
         following = np.roll(corners, -1, axis=0)
@@ -212,7 +214,7 @@ def _ridge(
     if polygon.interiors:
         return None
     sides = np.linalg.norm(np.roll(corners, -1, axis=0) - corners, axis=1)
-    # The ridge runs along the longer sides, those from corner 0 and 2.
+    # The ridge runs along the two longer sides: from corners 0 and 2.
     if sides[1] + sides[3] > sides[0] + sides[2]:
         corners = np.roll(corners, -1, axis=0)
     a, b, c, d = corners
@@ -232,7 +234,7 @@ def _ridge(
 
 
 def parts_of(geometry: BaseGeometry) -> Iterator[Polygon]:
-    """Yields the polygons of a geometry that has any."""
+    """Yields the polygons of a geometry."""
     if isinstance(geometry, Polygon):
         if geometry.area > _LEAST_PART:
             yield geometry
@@ -244,7 +246,7 @@ def parts_of(geometry: BaseGeometry) -> Iterator[Polygon]:
 def sound_parts(
     polygon: Polygon, name: str, faults: ImportFaults
 ) -> list[Polygon]:
-    """Returns a polygon's valid parts, in whole millimetres."""
+    """Returns the valid parts of a polygon, in whole millimetres."""
     geometry: BaseGeometry = polygon
     if not polygon.is_valid:
         faults.add("outline that crosses itself, repaired", name)
@@ -252,9 +254,9 @@ def sound_parts(
     return list(parts_of(shapely.set_precision(geometry, 0.001)))
 
 
-# Longer triangles are divided, so that their far parts can be left out.
+# Longer triangles are divided, so that parts far away can be left out.
 _LONGEST = 256  # In spacings.
-# Triangles at a time.
+# Number of triangles that are processed at a time.
 _AT_ONCE = 64
 
 
@@ -265,8 +267,8 @@ def surface_samples(
 ) -> Iterator[np.ndarray]:
     """Yields points (N, 3) on triangles (M, 3, 3), edges included [m].
 
-    No place on a triangle is farther from all of them than the spacing. Points
-    outside of a window, least and greatest x and y (2,), are left out.
+    Every place on a triangle is within `spacing` of a point. Points outside of
+    a window (least and greatest x and y, (2,) each) are left out.
     """
     while len(triangles):
         if window is not None:
@@ -288,9 +290,10 @@ def surface_samples(
 
 
 def _samples(triangles: np.ndarray, spacing: float) -> np.ndarray:
-    """Returns points (N, 3) on triangles (M, 3, 3), one after the other [m].
+    """Returns points (N, 3) on triangles (M, 3, 3), triangle by triangle [m].
 
-    Lines of points run across the two longer sides, along the shortest one.
+    The points are in lines between the two longer sides, parallel to the
+    shortest one.
     """
     sides = np.roll(triangles, 1, axis=1) - np.roll(triangles, -1, axis=1)
     lengths = np.sqrt((sides * sides).sum(axis=2))
@@ -309,9 +312,10 @@ def _samples(triangles: np.ndarray, spacing: float) -> np.ndarray:
 
 
 def _parts(counts: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Returns the ends of equal parts, as many as counted (N,) of each thing.
+    """Returns the ends of equal parts into which things are divided.
 
-    They are (M,) number of the thing, and (M,) share from 0 to 1.
+    Thing k has counts[k] parts. The ends are two arrays: the number of the
+    thing (M,), and the position of the end on it, from 0 to 1 (M,).
     """
     owner = np.repeat(np.arange(len(counts)), counts + 1)
     first = np.cumsum(counts + 1) - counts - 1

@@ -20,7 +20,7 @@ from cns_drake.city.geometry import (
 from cns_drake.imports.options import ImportFaults
 
 Rgb = tuple[float, float, float]
-# Sharpest turn from one street into another.
+# Sharpest turn from one street into another that drives take.
 SHARPEST_TURN_DEG = 125.0
 RED_ROOF: Rgb = (0.55, 0.30, 0.24)
 _GROUND_CLASSES = ("road", "parking", "other-ground", "terrain")
@@ -29,12 +29,12 @@ LAWN: Rgb = (0.42, 0.55, 0.30)
 
 
 def random_share(seed: int, purpose: str, name: str) -> float:
-    """Returns a random number from 0 to 1, fixed by the arguments."""
+    """Returns a random number from 0 to 1 that is fixed by the arguments."""
     return _number(seed, purpose, name) / 2.0**64
 
 
 def random_generator(seed: int, purpose: str, name: str) -> np.random.Generator:
-    """Returns a random generator that is fixed by the arguments."""
+    """Returns a random generator whose seed is fixed by the arguments."""
     return np.random.default_rng(_number(seed, purpose, name))
 
 
@@ -44,16 +44,24 @@ def _number(seed: int, purpose: str, name: str) -> int:
     return int.from_bytes(digest, "big")
 
 
-# Compared by identity: a city has thousands, and comparing meshes takes long.
+# Compared by identity, because there are thousands and comparing meshes takes
+# long.
 @dataclass(frozen=True, eq=False)
 class Imported:
-    """A structure of an imported city, from an object such as a Building.
+    """A structure of an imported city, made from an object of its file.
 
-    Triangles (M, 3, 3) are all surfaces that a car could hit or drive over, in
-    the world [m]. It was built in the year, if known, and demolished in that of
-    `until`, or at an unknown date if `is_gone`. A level of detail of 0 is
-    unknown. The original is the structure that it is a variant of; itself if
-    empty.
+    Attributes:
+        structure: the structure.
+        kind: type of the object in its file, such as Building.
+        year: year in which it was built; None if unknown.
+        triangles: (M, 3, 3) all surfaces that a car could hit or drive over, in
+            W [m].
+        until: year in which it was demolished; None if unknown.
+        tags: tags of the object in its file.
+        lod: level of detail; 0 if unknown.
+        original: name of the structure of which it is a variant; "" if it is
+            none.
+        is_gone: whether it was demolished at an unknown date.
     """
 
     structure: Structure
@@ -68,21 +76,22 @@ class Imported:
 
     @property
     def draw_name(self) -> str:
-        """Name that seeds the random draws of the object."""
+        """Name that seeds the random draws for the object."""
         return self.original or self.structure.name
 
     @property
     def is_ground(self) -> bool:
-        """Whether a car can drive over the object, if it is flat."""
+        """Whether a car could drive on the object, if it is flat."""
         return self.structure.semantic_class in _GROUND_CLASSES
 
 
 @dataclass(frozen=True)
 class Thing:
-    """A small thing of a file, such as a bench, at a place [m].
+    """A small object of a file, such as a bench, at a place [m].
 
-    `source` is the name of its element in the file. `kind` is a key of
-    `cns_drake.city.placement.objects.OBJECTS`. It may have a heading [rad].
+    `source` is its id in the file, and `element` its kind there. `kind` is a
+    key of `cns_drake.city.placement.objects.OBJECTS`. The heading `yaw` is None
+    if unknown [rad].
     """
 
     source: str
@@ -94,11 +103,12 @@ class Thing:
 
 @dataclass(frozen=True)
 class Street:
-    """A street of a map; cars drive along its line, against it, or both.
+    """A street of a map, on which cars drive forwards, backwards or both.
 
-    The line (N, 2) is its middle, with a node at each place; streets with a
-    common node meet there. The outermost lane lies aside of the middle, and an
-    unknown width is 0 [m]. Name and tags are those of its element in the file.
+    The line (N, 2) is its middle, with one node at each place; streets with a
+    common node meet there. `aside` is the distance of the outermost lane from
+    the middle. The width is 0 if unknown [m]. Name and tags are those in the
+    file.
     """
 
     line: np.ndarray
@@ -112,9 +122,9 @@ class Street:
 
 
 def ends_at_nodes(streets: Iterable[Street]) -> Counter[int]:
-    """Returns node -> number of street ends there.
+    """Returns node -> number of street ends at the node.
 
-    A street that passes the node counts as two.
+    A street that passes through a node counts as two ends.
     """
     ends: Counter[int] = Counter()
     for street in streets:
@@ -127,9 +137,9 @@ def ends_at_nodes(streets: Iterable[Street]) -> Counter[int]:
 def cut_at_nodes(
     streets: Sequence[Street], also: AbstractSet[int] = frozenset()
 ) -> Iterator[tuple[Street, np.ndarray, tuple[int, int]]]:
-    """Yields pieces of streets: the street, the line, first and last node.
+    """Yields pieces of streets: street, line (N, 2), first and last node.
 
-    Streets are cut where they meet, and at other nodes.
+    Streets are cut where they meet, and at the nodes in `also`.
     """
     uses = Counter(node for street in streets for node in street.nodes)
     for street in streets:
@@ -146,10 +156,11 @@ def cut_at_nodes(
 
 @dataclass(frozen=True)
 class StreetPlaces:
-    """Places on and beside streets, for traffic.
+    """Places on and beside streets that matter for traffic.
 
-    Numbers of the nodes of streets at which people cross, signals (N, 2), and
-    middles (M, 2) of ways for people [m].
+    `crossed` are nodes of streets at which people cross. `signals` (N, 2) are
+    the places of traffic signals, and `paths` the middle lines (M, 2) of ways
+    for people [m].
     """
 
     crossed: AbstractSet[int] = frozenset()
@@ -159,14 +170,21 @@ class StreetPlaces:
 
 @dataclass(frozen=True)
 class ForeignCity:
-    """The content of a file.
+    """The content of a city's file.
 
-    The origin of the map is in the file's coordinates, as metres east, north
-    and up, or latitude and longitude [deg]. Axes are these coordinates in
-    words, unless they are metres east, north and up. Faults count parts that
-    were repaired or left out. Drives are searched in streets with known lanes.
-    Small things get a place in a dressed city only; until then the faults count
-    them as left out.
+    Attributes:
+        structures: its structures.
+        origin: origin of the map in the file's coordinates: metres east, north
+            and up, or latitude and longitude [deg].
+        reference_system: name of these coordinates.
+        faults: counts of parts that were repaired or left out. Small objects
+            count as left out until they get a place in a dressed city.
+        streets: streets with known lanes, in which drives are searched.
+        street_places: places for traffic.
+        keeps_left: whether traffic keeps left.
+        axes: the coordinates in words, if they are not metres east, north and
+            up.
+        things: small objects, which are placed in a dressed city only.
     """
 
     structures: list[Imported]
@@ -196,9 +214,9 @@ def make_imported(
     Args:
         name: unique in the city.
         semantic_class: a key of `scene.semantics.CLASS_IDS`.
-        kind: kind of object, as the file calls it.
+        kind: type of the object in its file.
         surfaces: part of its surface -> triangles (M, 3, 3) [m]; empty parts
-            are left out, and not all are empty.
+            are left out, and at least one is not empty.
         colours: part -> its colour. Other parts have the colour of the class.
         year: year in which it was built; None if unknown.
         until: year until which it stands; None if unknown.
@@ -220,7 +238,7 @@ def make_imported(
 
 
 def boxes_of(structures: Sequence[Imported]) -> np.ndarray:
-    """Returns the least and greatest coordinates (N, 2, 3) of each [m]."""
+    """Returns (N, 2, 3) least and greatest coordinates of structures [m]."""
     return np.array(
         [
             (one.triangles.min(axis=(0, 1)), one.triangles.max(axis=(0, 1)))

@@ -1,4 +1,4 @@
-"""The height of an imported city's ground, from the file or guessed."""
+"""The height of an imported city's ground, from its file or guessed."""
 
 from __future__ import annotations
 
@@ -21,32 +21,36 @@ from cns_drake.city.geometry import (
 from cns_drake.imports.faces import joined, surface_samples
 from cns_drake.imports.foreign_city import Imported
 
-# Cells of a guessed ground, and how far it reaches beyond the city [m].
+# Cell size of a guessed ground, and how far it extends beyond the city [m].
 CELL = 4.0
 MARGIN = 40.0
-# A larger city has larger cells.
+# Above this number of cells along a side, cells are larger.
 _MOST_CELLS = 500
-# Number of cells over which it is smoothed, and its depth below the structures,
-# so that pavements are seen in its place [m].
+# Number of cells over which the ground is smoothed. Then its depth below the
+# structures [m], so that pavements can be seen.
 _SMOOTHING = 1.5
 _DEPTH = 0.1
-# Farther from the convex hull of the feet nothing lies between them [m].
+# Beyond this distance from the convex hull of the feet, heights are not
+# interpolated between feet [m].
 _BESIDE_HULL = 1.0
-# Corners of flat things of these classes give the height of the ground.
+# For flat things of these classes, corners give the height of the ground.
 _EVERY_CORNER = 7
 
 
 class Ground:
-    """Heights z (R, C) on a grid of xs (C,) and ys (R,), evenly spaced [m]."""
+    """The ground: heights z (R, C) on a grid of xs (C,) and ys (R,) [m].
+
+    The grid is evenly spaced.
+    """
 
     def __init__(self, xs: np.ndarray, ys: np.ndarray, z: np.ndarray):
         self.xs, self.ys, self.z = xs, ys, z
         self.cell = float(xs[1] - xs[0])
 
     def height(self, xy: np.ndarray) -> np.ndarray:
-        """Returns the height of the ground at places (N, 2) [m].
+        """Returns the heights (N,) of the ground at places (N, 2) [m].
 
-        Between the points of the grid it is interpolated.
+        Between the points of the grid, heights are interpolated.
         """
         column = np.clip(
             (xy[:, 0] - self.xs[0]) / self.cell, 0, len(self.xs) - 1.001
@@ -65,9 +69,9 @@ class Ground:
         )
 
     def below(self, places: Iterable[np.ndarray]) -> Ground:
-        """Returns the ground lowered so that it is below all given places [m].
+        """Returns the ground, lowered until it is below all given places.
 
-        Places (N, 3) are given some at a time.
+        The places come in arrays (N, 3) [m].
         """
         z = self.z.copy()
         for points in places:
@@ -79,7 +83,7 @@ class Ground:
         return Ground(self.xs, self.ys, z)
 
     def to_mesh(self) -> Mesh:
-        """Returns the surface, with two triangles a cell."""
+        """Returns the surface, with two triangles per cell."""
         x, y = np.meshgrid(self.xs, self.ys)
         vertices = np.stack([x, y, self.z - _DEPTH], axis=-1).reshape(-1, 3)
         number = np.arange(len(vertices)).reshape(self.z.shape)
@@ -92,7 +96,7 @@ class Ground:
 def guess_ground(feet: np.ndarray, corners: np.ndarray) -> Ground:
     """Returns a smooth ground through the feet (N, 3) of structures [m].
 
-    It reaches beyond the corners (M, 3) of all structures [m].
+    It extends beyond the corners (M, 3) of all structures [m].
     """
     low, high = corners[:, :2].min(axis=0), corners[:, :2].max(axis=0)
     cell = CELL * np.ceil(max(1.0, (high - low).max() / CELL / _MOST_CELLS))
@@ -103,7 +107,7 @@ def guess_ground(feet: np.ndarray, corners: np.ndarray) -> Ground:
     x, y = np.meshgrid(xs, ys)
     z = np.full(x.shape, np.nan)
     if len(feet) >= 4 and np.linalg.matrix_rank(feet[:, :2] - feet[0, :2]) == 2:
-        # SciPy looks long for places outside of the convex hull.
+        # SciPy takes long for places outside of the convex hull.
         hull = hull_of(feet[:, :2]).buffer(_BESIDE_HULL)
         near = shapely.contains_xy(hull, x, y)
         z[near] = LinearNDInterpolator(feet[:, :2], feet[:, 2])(
@@ -116,7 +120,7 @@ def guess_ground(feet: np.ndarray, corners: np.ndarray) -> Ground:
 
 
 def feet_of(solids: Sequence[np.ndarray]) -> np.ndarray:
-    """Returns the lowest corner (N, 3) of each solid of triangles (M, 3, 3)."""
+    """Returns (N, 3) the lowest corner of each solid of triangles (M, 3, 3)."""
     corners = [triangles.reshape(-1, 3) for triangles in solids]
     feet = [some[some[:, 2].argmin()] for some in corners]
     return np.array(feet).reshape(-1, 3)
@@ -125,10 +129,10 @@ def feet_of(solids: Sequence[np.ndarray]) -> np.ndarray:
 def ground_of(
     structures: Sequence[Imported], below_bridges: bool = False
 ) -> Ground:
-    """Returns the ground of a city: its terrain, or one below its feet.
+    """Returns the ground of a city: its terrain, or one guessed from feet.
 
-    With `below_bridges`, bridges and tunnels have no feet, unless there is
-    nothing else.
+    With `below_bridges`, the feet of bridges and tunnels do not count, unless
+    there are no others.
     """
     corners = joined(one.triangles for one in structures).reshape(-1, 3)
     terrain = [one for one in structures if one.kind == "TINRelief"]
@@ -152,14 +156,14 @@ def ground_of(
 def bottom_of(
     structures: Sequence[Imported], ground: Ground
 ) -> list[Structure]:
-    """Returns the guessed ground if the file has no terrain."""
+    """Returns the guessed ground as structures; none if there is a terrain."""
     if any(one.kind == "TINRelief" for one in structures):
         return []
     taken = {one.structure.name for one in structures}
     name = "ground"
     while name in taken:
         name += "_"
-    # The guessed ground must not cover streets and water.
+    # The guessed ground must not hide streets and water.
     covered = joined(one.triangles for one in structures if one.is_ground)
     lowered = ground.below(surface_samples(covered, ground.cell / 2.0))
     model = Model(

@@ -1,4 +1,4 @@
-"""Makes a map folder, with stages and drives, from an imported city."""
+"""Makes a map folder, with stages and drives, from the file of a city."""
 
 from collections import Counter
 from collections.abc import Callable, Mapping, Sequence
@@ -30,12 +30,12 @@ from cns_drake.roads.u_turn import TIGHTEST_RADIUS
 from cns_drake.roads.waypoints import load_waypoint_path, read_waypoints
 
 Progress = Callable[[str], None]
-# Receives the folder, and the numbers of structures and triangles by stage.
+# Gets the folder, and stage -> its numbers of structures and triangles.
 Finish = Callable[[Path, Mapping[str, tuple[int, int]]], None]
 
 
-# Threads of linear algebra would only wait for each other: the matrices are
-# small, and several processes work here.
+# One thread for linear algebra: the matrices are small and several processes
+# run, so more threads would only wait for each other.
 @threadpool_limits.wrap(limits=1)  # type: ignore[untyped-decorator]
 def import_city(
     source: Path,
@@ -49,15 +49,19 @@ def import_city(
     Args:
         source: CityJSON (.json, .jsonl), OpenStreetMap (.osm, .pbf) or
             OpenDRIVE (.xodr).
-        output: the folder, which must not be there yet.
+        output: the folder, which must not exist yet.
         options: what the user has chosen.
-        progress: takes one line at a time.
-        finish: adds files to the folder, which has its name and all files but
-            is not yet in its place. If it fails, nothing is left.
+        progress: is called with one line at a time.
+        finish: adds files to the folder. At this time the folder has all other
+            files and its final name, but is not at its final place. If `finish`
+            fails, nothing is left.
+
+    Returns:
+        Counts of what was imported.
 
     Raises:
         InputError: if the file or the options cannot be used, or the folder
-            is there or cannot be written.
+            exists or cannot be written.
     """
     _check(source, output, options)
     own = None if options.along is None else [drive_along(options.along)]
@@ -115,7 +119,7 @@ def import_city(
         map_files.write_facts(draft, source, facts, city.faults)
         report = ImportReport(
             kinds=dict(Counter(one.kind for one in staged.kept)),
-            # All but buildings may share their meshes.
+            # Structures other than buildings may share their meshes.
             triangles=sum(
                 one.structure.model.num_triangles
                 if one.kind.startswith("Building")
@@ -142,10 +146,10 @@ def import_city(
 
 
 def _check(source: Path, output: Path, options: ImportOptions) -> None:
-    """Checks options before the file is read.
+    """Checks the options before the file is read.
 
     Raises:
-        InputError: naming the option.
+        InputError: naming the option that cannot be used.
     """
     if source.suffix == ".xodr":
         for option, value, why in (
@@ -176,7 +180,7 @@ def _import_roads(
     progress: Progress,
     finish: Finish,
 ) -> ImportReport:
-    with uninterrupted():  # They import the whole city generator.
+    with uninterrupted():  # This imports the whole city generator.
         from cns_drake.imports.opendrive.town import build_town, write_town
 
     town = build_town(source, options.seed, progress, options.dressed)
@@ -201,7 +205,7 @@ def _read(source: Path, options: ImportOptions) -> ForeignCity:
 
 
 def drive_along(path: Path) -> WaypointDrive:
-    """Returns the drive along a file's waypoints, without their heights.
+    """Returns the drive along the waypoints in a file, without heights.
 
     Raises:
         InputError: if the file cannot be used, or a bend is too tight.
@@ -221,7 +225,7 @@ def drive_along(path: Path) -> WaypointDrive:
 def _lifted(
     drives: Sequence[WaypointDrive], ground: Ground, faults: ImportFaults
 ) -> list[WaypointDrive]:
-    """Returns drives with the heights of their waypoints.
+    """Returns drives whose waypoints have the heights of the ground.
 
     A drive that a car cannot steer on its slopes is left out and counted.
     """

@@ -1,4 +1,4 @@
-"""The files of an imported city."""
+"""Writes the files of an imported city."""
 
 from collections.abc import Mapping, Sequence
 from pathlib import Path
@@ -32,7 +32,7 @@ from cns_drake.imports.staged_city import StagedCity
 from cns_drake.scene.semantics import CLASS_RGB
 
 _OF_BOX = 12  # triangles
-# Column of the table of structures: the year in which a building was built.
+# Column of the structure table: the year in which a building was built.
 YEAR_COLUMN = "built"
 _CRUISE = 8.0  # [m/s]
 _ACCELERATION = {"longitudinal_acceleration": 2.0, "lateral_acceleration": 2.5}
@@ -54,9 +54,9 @@ def write_world(
 
     Args:
         draft: folder of the map.
-        source: file that is imported, named in errors.
+        source: file that is imported, which errors name.
         city: the structures of each stage.
-        bottom: structures of the ground, in all stages.
+        bottom: structures of the ground, which are in all stages.
         dressing: what was added to buildings and streets.
 
     Returns:
@@ -77,7 +77,7 @@ def write_world(
     for structure in structures:
         for name, mesh in structure.model.meshes.items():
             path = f"{MESH_FOLDER}/{name}.obj"
-            # Trees of a kind share their meshes.
+            # Trees of one kind share their meshes.
             if path not in triangles:
                 text = mesh.to_obj()
                 (draft / path).write_text(text, "utf-8")
@@ -96,16 +96,17 @@ def write_world(
 
 
 def triangles_in(obj: str) -> int:
-    """Returns the number of triangles of a mesh's faces."""
+    """Returns the number of triangles in the faces of an OBJ text."""
     faces = obj[obj.find("\nf ") :]
-    # A face of three corners has three spaces, and each further corner one.
+    # A face with three corners has three spaces; each further corner adds one.
     return faces.count(" ") - 2 * faces.count("f")
 
 
 def stage_size(sdf: str, triangles: Mapping[str, int]) -> tuple[int, int]:
-    """Returns the numbers of structures with a surface, and of triangles.
+    """Returns the numbers of structures and of triangles in a stage's SDF.
 
-    Each mesh's number of triangles is given by its path in the map's folder.
+    Only structures with a surface count. `triangles` maps a mesh's path in the
+    map's folder to its number of triangles.
     """
     structures = set(re.findall('visual name="([^"/]+)', sdf))
     meshes = re.findall("<uri>([^<]+)</uri>", sdf)
@@ -120,13 +121,13 @@ def city_facts(
     changes: Mapping[str, object] | None,
     dressing: Dressing | None = None,
 ) -> dict:
-    """Returns the place of a city's map, and counts of drawn parts.
+    """Returns facts about a map: its place, and counts of random parts.
 
     Args:
-        city: the city as the file has it.
+        city: the city as in its file.
         options: options of the import.
         stages: names of the stages.
-        changes: changes of the first stage, if it was drawn at random.
+        changes: what the first stage changes, if it was drawn at random.
         dressing: what was added to buildings and streets.
     """
     facts: dict[str, object] = {
@@ -160,7 +161,7 @@ def write_facts(
     Args:
         draft: folder of the map.
         source: file that is imported.
-        facts: what is remembered, by name.
+        facts: facts to record, by name.
         faults: counts of repaired and omitted parts.
         comment: first lines of the file.
     """
@@ -179,7 +180,7 @@ def write_facts(
 
 
 def write_report(draft: Path, report: ImportReport) -> None:
-    """Writes all counts of an import, of which the command prints some."""
+    """Writes all counts of an import, of which the command prints only some."""
     lines = [f"{kind}: {number}" for kind, number in report.kinds.items()]
     lines += [
         f"{kind}: {number}, such as {example}"
@@ -189,7 +190,7 @@ def write_report(draft: Path, report: ImportReport) -> None:
 
 
 def with_column(table: str, name: str, values: Sequence[str]) -> str:
-    """Returns a CSV table with one more column, at its end."""
+    """Returns a CSV table with one more column on the right."""
     lines = table.splitlines()
     rows = zip(lines, [name, *values], strict=True)
     return "".join(f"{line},{value}\n" for line, value in rows)
@@ -201,11 +202,11 @@ def write_drives(
     routes: Sequence[np.ndarray],
     cruise: Sequence[float] = (_CRUISE, _CRUISE),
 ) -> None:
-    """Writes the routes of a map, and a scenario of each per stage.
+    """Writes the routes of a map, and a scenario for each route and stage.
 
-    `stages` maps the name of a stage to words for its time, which end the title
-    of a drive. Each of at most two routes has waypoints (N, 3) [m], and a speed
-    [m/s].
+    `stages` maps the name of a stage to words for its time, with which the
+    titles of drives end. There are at most two routes; each has waypoints (N,
+    3) [m], and a speed in `cruise` [m/s].
     """
     for letter, waypoints in zip("ab", routes, strict=False):
         rows = [f"{x:.3f},{y:.3f},{z:.3f}" for x, y, z in waypoints]
@@ -213,8 +214,8 @@ def write_drives(
         (folder / f"route_{letter}.csv").write_text(text, "utf-8")
     speeds = dict(zip("ab", cruise, strict=False))
     for number, (stage, when) in enumerate(stages.items()):
-        # The query drive is in the last stage, on another route than the
-        # databases.
+        # The query drive is in the last stage. Its route is not that of the
+        # database drives.
         letters = "ab"[: len(routes)]
         if number < len(stages) - 1:
             letters = letters[::-1]
@@ -236,10 +237,10 @@ def draw_overview(
     space: FreeSpace | None,
     drives: Sequence[WaypointDrive],
 ) -> None:
-    """Draws structures, the room for a car, and the drives, with a legend.
+    """Draws a map's structures, the room for a car and the drives.
 
-    The second drive is a thinner line on the first one, so that both are seen
-    where they share a street.
+    Where both drives share a street, the second one is a thinner line on the
+    first, so that both can be seen.
     """
     corners = joined(one.triangles for one in structures).reshape(-1, 3)
     low, high = corners[:, :2].min(axis=0), corners[:, :2].max(axis=0)
@@ -264,14 +265,14 @@ def draw_overview(
                     name = "water"
                 classes.setdefault(name, Patch(facecolor=colour))
         for colour, triangles in alike.items():
-            # An array, which the library takes faster than a list, is none of
-            # what its hints allow.
+            # The library takes an array faster than a list, but its type hints
+            # do not allow it.
             corners_xy: Any = np.concatenate(triangles)[:, :, :2]
             axes.add_collection(
                 PolyCollection(
                     corners_xy,
                     facecolors=[colour],
-                    # Without this, fine lines show between triangles.
+                    # Otherwise fine lines show between triangles.
                     edgecolors="face",
                     linewidths=0.3,
                 )
@@ -279,7 +280,7 @@ def draw_overview(
     extent = (low[0], high[0], low[1], high[1])
     if space is not None:
         room = np.where(space.clearance >= space.least, 1.0, np.nan)
-        # Above the structures, below the lines.
+        # This lies above the structures and below the lines.
         axes.imshow(
             room,
             origin="lower",

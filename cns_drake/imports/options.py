@@ -1,15 +1,15 @@
-"""Options of an import, the faults that it counts, and its report."""
+"""The options of an import, the faults that it counts, and its report."""
 
 from collections import Counter
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Literal
 
-# The first stage that has the buildings without a year.
+# The first stage in which buildings without a year stand.
 Undated = Literal["first", "last", "never"]
-# The side of a street on which cars drive.
+# The side of a street on which traffic keeps.
 DriveOn = Literal["right", "left"]
-# Lists all counts of an import, in the folder of the map.
+# File in the map's folder that lists all counts of an import.
 REPORT_NAME = "import.txt"
 _LONGEST = 100
 
@@ -22,9 +22,10 @@ class ImportFaults:
         self._examples: dict[str, str] = {}
 
     def add(self, kind: str, example: str, number: int = 1) -> None:
-        """Counts faults of a kind: the fault and its remedy, in words.
+        """Counts faults of one kind.
 
-        The example is the name of an object that has it.
+        `kind` describes the fault and its remedy in words. `example` is the
+        name of an object that has the fault.
         """
         kind = _printable(kind)
         self._counts[kind] += number
@@ -38,7 +39,7 @@ class ImportFaults:
             del self._counts[kind], self._examples[kind]
 
     def rows(self) -> list[tuple[str, int, str]]:
-        """Returns kind, number and example, most frequent first."""
+        """Returns kind, number and example of faults, most frequent first."""
         return [
             (kind, number, self._examples[kind])
             for kind, number in sorted(
@@ -48,7 +49,7 @@ class ImportFaults:
 
 
 def _printable(text: str) -> str:
-    """Returns a text of a file without control characters."""
+    """Returns a text without its control characters."""
     shown = "".join(c if c.isprintable() else " " for c in text)
     return shown if len(shown) <= _LONGEST else f"{shown[: _LONGEST - 3]}..."
 
@@ -58,21 +59,23 @@ class ImportOptions:
     """The options of an import.
 
     Attributes:
-        years: years of the stages, increasing; without any there is one stage.
-        year_attribute: attribute with the year of construction; if None, the
-            usual attributes.
+        years: years of the stages, increasing; without any there is one stage,
+            of today.
+        year_attribute: attribute that has the year of construction; if None,
+            the usual attributes.
         undated: first stage in which buildings without a year stand.
         lod: level of detail; if None, the highest of each object.
-        seed: seed of the draws of `grow`, and of buildings along a file's
-            roads.
-        along: waypoints of a drive, in place of the two proposed ones.
-        grow: share of the buildings that, drawn at random, are missing or lower
-            in an additional first stage; no such stage if None.
-        drive_on: side of the street on which traffic keeps; if None, the side
-            that the file gives, or else the right.
+        seed: seed of the random draws of `grow`, and of buildings along a
+            file's roads.
+        along: file with the waypoints of a drive that replaces the two proposed
+            ones.
         within: greatest distance of structures from the drives [m]; no limit if
             None.
-        dressed: whether looks that the file leaves open are drawn at random.
+        drive_on: side of the street on which traffic keeps; if None, the side
+            in the file, or right if it has none.
+        grow: share of the buildings that are missing or lower in an additional
+            first stage, drawn at random; no such stage if None.
+        dressed: whether looks that the file does not give are drawn at random.
     """
 
     years: tuple[int, ...] = ()
@@ -91,9 +94,13 @@ class ImportOptions:
 class ImportReport:
     """The result of an import.
 
-    Numbers of structures by type of object and by stage, of triangles, and of
-    buildings without a year and with one; lengths of the proposed drives [m];
-    kind, number and example of faults.
+    Attributes:
+        kinds: number of structures by type of object.
+        triangles: number of triangles.
+        stages: number of structures by stage.
+        undated, dated: numbers of buildings without a year, and with one.
+        drives: lengths of the proposed drives [m].
+        faults: kind, number and example of faults.
     """
 
     kinds: dict[str, int]

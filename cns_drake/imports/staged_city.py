@@ -28,19 +28,19 @@ from cns_drake.imports.foreign_city import (
 from cns_drake.imports.options import ImportFaults, ImportOptions
 from cns_drake.scene.labels import MAX_INSTANCE
 
-# A building that shares so much of the smaller outline stands in the place of
-# the other.
+# Two buildings stand in the same place if they share this much of the smaller
+# outline.
 _SHARED = 0.3
-# Greatest distance from the middle of a city [m].
+# Greatest distance of a structure from the middle of a city [m].
 _FARTHEST = 10_000.0
-# Buildings this near to each other are of one block [m].
+# Buildings within this distance of each other belong to one block [m].
 _SAME_BLOCK = 4.0
-# The part of the changing buildings that is drawn block by block, and the part
-# that is lower at first; the others are missing.
+# Share of the changing buildings that is drawn block by block, and share of
+# them that is lower at first; all others are missing.
 _BY_BLOCK = 0.5
 _LOWER = 1.0 / 3.0
-# Only buildings at least this high [m] can be lower, with this part of their
-# height.
+# Only buildings at least this high can be lower [m]. They then have a share of
+# their height within this range.
 _LEAST_HEIGHT = 7.0
 _HEIGHTS = (0.4, 0.7)
 
@@ -48,14 +48,17 @@ _HEIGHTS = (0.4, 0.7)
 def _near(
     things: np.ndarray, ways: BaseGeometry, distance: float
 ) -> np.ndarray:
-    """Returns which of M things of N corners (M, N, 3) have a box nearby."""
+    """Returns (M,) which things have a bounding box near the ways.
+
+    `things` has the N corners of each, (M, N, 3) [m].
+    """
     low, high = things[:, :, :2].min(axis=1), things[:, :, :2].max(axis=1)
     boxes = shapely.box(*low.T, *high.T)
     return np.asarray(shapely.dwithin(boxes, ways, distance))
 
 
 def _cropped(one: Imported, ways: BaseGeometry, distance: float) -> Imported:
-    """Returns the near part of a terrain, unchanged."""
+    """Returns the part of a terrain near the ways, otherwise unchanged."""
     meshes = {}
     for name, mesh in one.structure.model.meshes.items():
         faces = mesh.triangles()
@@ -80,11 +83,11 @@ def _cropped(one: Imported, ways: BaseGeometry, distance: float) -> Imported:
 def with_gone(
     gone: Sequence[Imported], others: Iterable[Imported]
 ) -> list[Imported]:
-    """Returns a city's former structures and those that stood with them.
+    """Returns former structures of a city and those that stood with them.
 
-    If a former and a present building have the same place, the year of the
-    present one decides. If it has a year, it was there already, and the former
-    building was not. If it has none, it came later.
+    If a former and a present building have the same place, the present one's
+    year decides. If it has a year, it already stood, and the former building
+    did not. If it has none, it was built later, and the former building stood.
     """
     others = list(others)
     later = [one for one in others if one.kind.startswith("Building")]
@@ -112,10 +115,13 @@ def _shares(one: BaseGeometry, other: BaseGeometry) -> bool:
 
 @dataclass(frozen=True)
 class StagedCity:
-    """The structures of a city: those of each stage, and those of any stage.
+    """The structures of a city, by stage.
 
-    Buildings are counted by whether they have a year. If there is only one
-    stage, that of today, `gone` are the buildings that no longer stand.
+    Attributes:
+        standing: stage -> structures that stand at it.
+        kept: structures that stand at any stage.
+        undated, dated: numbers of buildings without a year, and with one.
+        gone: buildings that no longer stand, if the only stage is today.
     """
 
     standing: dict[str, list[Imported]]
@@ -132,8 +138,8 @@ class StagedCity:
     ) -> StagedCity:
         """Returns the city without structures far from drives.
 
-        Kept structures have a bounding box within the distance [m]; others are
-        counted. The near part of a terrain stays.
+        A structure is kept if its bounding box is within the distance [m]; all
+        others are counted. Of a terrain, the near part is kept.
 
         Raises:
             InputError: if no structure is near, or there is no drive.
@@ -183,12 +189,13 @@ class StagedCity:
 def stage_city(
     source: object, city: ForeignCity, options: ImportOptions
 ) -> StagedCity:
-    """Returns the structures at the wanted stages.
+    """Returns the structures that stand at the wanted stages.
 
-    The faults of the city count structures of no stage. Errors name the source.
+    Structures that stand at no stage are counted in the faults of the city.
+    Errors name the source.
 
     Raises:
-        InputError: if no structure, or too many, are at any stage.
+        InputError: if no structure, or too many, stand at any stage.
     """
     found = _together(city)
     if not found:
@@ -235,15 +242,15 @@ def stage_city(
 
 
 def _is_here(one: Imported) -> bool:
-    """Returns whether a structure stands today, if it was built."""
+    """Returns whether a structure, once built, still stands today."""
     return not one.is_gone and stands_today(one.until)
 
 
 def _stands(one: Imported, stage: int, options: ImportOptions) -> bool:
-    """Returns whether a structure stands at the stage of a number.
+    """Returns whether a structure stands at a stage, given by its number.
 
-    A structure that is gone without a date stood at all stages but the last, as
-    far as its year, or the lack of one, allows.
+    A structure that was demolished at an unknown date stands at all stages
+    except the last, if its year (or its missing year) allows it.
     """
     years, until = options.years, one.until
     if one.is_gone:
@@ -262,7 +269,7 @@ def _stands(one: Imported, stage: int, options: ImportOptions) -> bool:
 
 
 def stage_names(years: Sequence[int]) -> list[str]:
-    """Returns the name of each stage, from 01 on; one without years.
+    """Returns the name of each stage, from 01 on; one stage without years.
 
     Raises:
         InputError: if years do not increase.
@@ -276,7 +283,7 @@ def stage_names(years: Sequence[int]) -> list[str]:
 
 
 def _together(city: ForeignCity) -> list[Imported]:
-    """Returns the structures of a city without those far away."""
+    """Returns the structures of a city without those far from its middle."""
     if not city.structures:
         return []
     boxes = boxes_of(city.structures)
@@ -294,7 +301,7 @@ def _together(city: ForeignCity) -> list[Imported]:
 
 
 def _why_never(one: Imported, options: ImportOptions) -> str:
-    """Returns why a building stands at no stage."""
+    """Returns why a building stands at no stage, in words."""
     first = options.years[0] if options.years else None
     if one.until is not None and (first is None or one.until <= first):
         return "demolished before the first stage" if first else "demolished"
@@ -308,9 +315,9 @@ def _why_never(one: Imported, options: ImportOptions) -> str:
 
 
 def _has_years(one: Imported) -> bool:
-    """Returns whether a structure may be missing at a stage.
+    """Returns whether a structure may be missing at some stages.
 
-    Without any --years, only buildings are taken to have a year.
+    Of the structures without a year, only buildings may.
     """
     is_building = one.kind.startswith("Building")
     is_dated = one.year is not None or one.until is not None
@@ -320,16 +327,17 @@ def _has_years(one: Imported) -> bool:
 def grow(
     city: StagedCity, part: float, seed: int
 ) -> tuple[StagedCity, dict[str, Any]]:
-    """Returns a city with an additional first stage, and the changes.
+    """Returns a city with an additional first stage, and what it changes.
 
-    In the first stage, a `part` of the buildings is missing or lower. The draws
-    depend on the names of buildings, so that the rest of a file does not change
-    them. Structures that are gone by the only stage stand in the first one, and
-    structures that have their place today do not.
+    In the first stage, the share `part` of the buildings is missing or lower.
+    The random draws depend on the names of buildings, so that a change
+    elsewhere in the file does not affect them. Buildings of the file that are
+    gone today stand in the first stage, in place of structures that came after
+    them.
 
     The changes are the names of the buildings that are `missing`, the
-    `part_of_height` of lower buildings, and, if there are any, the buildings of
-    the file that are `gone_since`.
+    `part_of_height` of lower buildings, and the buildings that are
+    `gone_since`, if there are any.
     """
     (last,) = city.standing.values()
     buildings = [one for one in last if one.kind.startswith("Building")]
@@ -381,7 +389,7 @@ def grow(
 def _drawn(
     buildings: Sequence[Imported], number: int, seed: int
 ) -> list[Imported]:
-    """Returns a number of buildings, about half of them block by block."""
+    """Returns `number` random buildings, about half of them block by block."""
     blocks: dict[int, list[Imported]] = {}
     for block, one in zip(_blocks(buildings), buildings, strict=True):
         blocks.setdefault(block, []).append(one)
@@ -404,7 +412,7 @@ def _drawn(
 
 
 def _blocks(buildings: Sequence[Imported]) -> np.ndarray:
-    """Returns the number of the block (N,) of each building."""
+    """Returns (N,) the number of the block to which each building belongs."""
     if not buildings:
         return np.zeros(0, dtype=int)
     outlines = [one.structure.model.footprint for one in buildings]
@@ -418,7 +426,7 @@ def _blocks(buildings: Sequence[Imported]) -> np.ndarray:
 
 
 def _lowered(one: Imported, share: float, taken: set[str]) -> Imported:
-    """Returns a building cut to a part of its height, under a new name."""
+    """Returns a building cut to a share of its height, with a new name."""
     suffix = "_lower"
     while f"{one.structure.name}{suffix}" in taken:
         suffix += "_"

@@ -1,1 +1,1 @@
-"""The vehicle's motion: from a path of lanes to poses over time."""
+"""The vehicle's motion: from a path along lanes to poses over time."""

@@ -16,26 +16,26 @@ from cns_drake.base.elementary import arctan2
 if TYPE_CHECKING:
     from scipy.interpolate import PPoly
 
-# Quintic: four continuous derivatives, as the accelerations of steered
-# wheels need.
+# Quintic, with four continuous derivatives: the accelerations of steered wheels
+# need them.
 ORDER = 6
-# Control points that weigh on the value at a knot, on each side of it.
+# Number of control points on each side of a knot that affect the value there.
 REACH = ORDER // 2 - 1
 
 
 def make_uniform_spline(
     control_points: np.ndarray, spacing: float
 ) -> BsplineTrajectory:
-    """Returns the spline with one control point for each knot.
+    """Returns a quintic spline with one control point per knot.
 
     Bounds on the control points are also bounds on the curve: the spline never
     leaves the convex hull of ORDER neighbouring control points, and its
     derivatives never leave that of their difference quotients. A straight line
-    is reproduced.
+    stays a straight line.
 
-    The parameter starts at 0, and the i-th knot is at i * spacing. At each end
-    the (N, D) control points, N > REACH, are mirrored in the outermost one, so
-    that the curve ends in it.
+    The parameter starts at 0, and the i-th knot is at i * spacing. At each end,
+    the control points (N, D), N > REACH, are mirrored at the outermost one, so
+    that the curve ends there.
     """
     points = np.asarray(control_points, dtype=float)
     points = np.concatenate(
@@ -52,22 +52,22 @@ def make_uniform_spline(
 
 
 class SplineDerivatives:
-    """A spline with its first derivatives, evaluated at many parameters."""
+    """A spline and its first derivatives, for evaluation at many parameters."""
 
     def __init__(self, spline: BsplineTrajectory, count: int):
-        """Prepares the value and `count` derivatives."""
+        """Prepares the value and the first `count` derivatives."""
         self._splines = [spline]
         self._splines += [spline.MakeDerivative(k) for k in range(1, count + 1)]
         self.end = spline.end_time()
 
     def evaluate(self, parameter: ArrayLike) -> list[np.ndarray]:
-        """Returns value and derivatives, each (N, D), at (N,) parameters."""
+        """Returns value and derivatives, each (N, D), at parameters (N,)."""
         parameter = np.clip(parameter, 0.0, self.end)
         return [spline.vector_values(parameter).T for spline in self._splines]
 
 
-# Distance of the places at which bends are measured and functions are taken,
-# far below that of the knots between which curvature changes [m].
+# Distance between the places at which bends and functions are evaluated [m]. It
+# is far below the distance of the knots, over which the curvature changes.
 _STEP = 0.1
 
 
@@ -75,15 +75,16 @@ _STEP = 0.1
 class PathJet:
     """The path and its derivatives with respect to the path parameter u.
 
-    A name with n leading `d` is an n-th derivative. All are arrays over the
-    N parameters that were asked for.
+    A name with n leading `d` is an n-th derivative. All are arrays over N
+    parameters.
 
     Attributes:
-        p, dp, ddp: (N, 3) position in the world.
-        yaw, dyaw, ddyaw: heading about the world's z, without jumps [rad].
+        p, dp, ddp: (N, 3) position in W [m].
+        yaw, dyaw, ddyaw: heading about the z axis of W, without jumps [rad].
         climb, dclimb, ddclimb: angle of the tangent above the horizon [rad].
         speed, dspeed, ddspeed: arc length per parameter, about 1.
-        turn, dturn, ddturn: rotation about the vehicle's own z [rad].
+        turn, dturn, ddturn: rate of rotation about the vehicle's z axis, per
+            parameter [rad].
     """
 
     p: np.ndarray
@@ -106,33 +107,33 @@ class PathJet:
 class SmoothPath:
     """A quintic B-spline along the points of a lane path.
 
-    The points are the control points, not points of the curve: in a bend of
-    radius r the curve runs spacing^2 / (4 r) to the inside of them, and its
-    curvature changes without a step. The parameter u runs from 0 to `end`,
-    in metres along the points.
+    The points are control points, not points on the curve: in a bend of radius
+    r, the curve runs spacing^2 / (4 r) inside of them, and its curvature has no
+    steps. The parameter u runs from 0 to `end`, in metres along the points.
     """
 
     def __init__(self, points: np.ndarray, spacing: float):
-        """Makes the path of (N, 3) points at even distances [m]."""
+        """Makes the path along evenly spaced points (N, 3) [m]."""
         self.spacing = spacing
         self._spline = SplineDerivatives(
             make_uniform_spline(points, spacing), 4
         )
         self.end = self._spline.end
-        # Headings at the knots, free of jumps, from which to count turns.
+        # Headings at the knots, without jumps, from which turns are counted.
         knots = np.arange(len(points)) * spacing
         tangents = self._spline.evaluate(knots)[1]
         self._knot_yaw = np.unwrap(arctan2(tangents[:, 1], tangents[:, 0]))
 
     def evaluate(self, u: ArrayLike) -> PathJet:
-        """Returns the path and its derivatives at (N,) parameters u."""
+        """Returns the path and its derivatives at parameters u (N,)."""
         u = np.atleast_1d(np.asarray(u, dtype=float))
         p, d1, d2, d3, d4 = self._spline.evaluate(u)
         (x1, y1, z1), (x2, y2, z2) = d1.T, d2.T
         (x3, y3, z3), (x4, y4, _) = d3.T, d4.T
 
-        # The tangent's horizontal length, squared, and its heading: from
-        # yaw' * h = x' y'' - y' x'' by differentiating both sides.
+        # h is the squared horizontal length of the tangent. The heading follows
+        # from yaw' * h = x' y'' - y' x'', and its derivative from
+        # differentiating both sides.
         h = x1**2 + y1**2
         dh = 2 * (x1 * x2 + y1 * y2)
         ddh = 2 * (x2**2 + x1 * x3 + y2**2 + y1 * y3)
@@ -148,7 +149,8 @@ class SmoothPath:
         ds = np.sum(d1 * d2, axis=1) / s
         dds = (np.sum(d2 * d2 + d1 * d3, axis=1) - ds**2) / s
 
-        # Climb: tan(climb) = z' / r, r the tangent's horizontal length.
+        # Climb: tan(climb) = z' / r, where r is the horizontal length of the
+        # tangent.
         r = np.sqrt(h)
         dr = dh / (2 * r)
         ddr = (ddh / 2 - dr**2) / r
@@ -156,7 +158,8 @@ class SmoothPath:
         dclimb = (z2 * r - z1 * dr) / s**2
         ddclimb = (z3 * r - z1 * ddr) / s**2 - 2 * dclimb * ds / s
 
-        # Yaw is about the world's z; the vehicle's z is tilted by the climb.
+        # Yaw is about the z axis of W; the vehicle's z axis is tilted by the
+        # climb.
         c, sine = r / s, z1 / s
         dc = -sine * dclimb
         ddc = -c * dclimb**2 - sine * ddclimb
@@ -179,19 +182,19 @@ class SmoothPath:
         )
 
     def tightest_bend(self) -> tuple[float, np.ndarray]:
-        """Returns the least radius [m] of the path, and its place (3,)."""
+        """Returns the least radius of the path, and where it is (3,) [m]."""
         jet = self.evaluate(self._places())
         curvature = np.abs(jet.turn) / jet.speed
         at = int(curvature.argmax())
         return float(1 / max(curvature[at], 1e-12)), jet.p[at]
 
     def integral(self, integrand: Callable[[PathJet], np.ndarray]) -> PPoly:
-        """Returns the integral from 0 to u of a function along the path.
+        """Returns the integral of a function along the path, from 0 to u.
 
-        Its error is far below a micrometre where the function changes as
-        smoothly as the path.
+        Its error is far below a micrometre if the function is as smooth as the
+        path.
         """
-        # Slow to import.
+        # This import is slow.
         from scipy.interpolate import CubicSpline
 
         u = self._places()
@@ -202,7 +205,7 @@ class SmoothPath:
         return np.linspace(0.0, self.end, steps + 1)
 
     def _count_turns(self, u: np.ndarray, yaw: np.ndarray) -> np.ndarray:
-        """Returns yaw plus the full turns made so far."""
+        """Returns the yaw (N,) plus the full turns made so far [rad]."""
         index = np.rint(np.clip(u, 0.0, self.end) / self.spacing).astype(int)
         nearby = self._knot_yaw[index.clip(0, len(self._knot_yaw) - 1)]
         return yaw + 2 * np.pi * np.rint((nearby - yaw) / (2 * np.pi))

@@ -1,4 +1,4 @@
-"""Roughness of roads: random heights of a class of ISO 8608."""
+"""The roughness of roads: random heights of a class of ISO 8608."""
 
 import math
 from typing import Literal
@@ -7,21 +7,21 @@ import numpy as np
 
 RoughnessClass = Literal["A", "B", "C", "D", "E"]
 
-# Geometric means of ISO 8608: one-sided power spectral density of the
-# heights along a line at the spatial frequency _N0 [m^3].
+# Class -> one-sided power spectral density of the heights along a line, at the
+# spatial frequency _N0 [m^3]. These are the geometric means of ISO 8608.
 ROUGHNESS: dict[str, float] = {
     name: 16e-6 * 4.0**k for k, name in enumerate("ABCDE")
 }
 _N0 = 0.1  # [cycles/m]
 
-# The layers' lattices [m]. Their sum has the class's spectrum for wavelengths
-# from 0.35 to 90 m. Longer waves, which are hills, are no stronger than 90 m; a
-# tyre smooths shorter ones.
+# Spacings of the layers' lattices [m]. The sum of the layers has the spectrum
+# of the class for wavelengths from 0.35 to 90 m. Longer waves, which are hills,
+# are no stronger than those of 90 m; shorter ones are smoothed by the tyre.
 _SPACINGS = 0.05 * 2.0 ** np.arange(10)
-# The finest layer also stands for all finer ones: the sum of the geometric
-# series 1 + 1/4 + 1/16 + ...
+# The finest layer also stands for all finer ones: this is the sum of the
+# geometric series 1 + 1/4 + 1/16 + ...
 _FINEST_SHARE = 4.0 / 3.0
-# Nodes of a lattice in each direction, before it repeats.
+# Number of nodes in each direction after which a lattice repeats.
 _NODES = 512
 
 # Integral of sinc(x)^8 from -inf to inf: the B-spline of degree 7 at 0.
@@ -31,29 +31,30 @@ _OVER_LAYERS = 0.03611499185872766
 
 
 class RoadProfile:
-    """Heights of the road's surface, a function of place and seed only.
+    """Random heights of a road's surface, as a function of place and seed only.
 
     The heights are a sum of layers. A layer is a cubic B-spline over a square
-    lattice whose coefficients are independent normal numbers of variance s^2.
-    With lattice spacing h its spectrum along any line is nearly
-    2 s^2 h sinc(n h)^8 151/315, flat up to n = 0.2 / h and then falling
-    steeply. Spacings that double and variances s^2 that grow like h make the
-    levels grow like h^2, and the sum over the layers falls like n^-2: that is
-    G_d(n) = G_d(n0) (n / n0)^-2 of ISO 8608, with ripples of 1.5 %.
+    lattice, whose coefficients are independent normal numbers of variance s^2.
+    With the lattice spacing h, its spectrum along any line is nearly 2 s^2 h
+    sinc(n h)^8 151/315: flat up to n = 0.2 / h, and then falling steeply. From
+    layer to layer, the spacing doubles and the variance s^2 grows like h. The
+    levels of the spectra then grow like h^2, and the spectrum of the sum falls
+    like n^-2: this is G_d(n) = G_d(n0) (n / n0)^-2 of ISO 8608, with ripples of
+    1.5 %.
 
-    Each lattice is turned and shifted at random, so that no street runs along
-    all of them, and repeats after 512 nodes: a street would have to run
-    along a lattice to meet the same layer again.
+    Each lattice is rotated and shifted at random, so that no street runs along
+    all of them. A layer repeats after 512 nodes; only a street along its
+    lattice would notice this.
     """
 
     def __init__(self, roughness: RoughnessClass, seed: int):
-        """Makes the profile."""
+        """Draws the coefficients of all layers."""
         self._level = ROUGHNESS[roughness] * _N0**2 * math.log(2) / _OVER_LAYERS
         self._seed = seed
 
     def heights(self, p_WQset: np.ndarray) -> np.ndarray:
-        """Returns the (N,) heights [m] at (N, 2) places in the world [m]."""
-        # Slow to import, and not needed to describe a scenario.
+        """Returns the heights (N,) at places (N, 2) in W [m]."""
+        # This import is slow, and not needed to describe a scenario.
         from scipy.ndimage import map_coordinates
 
         heights = np.zeros(len(p_WQset))

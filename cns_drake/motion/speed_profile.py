@@ -1,4 +1,4 @@
-"""Speed along a path: bounded speed, continuous acceleration."""
+"""The speed along a path: within limits, with continuous acceleration."""
 
 from typing import NamedTuple
 
@@ -8,15 +8,14 @@ from pydrake.trajectories import BsplineTrajectory
 from cns_drake.motion import path_geometry
 from cns_drake.roads.lane_path import Speeds
 
-# Distance of the knots of the time scaling [s]; acceleration changes within
-# about two of them, so the jerk stays near (acceleration / knot period).
+# Distance between the knots of the time scaling [s]. The acceleration changes
+# within about two of them, so the jerk stays near (acceleration / knot period).
 KNOT_PERIOD = 0.3
-# Grid on which the limits are evaluated [m].
+# Distance between the places at which the limits are evaluated [m].
 _STEP = 0.1
-# Margin for values between grid points: the limits are smooth over several
-# metres.
+# Margin for places in between: the limits are smooth over several metres.
 _MARGIN = 0.998
-# The smoothed drive runs ahead of the unsmoothed by less than this [m].
+# The smoothed drive is ahead of the original one by less than this [m].
 _SMOOTHING_SLACK = 0.2
 
 
@@ -35,10 +34,10 @@ class SpeedProfile(NamedTuple):
 
 
 def make_time_scaling(positions: np.ndarray) -> BsplineTrajectory:
-    """Returns the path parameter u(t) through places of a drive, smoothed.
+    """Returns a smooth path parameter u(t) from the places of a drive.
 
-    The (N,) places [m] are those of the drive at multiples of `KNOT_PERIOD`. At
-    both ends, the drive must be at rest for REACH periods.
+    The places (N,) are those at multiples of `KNOT_PERIOD` [m]. At both ends,
+    the drive must be at rest for REACH periods.
     """
     return path_geometry.make_uniform_spline(positions[:, None], KNOT_PERIOD)
 
@@ -46,21 +45,21 @@ def make_time_scaling(positions: np.ndarray) -> BsplineTrajectory:
 def find_speed_profile(
     path: path_geometry.SmoothPath, speed_limits: np.ndarray, speeds: Speeds
 ) -> SpeedProfile:
-    """Returns the fastest drive under (N,) limits at control points [m/s].
+    """Returns the fastest drive under limits (N,) at control points [m/s].
 
-    The drive has stepwise constant acceleration. It is found by a forward and a
-    backward pass over v^2.
+    The drive has piecewise constant acceleration. It is found by a forward and
+    a backward pass over v^2.
 
-    The positions of the drive at even times then become the control points of a
-    quintic B-spline u(t). At each time, u' is a weighted mean of the drive's
+    Later, the positions of the drive at even times become the control points of
+    a quintic B-spline u(t). At each time, u' is a weighted mean of the drive's
     speed, and u'' one of its acceleration, over at most REACH + 1 knot periods
     before and after. A bound on the drive's acceleration is therefore a bound
-    on u'', too. A bound on its speed is one on u' only if the drive observes it
-    for that long before and after, which `_early_and_late` ensures.
+    on u'', too. A bound on its speed is a bound on u' only if the drive keeps
+    it for that long before and after, which `_early_and_late` ensures.
 
     The path parameter u and the arc length differ by less than a percent. Since
     |p'| <= 1, a bound on u' is also a bound on the speed. For the acceleration,
-    the term by which they differ is subtracted from the bound.
+    the term by which both differ is subtracted from the bound.
     """
     u = np.linspace(0.0, path.end, max(2, int(np.ceil(path.end / _STEP)) + 1))
     jet = path.evaluate(u)
@@ -69,12 +68,12 @@ def find_speed_profile(
         _MARGIN * speeds.lateral_acceleration / np.maximum(bending, 1e-9)
     )
     limit = np.minimum(lateral, speeds.cruise)
-    # At a place, the lower one of the limits at both ends of its interval.
+    # At each place, the lower of the limits at both ends of its interval.
     knot = (u / path.spacing).astype(int).clip(0, len(speed_limits) - 2)
     limit = np.minimum(limit, speed_limits[knot])
     limit = np.minimum(limit, speed_limits[knot + 1])
     limit = _early_and_late(limit, u[1])
-    # Along the path v = |p'| u', so v' = |p'| u'' + |p'|' u'^2.
+    # Along the path v = |p'| u', and therefore v' = |p'| u'' + |p'|' u'^2.
     parametric = np.max(np.abs(jet.dspeed) * limit**2)
     acceleration = _MARGIN * speeds.longitudinal_acceleration - parametric
     speed = np.sqrt(_reachable(limit**2, acceleration, u[1]))
@@ -82,22 +81,22 @@ def find_speed_profile(
 
 
 def drive_positions(profile: SpeedProfile) -> np.ndarray:
-    """Returns the distances of the fastest drive at each `KNOT_PERIOD` [m]."""
+    """Returns the places of the fastest drive at each `KNOT_PERIOD` [m]."""
     u, speed, _ = profile
     times = np.concatenate(
         [[0.0], np.cumsum(2 * np.diff(u) / (speed[1:] + speed[:-1]))]
     )
-    # With REACH knots of rest at both ends the spline too is at rest there.
+    # With REACH knots of rest at both ends, the spline is at rest there, too.
     knots = int(np.ceil(times[-1] / KNOT_PERIOD)) + 2 * path_geometry.REACH
     drive_times = (np.arange(knots + 1) - path_geometry.REACH) * KNOT_PERIOD
     return _drive(drive_times, times, u, speed)
 
 
 def _early_and_late(limit: np.ndarray, step: float) -> np.ndarray:
-    """Returns limits that anticipate, and outlast, each limit in time.
+    """Returns limits (N,) that also hold some time before and after each limit.
 
-    A drive that keeps to limit v within T * v of a place passes the place
-    with at most v during at least T before and after.
+    A drive that keeps to the limit v within the distance T * v of a place
+    passes the place with at most v for at least T before and after.
     """
     period = (path_geometry.REACH + 1) * KNOT_PERIOD
     reach = np.ceil((period * limit + _SMOOTHING_SLACK) / step).astype(int)
@@ -112,7 +111,7 @@ def _early_and_late(limit: np.ndarray, step: float) -> np.ndarray:
 def _reachable(
     squared_limit: np.ndarray, acceleration: float, step: float
 ) -> np.ndarray:
-    """Returns the greatest v^2 under a limit, from rest to rest."""
+    """Returns the greatest v^2 under a limit of v^2, from rest to rest."""
     gain = 2 * acceleration * step
     squared = squared_limit.copy()
     squared[0] = squared[-1] = 0.0
@@ -126,7 +125,7 @@ def _reachable(
 def _drive(
     wanted: np.ndarray, times: np.ndarray, u: np.ndarray, speed: np.ndarray
 ) -> np.ndarray:
-    """Returns positions at wanted times, at rest before and after."""
+    """Returns positions at wanted times; the drive rests before and after."""
     wanted = np.clip(wanted, 0.0, times[-1])
     k = np.searchsorted(times, wanted, side="right") - 1
     k = k.clip(0, len(times) - 2)

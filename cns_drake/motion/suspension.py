@@ -17,9 +17,10 @@ from cns_drake.base.yaml_files import read_yaml
 from cns_drake.motion.road_profile import RoadProfile
 from cns_drake.motion.trajectory import NUM_COORDINATES, BodyRide, Trajectory
 
-# The longest step [s]: a fifteenth of a period of the wheels on their tyres.
+# Longest time step [s]: a fifteenth of the period of the wheels on their tyres.
 _STEP = 0.005
-# The farthest that a wheel goes in a step, to resolve the profile's waves [m].
+# Greatest distance that a wheel travels in a step, so that the waves of the
+# profile are resolved [m].
 _STRIDE = 0.1
 # Time for the body to come to rest at the end of the drive [s].
 _AFTERWARDS = 3.0
@@ -27,7 +28,7 @@ _GRAVITY = 9.81
 
 
 class AxleRates(BaseModel):
-    """A rate of both axles."""
+    """A rate, as of a spring, for each of the two axles."""
 
     model_config = ConfigDict(extra="forbid", frozen=True, strict=True)
 
@@ -54,7 +55,7 @@ class SuspensionRates(BaseModel):
 
 
 def load_suspension_rates(path: Path) -> SuspensionRates:
-    """Loads rates from a YAML file.
+    """Returns the rates in a YAML file.
 
     Raises:
         InputError: the file cannot be used.
@@ -64,11 +65,15 @@ def load_suspension_rates(path: Path) -> SuspensionRates:
 
 @dataclass(frozen=True)
 class CarMasses:
-    """The masses [kg] of a car's body and wheels, and their places.
+    """The masses of a car's body and W wheels, and where they are.
 
-    Moments of inertia [kg m^2] are the body's, about its centre of mass, whose
-    x and z in the vehicle frame B are `center` [m]. A wheel's mass includes its
-    moving parts; (W, 2) x and y of the wheels are in B [m].
+    Attributes:
+        body: mass of the body [kg].
+        roll_inertia, pitch_inertia: moments of inertia of the body about its
+            centre of mass [kg m^2].
+        center: x and z of the body's centre of mass in the vehicle frame B [m].
+        wheels: (W,) masses of the wheels, moving parts included [kg].
+        p_BWset: (W, 2) x and y of the wheels in B [m].
     """
 
     body: float
@@ -80,9 +85,9 @@ class CarMasses:
 
 
 def load_car_masses(vehicle: Path) -> CarMasses:
-    """Loads the masses of an SDF model.
+    """Returns the masses in an SDF model.
 
-    Its floating base is the body. A link on a joint along z is a wheel.
+    Its floating base is the body, and a link on a joint along z is a wheel.
 
     Raises:
         RuntimeError: the model cannot be used.
@@ -120,17 +125,17 @@ class Suspension:
     spring and its tyre. The coordinates are the heave of the body, upwards; its
     roll and pitch about x and y of B (right side down, nose down); and the
     heights of the wheels. All are relative to rest on a level road. The body
-    turns about the point on the ground below its centre of mass: the source of
-    the shipped rates has its roll axis at ground level. The model has no
-    anti-dive or anti-squat geometry.
+    rotates about the point on the ground below its centre of mass, because the
+    source of the shipped rates has its roll axis at ground level. The model has
+    no anti-dive or anti-squat geometry.
 
-    If g q is the stretch of a spring of rate k at the coordinates q, the
+    If g q is the stretch of a spring with the rate k at the coordinates q, the
     stiffness matrix K is the sum of k g' g over all springs. The damping matrix
-    C is the same sum over all dampers.
+    C is the corresponding sum over all dampers.
     """
 
     def __init__(self, masses: CarMasses, rates: SuspensionRates):
-        """Sets the equations of motion up."""
+        """Sets up the equations of motion."""
         self.masses = masses
         x, y = masses.p_BWset.T
         count = len(x)
@@ -141,7 +146,7 @@ class Suspension:
         def each(axles: AxleRates) -> np.ndarray:
             return np.where(front, axles.front, axles.rear)
 
-        # The stretch of each spring and each tyre by the coordinates.
+        # How the coordinates stretch each spring and each tyre.
         tyres = np.eye(size)[NUM_COORDINATES:]
         springs = np.column_stack(
             [np.ones(count), y, center_x - x, -np.eye(count)]
@@ -160,8 +165,8 @@ class Suspension:
             (front, rates.roll_bar_rate.front),
             (~front, rates.roll_bar_rate.rear),
         ):
-            # The bar is twisted by the difference of the body's and the axle's
-            # roll.
+            # The bar is twisted by the difference between the roll of the body
+            # and that of the axle.
             twist = (np.sign(y[axle, None]) * springs[axle]).sum(axis=0)
             twist /= np.abs(y[axle]).sum()
             stiffness += rate * np.outer(twist, twist)
@@ -170,8 +175,8 @@ class Suspension:
         stiffness -= np.diag([0.0, overhang, overhang, *np.zeros(count)])
         self._stiffness = stiffness
         self._damping = product(springs.T * each(rates.damping_rate), springs)
-        # The effect on the coordinates of the heights of the road below the
-        # wheels, and of the specific force in B less its value at rest.
+        # How the inputs (heights of the road below the wheels, and specific
+        # force in B minus its value at rest) act on the coordinates.
         self._loads = np.zeros((size, count + 3))
         self._loads[:, :count] = tyres.T * each(rates.tyre_rate)
         self._loads[2, count] = -masses.body * height
@@ -180,7 +185,10 @@ class Suspension:
         self._loads[NUM_COORDINATES:, count + 2] = -masses.wheels
 
     def at_rest(self, inputs: np.ndarray) -> np.ndarray:
-        """Returns the body's coordinates at rest under (W + 3,) inputs."""
+        """Returns the body's coordinates at rest, under inputs (W + 3,).
+
+        The inputs are those of `respond`.
+        """
         return rotated(inv(self._stiffness), rotated(self._loads, inputs))
 
     def respond(
@@ -189,19 +197,19 @@ class Suspension:
         """Returns the motion of the body, from rest under the first inputs.
 
         The solution is exact for inputs that change linearly within a step [s].
-        The (N, W + 3) inputs are heights of the road below the wheels [m] and
-        specific force along x, y, z of B less its value at rest [m/s^2].
+        The inputs (N, W + 3) are heights of the road below the wheels [m], and
+        specific force along x, y, z of B minus its value at rest [m/s^2].
 
         Returns:
-            Heave [m], roll and pitch [rad], (N, 3), and their first and
-            second derivatives.
+            (N, 3) heave [m], roll and pitch [rad], and their first and second
+            derivatives.
         """
         size, count = self._loads.shape
         to_rates = np.hstack([-self._stiffness, -self._damping, self._loads])
         to_rates /= self._mass[:, None]
         # The motion within a step is that of a linear system whose state also
-        # has the inputs and their slopes (Franklin, Powell and Workman, Digital
-        # Control of Dynamic Systems, the triangle hold).
+        # contains the inputs and their slopes (Franklin, Powell and Workman,
+        # Digital Control of Dynamic Systems, the triangle hold).
         whole = np.zeros((2 * (size + count), 2 * (size + count)))
         whole[:size, size : 2 * size] = step * np.eye(size)
         whole[size : 2 * size, : 2 * size + count] = step * to_rates
@@ -227,12 +235,13 @@ class Suspension:
 
 
 def _exponential(matrix: np.ndarray) -> np.ndarray:
-    """Returns exp(matrix): a Taylor series, squared again and again."""
+    """Returns exp(matrix), from a Taylor series that is squared repeatedly."""
     _, exponent = math.frexp(np.abs(matrix).sum(axis=1).max())
     squarings = max(exponent + 1, 0)
     part = matrix / 2.0**squarings
     term = result = np.eye(len(matrix))
-    # The norm of the part is at most 1/2: what is left out is below rounding.
+    # The norm of `part` is at most 1/2, so that the omitted terms are below
+    # rounding.
     for k in range(1, 16):
         term = product(term, part) / k
         result = result + term
@@ -248,11 +257,11 @@ def ride_on_springs(
     *,
     crossfall: float = 0.0,
 ) -> Trajectory:
-    """Returns a drive on which the body heaves, rolls and pitches.
+    """Returns a drive in which the body heaves, rolls and pitches.
 
-    The vehicle follows the same path at the same speed. Its springs feel the
-    acceleration of the body's centre of mass, gravity on slopes, and the
-    profile below each wheel, which falls to the right by the crossfall.
+    The vehicle follows the same path at the same speed. Its springs react to
+    the acceleration of the body's centre of mass, to gravity on slopes, and to
+    the profile below each wheel, which falls to the right by the crossfall.
     """
     masses = suspension.masses
     end = trajectory.duration + _AFTERWARDS
@@ -260,7 +269,7 @@ def ride_on_springs(
     _, speeds, _ = trajectory.path_parameter(np.arange(0.0, end, _STEP))
     step = min(_STEP, _STRIDE / speeds.max())
     frame = trajectory.path_motion(np.arange(0.0, end, step))
-    # The profile at every wheel and every time.
+    # The profile below each wheel at each time.
     p_FQ_Wset = product(frame.R[:, :2, :2], masses.p_BWset.T)
     p_WQset = frame.p[:, :2, None] + p_FQ_Wset
     heights = profile.heights(p_WQset.transpose(0, 2, 1).reshape(-1, 2))

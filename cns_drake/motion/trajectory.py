@@ -1,4 +1,4 @@
-"""Pose, velocity and acceleration of a vehicle at every time."""
+"""A vehicle's trajectory: pose, velocity and acceleration at any time."""
 
 from __future__ import annotations
 
@@ -18,9 +18,11 @@ from cns_drake.roads.lane_path import LanePath, Speeds
 class FrameMotion(NamedTuple):
     """Pose, velocity and acceleration of a frame F in a frame E at N times.
 
-    It has the (N, 3, 3) rotation R_EF, the (N, 3) place p of F's origin [m],
-    and (N, 3) velocities w [rad/s], v [m/s] and accelerations alpha [rad/s^2],
-    a [m/s^2], angular and linear, in E.
+    Attributes:
+        R: (N, 3, 3) rotations R_EF.
+        p: (N, 3) positions of F's origin in E [m].
+        w, v: (N, 3) angular and linear velocity, in E [rad/s, m/s].
+        alpha, a: (N, 3) angular and linear acceleration, in E [rad/s^2, m/s^2].
     """
 
     R: np.ndarray
@@ -31,14 +33,14 @@ class FrameMotion(NamedTuple):
     a: np.ndarray
 
     def acceleration_at(self, p_FQ: np.ndarray) -> np.ndarray:
-        """Returns (N, 3) accelerations of a point Q fixed in F [m/s^2]."""
+        """Returns accelerations (N, 3) of a point Q fixed in F [m/s^2]."""
         r = rotated(self.R, p_FQ[None])
         return self.a + cross(self.alpha, r) + cross(self.w, cross(self.w, r))
 
     def of_frame(self, motion: FrameMotion) -> FrameMotion:
         """Returns the motion in E of a frame B, given its motion in F.
 
-        This motion is that of F in E.
+        `self` is the motion of F in E.
         """
         p, w, v, alpha, a = (rotated(self.R, vector) for vector in motion[1:])
         rotating = cross(self.alpha, p) + cross(self.w, cross(self.w, p))
@@ -53,9 +55,9 @@ class FrameMotion(NamedTuple):
 
 
 def cross(a: np.ndarray, b: np.ndarray) -> np.ndarray:
-    """Returns the (N, 3) cross products of (N, 3) vectors.
+    """Returns the cross products (N, 3) of vectors (N, 3).
 
-    For a few vectors it takes a fraction of the time of `numpy.cross`.
+    For a few vectors, this function is several times faster than `numpy.cross`.
     """
     return a[:, [1, 2, 0]] * b[:, [2, 0, 1]] - a[:, [2, 0, 1]] * b[:, [1, 2, 0]]
 
@@ -65,11 +67,11 @@ NUM_COORDINATES = 3
 
 
 class RideMoments(NamedTuple):
-    """Heave, roll and pitch at N times, (N, 3), and their derivatives by time.
+    """Heave, roll and pitch (N, 3) at N times, and their time derivatives.
 
     Heave is the upward motion of the body [m]. Roll and pitch are about x and y
-    of the vehicle [rad]. `pivot` is the x coordinate of the point on the ground
-    about which the body turns [m].
+    of the vehicle [rad]. `pivot` is x of the point on the ground about which
+    the body rotates [m].
     """
 
     q: np.ndarray
@@ -79,12 +81,12 @@ class RideMoments(NamedTuple):
 
 
 class BodyRide:
-    """The motion X_FB(t) of a body B against the frame F of its path.
+    """The motion X_FB(t) of a body B relative to the frame F of its path.
 
-    At rest on a level road, B is F. At evenly spaced times, the values and two
-    derivatives of heave, roll and pitch are given. Between these times they are
-    polynomials of degree 5, so that accelerations have no jumps. The body turns
-    about a point on the ground, by its pitch and then by its roll.
+    At rest on a level road, B equals F. Heave, roll and pitch and two of their
+    derivatives are given at evenly spaced times. In between they are
+    polynomials of degree 5, so that accelerations have no jumps. The body
+    rotates about a point on the ground, by its pitch and then by its roll.
     """
 
     def __init__(
@@ -95,13 +97,13 @@ class BodyRide:
         step: float,
         pivot: float,
     ):
-        """Makes the motion.
+        """Takes the motion at evenly spaced times.
 
         Args:
             q: (N, 3) heave [m], roll and pitch [rad], from time zero on.
             dq, ddq: (N, 3) first and second derivatives of q.
             step: time between two rows [s].
-            pivot: x in F of the axes about which the body turns [m].
+            pivot: x in F of the axes about which the body rotates [m].
         """
         self._pivot = pivot
         from scipy.interpolate import PPoly
@@ -109,8 +111,8 @@ class BodyRide:
         times = step * np.arange(len(q))
         self._end = times[-1]
         v, a = dq * step, ddq * step**2 / 2
-        # Remainders of the value and its derivatives at the end, after degree
-        # 2.
+        # What the value and its derivatives still lack at the end, after the
+        # terms up to degree 2.
         rest = q[1:] - q[:-1] - v[:-1] - a[:-1]
         drest = v[1:] - v[:-1] - 2 * a[:-1]
         ddrest = a[1:] - a[:-1]
@@ -129,9 +131,9 @@ class BodyRide:
         self._splines = [spline, spline.derivative(), spline.derivative(2)]
 
     def at(self, t: ArrayLike) -> RideMoments:
-        """Returns heave, roll and pitch of the body at (N,) times.
+        """Returns heave, roll and pitch of the body at times (N,).
 
-        At the ends it rests.
+        Before and after the ride, the body rests.
         """
         times = np.clip(np.atleast_1d(t), 0.0, self._end)
         q, dq, ddq = (spline(times) for spline in self._splines)
@@ -174,11 +176,11 @@ _UP = np.array([[0.0, 0.0, 1.0]])
 
 
 class Moments(NamedTuple):
-    """The path at N times; all motion is computed from it.
+    """The state of the path at N times, from which all motion is computed.
 
-    It consists of the (N,) path parameters u, their rates [1/s] and
-    accelerations [1/s^2], and the path at these parameters. `ride` is the
-    motion of the body against the path; None if the vehicle is rigid.
+    `u` are the path parameters (N,); `rate` and `acceleration` are their
+    derivatives [1/s, 1/s^2]; `jet` is the path at these parameters. `ride` is
+    the motion of the body relative to the path; None if the vehicle is rigid.
     """
 
     u: np.ndarray
@@ -191,11 +193,11 @@ class Moments(NamedTuple):
 class Trajectory:
     """The motion X_WB(t) of a vehicle along a lane path.
 
-    F is the frame of the path: its origin on the ground follows the path, x
-    along the tangent, y horizontal to the left. On a slope the pitch follows
-    the road; there is no roll. The vehicle frame B is F, unless a ride on
-    springs moves it against F. The motion is exact: derivatives are taken of
-    the splines, not of samples. It starts and ends at rest.
+    F is the frame of the path: its origin on the ground follows the path, with
+    x along the tangent, and y horizontal to the left. On a slope, the pitch
+    follows the road; there is no roll. The vehicle frame B equals F, unless a
+    ride on springs moves it relative to F. The motion is exact: derivatives are
+    those of the splines, not of samples. It starts and ends at rest.
     """
 
     def __init__(self, lane_path: LanePath, speeds: Speeds):
@@ -215,9 +217,9 @@ class Trajectory:
         self._ride: BodyRide | None = None
 
     def with_positions(self, positions: np.ndarray) -> Trajectory:
-        """Returns a drive along the same path with other timing.
+        """Returns a drive along the same path with another timing.
 
-        See `make_time_scaling` for the positions.
+        For the positions, see `make_time_scaling`.
         """
         drive = copy.copy(self)
         drive._time_scaling = path_geometry.SplineDerivatives(
@@ -226,7 +228,7 @@ class Trajectory:
         return drive
 
     def with_ride(self, ride: BodyRide) -> Trajectory:
-        """Returns the same drive with a body that moves against its path."""
+        """Returns the same drive with a body that moves on its springs."""
         riding = copy.copy(self)
         riding._ride = ride
         return riding
@@ -242,42 +244,42 @@ class Trajectory:
         return float(self._travelled(self.path.end))
 
     def path_parameter(self, t: ArrayLike) -> list[np.ndarray]:
-        """Returns the path parameter u and its rates u', u'' at (N,) times."""
+        """Returns the path parameter u and its rates u', u'' at times (N,)."""
         values = self._time_scaling.evaluate(np.atleast_1d(t))
         return [value[:, 0] for value in values]
 
     def at(self, t: ArrayLike) -> Moments:
-        """Returns the quantities of the path at (N,) times."""
+        """Returns the state of the path at times (N,)."""
         u, rate, acceleration = self.path_parameter(t)
         ride = None if self._ride is None else self._ride.at(t)
         return Moments(u, rate, acceleration, self.path.evaluate(u), ride)
 
     def path_motion(self, t: ArrayLike) -> FrameMotion:
-        """Returns the path frame F's motion in the world at (N,) times."""
+        """Returns the motion of the path frame F in W at times (N,)."""
         u, rate, acceleration = self.path_parameter(t)
         return _path_motion(self.path.evaluate(u), rate, acceleration)
 
     def body_motion(self, t: ArrayLike) -> FrameMotion:
-        """Returns the vehicle frame B's motion in the world at (N,) times."""
+        """Returns the motion of the vehicle frame B in W at times (N,)."""
         motion = self.path_motion(t)
         if self._ride is None:
             return motion
         return motion.of_frame(ride_motion(self._ride.at(t)))
 
     def travelled(self, t: ArrayLike) -> np.ndarray:
-        """Returns the (N,) distances travelled at (N,) times [m]."""
+        """Returns the distances (N,) travelled at times (N,) [m]."""
         return self._travelled(self.path_parameter(t)[0])
 
     def positions(self, t: ArrayLike) -> np.ndarray:
-        """Returns the (N, 3) positions p_WF on the path at (N,) times [m]."""
+        """Returns the positions p_WF (N, 3) on the path at times (N,) [m]."""
         return self.path.evaluate(self.path_parameter(t)[0]).p
 
     def pose(self, t: float) -> RigidTransform:
-        """Returns X_WB at a time."""
+        """Returns the pose X_WB at a time [s]."""
         return pose_at(self.at(t))
 
     def poses(self, t: ArrayLike) -> tuple[np.ndarray, np.ndarray]:
-        """Returns R_WB (N, 3, 3) and p_WB (N, 3) [m] at (N,) times."""
+        """Returns R_WB (N, 3, 3) and p_WB (N, 3) [m] at times (N,)."""
         jet = self.path.evaluate(self.path_parameter(t)[0])
         R_WF = _rotations(jet)
         if self._ride is None:
@@ -287,7 +289,7 @@ class Trajectory:
 
 
 def pose_at(moments: Moments, row: int = 0) -> RigidTransform:
-    """Returns X_WB at one of several times."""
+    """Returns X_WB at one of several times, given by its row."""
     jet = moments.jet
     X_WF = RigidTransform(
         RollPitchYaw(0.0, -jet.climb[row], jet.yaw[row]), jet.p[row]
@@ -301,7 +303,7 @@ def pose_at(moments: Moments, row: int = 0) -> RigidTransform:
 def poses_and_motion(
     moments: Moments,
 ) -> tuple[list[RigidTransform], FrameMotion]:
-    """Returns X_WB at N times, and the motion of B in the world."""
+    """Returns X_WB at N times, and the motion of B in W."""
     motion = _path_motion(moments.jet, moments.rate, moments.acceleration)
     if moments.ride is None:
         return [pose_at(moments, k) for k in range(len(moments.u))], motion
@@ -315,18 +317,18 @@ def poses_and_motion(
 
 def _rotations(jet: path_geometry.PathJet) -> np.ndarray:
     yaw_pitch = np.stack([jet.yaw, -jet.climb], axis=1)
-    # Capital letters: about the axes of the vehicle in turn.
+    # Capital letters: one after the other, about the axes of the vehicle.
     return Rotation.from_euler("ZY", yaw_pitch).as_matrix()
 
 
 def _path_motion(
     jet: path_geometry.PathJet, rate: np.ndarray, acceleration: np.ndarray
 ) -> FrameMotion:
-    """Returns the motion of F in the world; see `Moments`."""
+    """Returns the motion of F in W; for the arguments, see `Moments`."""
     yaw_rate, pitch_rate = jet.dyaw * rate, -jet.dclimb * rate
     ddyaw = jet.ddyaw * rate**2 + jet.dyaw * acceleration
     ddclimb = jet.ddclimb * rate**2 + jet.dclimb * acceleration
-    # The pitch axis, to the left, turns with the vehicle.
+    # The pitch axis, to the left, rotates with the vehicle.
     zero = np.zeros_like(jet.yaw)
     left = np.stack([-sin(jet.yaw), cos(jet.yaw), zero], axis=1)
     turning = (yaw_rate * pitch_rate)[:, None] * cross(_UP, left)

@@ -28,14 +28,15 @@ from cns_drake.base.elementary import arctan2, product, rotated
 from cns_drake.motion.path_geometry import PathJet
 from cns_drake.motion.trajectory import Moments, Trajectory, poses_and_motion
 
-# States computed at a time.
+# Number of states that are computed at a time.
 _BLOCK = 64
-# Two directions are equal if the cosine of their angle is at least this.
+# Two directions are the same if the cosine of the angle between them is at
+# least this.
 _PARALLEL = 1 - 1e-9
 
 
 class JointMotion(NamedTuple):
-    """An angle [rad] or a distance [m], its rate and its acceleration."""
+    """The angle [rad] or distance [m] of a joint, its rate and acceleration."""
 
     position: np.ndarray
     rate: np.ndarray
@@ -48,18 +49,18 @@ class WheelMotion:
     The wheel's centre is at p_BC = (x, y, r) in the vehicle frame, where r is
     its radius. Let s be the path speed, m the turn rate about the vehicle's z,
     and d the steering angle (all per path parameter). The ground below the
-    wheel then passes with the velocity (s - m y, m x). Therefore
-    tan(d) = m x / (s - m y), so a wheel on the rear axle (x = 0) needs no
-    steering. The wheel rolls by the length of that vector divided by r.
+    wheel then passes with the velocity (s - m y, m x). Therefore tan(d) = m x /
+    (s - m y), so that a wheel on the rear axle (x = 0) needs no steering. The
+    wheel rolls by the length of that vector divided by r.
 
-    While a ride moves the body, the wheel stays on the drawn ground: it travels
-    up in the body by as much as the body comes down there. That is exact for
-    small angles, and within a millimetre for 3 degrees. Steering and rolling
-    are those without a ride.
+    While a ride moves the body, the wheel stays on the drawn ground: it moves
+    up relative to the body by as much as the body comes down there. This is
+    exact for small angles, and within a millimetre for 3 degrees. Steering and
+    rolling are the same as without a ride.
     """
 
     def __init__(self, trajectory: Trajectory, p_BC: np.ndarray):
-        """Prepares the wheel, whose centre is at p_BC [m]."""
+        """Takes a trajectory, and the wheel's centre p_BC [m]."""
         self._x, self._y, self._radius = p_BC
         self._rolled = trajectory.path.integral(
             lambda jet: np.hypot(*self._ground_velocity(jet))
@@ -69,7 +70,7 @@ class WheelMotion:
         return jet.speed - jet.turn * self._y, jet.turn * self._x
 
     def steering(self, moments: Moments) -> JointMotion:
-        """Returns steering angles of wheels at (N,) times, left positive."""
+        """Returns the steering angle at N times, positive to the left."""
         rate, acceleration, jet = moments[1:4]
         a, b, da, db, dda, ddb = self._ground_motion(jet)
         squared = a**2 + b**2
@@ -83,9 +84,9 @@ class WheelMotion:
         )
 
     def rolling(self, moments: Moments) -> JointMotion:
-        """Returns rolling angles of the wheels at (N,) times.
+        """Returns the wheel's rolling angle at N times.
 
-        They are positive forwards and zero at the start.
+        It is positive forwards, and zero at the start.
         """
         u, rate, acceleration, jet = moments[:4]
         a, b, da, db, _, _ = self._ground_motion(jet)
@@ -98,12 +99,13 @@ class WheelMotion:
         )
 
     def travel(self, moments: Moments) -> JointMotion:
-        """Returns how far wheels move up in the body at (N,) times [m]."""
+        """Returns how far the wheel has moved up in the body at N times [m]."""
         ride = moments.ride
         if ride is None:
             still = np.zeros_like(moments.u)
             return JointMotion(still, still, still)
-        # In a fixed order: a matrix product rounds by the number of rows.
+        # In a fixed order, since the rounding of a matrix product depends on
+        # the number of rows.
         return JointMotion(
             *(
                 (self._x - ride.pivot) * pitch - self._y * roll - heave
@@ -112,7 +114,7 @@ class WheelMotion:
         )
 
     def _ground_motion(self, jet: PathJet) -> tuple[np.ndarray, ...]:
-        """Returns the ground's velocity and its two derivatives by u."""
+        """Returns the velocity of the ground, and two derivatives by u."""
         return (
             *self._ground_velocity(jet),
             jet.dspeed - jet.dturn * self._y,
@@ -125,7 +127,7 @@ class WheelMotion:
 class _State(NamedTuple):
     """Positions, velocities and accelerations of the whole plant.
 
-    Arrays of one more dimension are those of many times.
+    If there are several times, the arrays have a first axis for the times.
     """
 
     q: np.ndarray
@@ -139,10 +141,11 @@ class VehicleMotion(LeafSystem):
     It has the kinematic output ports of a MultibodyPlant. It can feed sensors
     and a SceneGraph in place of a plant, which has no port for prescribed
     motion.
-    The vehicle's floating base B follows the trajectory; each revolute joint
-    about B's y rolls, each about B's z steers, so that no wheel slips; each
-    prismatic joint along B's z keeps its wheel on the ground. All other joints
-    keep their default positions.
+
+    The vehicle's floating base B follows the trajectory. Revolute joints about
+    B's y roll, and those about B's z steer, so that no wheel slips. Prismatic
+    joints along B's z keep their wheels on the ground. All other joints keep
+    their default positions.
 
     .. pydrake_system::
 
@@ -154,7 +157,7 @@ class VehicleMotion(LeafSystem):
         - body_spatial_accelerations
 
     `position` is the plant's q; the others are lists over its bodies of X_WB,
-    V_WB and A_WB, expressed in the world. They depend on time only.
+    V_WB and A_WB, expressed in W. All depend on time only.
 
     Example:
         from cns_drake import VehicleMotion
@@ -176,8 +179,8 @@ class VehicleMotion(LeafSystem):
             plant: a finalized plant; only its model is used.
             vehicle: the model instance that moves.
             trajectory: motion of its base.
-            period: distance of the times at which states are mostly wanted;
-                many are computed at once, which takes a tenth of the time [s].
+            period: time step at which states are usually needed [s]. States at
+                many such times are then computed at once, ten times as fast.
 
         Raises:
             ValueError: a joint of the vehicle is of another kind.
@@ -186,11 +189,11 @@ class VehicleMotion(LeafSystem):
         self._plant = plant
         self._trajectory = trajectory
         self._period = period
-        # The last block of states, and its number.
+        # The number of the last block of states, and these states.
         self._block: tuple[int, _State] | None = None
         self._base = plant.GetUniqueFloatingBaseBodyOrThrow(vehicle)
-        # Scratch to compute the motion of bodies from q and v; every use sets
-        # all values that it reads.
+        # Scratch space to compute the motion of bodies from q and v. Every use
+        # sets all values that it reads.
         self._plant_context = plant.CreateDefaultContext()
         self._default_q = plant.GetPositions(self._plant_context).copy()
         self._joints = [
@@ -228,7 +231,7 @@ class VehicleMotion(LeafSystem):
     def _describe(
         self, joint: Joint
     ) -> tuple[Callable[[Moments], JointMotion], float]:
-        """Returns the kind of motion of a joint, and its sign."""
+        """Returns the function for the motion of a joint, and its sign."""
         context = self._plant_context
         X_BJ = joint.frame_on_child().CalcPose(context, self._base.body_frame())
         R_BJ = X_BJ.rotation().matrix()
@@ -262,7 +265,7 @@ class VehicleMotion(LeafSystem):
         value.set_value(_State(*(values[row] for values in states)))
 
     def _states(self, times: np.ndarray) -> _State:
-        """Returns the states at (N,) times; each depends on its time alone."""
+        """Returns the states at times (N,); each depends only on its time."""
         plant, base = self._plant, self._base
         moments = self._trajectory.at(times)
         X_WBs, motion = poses_and_motion(moments)
@@ -272,7 +275,7 @@ class VehicleMotion(LeafSystem):
             plant.SetFreeBodyPose(self._plant_context, base, X_WB)
             q[k] = plant.GetPositions(self._plant_context)
         v, vdot = np.zeros((2, len(times), plant.num_velocities()))
-        # A floating base's velocities are V_WB, expressed in the world.
+        # A floating base's velocities are V_WB, expressed in W.
         start = base.floating_velocities_start_in_v()
         v[:, start : start + 6] = np.hstack([motion.w, motion.v])
         vdot[:, start : start + 6] = np.hstack([motion.alpha, motion.a])
@@ -294,7 +297,7 @@ class VehicleMotion(LeafSystem):
         plant.SetPositions(scratch, state.q)
         plant.SetVelocities(scratch, state.v)
         if name == "body_spatial_accelerations":
-            # The plant's port has those of its dynamics.
+            # The port of a plant would have those of its dynamics.
             output.set_value(
                 plant.CalcSpatialAccelerationsFromVdot(scratch, state.vdot)
             )
@@ -303,16 +306,16 @@ class VehicleMotion(LeafSystem):
 
 
 class Sweep(NamedTuple):
-    """Poses of a frame P in the world at N times.
+    """Poses of a frame P in W at N times.
 
-    They are (N, 3, 3) rotations and (N, 3) positions [m].
+    They are rotations (N, 3, 3) and positions (N, 3) [m].
     """
 
     R_WPset: np.ndarray
     p_WPset: np.ndarray
 
     def of_frame(self, X_PS: RigidTransform) -> Sweep:
-        """Returns the poses of a frame S that is fixed in P."""
+        """Returns the poses of a frame S that is fixed in P at X_PS."""
         return Sweep(
             product(self.R_WPset, X_PS.rotation().matrix()),
             self.p_WPset + rotated(self.R_WPset, X_PS.translation()),
@@ -320,9 +323,9 @@ class Sweep(NamedTuple):
 
 
 class VehicleSweep(LeafSystem):
-    """Gives the poses of a vehicle at times shortly after the present one.
+    """A system that returns poses of a vehicle shortly after the present time.
 
-    A LiDAR keeps turning during a frame. Its output at a time needs poses of
+    A LiDAR keeps turning during a frame. Its output at a time needs poses at
     later times, which the SceneGraph does not have.
 
     .. pydrake_system::
@@ -331,12 +334,12 @@ class VehicleSweep(LeafSystem):
         output_ports:
         - sweep
 
-    `sweep` is abstract, a `Sweep` of the vehicle frame B at the present time
-    plus each offset. After the end of the trajectory B rests there.
+    `sweep` is abstract: a `Sweep` of the vehicle frame B at the present time
+    plus each offset. After the end of the trajectory, B rests there.
     """
 
     def __init__(self, trajectory: Trajectory, offsets: np.ndarray):
-        """Declares the port, for (N,) offsets [s]."""
+        """Declares the port, for time offsets (N,) [s]."""
         super().__init__()
         self._trajectory = trajectory
         self._offsets = np.array(offsets, dtype=float)

@@ -1,1 +1,1 @@
-"""Pictures of stages, and web pages of drives."""
+"""Draws pictures of stages, and web pages of drives."""

@@ -1,4 +1,4 @@
-"""The static structures of a stage, and their differences to another stage."""
+"""The static structures of a stage, and how they differ from another stage."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
@@ -13,15 +13,16 @@ from cns_drake.scene.semantics import CLASS_RGB
 from cns_drake.scene.surfaces import TriangleSurface
 from cns_drake.scene.world import World
 
-# Two stages of a structure are equally high up to this [m].
+# A structure has the same height in two stages if it differs by at most this
+# [m].
 _HEIGHT_TOLERANCE = 0.5
 
 
 @dataclass(frozen=True)
 class Part:
-    """A part of a structure, of one colour.
+    """A part of a structure that has one colour.
 
-    The colour is sRGB, each from 0 to 1; the surface is in the world.
+    The colour is sRGB, each value from 0 to 1; the surface is in W.
     """
 
     semantic_class: str
@@ -35,14 +36,15 @@ class Part:
 
 @dataclass(frozen=True)
 class StageDifference:
-    """A stage compared with another one.
+    """The differences between a stage and another one.
 
     Attributes:
         common: parts of this stage that the other one has as well.
         additional: structures of this stage that the other one lacks, and parts
-            of structures above their height there.
+            of structures above their height in the other one.
         absent: structures of the other stage that this one lacks.
-        lower: parts of structures of the other stage above their height here.
+        lower: parts of structures of the other stage above their height in this
+            one.
     """
 
     common: list[Part] = field(default_factory=list)
@@ -52,7 +54,7 @@ class StageDifference:
 
 
 def read_parts(world: World) -> dict[str, list[Part]]:
-    """Returns structure -> parts, for everything that never moves."""
+    """Returns structure -> its parts, for all structures that never move."""
     plant = world.plant
     context = plant.CreateDefaultContext()
     geometries = read_perception_geometry(
@@ -84,7 +86,7 @@ def read_parts(world: World) -> dict[str, list[Part]]:
 def compare_parts(
     own: Mapping[str, Sequence[Part]], other: Mapping[str, Sequence[Part]]
 ) -> StageDifference:
-    """Returns how a stage differs from another one, by structure.
+    """Returns how a stage differs from another one, structure by structure.
 
     A structure that was moved, or has another shape of the same height, is
     common to both.
@@ -118,7 +120,7 @@ def _split(
 ) -> tuple[list[Part], list[Part]]:
     """Returns the parts below a height, and the parts above it [m].
 
-    Triangles are kept whole.
+    No triangle is cut.
     """
     below: list[Part] = []
     above: list[Part] = []

@@ -1,4 +1,4 @@
-"""A drive through a city as one web page that opens without a server."""
+"""Makes one web page of a drive through a city, which needs no server."""
 
 from __future__ import annotations
 
@@ -33,7 +33,7 @@ from cns_drake.scene.world import World
 
 Rgb = tuple[float, float, float]
 
-# Colours of change, and their legends.
+# Kind of change -> its colour, and its text in the legend.
 CHANGE_RGB: dict[str, Rgb] = {
     "absent": (0.86, 0.08, 0.20),
     "lower": (0.96, 0.50, 0.05),
@@ -44,7 +44,7 @@ _CHANGES = {
     "lower": "higher in {other}",
     "additional": "not in {other}, or lower there",
 }
-# Absent structures are translucent, hidden behind present ones, and cast no
+# Opacity of absent structures. They are hidden behind present ones, and cast no
 # shadow.
 _OPACITY = 0.45
 _UNREAL = {
@@ -53,44 +53,45 @@ _UNREAL = {
     "material.polygonOffsetFactor": 1.0,
     "material.polygonOffsetUnits": 4.0,
 }
-# Traffic has a pose only every few frames, which keeps pages small. In the
-# tightest turns at 10 m/s the error between them is 0.1 m.
+# Traffic gets a pose only every so many frames, which keeps pages small. In the
+# tightest turns at 10 m/s, the error between these frames is 0.1 m.
 _TRAFFIC_INTERVAL = 5
-# More samples of a plot would not be visible.
+# Greatest number of samples in a plot; more would not be visible.
 _MAX_SAMPLES = 400
-# Size of a plot in units of its own; the page stretches it.
+# Size of a plot in units of its own, which the page stretches.
 _PLOT_WIDTH, _PLOT_HEIGHT = 400.0, 20.0
-# Least range of a plot: a smaller one would magnify noise.
+# Unit -> least range of a plot. A smaller one would magnify noise.
 _LEAST_RANGE = {"km/h": 10.0, "m/s²": 2.0, "deg/s": 10.0}
-# Times on the scale may be so far apart [s].
+# Possible distances of the times on the scale [s].
 _TIME_STEPS = (1, 2, 5, 10, 15, 30, 60, 120, 300, 600, 900, 1800)
-# Together they keep the page of any drive below 25 MB.
+# These limits keep the page of any drive below 25 MB.
 _MAX_SCANS = 160
 _MAX_POINTS_PER_SCAN = 3000
-# The same for images of a camera, and pixels of their longer side.
+# Greatest number of images per camera, and their longer side in pixels.
 _MAX_IMAGES, _IMAGE_SIDE = 200, 400
-# One point for each cube of this size [m]: without that, nearly all points
-# would lie on the rings of ground around the vehicle.
+# One point is kept per cube of this size [m]. Otherwise nearly all points would
+# lie on the rings of ground around the vehicle.
 _THINNING_SIZE = 0.5
 
 
 @dataclass(frozen=True)
 class DriveRecord:
-    """The record of a drive; most lists have an entry for each frame.
+    """The record of a drive; most lists have one entry per frame.
 
     Attributes:
         period: time between frames [s].
+        X_WBs: poses of the vehicle.
         X_WFs: moving geometry frame F -> its poses.
-        scans: frame index and (N, 3) positions in the world [m] of the
-            scans to show.
+        scans: for each scan to show, its frame index and the positions (N, 3)
+            of its points in W [m].
         speeds: forward speed of the vehicle [m/s].
         specific_forces_I: specific force in the IMU's frame I [m/s^2].
         angular_velocities_I: angular velocity w_WI_I [rad/s].
-        num_points: numbers of points in the scans as measured.
-        limbs: leading frame F -> the poses in F of all frames that move with it
-            as one, with F itself.
+        num_points: number of points in each scan as measured.
+        limbs: leading frame F -> the poses in F of all frames that move
+            together with it, including F itself.
         names: leading frame -> its name in the page.
-        images: camera -> frame index and JPEG of the images to show.
+        images: camera -> frame index and JPEG of each image to show.
     """
 
     period: float
@@ -110,11 +111,11 @@ class DriveRecord:
 
 @dataclass(frozen=True)
 class ShownStages:
-    """The stage of a drive among others, as its page shows it.
+    """The stage of a drive and other stages, as the page shows them.
 
-    The page shows the difference to the other stage, if any. If the drive is in
-    a stage of a map, `stage` names this stage, and `stages` names all stages of
-    the map, the earliest first.
+    The page shows the difference to the stage `other`, if any. If the drive is
+    in a stage of a map, `stage` is the name of this stage, and `stages` are the
+    names of all stages of the map, the earliest first.
     """
 
     other: World | None = None
@@ -132,9 +133,9 @@ def make_drive_page(
     shown: ShownStages = _ALONE,
     title: str = "cns-drake",
 ) -> str:
-    """Returns a page with the city, the drive and its scans.
+    """Returns the HTML of a page with the city, the drive and its scans.
 
-    The page has switches for its layers:
+    The page has layers, which can be switched on and off:
 
     - `/city/<class>`: the structures of the stage in their own colours,
     - `/vehicle/<body>`, `/moving/<body>`: the moving bodies,
@@ -147,12 +148,11 @@ def make_drive_page(
     - `/stage_difference/lower/<class>`: parts of the other stage above their
       height here, translucent orange, off when the page opens.
 
-    A panel has the title, the stage and the switches, which also serve as the
-    legend. With them, the camera follows the car, layers are hidden, and the
-    change is shown, with additional parts in violet. Other panels show what
-    cameras see.
-    Below the time line are plots of speed and IMU. On a phone, the panels are
-    one sheet, folded when the page opens.
+    A panel shows the title, the stage and the switches, which also are the
+    legend. The switches let the camera follow the car, hide layers, and show
+    the change (additional parts in violet). Other panels show the images of
+    cameras. Below the time line are plots of the speed and the IMU. On a phone,
+    the panels are one sheet, which is folded when the page opens.
     """
     with _quiet():
         meshcat = geometry.Meshcat(MeshcatParams(host="127.0.0.1", port=0))
@@ -175,9 +175,10 @@ def make_panel(
 ) -> str:
     """Returns the HTML of the page's title, switches, legend and plots.
 
-    The legend is that of `CHANGE_RGB`.
+    `changes` are the kinds of change in the page, for which the legend has the
+    colours of `CHANGE_RGB`.
     """
-    # Only pages need templates, whose import takes a moment.
+    # Only pages need templates, and the import takes a moment.
     from jinja2 import Environment, StrictUndefined
     from markupsafe import Markup
 
@@ -225,9 +226,13 @@ def make_panel(
 class Plot:
     """A curve over the time of the drive, as the page's template draws it.
 
-    The unit is a key of `_LEAST_RANGE`. `values` is what is said at some times,
-    evenly spread over the drive; `points`, the curve, is as SVG has it. `ticks`
-    are the scale: what stands at which share of the height, from the top.
+    Attributes:
+        name: title of the plot.
+        unit: a key of `_LEAST_RANGE`.
+        values: values to display, evenly spread over the drive, as text.
+        points: the curve as SVG has it.
+        ticks: texts on the scale, and their places as shares of the height from
+            the top.
     """
 
     name: str
@@ -238,7 +243,7 @@ class Plot:
 
     @classmethod
     def of(cls, name: str, unit: str, values: np.ndarray) -> Plot:
-        """Returns the plot of values (F,), one for each frame."""
+        """Returns the plot of values (F,), one per frame."""
         count = min(len(values), _MAX_SAMPLES)
         frames = np.linspace(0, len(values) - 1, count).round().astype(int)
         values = values[frames]
@@ -253,7 +258,7 @@ class Plot:
         return cls(
             name,
             unit,
-            # Zero has no sign.
+            # Adding 0.0 removes the sign of a negative zero.
             ",".join(f"{value:.1f}" for value in values.round(1) + 0.0),
             " ".join(f"{a:.1f},{b:.1f}" for a, b in zip(x, y, strict=True)),
             _scale(low, high),
@@ -261,9 +266,10 @@ class Plot:
 
 
 def _scale(low: float, high: float) -> list[tuple[str, float]]:
-    """Returns zero and a round value on either side, if in a range around it.
+    """Returns ticks for zero, and for a round value above and below it.
 
-    With them come their shares of the height, from the top.
+    Values outside of the range are left out. Each tick has its place as a share
+    of the height, from the top.
     """
     reach = max(-low, high)
     power = 10.0 ** math.floor(math.log10(reach))
@@ -276,7 +282,7 @@ def _scale(low: float, high: float) -> list[tuple[str, float]]:
 
 
 def _time_scale(duration: float) -> list[tuple[str, float]]:
-    """Returns round times of a drive, at most seven, and their shares of it."""
+    """Returns at most seven round times of a drive, and their shares of it."""
     step = next((s for s in _TIME_STEPS if duration <= 6 * s), 3600)
     return [
         (f"{t // 60}:{t % 60:02d}", t / max(duration, 1.0))
@@ -285,7 +291,7 @@ def _time_scale(duration: float) -> list[tuple[str, float]]:
 
 
 def _shown_points(drive: DriveRecord) -> str:
-    """Returns a sentence on the part of the points that a page shows."""
+    """Returns a sentence that says which part of the points the page shows."""
     if not drive.num_points:
         return ""
     most = max(len(p_WRset) for _, p_WRset in drive.scans)
@@ -296,9 +302,9 @@ def _shown_points(drive: DriveRecord) -> str:
 
 
 def motion_plots(drive: DriveRecord) -> list[Plot]:
-    """Returns the plots of speed and IMU.
+    """Returns the plots of the speed and the IMU.
 
-    A drive of less than two frames has none.
+    A drive of less than two frames has no plots.
     """
     if len(drive.speeds) < 2:
         return []
@@ -313,7 +319,7 @@ def motion_plots(drive: DriveRecord) -> list[Plot]:
 
 
 def moving_frames(world: World) -> tuple[FrameId, ...]:
-    """Returns the frames with visible geometry that may move."""
+    """Returns the frames that may move and have visible geometry."""
     inspector = world.scene_graph.model_inspector()
     frames = (
         inspector.GetFrameId(geometry_id)
@@ -328,7 +334,7 @@ def moving_frames(world: World) -> tuple[FrameId, ...]:
 def _draw_city(
     meshcat: geometry.Meshcat, world: World, other_stage: World | None
 ) -> set[str]:
-    """Draws static structures; returns the layers of change that exist."""
+    """Draws static structures; returns the kinds of change that exist."""
     own = read_parts(world)
     other = own if other_stage is None else read_parts(other_stage)
     difference = compare_parts(own, other)
@@ -344,7 +350,7 @@ def _draw_city(
 def _draw_missing(
     meshcat: geometry.Meshcat, name: str, parts: Sequence[Part]
 ) -> None:
-    """Draws the parts that only the other stage has; off at first."""
+    """Draws parts that only the other stage has; they are hidden at first."""
     if not parts:
         return
     path = f"/stage_difference/{name}"
@@ -362,7 +368,8 @@ def _animate(
 ) -> None:
     """Draws moving bodies and scans, and animates them over the drive."""
     animation = geometry.MeshcatAnimation(frames_per_second=1.0 / drive.period)
-    # The frame that leads each limb, and the pose of the limb in it.
+    # Frame of each limb -> the frame that leads it, and the pose of the limb in
+    # it.
     led = {frame: (frame, RigidTransform()) for frame in drive.X_WFs}
     for leading, X_FLs in drive.limbs.items():
         led |= {limb: (leading, X_FL) for limb, X_FL in X_FLs.items()}
@@ -378,12 +385,12 @@ def _animate(
         drawing.draw_body(meshcat, path, geometries)
         X_WFs = drive.X_WFs[leading]
         meshcat.SetTransform(path, X_WFs[0])
-        # In between, the page interpolates.
+        # The page interpolates between these frames.
         interval = _TRAFFIC_INTERVAL if leading in drive.limbs else 1
         last = len(X_WFs) - 1
         for frame in {*range(0, last, interval), last}:
             animation.SetTransform(frame, path, X_WFs[frame])
-    # The page's script places it.
+    # The script of the page places it.
     drawing.draw_marker(meshcat, "/vehicle/marker")
     for k, (frame, p_WRset) in enumerate(drive.scans):
         path = f"/scans/{k:03d}"
@@ -398,7 +405,7 @@ def _animate(
 
 
 def _path(world: World, drive: DriveRecord, frame_id: FrameId) -> str:
-    """Returns the layer of a moving frame."""
+    """Returns the layer that contains a moving frame."""
     if frame_id in drive.names:
         return f"/moving/{drive.names[frame_id]}"
     body = world.plant.GetBodyFromFrameId(frame_id)
@@ -409,7 +416,7 @@ def _path(world: World, drive: DriveRecord, frame_id: FrameId) -> str:
 
 @contextlib.contextmanager
 def _quiet() -> Iterator[None]:
-    """Keeps Drake from announcing a port that is not for users."""
+    """Stops Drake from printing the address of a port that is not for users."""
     logger = logging.getLogger("drake")
     level = logger.level
     logger.setLevel(logging.WARNING)
@@ -433,7 +440,9 @@ def _hex(rgb: Rgb | np.ndarray) -> str:
 
 
 class MeshcatRecorder(LeafSystem):
-    """Follows a drive and saves it as a page (see `make_drive_page`).
+    """A system that records a drive and saves it as a page.
+
+    See `make_drive_page` for the page.
 
     .. pydrake_system::
 
@@ -446,14 +455,14 @@ class MeshcatRecorder(LeafSystem):
         - <lidar>_scan (one for each LiDAR)
         - <camera>_image (one for each camera)
 
-    Frames: world W, vehicle B (`base_link`), LiDAR S, IMU I. `odometry` is
-    an `Odometry`; `specific_force` [m/s^2] and `angular_velocity` w_WI_I
-    [rad/s] are expressed in I; `<lidar>_scan` is a structured array of points
-    expressed in S; `<camera>_image` is an ImageRgba8U.
+    Frames: world W, vehicle B (`base_link`), LiDAR S, IMU I. `odometry` is an
+    `Odometry`; `specific_force` [m/s^2] and `angular_velocity` w_WI_I [rad/s]
+    are expressed in I; `<lidar>_scan` is a structured array of points expressed
+    in S; `<camera>_image` is an ImageRgba8U.
 
-    The poses of all moving frames are recorded at every frame, and the scans
-    whenever the vehicle has gone another `scan_spacing` meters. On a long drive
-    the spacing is doubled as often as needed.
+    The poses of all moving frames are recorded at every frame. Scans are
+    recorded whenever the vehicle has driven another `scan_spacing` metres. On a
+    long drive, this spacing is doubled as often as needed.
     """
 
     def __init__(
@@ -473,11 +482,11 @@ class MeshcatRecorder(LeafSystem):
             world: the world that is drawn.
             X_BSs: name of a LiDAR -> pose of its frame S on the body B.
             period: time between two frames [s].
-            num_frames: frames that are recorded; all if None.
-            shown: stages whose change the page shows.
-            scan_spacing: way between two shown scans [m].
-            cameras: name of a camera -> number of frames from one image to
-                the next.
+            num_frames: number of frames that are recorded; all if None.
+            shown: stages whose differences the page shows.
+            scan_spacing: distance driven between two shown scans [m].
+            cameras: name of a camera -> number of frames from one image to the
+                next.
         """
         super().__init__()
         self._world = world
@@ -517,10 +526,10 @@ class MeshcatRecorder(LeafSystem):
         self.DeclareForcedPublishEvent(self._publish)
 
     def show_too(self, name: str, frames: Sequence[FrameId]) -> None:
-        """Adds a moving object with a unique name.
+        """Adds a moving object, with a unique name, to the page.
 
-        The first of its frames leads. Its limbs stay as at the first frame of
-        the drive.
+        The first of its frames leads: the others keep the poses relative to it
+        that they have at the first frame of the drive.
         """
         leading = frames[0]
         self.drive.X_WFs[leading] = []
@@ -542,8 +551,8 @@ class MeshcatRecorder(LeafSystem):
         query_object = self._geometry_query.Eval(context)
         for frame_id, X_WFs in self.drive.X_WFs.items():
             X_WF = query_object.GetPoseInWorld(frame_id)
-            # Copies: the values of the ports may be overwritten at the next
-            # step.
+            # Copies, since the values of the ports may be overwritten in the
+            # next step.
             X_WFs.append(RigidTransform(X_WF))
         if not self.drive.X_WBs:
             for leading, X_FLs in self.drive.limbs.items():
@@ -573,7 +582,7 @@ class MeshcatRecorder(LeafSystem):
         for name, images in self.drive.images.items():
             if frame % self._cameras[name]:
                 continue
-            # Slow to import, and few drives have cameras.
+            # The import is slow, and few drives have cameras.
             from PIL import Image
 
             pixels = self._images[name].Eval(context).data[:, :, :3]
@@ -600,16 +609,17 @@ class MeshcatRecorder(LeafSystem):
 
 
 def _positions(X_WS: RigidTransform, scan: np.ndarray) -> np.ndarray:
-    """Returns the (N, 3) positions of a scan in the world [m]."""
+    """Returns the positions (N, 3) of a scan's points in W [m]."""
     p_SRset = np.column_stack([scan["x"], scan["y"], scan["z"]])
     return p_SRset @ X_WS.rotation().matrix().T + X_WS.translation()
 
 
 def _thinned(p_WRset: np.ndarray) -> np.ndarray:
-    """Returns an evenly spread part of a point set."""
+    """Returns an evenly spread part of points (N, 3)."""
     cubes = np.floor(p_WRset / _THINNING_SIZE).astype(np.int64)
     _, first = np.unique(cubes, axis=0, return_index=True)
     count = min(len(first), _MAX_POINTS_PER_SCAN)
-    # Points are dropped evenly over the sorted cubes, so on all sides alike.
+    # Points are dropped evenly from the sorted cubes, and thus evenly on all
+    # sides.
     kept = first[np.linspace(0, len(first) - 1, count).astype(int)]
     return p_WRset[np.sort(kept)]

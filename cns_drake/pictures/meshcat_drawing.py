@@ -1,4 +1,4 @@
-"""Drawing a city by day, a route and scans into a Meshcat scene."""
+"""Draws a city by day, a route and scans into a Meshcat scene."""
 
 from collections.abc import Iterable, Sequence
 
@@ -15,15 +15,15 @@ from cns_drake.scene.perception_geometry import (
 )
 from cns_drake.scene.surfaces import TriangleSurface, merge_triangles
 
-# Vertices are put on an invisible grid of 4 mm: the zeros at the end of each
-# float compress well.
+# Vertices are rounded to an invisible grid of 4 mm, because the zeros at the
+# end of each float compress well.
 _VERTEX_GRID = 2.0**-8
 
 START_RGB = np.array([1.00, 0.10, 0.10])
 END_RGB = np.array([0.10, 0.30, 1.00])
 _ROUTE_WIDTH = 2.0
-# Rise of the ribbon along the route [m]: where a route passes twice, its later
-# part is on top.
+# Height of the ribbon at the start and at the end of the route [m]: where a
+# route passes twice, its later part is on top.
 _ROUTE_HEIGHTS = (0.2, 0.7)
 
 _MARKER_HEIGHT = 7.0
@@ -31,14 +31,15 @@ _MARKER_RADIUS = 2.5
 _MARKER_RGBA = Rgba(1.0, 0.75, 0.0)
 
 _POINT_PIXELS = 2.0
-# Heights above the map's zero of the first and the last colour of points [m].
+# Heights above the map's zero with the first and the last colour of points [m].
 POINT_HEIGHTS = (0.0, 25.0)
 _NUM_COLORS = 64
 
-# Toward the sun: from the south-west, so that the sides in view are lit.
+# Direction towards the sun, in the south-west, so that the visible sides are
+# lit.
 _SUN_W = np.array([-0.50, -0.55, 0.67]) / np.linalg.norm([-0.50, -0.55, 0.67])
-# Range around the view in which shadows are cast, and height of their casters
-# [m].
+# Margin around the view within which shadows are cast, and height of what casts
+# them [m].
 _SHADOW_MARGIN = 150.0
 _SHADOW_HEIGHT = 120.0
 _SHADOW_PIXELS = 4096.0
@@ -50,7 +51,7 @@ _DEFAULT_RGB = (0.7, 0.7, 0.7)
 def draw_parts(
     meshcat: Meshcat, path: str, parts: Iterable[Part], rgba: Rgba | None = None
 ) -> None:
-    """Draws parts of a city as one mesh for each class, `<path>/<class>`.
+    """Draws parts of a city as one mesh per class, named `<path>/<class>`.
 
     Without `rgba`, each part keeps its own colour.
     """
@@ -82,7 +83,7 @@ def draw_body(
 
 
 def draw_marker(meshcat: Meshcat, path: str) -> None:
-    """Draws an arrow that points down at the origin, large enough to see."""
+    """Draws a large arrow that points down to the origin."""
     meshcat.SetObject(
         path,
         MeshcatCone(height=_MARKER_HEIGHT, a=_MARKER_RADIUS, b=_MARKER_RADIUS),
@@ -93,7 +94,7 @@ def draw_marker(meshcat: Meshcat, path: str) -> None:
 def draw_route(
     meshcat: Meshcat, path: str, X_WBs: Sequence[RigidTransform]
 ) -> None:
-    """Draws a route as a ribbon along y of B, red (start) to blue (end)."""
+    """Draws a route as a flat ribbon, from red (start) to blue (end)."""
     p_WBset = np.array([X_WB.translation() for X_WB in X_WBs])
     left_W = np.array([X_WB.rotation().matrix()[:, 1] for X_WB in X_WBs])
     step = np.linalg.norm(np.diff(p_WBset, axis=0), axis=1)
@@ -118,21 +119,22 @@ def draw_route(
 
 
 def height_rgb(z: np.ndarray) -> np.ndarray:
-    """Returns the (N, 3) sRGB colours of points at heights (N,) [m]."""
-    # Only pages need colour maps, whose import takes a moment.
+    """Returns sRGB colours (N, 3) for points at heights (N,) [m]."""
+    # Only pages need colour maps, and the import takes a moment.
     from matplotlib import colormaps
 
     lowest, highest = POINT_HEIGHTS
     level = np.clip((z - lowest) / (highest - lowest), 0.0, 1.0)
     level = np.round(level * (_NUM_COLORS - 1)) / (_NUM_COLORS - 1)
-    # The dark ends of the colour map look much like asphalt and brick.
+    # Without the dark ends of the colour map, which look much like asphalt and
+    # brick.
     return colormaps["turbo"](0.15 + 0.75 * level)[:, :3]
 
 
 def draw_points(meshcat: Meshcat, path: str, p_WRset: np.ndarray) -> None:
     """Draws points (N, 3) in W [m], coloured by height.
 
-    They have the same size near and far.
+    They have the same size on the screen, near and far.
     """
     cloud = PointCloud(len(p_WRset), Fields(BaseField.kXYZs | BaseField.kRGBs))
     cloud.mutable_xyzs()[:] = _on_grid(p_WRset).T
@@ -144,9 +146,9 @@ def draw_points(meshcat: Meshcat, path: str, p_WRset: np.ndarray) -> None:
 
 
 def set_view(meshcat: Meshcat, lower: np.ndarray, upper: np.ndarray) -> None:
-    """Lights a scene as by day, and views it from the south from the air.
+    """Lights a scene as by day, and views it from the air and the south.
 
-    The view reaches from (3,) lower to upper coordinates [m].
+    The view covers the coordinates from `lower` (3,) to `upper` (3,) [m].
     """
     meshcat.SetProperty("/Grid", "visible", False)
     meshcat.SetProperty("/Axes", "visible", False)
@@ -168,14 +170,14 @@ def set_view(meshcat: Meshcat, lower: np.ndarray, upper: np.ndarray) -> None:
 
 
 def _set_lights(meshcat: Meshcat, lower: np.ndarray, upper: np.ndarray) -> None:
-    # These lamps hang near the origin and would light one block only.
+    # These lamps are near the origin and would light one block only.
     for lamp in ("SpotLight", "PointLightNegativeX", "PointLightPositiveX"):
         meshcat.SetProperty(f"/Lights/{lamp}", "visible", False)
     meshcat.SetProperty("/Lights/AmbientLight/<object>", "intensity", 1.6)
     sun = "/Lights/FillLight/<object>"
     meshcat.SetProperty(sun, "intensity", 2.6)
-    # The sun shines toward the origin and casts shadows in a box along its
-    # rays; the box has to hold the whole view.
+    # The sun shines towards the origin, and casts shadows in a box along its
+    # rays. The box must contain the whole view.
     low = np.array([*(lower[:2] - _SHADOW_MARGIN), lower[2] - 10.0])
     high = np.array([*(upper[:2] + _SHADOW_MARGIN), upper[2] + _SHADOW_HEIGHT])
     corners = np.array(np.meshgrid(*zip(low, high, strict=True))).reshape(3, 8)
@@ -206,7 +208,7 @@ def _draw_mesh(
     surface: TriangleSurface,
     colours: Rgba | np.ndarray,
 ) -> None:
-    """Draws a mesh with one colour, or an sRGB colour (N, 3) of each vertex."""
+    """Draws a mesh with one colour, or with sRGB colours (N, 3) of vertices."""
     vertices = _columns(_on_grid(surface.p_GVset))
     triangles = _columns(surface.triangles, np.int32)
     if isinstance(colours, Rgba):
@@ -214,14 +216,14 @@ def _draw_mesh(
         return
     rgb = _columns(_linear(colours))
     meshcat.SetTriangleColorMesh(path, vertices, triangles, rgb)
-    # Drake's default is light grey, which would darken the colours.
+    # Drake's default, light grey, would darken the colours.
     meshcat.SetProperty(path, "color", _WHITE)
 
 
 def _linear(srgb: np.ndarray) -> np.ndarray:
-    """Returns colours of vertices and points as the page needs them.
+    """Returns colours of vertices and points in linear light, for the page.
 
-    Unlike the colour of a whole object they are taken as linear light.
+    Only the colour of a whole object is taken as sRGB.
     """
     return srgb**2.2
 
@@ -231,5 +233,5 @@ def _on_grid(positions: np.ndarray) -> np.ndarray:
 
 
 def _columns(rows: np.ndarray, dtype: DTypeLike = float) -> np.ndarray:
-    """Returns an array as (3, N) in Fortran's order, which Drake requires."""
+    """Returns an array as (3, N) in Fortran order, which Drake requires."""
     return np.asfortranarray(rows.T, dtype=dtype)

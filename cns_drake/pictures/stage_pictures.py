@@ -1,4 +1,4 @@
-"""Pictures of a map: a view of its stages, and its drives from above."""
+"""Draws pictures of a map: a view of its stages, and its drives from above."""
 
 from collections.abc import Mapping
 from pathlib import Path
@@ -19,15 +19,15 @@ from cns_drake.scenarios.scenario import Scenario
 from cns_drake.scenarios.scenario_files import world_file
 from cns_drake.sensors.lidar.presets import make_beam_pattern
 
-# As many pixels as a panel has: width and height of a view, and the side of a
-# picture from above.
+# Size of a panel in pixels: width and height of a view, and side of a picture
+# from above.
 _WIDTH, _HEIGHT = 704, 396
 _SIDE = 600
-# Height of the LiDAR below the camera's mast [m].
+# Height of the LiDAR, which stands below the camera [m].
 _SENSOR_HEIGHT = 1.6
 # Margin around the routes [m].
 _MARGIN = 40.0
-# From far up, so that towers lean little [m].
+# Height of the camera: so high that towers hardly lean [m].
 _CAMERA_HEIGHT = 1200.0
 # Red at the start and blue at the end, as in the paper.
 _COLOURS = "turbo_r"
@@ -37,7 +37,7 @@ _PANEL_INCHES = 4.0
 
 
 def load_views(path: Path) -> dict[str, View]:
-    """Reads the views of a map.
+    """Returns the views in a file, by name.
 
     Raises:
         InputError: the file is missing or not a mapping of views.
@@ -52,12 +52,12 @@ def load_views(path: Path) -> dict[str, View]:
 def draw_stages(stages: dict[str, Path], view: View, path: Path) -> None:
     """Draws a view of stages side by side, above the scans taken there.
 
-    Stages have titles, and are drawn from left to right. The LiDAR stands below
-    the camera; its points are seen by the camera, coloured by distance. The
-    ending of the path chooses the format.
+    `stages` maps titles to worlds, from left to right. The LiDAR stands below
+    the camera; its points are drawn as the camera sees them, coloured by
+    distance. The ending of the path gives the format.
 
     Raises:
-        InputError: a world cannot be loaded or the picture not be written.
+        InputError: a world cannot be loaded, or the picture cannot be written.
     """
     figure = Figure(
         figsize=(2 * 6.4, len(stages) * 3.6 + 0.3), layout="constrained"
@@ -82,10 +82,11 @@ def draw_stages(stages: dict[str, Path], view: View, path: Path) -> None:
 
 
 def draw_drives(scenarios: Mapping[str, Scenario], path: Path) -> None:
-    """Draws drives side by side, from above, north up.
+    """Draws drives side by side, seen from above, with north up.
 
-    Drives have titles. All panels show the same piece of the world, so that
-    they can be compared. The ending of the path chooses the format.
+    `scenarios` maps titles to drives. All panels show the same part of the
+    world, so that they can be compared. The ending of the path gives the
+    format.
 
     Raises:
         InputError: a drive cannot be planned, a world cannot be loaded, or the
@@ -123,7 +124,7 @@ def draw_drives(scenarios: Mapping[str, Scenario], path: Path) -> None:
 
 
 def view_from_above(positions: np.ndarray) -> View:
-    """Returns a view straight down that shows all positions."""
+    """Returns a view straight down that shows all positions (N, 3) [m]."""
     low, high = positions.min(axis=0), positions.max(axis=0)
     x, y, z = (low + high) / 2
     half = (high - low)[:2].max() / 2 + _MARGIN
@@ -135,12 +136,14 @@ def view_from_above(positions: np.ndarray) -> View:
 
 
 def _draw_route(axes: Axes, view: View, positions: np.ndarray) -> None:
-    # Above the car, so that the line lies over everything that is drawn.
+    # Slightly above the car, so that the line lies over everything that is
+    # drawn.
     pixels, _ = view.project(positions, _SIDE, _SIDE)
     segments = list(np.stack([pixels[:-1], pixels[1:]], axis=1))
-    # The line gets thinner, so that a street that is driven twice shows both.
+    # The line gets thinner, so that a street that is driven twice shows both
+    # lines.
     widths = np.linspace(5.0, 2.0, len(segments))
-    # A rim sets the line apart from roofs of its colour.
+    # A white rim distinguishes the line from roofs of the same colour.
     axes.add_collection(
         LineCollection(segments, colors="white", linewidths=widths + 1.5)
     )
@@ -158,7 +161,7 @@ def _draw_route(axes: Axes, view: View, positions: np.ndarray) -> None:
 def _scan_seen_by(
     scene: StageScene, view: View
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Returns pixels of a scan's points and their distances [m]."""
+    """Returns pixels and distances [m] of the scan points in a view."""
     x, y, z = view.position
     down = scene.scene.cast_rays(
         np.array([x, y, z]), np.array([[0.0, 0.0, -1.0]]), 100.0

@@ -1,4 +1,4 @@
-"""A stage of a city that can be photographed and scanned.
+"""A stage of a city, to be photographed and scanned.
 
 Photographs are made by casting rays, without a GPU or a display.
 """
@@ -29,7 +29,7 @@ _SUN_RGB = np.array([1.00, 0.95, 0.86])
 _AMBIENT_RGB = np.array([0.52, 0.57, 0.66])
 _HORIZON_RGB = np.array([0.83, 0.88, 0.93])
 _ZENITH_RGB = np.array([0.42, 0.60, 0.84])
-# Distance at which haze has taken two thirds of the contrast [m].
+# Distance at which haze has removed two thirds of the contrast [m].
 HAZE_LENGTH = 1200.0
 _FAR = 5000.0
 _DEFAULT_RGB = (0.7, 0.7, 0.7)
@@ -39,8 +39,8 @@ class View(BaseModel):
     """A camera.
 
     Attributes:
-        position: where the camera is in the world [m].
-        target: a point in the middle of the picture [m].
+        position: position of the camera in W [m].
+        target: point in W in the middle of the picture [m].
         fov_y: vertical field of view [deg].
     """
 
@@ -57,15 +57,15 @@ class View(BaseModel):
         return self
 
     def pose(self) -> RigidTransform:
-        """Returns the pose X_WC of the camera; x forward, y left, z up."""
+        """Returns the pose X_WC of the camera, with x forward, y left, z up."""
         return look_at(self.position, self.target)
 
     def project(
         self, p_WQset: np.ndarray, width: int, height: int
     ) -> tuple[np.ndarray, np.ndarray]:
-        """Returns pixels (M, 2) of visible points, and their indices (M,).
+        """Returns pixels (M, 2) of the visible points, and their indices (M,).
 
-        The (N, 3) points are in the world [m], the size of the picture is in
+        The points (N, 3) are in W [m]; width and height of the picture are in
         pixels.
         """
         scale = height / 2 / np.tan(np.deg2rad(self.fov_y) / 2)
@@ -78,7 +78,7 @@ class View(BaseModel):
 
 
 class StageScene:
-    """The geometry of a stage, ready for pictures, and for scans in `scene`."""
+    """The geometry of a stage, ready for pictures; `scene` is for scans."""
 
     def __init__(self, path: Path, without: Collection[str] = ()):
         """Loads an SDF world.
@@ -116,14 +116,14 @@ class StageScene:
 
 
 def look_at(p_WC: ArrayLike, p_WT: ArrayLike) -> RigidTransform:
-    """Returns X_WC of a camera at C that looks at T, upright.
+    """Returns X_WC of an upright camera at C that looks at T.
 
     The camera frame is x forward, y left, z up.
     """
     forward = np.asarray(p_WT, dtype=float) - np.asarray(p_WC, dtype=float)
     forward /= np.linalg.norm(forward)
     left = np.cross([0.0, 0.0, 1.0], forward)
-    if np.linalg.norm(left) < 1e-6:  # Straight down, north is up.
+    if np.linalg.norm(left) < 1e-6:  # If it looks straight down, north is up.
         left = np.array([-1.0, 0.0, 0.0])
     left /= np.linalg.norm(left)
     up = np.cross(forward, left)
@@ -142,17 +142,17 @@ def render(
     samples: int = 2,
     haze_length: float = HAZE_LENGTH,
 ) -> np.ndarray:
-    """Renders a view with sun, shadows, sky light and haze.
+    """Returns an image of a scene with sun, shadows, sky light and haze.
 
     Args:
         scene: the scene of the geometries, for rays.
         geometries: what is drawn, with colours.
-        X_WC: pose of the camera: x ahead, y left, z up.
+        X_WC: pose of the camera: x forward, y left, z up.
         width, height: size of the image in pixels.
         fov_y_deg: vertical field of view.
-        samples: rays for each pixel and axis.
-        haze_length: distance at which haze has taken two thirds of the contrast
-            [m]; infinite is clear air.
+        samples: number of rays per pixel along each axis.
+        haze_length: distance at which haze has removed two thirds of the
+            contrast [m]; infinite for clear air.
 
     Returns:
         (height, width, 3) uint8 sRGB image.
@@ -199,7 +199,7 @@ def _shade(
     sun = np.broadcast_to(_SUN_W, p_W.shape)
     lit = ~np.isfinite(scene.cast_rays(p_W, sun, _FAR).ranges)
     # Walls get half of the sky's light, roofs and streets all of it. Two short
-    # rays approximate the shade between other surfaces.
+    # rays approximate the shade between surfaces.
     sky = 0.65 + 0.35 * normal[:, 2]
     sky *= 0.55 + 0.45 * _openness(scene, p_W, normal)
     light = (
@@ -215,7 +215,7 @@ def _shade(
 def _openness(
     scene: RayCastingScene, p_W: np.ndarray, normal: np.ndarray
 ) -> np.ndarray:
-    """Returns the free share of short rays around the normal, from 0 to 1."""
+    """Returns the share of short rays around the normal that hit nothing."""
     reach = 6.0
     total = np.zeros(len(p_W))
     tilts = ([0.6, 0.3, 0.4], [-0.5, 0.6, 0.5], [0.1, -0.8, 0.3])

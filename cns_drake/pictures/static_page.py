@@ -1,4 +1,4 @@
-"""Writes a Meshcat scene as one small HTML file, commands in order."""
+"""Writes a Meshcat scene as one small HTML file."""
 
 import base64
 from html import escape
@@ -11,13 +11,13 @@ from pydrake.geometry import Meshcat
 
 from cns_drake.base.files import write_text
 
-# Higher levels take many times as long for a few percent.
+# Level of compression. Higher levels take many times as long for a few percent.
 _LEVEL = 4
-# Bytes of a vertex or of a triangle: rows differ little from their
-# predecessors, and their differences compress well.
+# Bytes per row: those of a vertex or of a triangle. Rows differ little from the
+# row before, and the differences compress well.
 _ROW = 12
 
-# How Meshcat.StaticHtml() embeds each of its commands.
+# The form in which Meshcat.StaticHtml() embeds each of its commands.
 _COMMAND = re.compile(
     r'fetch\("data:application/octet-binary;base64,([A-Za-z0-9+/=]*)"\)\s*'
     r"\.then\(res => res\.arrayBuffer\(\)\)\s*"
@@ -25,8 +25,8 @@ _COMMAND = re.compile(
     r"new Uint8Array\(buffer\)\)\);"
 )
 
-# Commands are chained. Drake's page fetches all at once, where a command could
-# overtake a larger one that it refers to.
+# Commands run one after the other. Drake's page runs all at once, so that a
+# command could overtake a larger one that it needs.
 _QUEUE = """
     // Undoes what `filter_rows` did in Python.
     function unfilterRows(planes, length) {
@@ -56,15 +56,15 @@ _QUEUE = """
 def make_static_page(
     meshcat: Meshcat, title: str, *, body: str = "", script: str = ""
 ) -> str:
-    """Returns the scene as a self-contained page, without a server.
+    """Returns the scene as the HTML of a page that needs no server.
 
-    It is Drake's page with compressed commands, in which a city takes a third
-    of the space. Browsers of 2023 or later decompress them.
+    It is Drake's page with compressed commands, so that a city takes a third of
+    the space. Browsers since 2023 can decompress them.
 
     Args:
         meshcat: the server with the scene.
         title: title of the page, plain text.
-        body: HTML that precedes the scene, and is visible while it loads.
+        body: HTML before the scene, which is visible while the scene loads.
         script: JavaScript module that runs when the page is ready. In it,
             `commands` is a promise of the scene.
     """
@@ -113,9 +113,9 @@ def save_meshcat_page(
 def filter_rows(data: bytes) -> bytes:
     """Returns bytes rearranged so that they compress better.
 
-    Each byte becomes its difference to the byte one row before. All bytes in
-    the first place of their row come first, then all in the second, and so on.
-    The last row is filled up with zeros.
+    Each byte is replaced by its difference from the byte in the row before.
+    Then come all first bytes of rows, all second ones, and so on. The last row
+    is filled up with zeros.
     """
     padded = np.frombuffer(data + bytes(-len(data) % _ROW), np.uint8)
     rows = padded.reshape(-1, _ROW)

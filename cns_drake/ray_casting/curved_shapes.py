@@ -1,12 +1,12 @@
-"""What Embree does not do for curved shapes.
+"""Polyhedra around curved shapes, and capsules in closed form.
 
-Polyhedra about them: a ray that misses the polyhedron misses the shape, unless
-it starts between the two. Few rays then have to be cast on the shapes
-themselves.
+A ray that misses the polyhedron around a shape misses the shape as well, unless
+it starts between the two. Casting on the polyhedra first leaves few rays to be
+cast on the shapes themselves.
 
-Rays along the axes of capsules, in closed form: Embree's rounded segments lose
-most rays that point along their axis, up to an angle of 1e-3 rad. Only rays
-that start in line with a capsule can be of these.
+Rays that run along the axis of a capsule are cast in closed form, because
+Embree's rounded segments lose most rays within 1e-3 rad of their axis. Only
+rays that start in line with a capsule can run along its axis.
 """
 
 from collections.abc import Sequence
@@ -32,13 +32,13 @@ CurvedSurface = EllipsoidSurface | CylinderSurface | CapsuleSurface
 
 # Sides of a circle.
 _SIDES = 16
-# Least distance between shape and polyhedron, above errors of single precision:
-# a part of the radius, and [m].
+# Least distance between shape and polyhedron: a fraction of the radius, and
+# [m]. It exceeds the errors of single precision.
 _MARGIN = 0.005
 _GAP = 1e-3
-# Sine of the angle to a capsule's axis up to which rays are cast here.
+# Rays are cast in closed form up to this angle to a capsule's axis (sine).
 _ALONG = 5e-3
-# What is nearer by less than this is the same hit [m].
+# Hits whose ranges differ by less than this are the same [m].
 _SAME = 1e-4
 
 
@@ -46,7 +46,7 @@ _SAME = 1e-4
 def circumscribe(surface: CurvedSurface) -> TriangleSurface:
     """Returns a polyhedron that contains a curved shape.
 
-    It lies within 1.1 radii + 2 mm of the shape's axis, or centre.
+    The polyhedron lies within 1.1 radii + 2 mm of the shape's axis or centre.
     """
     # The faces of an inscribed ball are nearest to its centre at the equator.
     side = np.cos(np.pi / _SIDES)
@@ -62,10 +62,10 @@ def circumscribe(surface: CurvedSurface) -> TriangleSurface:
 
 
 class NearCurvedShapes:
-    """Finds the rays that start near curved shapes of groups that stay."""
+    """Finds rays that start near curved shapes of groups that never move."""
 
     def __init__(self, groups: Sequence[RayGroup]):
-        """Takes the curved shapes of groups, which are placed."""
+        """Takes the curved shapes of groups; the groups must have poses."""
         rows: list[int] = []
         X_LGs, sizes = [], []
         for row, group in enumerate(groups):
@@ -114,16 +114,16 @@ class NearCurvedShapes:
 
 
 class _Sorted(NamedTuple):
-    """M placed shapes, sorted by the start of their balls along x.
+    """M shapes with bounding balls, sorted by the least x of the balls.
 
     Attributes:
-        places: (M, 3) middles in O.
-        reaches: (M,) radii of balls about them [m].
-        X_GOs: (M, 4, 4) from O to their own frames; not rigid for an ellipsoid,
-            which is a ball there.
+        places: (M, 3) centres in O [m].
+        reaches: (M,) radii of the balls [m].
+        X_GOs: (M, 4, 4) maps from O to the shapes' own frames; not rigid for an
+            ellipsoid, which is a ball in its own frame.
         halves, radii: (M,) half the length along z, and the radius around it.
-        begins: (M,) starts of their balls along x [m].
-        ends: (M,) the farthest end along x of this ball and those before [m].
+        begins: (M,) least x of each ball [m].
+        ends: (M,) greatest x of this ball and all balls before it [m].
     """
 
     places: np.ndarray
@@ -137,7 +137,7 @@ class _Sorted(NamedTuple):
 
 @compiled
 def _find_near(near: _Sorted, p_OSset: np.ndarray, result: np.ndarray) -> None:
-    """Fills in the places near a shape; see `contain`."""
+    """Sets `result` for places near a shape; see `contain`."""
     p_GS = np.empty(3)
     for i in range(len(p_OSset)):
         p = p_OSset[i]
@@ -162,10 +162,10 @@ def _find_near(near: _Sorted, p_OSset: np.ndarray, result: np.ndarray) -> None:
 
 
 class CapsuleAxes:
-    """The capsules of groups, for rays along their axes."""
+    """The capsules of groups, to cast rays along their axes."""
 
     def __init__(self, groups: Sequence[RayGroup]):
-        """Takes groups that are placed."""
+        """Takes groups; the groups must have poses."""
         found = [
             (row, index, X_LG, surface)
             for row, group in enumerate(groups)
@@ -258,7 +258,7 @@ def _meet_capsule(
     half: float,
     radius: float,
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Returns where N rays meet a capsule, in closed form.
+    """Returns the hits of N rays on a capsule, in closed form.
 
     Origins are relative to its middle [m]. `half` is half the length of its
     straight part [m].
@@ -282,7 +282,7 @@ def _meet_capsule(
         fits &= (distance >= 0.0) & (distance < nearest)
         nearest[fits] = distance[fits]
 
-    # NaN, where there is no root, fits nowhere.
+    # NaN, which stands for no root, fails every comparison.
     with np.errstate(invalid="ignore", divide="ignore"):
         for end in (-1.0, 1.0):
             b = toward - end * half * d_along

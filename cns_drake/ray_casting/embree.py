@@ -14,7 +14,7 @@ from pathlib import Path
 
 from numba import types
 
-# Numba then takes functions as arguments of compiled ones.
+# With this import, numba accepts functions as arguments of compiled functions.
 from numba.extending import typeof_impl
 
 TRIANGLE, CONE, ROUND_SEGMENT, SPHERE, DISC, INSTANCE = (
@@ -26,16 +26,16 @@ FLOAT3X4_ROW_MAJOR = 0x9134
 ROBUST_SCENE = 1 << 2
 COHERENT_RAYS = 1 << 16
 INVALID_ID = 0xFFFFFFFF
-# A setting of devices: room for more threads of the caller than a machine has.
-# `rtcJoinCommitScene` then builds a scene in the calling thread alone. Once
-# woken, Embree's own threads go on looking for work, and hundreds of instances
-# have none for them. A forked process would lack these threads.
+# Setting of a device: room for more user threads than a machine has.
+# `rtcJoinCommitScene` then builds a scene in the calling thread only, without
+# Embree's own threads. Once woken, those keep looking for work, of which
+# hundreds of instances have none; and a forked process would lack them.
 ALONE = b"user_threads=65536"
 # Rays in a packet, and RTC_DEVICE_PROPERTY_NATIVE_RAY<rays>_SUPPORTED.
 _NATIVE_PACKETS = ((8, 33), (16, 34))
 
 
-# Numba takes its own addresses as unsigned numbers.
+# Numba's own addresses are unsigned numbers.
 _PACKET_TYPE = types.FunctionType(
     types.void(types.uintp, types.intp, types.uintp, types.intp)
 )
@@ -122,7 +122,7 @@ class PacketFunction(types.WrapperAddressProtocol):
 
 @typeof_impl.register(PacketFunction)  # type: ignore[untyped-decorator]  # numba has no hints.
 def _typeof_packet_function(*_: object) -> types.Type:
-    """Returns numba's type, which numba would make anew for each call."""
+    """Returns numba's type; without this, numba makes one for each call."""
     return _PACKET_TYPE
 
 

@@ -1,13 +1,14 @@
 """Groups of geometry as Embree scenes, and rays through them in packets.
 
-Curved shapes are not tessellated: Embree intersects spheres, cones, discs
-and rounded segments exactly (in float32), and an ellipsoid is an instance of
-the unit sphere. A curved shape in a scene slows down all its rays by a third
-(measured), even those that meet only triangles. Curved shapes that stay
-therefore have a second hierarchy. Polyhedra about them in the first one select
-the few rays to cast on it. Those that move are instances, which few rays enter:
-they are in the first hierarchy themselves. Embree loses rays along the axis of
-a rounded segment, which are therefore cast in closed form (`CapsuleAxes`).
+Curved shapes are not tessellated: Embree intersects spheres, cones, discs and
+rounded segments exactly (in float32), and an ellipsoid is an instance of the
+unit sphere. A curved shape in a scene slows down all rays of the scene by a
+third (measured), even rays that meet only triangles. Curved shapes that never
+move are therefore in a second hierarchy. Polyhedra around them in the first
+hierarchy select the few rays to cast on the second. Curved shapes that move are
+instances, which few rays enter; they are in the first hierarchy directly.
+Embree loses rays along the axis of a rounded segment, which are therefore cast
+in closed form (`CapsuleAxes`).
 """
 
 from __future__ import annotations
@@ -43,20 +44,20 @@ from cns_drake.scene.surfaces import (
     merge_triangles,
 )
 
-# Masks of geometry: all rays hit solids, some also hit proxies.
+# Masks of geometry: all rays hit solids; some rays also hit proxies.
 SOLID, PROXY = 1, 2
 ALL = SOLID | PROXY
-# Owns the primitives of proxies.
+# Owner of the primitives of proxies.
 PROXY_OWNER = -2
 # Longest cones and rounded segments [radii]: longer ones lose hits to single
-# precision (measured at 3000: one in 40). They are cut, into at most the second
-# number of pieces.
+# precision (measured at 3000: one in 40). Longer ones are cut into pieces, at
+# most as many as the second number.
 _SLENDEREST = 700.0
 _MOST_PIECES = 1000
 
 
 class Primitives(NamedTuple):
-    """One Embree geometry, of a kind that Embree numbers.
+    """The data of one Embree geometry, and its type number in Embree.
 
     Buffers are (slot, format, array) each. `owners` has the (P,) int32 number
     of each primitive's member in its group, and `mask` is `SOLID` or `PROXY`.
@@ -71,8 +72,8 @@ class Primitives(NamedTuple):
 def merge_first(group: RayGroup) -> Iterator[Primitives]:
     """Yields the primitives of a group on which all rays are cast.
 
-    They are its triangles, and polyhedra about its curved shapes; or the curved
-    shapes themselves, if the group can move.
+    These are the group's triangles, and polyhedra around its curved shapes. If
+    the group can move, the curved shapes themselves replace the polyhedra.
     """
     members = _numbered(group)
     flat = [
@@ -104,10 +105,10 @@ def merge_second(group: RayGroup) -> Iterator[Primitives]:
 
 
 def _numbered(group: RayGroup) -> list[Member]:
-    """Returns the members of a group with their numbers in it.
+    """Returns a group's members, numbered from 0 within the group.
 
-    Primitives then depend on shapes alone, and groups of the same shapes share
-    them.
+    The primitives then depend only on the shapes, so that groups of the same
+    shapes can share them.
     """
     return [(k, X, surface) for k, (_, X, surface) in enumerate(group.members)]
 
@@ -181,9 +182,10 @@ def _owners(shapes: Iterable[tuple]) -> np.ndarray:
 def _cut(
     ends: Sequence[ArrayLike], surface: CylinderSurface | CapsuleSurface
 ) -> list[np.ndarray]:
-    """Returns the (2, 4) ends of pieces within the allowed slenderness.
+    """Cuts a long shape; returns the ends (2, 4) of each piece.
 
-    Rays from inside meet the joints.
+    The ends are centre and radius. Rays that start inside the shape hit the
+    joints.
     """
     slenderness = surface.length / surface.radius
     num = math.ceil(min(slenderness / _SLENDEREST, _MOST_PIECES))
@@ -201,11 +203,11 @@ def _float32(arrays: Iterable[ArrayLike]) -> np.ndarray:
     return np.concatenate([np.asarray(a) for a in arrays]).astype(np.float32)
 
 
-# Embree takes smaller components for positive, of either sign. A packet that
-# mixes such rays with truly positive ones loses hits.
+# Embree treats smaller direction components as positive, whatever their sign. A
+# packet that mixes such rays with truly positive ones loses hits.
 _TINY = 1e-18
-# The least rays that a thread takes at once: whole packets of any size, and
-# enough that the call costs little.
+# Least number of rays that a thread takes at once: a multiple of every packet
+# size, and large enough that the call costs little.
 _BLOCK = 1024
 
 
@@ -217,7 +219,7 @@ class _Built(NamedTuple):
 
 
 class _Tree(NamedTuple):
-    """Scenes of Embree's, with the owners of their primitives.
+    """Embree's scenes, with the owners of their primitives.
 
     Attributes:
         lanes: the number of rays in a packet.
@@ -227,10 +229,12 @@ class _Tree(NamedTuple):
         first_primitive: (1 + I, G) int64, the index in `owner_of_primitive` of
             the first primitive of geometry g in the fixed scene (first row) and
             in each instance.
-        owner_of_primitive: (P,) int32 number of its member in the group.
+        owner_of_primitive: (P,) int32 number of the member of the group to
+            which each primitive belongs.
         groups: (1 + I,) int32 row of the group of the fixed scene and of each
             instance.
-        first_member: (1 + I,) int64 place of the group's first member in:
+        first_member: (1 + I,) int64 index in `geometries` of each group's first
+            member.
         geometries: (M,) int32 index of the geometry of each member.
     """
 
@@ -250,8 +254,8 @@ class EmbreeHierarchy:
 
     Rays are cast in packets marked as coherent, which makes a LiDAR's
     neighbouring beams cheap. Scenes are built robust, so that no ray passes
-    through an edge that two triangles share. `rows` has the rows of the groups
-    with primitives in it.
+    through an edge that two triangles share. `rows` contains the rows of the
+    groups whose primitives are in the hierarchy.
     """
 
     def __init__(
@@ -263,8 +267,8 @@ class EmbreeHierarchy:
     ):
         """Builds the hierarchy.
 
-        `merge` makes primitives of a group; it may make none. Scenes of groups
-        that are unchanged since a previous hierarchy are reused.
+        `merge` returns the primitives of a group, possibly none. Scenes of
+        groups that are unchanged since a previous hierarchy are reused.
 
         Raises:
             MemoryError: Embree cannot build it.
@@ -300,8 +304,8 @@ class EmbreeHierarchy:
         fixed = [row for row in self.rows if groups[row].is_merged_world]
         moving = [row for row in self.rows if row not in fixed]
         self._top = 0
-        # Row of a group -> its instance; the rows of those that are disabled,
-        # and of those that move during a cast.
+        # Row of a group -> its instance. Then the rows of disabled groups, and
+        # of groups that move during a cast.
         self._instances: dict[int, int] = {}
         self._disabled: set[int] = set()
         self._in_motion: set[int] = set()
@@ -386,10 +390,10 @@ class EmbreeHierarchy:
         mask: int = ALL,
         with_normals: bool = False,
     ) -> Hits:
-        """Casts rays on the geometry; returns what they hit."""
+        """Casts rays on the geometry; returns the hits."""
         num_rays = len(rays.d_Sset)
         hits = Hits.misses(num_rays, with_normals)
-        # All threads draw from one iterator, which gives each part once.
+        # All threads take parts from one iterator, which yields each part once.
         parts = iter(_divide(num_rays, self._num_threads))
 
         def cast() -> None:
@@ -449,7 +453,7 @@ class EmbreeScene:
         num_threads: int,
         previous: EmbreeScene | None = None,
     ):
-        """Builds the scene of groups that are placed.
+        """Builds the scene of groups; the groups must have poses.
 
         Raises:
             MemoryError: Embree cannot build it.
@@ -474,7 +478,7 @@ class EmbreeScene:
         self._axes.place(placed)
 
     def cast_rays(self, rays: Rays, with_normals: bool) -> Hits:
-        """Casts rays on the scene; returns what they hit."""
+        """Casts rays on the scene; returns the hits."""
         hits = self._first.cast(rays, with_normals=with_normals)
         if self._second.rows:
             self._cast_again(rays, hits, with_normals)
@@ -482,7 +486,7 @@ class EmbreeScene:
         return hits
 
     def _cast_again(self, rays: Rays, hits: Hits, with_normals: bool) -> None:
-        """Updates the hits of rays that may meet curved shapes that stay."""
+        """Updates hits of rays that may meet curved shapes that never move."""
         is_near = self._near.contain(rays.p_OSset)
         is_unsure = hits.owner == PROXY_OWNER
         if is_near.any():  # Origins are taken in turn.
@@ -509,8 +513,9 @@ class EmbreeScene:
 def _divide(num_rays: int, num_threads: int) -> list[tuple[int, int]]:
     """Returns the ranges of rays that threads take, the largest first.
 
-    Some directions meet more geometry than others: a thread that ends early
-    takes another range. Ranges get shorter, so that all threads end together.
+    Some directions meet more geometry than others, so a thread that finishes
+    early takes another range. Later ranges are shorter, so that all threads
+    finish at about the same time.
     """
     parts, first = [], 0
     while first < num_rays:
@@ -546,7 +551,7 @@ def _release(lib: ctypes.CDLL, device: int, scenes: Sequence[int]) -> None:
 
 
 def _decompose_motion(group: RayGroup) -> np.ndarray:
-    """Returns the poses of a moving group at even times of the turn.
+    """Returns the poses of a moving group at evenly spaced times of a turn.
 
     Embree turns from one orientation to the next at a constant rate about F's
     origin, which moves in a straight line. That is the motion of a frame with
@@ -560,7 +565,7 @@ def _decompose_motion(group: RayGroup) -> np.ndarray:
     assert group.motion is not None
     num_steps = group.motion.num_steps
     R_OO, way_F = group.motion.at(np.linspace(0.0, 1.0, num_steps))
-    # The columns of both maps are rotated and stretched axes of L.
+    # The columns of both maps are the axes of L, rotated and stretched.
     scale = np.linalg.norm(group.X_FL[:3, :3], axis=0)
     R_OL = group.X_OL[:, :3] / scale
     p_FL_L = rotated((group.X_FL[:3, :3] / scale).T, group.X_FL[:3, 3])
@@ -586,12 +591,12 @@ def _cast_packets(
     first: int,
     last: int,
 ) -> None:
-    """Casts the rays from `first` to before `last`.
+    """Casts the rays `first` to `last` - 1.
 
-    Directions are rotated here, in double precision and in a fixed order: the
-    result of a matrix library depends on the processor.
-
-    One Python call per packet would cost more than its rays.
+    Directions are rotated here, in double precision and in a fixed order,
+    because the result of a matrix library depends on the processor. The
+    function is compiled, because a Python call per packet would take longer
+    than its rays.
     """
     # A packet is an RTCRayHit16, or one of fewer lanes: 12 ray fields and 9 hit
     # fields (10 with room for the primitive of an instance array). It and the
@@ -604,7 +609,8 @@ def _cast_packets(
     packet_id = packet.view(np.uint32)
     num_origins, num_rotations = len(rays.p_OSset), len(rays.R_OSset)
     num_ranges = len(rays.max_ranges)
-    # Indices are counted along: remainders would cost a tenth of the casting.
+    # Indices are incremented: remainders would take a tenth of the casting
+    # time.
     origin, rotation = first % num_origins, first % num_rotations
     reach, time = first % num_ranges, first % len(rays.times)
     for begin in range(first, last, lanes):

@@ -1,4 +1,4 @@
-"""Groups that move, and the choice of those to place anew."""
+"""Groups that move, and the choice of groups whose poses must be updated."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from cns_drake.scene import surfaces
 
 
 class KnownPoses(NamedTuple):
-    """Poses of M frames: the row of each, and (M, 4, 4) X_WF.
+    """Poses X_WF (M, 4, 4) of M frames, and the row of each frame.
 
     The mapping `rows` is always the same object.
     """
@@ -23,8 +23,8 @@ class KnownPoses(NamedTuple):
     X_WFs: np.ndarray
 
     def __deepcopy__(self, memo: dict) -> KnownPoses:
-        # A Context is cloned with it. It never changes, and frames cannot be
-        # copied.
+        # A Context is cloned together with this value. It never changes, and
+        # frames cannot be copied.
         return self
 
     def find(
@@ -45,10 +45,13 @@ class Ball(NamedTuple):
 
 
 class Placed(NamedTuple):
-    """P groups of a scene that were placed anew.
+    """P groups of a scene whose poses were updated.
 
-    Their (P,) rows and (P, 3, 4) `X_OL`; whether each is in sight, and whether
-    it has a `motion`, (P,) bool.
+    Attributes:
+        rows: (P,) rows of the groups.
+        X_OLs: (P, 3, 4) poses; see `RayGroup.X_OL`.
+        in_sight: (P,) bool, whether rays can meet each group.
+        moves: (P,) bool, whether each group has a `motion`.
     """
 
     rows: np.ndarray
@@ -58,7 +61,7 @@ class Placed(NamedTuple):
 
     @classmethod
     def of(cls, groups: Sequence[RayGroup], rows: Sequence[int]) -> Placed:
-        """Returns groups with their present places."""
+        """Returns groups with their present poses."""
         chosen = [groups[row] for row in rows]
         return cls(
             np.array(rows, int),
@@ -68,7 +71,7 @@ class Placed(NamedTuple):
         )
 
     def below(self, row: int) -> Placed:
-        """Returns only the first groups, up to a row."""
+        """Returns only the groups whose row is less than the given one."""
         kept = self.rows < row
         return Placed(*(one[kept] for one in self))
 
@@ -80,10 +83,10 @@ NOTHING_PLACED = Placed.of((), ())
 
 
 class MovingGroups:
-    """The groups of a scene that are on frames which are not anchored."""
+    """The groups of a scene whose frames are not anchored."""
 
     def __init__(self, groups: Sequence[RayGroup], p_WO: np.ndarray):
-        """Takes groups that are placed."""
+        """Takes groups; the groups must have poses."""
         self._groups = groups
         self._p_WO = p_WO
         self._rows = np.array(
@@ -97,7 +100,8 @@ class MovingGroups:
         moving = [groups[row] for row in self._rows]
         self._frames = [group.frame_id for group in moving]
         self._X_FLs = np.array([group.X_FL for group in moving])
-        # Groups have parts of this array, so that all are placed at once.
+        # The poses of the groups are views of this array, so that all can be
+        # updated at once.
         self._X_OLs = np.array([group.X_OL for group in moving])
         for group, X_OL in zip(moving, self._X_OLs, strict=True):
             group.X_OL = X_OL
@@ -117,12 +121,12 @@ class MovingGroups:
     ) -> Placed:
         """Updates the poses, motions and visibility of moving groups.
 
-        These are `X_OL`, `motion` and `in_sight`. Groups that are out of sight,
-        beyond the ball `seen`, stay where they are, and so do those whose
-        frames have not moved. Known poses replace calls of `calc_X_WF`.
+        Sets `X_OL`, `motion` and `in_sight` of each group, except of groups
+        whose frames have not moved. Groups beyond the ball `seen` are out of
+        sight and keep their poses. Known poses replace calls of `calc_X_WF`.
 
         Returns:
-            The groups that were placed.
+            The groups whose poses were updated.
         """
         if not len(self._rows):
             return NOTHING_PLACED
@@ -140,7 +144,7 @@ class MovingGroups:
         shown = sees != self._in_sight
         self._in_sight = sees
         near = np.flatnonzero(sees | shown)
-        # Whether each is placed even if it has not moved.
+        # Whether each pose is updated even if the frame has not moved.
         anew = (shown | moves | self._was_in_motion)[near]
         X_WF, X_FL = X_WFs[rows[near], :3], self._X_FLs[near]
         # In a fixed order: the result of a matrix library depends on the
@@ -165,7 +169,7 @@ class MovingGroups:
     def _find_poses(
         self, calc_X_WF: Callable[[FrameId], RigidTransform], known: KnownPoses
     ) -> tuple[np.ndarray, np.ndarray]:
-        """Returns (M, 4, 4) poses, and the (G,) rows of those of frames."""
+        """Returns (M, 4, 4) poses, and the (G,) row of each group's frame."""
         if known.rows is not self._known:
             self._known = known.rows
             self._known_rows = np.array(

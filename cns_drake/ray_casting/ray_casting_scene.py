@@ -52,7 +52,8 @@ class RayCastingScene:
 
     Coordinates are relative to a point O in the middle of the merged geometry,
     so that float32 resolves 1e-5 m within 200 m of it, for any origin of the
-    world. If the sensor is more than 1 km from there, O is near the sensor.
+    world. If the sensor is more than 1 km from that point, O is near the sensor
+    instead.
     """
 
     def __init__(
@@ -68,14 +69,14 @@ class RayCastingScene:
         """Builds the scene; hits give indices into the geometries.
 
         Args:
-            geometries: what rays can meet.
+            geometries: the geometries that rays can hit.
             anchored_frames: frames that never move.
-            calc_X_WF: gives the poses of frames.
+            calc_X_WF: returns the pose of a frame.
             num_threads: threads that share the rays of a cast; hits do not
                 depend on it.
             previous: a scene of similar geometry, which is replaced: frames
                 whose surfaces are still the same objects are not built anew.
-            p_WS: the place of the sensor [m].
+            p_WS: the position of the sensor [m].
         """
         self._p_WO, self._groups = group_geometries(
             enumerate(geometries),
@@ -119,7 +120,7 @@ class RayCastingScene:
         """
         placed = self._moving.place(calc_X_WF, motions, known, seen)
         if len(placed.rows):
-            if self._planes:  # They are the last groups, beyond the scene's.
+            if self._planes:  # Half spaces are the last groups.
                 placed = placed.below(min(self._planes))
             self._scene.place(placed)
             self._normal_matrices = None
@@ -157,9 +158,10 @@ class RayCastingScene:
         Args:
             p_WSset: (3,) or (K, 3) origins in the world [m].
             d_Sset: (N, 3) unit directions, expressed in S.
-            max_range: how far to look [m], one for all or (M,).
+            max_range: greatest range [m], one for all or (M,).
             R_WSset: (3, 3) or (L, 3, 3) orientations of S in the world.
-            times: (T,) when rays are cast, as parts of the turn from 0 to 1.
+            times: (T,) when rays are cast, as fractions of the turn from 0 to
+                1.
             with_normals: also return the normals of the surfaces, as they
                 are at the start of the turn.
 
@@ -195,9 +197,10 @@ class RayCastingScene:
         return RayHits(hits.ranges, hits.owner, hits.normals, is_outside)
 
     def _cast_on_planes(self, rays: Rays, with_normals: bool) -> Hits:
-        """Casts rays on half spaces, and no farther on all else.
+        """Casts rays on half spaces first, and then on all other geometry.
 
-        Rays meet a plane from both sides, like any other surface.
+        A ray that hits a plane is followed no farther than that. Rays hit a
+        plane from both sides, like any other surface.
         """
         repeats = len(rays.d_Sset) // max(len(rays.max_ranges), 1)
         limits = np.tile(rays.max_ranges, repeats)
@@ -232,8 +235,8 @@ def _face_origins(
 ) -> np.ndarray:
     """Makes normals unit vectors in O that face the origins of rays.
 
-    NumPy takes a quarter of a frame. The (G, 3, 3) matrices take normals from a
-    group's frame to O.
+    The (G, 3, 3) matrices map normals from a group's frame to O. The function
+    is compiled, because NumPy would take a quarter of a frame's time.
 
     Returns:
         (N,) whether each ray has met the outside of a surface, by its winding.
@@ -268,17 +271,19 @@ def _meet_plane(
     limits: np.ndarray,
     met: np.ndarray,
 ) -> None:
-    """Lowers the limits of rays that meet z = 0 of L, and notes the row.
+    """Casts rays on a half space: the plane z = 0 of its group's frame L.
 
-    NumPy takes as long as all other geometry. Ray i takes pose i mod (K,) of
-    the (K, 3, 4) X_OLs.
+    For rays that hit the plane nearer than their limit, it sets `limits` to the
+    range and `met` to the group's row. Ray i takes pose i mod K of the (K, 3,
+    4) `X_OLs`. The function is compiled, because NumPy would take as long as
+    all other geometry.
     """
     counts = len(rays.p_OSset), len(rays.R_OSset), len(X_OLs)
     origin = turn = pose = -1
     height, normal_S = 0.0, np.empty(3)
     for ray in range(len(rays.d_Sset)):
         if ray == 0 or max(counts) > 1:
-            # Indices are counted along, since remainders take long.
+            # Indices are incremented, because remainders take long.
             origin = origin + 1 if origin + 1 < counts[0] else 0
             turn = turn + 1 if turn + 1 < counts[1] else 0
             pose = pose + 1 if pose + 1 < counts[2] else 0
@@ -291,7 +296,7 @@ def _meet_plane(
         along = 0.0
         for i in range(3):
             along += normal_S[i] * rays.d_Sset[ray, i]
-        # A ray along the plane does not meet it, nor one that leads away.
+        # Rays parallel to the plane, or away from it, do not hit it.
         if along == 0.0 or height * along < 0.0:
             continue
         distance = height / along
@@ -304,7 +309,7 @@ def _meet_plane(
 def _take_planes(
     met: np.ndarray, limits: np.ndarray, owners: np.ndarray, hits: Hits
 ) -> None:
-    """Sets hits of rays that have met nothing before a plane."""
+    """Sets the hits of rays that hit a plane and nothing nearer."""
     for ray in range(len(met)):
         row = np.int64(met[ray])
         if row >= 0 and hits.owner[ray] == -1:

@@ -1,4 +1,4 @@
-"""Geometry in groups that move as one, for the ray casters."""
+"""Groups of geometry that moves rigidly together, for ray casters."""
 
 from collections import Counter
 from collections.abc import Callable, Collection, Iterable, Sequence
@@ -14,16 +14,17 @@ from cns_drake.base.elementary import product, rotated, turns
 from cns_drake.scene import surfaces
 from cns_drake.scene.perception_geometry import PerceptionGeometry
 
-# A mesh whose copies have more triangles than this is held once. Its rays are
-# slower, since each copy has its own hierarchy. The many small objects of a
-# city stay merged.
+# If the copies of a mesh have more triangles than this together, the mesh is
+# stored once and each copy is an instance. Rays on instances are slower; the
+# many small objects of a city stay merged.
 MOST_COPIED_TRIANGLES = 2**18
-# Largest rotation in a step: Embree takes the shorter way between orientations.
+# Largest rotation in a step: Embree interpolates along the shorter rotation.
 _LARGEST_STEP_RAD = 2.0
-# The most time steps that Embree supports.
+# Greatest number of time steps that Embree supports.
 _MOST_STEPS = 129
-# Sides of the cubes with an origin each, for a scene with geometry that is
-# merged and for others, which are quick to build anew [m].
+# Space is divided into cubes, each with an origin O. Sides of the cubes [m]:
+# for scenes with merged geometry, and for other scenes, which are quick to
+# rebuild.
 _CUBE, _MOVING_CUBE = 2000.0, 256.0
 # A member of a scene: index of a geometry, its pose, its surface.
 Member = tuple[int, RigidTransform, surfaces.Surface]
@@ -79,12 +80,12 @@ class RayGroup:
         frame_id: the frame F it is fixed to; None for the world.
         X_FL: (4, 4) affine map from L to F; not rigid for an ellipsoid,
             which in L is the unit sphere.
-        members: the geometry of the group, posed in L. A half space is alone in
-            its group, and in L bounded by z = 0.
+        members: the geometry of the group, posed in L. A half space has a group
+            of its own; its surface is z = 0 in L.
         is_merged_world: whether L is the world, moved to O.
-        X_OL: (3, 4) affine map from L to the scene's origin, at the start of
-            a turn; it does not exist before `place`.
-        motion: motion of F during the turn, None if it stays.
+        X_OL: (3, 4) affine map from L to the scene's frame O, at the start of a
+            turn; it does not exist before `place` is called.
+        motion: motion of F during the turn; None if F does not move.
         in_sight: whether rays can meet the group. If not, `X_OL` and `motion`
             are those of an earlier turn.
     """
@@ -116,7 +117,8 @@ class RayGroup:
         if self.motion is None:
             return np.broadcast_to(self.X_OL, (len(times), 3, 4))
         R_OL0, way_F = self.motion.at(times)
-        # L in axes of O about F's origin, which moves in a straight line.
+        # L in axes of O, relative to F's origin, which moves in a straight
+        # line.
         p_LF = rotated(inv(self.X_FL[:3, :3]), self.X_FL[:3, 3])
         p_FL = rotated(self.X_OL[:, :3], p_LF)
         X_OL = product(R_OL0, self.X_OL)
@@ -136,7 +138,7 @@ class RayGroup:
             )
             for _, X_LG, one in self.members
         )
-        # Curved shapes that stay are built in another way.
+        # Curved shapes that never move are built in another way.
         is_flat = all(isinstance(one, int) for one, _ in shapes)
         return is_flat or self.frame_id is None, shapes
 
@@ -150,11 +152,11 @@ def group_geometries(
 ) -> tuple[np.ndarray, list[RayGroup]]:
     """Returns the origin p_WO and the groups of geometries.
 
-    Geometries are given with their indices. The world's group is the first if
-    there is one; half spaces are the last. Large surfaces with many copies get
-    a group for each copy, all with the same surface. Where a sensor at p_WS is
-    far from the middle of the world's geometry, O is in the middle of the cube
-    with the sensor.
+    Geometries come with their indices. The world's group is the first, if there
+    is one; half spaces are the last groups. A large surface with many copies
+    gets a group for each copy, and these groups share the surface. O is the
+    middle of the world's geometry. If the sensor at p_WS is far from there, O
+    is the middle of the cube that contains the sensor.
     """
     geometries = list(geometries)
     shared = _find_shared(geometries)
@@ -222,7 +224,7 @@ def group_geometries(
 def serves(
     p_WO: np.ndarray, groups: Sequence[RayGroup], p_WS: np.ndarray
 ) -> bool:
-    """Returns whether groups about O are precise for a sensor at p_WS."""
+    """Returns whether a scene about O is precise for a sensor at p_WS."""
     has_world = any(group.is_merged_world for group in groups)
     cube = _CUBE if has_world else _MOVING_CUBE
     return bool((np.abs(p_WS - p_WO) <= cube / 2.0).all())
@@ -231,7 +233,7 @@ def serves(
 def _find_shared(
     geometries: Iterable[tuple[int, PerceptionGeometry]],
 ) -> frozenset[int]:
-    """Returns the `id` of each surface that is held once."""
+    """Returns the `id` of each surface that is stored once for all copies."""
     num_triangles: Counter[int] = Counter()
     copies: Counter[int] = Counter()
     for _, geometry in geometries:

@@ -15,15 +15,15 @@ from cns_drake.base.compiled import compiled
 class Rays(NamedTuple):
     """N rays from one pose of a sensor S or from several.
 
-    Ray i takes entry i mod length of all arrays but the directions.
+    Ray i takes entry i mod n of each array of length n, except the directions.
 
     Attributes:
         p_OSset: (K, 3) float32 origins [m].
         R_OSset: (L, 3, 3) float64 orientations of S.
-        max_ranges: (M,) float32, how far to look [m].
+        max_ranges: (M,) float32 greatest ranges [m].
         d_Sset: (N, 3) float64 unit directions.
-        times: (T,) float32 when each ray is cast, as a part of the turn from
-            0 to 1.
+        times: (T,) float32 when each ray is cast, as a fraction of the turn
+            from 0 to 1.
     """
 
     p_OSset: np.ndarray
@@ -60,8 +60,9 @@ class Rays(NamedTuple):
 def rotate(R_FSset: np.ndarray, d_Sset: np.ndarray) -> np.ndarray:
     """Returns directions (N, 3) in F of directions in S.
 
-    The (L, 3, 3) orientations apply in turn. Products are added in a fixed
-    order: the result of a matrix library depends on the processor.
+    Direction i takes orientation i mod L of the (L, 3, 3) orientations.
+    Products are added in a fixed order: the result of a matrix library depends
+    on the processor.
     """
     d_Fset, turn = np.empty((len(d_Sset), 3)), -1
     for ray in range(len(d_Sset)):

@@ -8,7 +8,8 @@ An interrupted run leaves a part file. A later run of the same recording takes
 over its messages by writing them again; see PartFile.
 
 Messages are written in a thread, while the next frame is computed: compression
-takes half of a frame's time, and other Python code can run meanwhile."""
+takes half of a frame's time, during which other Python code can run.
+"""
 
 from __future__ import annotations
 
@@ -37,22 +38,23 @@ from cns_drake.recording.rosbag2_metadata import Topic, to_yaml
 from cns_drake.recording.schedule import START_NS, Schedule
 
 _CHUNK_BYTES = 1024 * 1024
-# A killed process loses the open chunk. Without a LiDAR a chunk of 1 MiB lasts
-# for many seconds, hence the flush by time. A kill may cost a second, with a
-# part of it reserved for frames on their way to the file.
+# A killed process loses the open chunk. Without a LiDAR, a chunk of 1 MiB takes
+# many seconds to fill, so chunks are also flushed by time. A kill may lose one
+# second; part of it is reserved for frames on their way to the file.
 _FLUSH_PERIOD_NS = 800_000_000
-# Number of batches that may wait, each with the small ones before it: two
-# frames with one LiDAR and traffic, so that the next frame does not wait for
-# the last one. A killed process loses them, at most eight frames.
+# Number of batches that may wait to be written: about two frames with one LiDAR
+# and traffic, so that a frame does not wait for the one before. A batch is a
+# large message with the small ones before it. A killed process loses waiting
+# batches, at most eight frames.
 _WAITING = 8
-# Small messages wait for the next larger one, at most this many: handing one
-# over takes longer than making it.
+# At most this many small messages wait for the next large one: handing a small
+# message over takes longer than making it.
 _SMALL_BYTES = 1024
 _MOST_HELD = 64
 
 
 class RecordedMessage(NamedTuple):
-    """A message as `BagWriter.write` takes it."""
+    """A message with the arguments of `BagWriter.write`."""
 
     topic: str
     stamp_ns: int
@@ -132,12 +134,12 @@ class BagWriter:
         self._latched = {topic.name for topic in topics if topic.latched}
         self._is_open = False
         self._counts = {topic.name: 0 for topic in self._topics}
-        # Topic -> stamp of its last message [ns], and those of the first and
-        # the last of all messages.
+        # Topic -> stamp of its last message; stamps of the first and the last
+        # message of all [ns].
         self._latest_ns: dict[str, int] = {}
         self._span_ns: tuple[int, int] | None = None
         self._flushed_ns = start_ns
-        # False while a record is being written. After an interruption then, the
+        # False while a record is being written. If an interrupt comes then, the
         # writer's index does not describe the file and must not be used.
         self._intact = False
 
@@ -164,7 +166,7 @@ class BagWriter:
         return self
 
     def __exit__(self, exception_type: type | None, *_: object) -> None:
-        """Completes the recording, or closes it as a part.
+        """Completes the recording, or closes it as a part file.
 
         Raises:
             InputError: if the files cannot be completed, e.g. on a full disk;
@@ -280,7 +282,7 @@ class BagWriter:
             and not self._files.is_finished()
             and not self._part.exists()
         ):
-            # The run was interrupted between the final names of the files.
+            # The earlier run was interrupted while it renamed the files.
             with contextlib.closing(PartFile(self._files.mcap)) as stream:
                 if self._goes_on(stream, preamble):
                     os.replace(self._files.mcap, self._part)
@@ -364,8 +366,8 @@ class BagWriter:
         """Gives the finished files their final names, `metadata.yaml` last.
 
         All files are whole under their `.part` names before the first is
-        renamed. Old ones that describe the MCAP go first: they must never
-        describe the new one.
+        renamed. Old files that describe the MCAP are removed first: they must
+        never describe the new MCAP.
         """
         own = self._files
         metadata = {"rosbag2_bagfile_information": self._information()}
@@ -384,7 +386,7 @@ class BagWriter:
         files.complete_part(own.metadata)
 
     def _close_part(self) -> None:
-        """Ends an incomplete file as well as its state allows."""
+        """Closes an incomplete file, as a valid MCAP file where possible."""
         # The first exception is the one to report, not a second one that
         # follows from it. If nothing new was written, the file stays as it is.
         with contextlib.suppress(InputError):
@@ -459,7 +461,7 @@ def take_over_frames(
     frame: list[RecordedMessage] = []
     missing = {topic.name for topic in topics if topic.latched}
     missing.update(schedule.due(0))
-    # After the end of all streams, if they have one, no message is due.
+    # If all streams have an end, no message is due after the last one.
     last = None
     if schedule.ends.keys() >= schedule.steps.keys():
         last = max(schedule.ends.values())
@@ -499,7 +501,7 @@ class BackgroundWriter:
     """
 
     def __init__(self, write: Callable[..., None]):
-        """Starts nothing yet; `write` is called in a thread of its own."""
+        """Prepares the writer; `write` will be called in a second thread."""
         self._write = write
         self._thread = ThreadPoolExecutor(1)
         self._batches: deque[Future] = deque()
@@ -527,7 +529,7 @@ class BackgroundWriter:
             self._hand_over(_WAITING)
 
     def _hand_over(self, waiting: int) -> None:
-        """Hands over what is held, and waits until so few batches wait."""
+        """Queues held messages; waits until `waiting` batches are left."""
         before = self._batches[-1] if self._batches else None
         self._batches.append(
             self._thread.submit(self._write_batch, self._held, before)
@@ -538,6 +540,6 @@ class BackgroundWriter:
 
     def _write_batch(self, batch: list[tuple], before: Future | None) -> None:
         if before is not None:
-            before.result()  # It is done; its error is that of this one.
+            before.result()  # If the batch before failed, this one fails, too.
         for message in batch:
             self._write(*message)

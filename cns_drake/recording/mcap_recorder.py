@@ -190,16 +190,17 @@ class McapRecorder(LeafSystem):
         if X_BI is not None:
             self._X_BCs[messages.IMU_FRAME] = X_BI
         self._X_BCs |= {s.frame or n: s.X_BC for n, s in further.items()}
-        # Frame on the map -> the port with its pose, and the pose from there.
+        # Child frame of the map -> the port of a frame's pose, and the child's
+        # pose in that frame.
         self._poses: dict[str, tuple[InputPort, RigidTransform]] = {}
-        # A topic, and what makes the messages at its times, on others as well.
+        # A topic, and a function that makes all messages that are due with it.
         self._streams: list[
             tuple[Topic, Callable[[Context, int], dict[Topic, Any]]]
         ] = []
         # The tick of the last event; there was none so far.
         self._last_tick: int | None = None
 
-        # The order of the ports is that of these lines.
+        # The following lines determine the order of the ports.
         self._odometry = self._declare("odometry", object())
         self._imu_samples: InputPort | None = None
         if with_imu_samples:
@@ -227,11 +228,11 @@ class McapRecorder(LeafSystem):
         self.DeclareForcedPublishEvent(self._publish)
 
     def _declare(self, name: str, example: object) -> InputPort:
-        """Declares an abstract port, for any value if that is an object."""
+        """Declares an abstract port of the value's type; object means any."""
         return self.DeclareAbstractInputPort(name, Value(example))
 
     def _add_pose(self, name: str, X_PC: RigidTransform) -> None:
-        """Declares the port of a frame P, in which a sensor has a pose."""
+        """Declares the pose port of a frame P, and a sensor's pose in P."""
         port = self._declare(f"{name}_pose", RigidTransform())
         self._poses[name] = (port, X_PC)
 
@@ -323,7 +324,7 @@ class McapRecorder(LeafSystem):
         )
         end = self._schedule.ends.get(IMU_TOPIC.name, 0)
         if waits and end % step:
-            # The last samples come after all else.
+            # The last samples come after all other messages.
             self.DeclarePeriodicPublishEvent(
                 period_sec=end * self._schedule.period,
                 offset_sec=end * self._schedule.period,

@@ -21,16 +21,17 @@ MAP_FRAME = "map"
 BASE_FRAME = "base_link"
 IMU_FRAME = "imu"
 _NS_PER_S = 1_000_000_000
-# The variance of a value without noise, in the square of its unit: its error is
-# below a millionth. ROS takes a covariance of zeros for an unknown one.
+# Variance given for an exact value, in the square of its unit: a standard
+# deviation of a millionth. It is not 0, because ROS reads zeros as an unknown
+# covariance.
 _EXACT = 1e-12
 # The covariance of an exact pose or twist, row by row: (36,).
 EXACT_COVARIANCE = _EXACT * np.eye(6).ravel()
-# Stands for numbers that change, in a message that is made once. It can be the
-# nanoseconds of a stamp, and no part of a text.
+# Placeholder for the numbers that change in a message that is made once. It is
+# a valid number of nanoseconds, and cannot occur in a text.
 _MARK = 0x3A17C0DE
 IMAGE = "sensor_msgs/msg/Image"
-# At 90 of 100, colours are right to a few levels.
+# At quality 90 of 100, colours are within a few levels of the original.
 _JPEG_QUALITY = 90
 CAMERA_INFO = "sensor_msgs/msg/CameraInfo"
 # Kind of image -> its encoding in ROS.
@@ -70,7 +71,10 @@ def encode_point_cloud(
 
 @functools.cache
 def _cloud_frame(dtype: np.dtype, frame_id: str) -> list[bytes]:
-    """Returns what is about the stamp, the width and the data of a cloud."""
+    """Returns the constant bytes of a cloud's message, without the data.
+
+    They are the pieces between stamp, width, row step and data.
+    """
     data = ros_types.serialize(
         ros_types.make_message(
             ros_types.POINT_CLOUD,
@@ -90,7 +94,7 @@ def _cloud_frame(dtype: np.dtype, frame_id: str) -> list[bytes]:
 
 @functools.cache
 def _point_fields(dtype: np.dtype) -> tuple[list[tuple], list[int]]:
-    """Returns the PointFields of records, and the bytes that none has."""
+    """Returns PointFields of records, and offsets of bytes in no field."""
     fields, padding = [], set(range(dtype.itemsize))
     for name, (scalar, offset, *_) in (dtype.fields or {}).items():
         padding.difference_update(range(offset, offset + scalar.itemsize))
@@ -137,7 +141,7 @@ def make_imu(
 
 
 def _covariance(value: object, variance: float) -> np.ndarray:
-    """Returns the covariance, row by row, of a value, which may be None."""
+    """Returns the covariance of a value, row by row; -1 first for None."""
     covariance = np.zeros(9)
     if value is None:
         covariance[0] = -1.0
@@ -149,7 +153,7 @@ def _covariance(value: object, variance: float) -> np.ndarray:
 def make_odometry(
     X_WB: RigidTransform, V_WB_B: SpatialVelocity, stamp_ns: int
 ) -> Any:
-    """Returns an Odometry message: pose in the map, twist in the vehicle.
+    """Returns an Odometry message: pose in the map, twist expressed in B.
 
     The velocity V_WB_B is expressed in B [rad/s, m/s]. The values are exact;
     their standard deviations are given as 1e-6.

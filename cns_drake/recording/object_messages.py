@@ -15,9 +15,9 @@ _NS_PER_S = 1_000_000_000
 # Placeholder of the stamp: seconds and nanoseconds.
 _STAMP_MARK = (0x5A17C0DE, 0x3A17C0DE)
 _STAMP_MARK_NS = _STAMP_MARK[0] * _NS_PER_S + _STAMP_MARK[1]
-# CDR begins with its encoding; alignment counts from behind it.
+# CDR begins with the encoding; alignment is counted from the byte after it.
 _ENCAPSULATION = 4
-# Position, orientation and size of a box.
+# Numbers of a box: position, orientation and size.
 _NUMBERS = 10
 # A record of the table of velocities.
 MOTION_DTYPE = np.dtype(
@@ -31,7 +31,7 @@ _OPACITY = 0.45
 
 
 class RecordedObjects(NamedTuple):
-    """The N vehicles and walkers that are present at a time.
+    """The N vehicles and walkers at one time.
 
     Attributes:
         instance: (N,) uint16 ids in points and tables.
@@ -57,7 +57,7 @@ class RecordedObjects(NamedTuple):
 
 
 class BoxMessages:
-    """Makes one message of all boxes at a time.
+    """Makes messages that contain all boxes of a time.
 
     For each set of objects, a message is made only once, with placeholders for
     its float64 numbers and its stamp. Later messages fill in these numbers,
@@ -90,10 +90,10 @@ class BoxMessages:
         return data.tobytes()
 
     def _prepare(self, objects: RecordedObjects) -> None:
-        """Makes the message, and finds the places of its placeholders.
+        """Makes the message, and finds the positions of its placeholders.
 
         Raises:
-            ValueError: a number is missing.
+            ValueError: the message lacks a placeholder.
         """
         count = _NUMBERS * len(objects.instance)
         marks = (_FIRST_MARK + np.arange(count)).reshape(-1, _NUMBERS)
@@ -118,7 +118,7 @@ class BoxMessages:
 
 
 def _views(data: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Returns what can be a float64, and what a uint32, of (L,) bytes."""
+    """Returns views of a message's bytes (L,) as float64 and as uint32."""
     body = data[_ENCAPSULATION:]
     return (
         body[: len(body) // 8 * 8].view("<f8"),
@@ -131,8 +131,8 @@ def marked_detections(
 ) -> Any:
     """Returns a Detection3DArray in the map, whose stamp is a placeholder.
 
-    It takes id and class of N objects, and (N, 10) position, orientation (x, y,
-    z, w) and size.
+    `who` has id and class of N objects; `numbers` has (N, 10) position,
+    orientation (x, y, z, w) and size.
     """
     header = messages.make_header(messages.MAP_FRAME, _STAMP_MARK_NS)
     detections = []
@@ -175,7 +175,7 @@ def marked_boxes(who: Sequence[tuple[int, str]], numbers: np.ndarray) -> Any:
 
 
 def _box(numbers: np.ndarray) -> tuple[tuple, np.ndarray]:
-    """Returns the fields of a pose, and the size."""
+    """Returns the fields of a box's pose, and its size."""
     return (numbers[:3], numbers[3:7]), numbers[7:]
 
 

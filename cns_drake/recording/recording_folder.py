@@ -13,9 +13,9 @@ from cns_drake.base.files import open_plain, part_path, user_errors
 class RecordingFolder:
     """A rosbag2 folder with one MCAP file; its last part names the recording.
 
-    The fingerprint covers all inputs; see `cns_drake.scenarios.provenance`. The
-    file of metadata gets its name last: a folder with it holds a finished
-    recording.
+    The fingerprint covers all inputs; see `cns_drake.scenarios.provenance`.
+    `metadata.yaml` gets its name last, so a folder with this file holds a
+    finished recording.
     """
 
     def __init__(self, path: Path):
@@ -69,10 +69,10 @@ class PartFile(io.BufferedRandom):
     """A binary file for one writer at a time.
 
     A process that resumes an interrupted file writes it again from its start.
-    Equal bytes stay untouched; the first different byte cuts the file off, and
-    all that follows is new. The file never holds less than the common part of
-    both runs, no second copy takes up disk space, and the result is the same as
-    in an empty file.
+    As long as the bytes equal those in the file, nothing is written. At the
+    first different byte the file is cut off, and the rest is written. The
+    result is the same as in an empty file. The common part of the two runs is
+    never lost, and no second copy takes up disk space.
 
     The file is locked until it is closed or its process ends in any way.
 

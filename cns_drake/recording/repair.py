@@ -27,7 +27,7 @@ from cns_drake.recording import rosbag2_metadata
 # Schemas and channels are kept in memory; more of them is no recording.
 _DEFINITIONS_LIMIT = 64 * 1024 * 1024
 _ROSBAG2 = "rosbag2"
-# Reports how many bytes of how many are done.
+# Reports the number of bytes done and their total.
 BytesCallback = Callable[[int, int], None]
 
 
@@ -81,7 +81,7 @@ def repair_mcap(
             )
 
     def read(before: int) -> Iterator[McapRecord | Fault]:
-        """Reads the file, after so many bytes of the work [bytes]."""
+        """Yields the file's records; `before` counts bytes done earlier."""
         with user_errors(path), open(path, "rb") as stream:
             for record in read_records(stream):
                 on_bytes(before + stream.tell(), 2 * size)
@@ -103,7 +103,8 @@ def repair_mcap(
 class _Definitions(NamedTuple):
     """What messages refer to: schemas and channels by id.
 
-    The first one of an id counts, and only channels with a known schema do.
+    If an id is defined twice, the first definition counts. Channels without a
+    known schema are left out.
     """
 
     profile: str
@@ -114,10 +115,10 @@ class _Definitions(NamedTuple):
 def _find_definitions(
     records: Iterable[McapRecord | Fault], path: Path
 ) -> _Definitions:
-    """Returns what records define.
+    """Returns the schemas and channels that records define.
 
     Raises:
-        InputError: they define nothing, or too much.
+        InputError: the records define nothing, or too much.
     """
     header: Header | None = None
     schemas: dict[int, Schema] = {}
@@ -133,7 +134,7 @@ def _find_definitions(
         elif isinstance(record, Channel) and record.id not in channels:
             channels[record.id] = record
             kept = (record.topic, *itertools.chain(*record.metadata.items()))
-        elif isinstance(record, Attachment):  # Names go into an index.
+        elif isinstance(record, Attachment):  # The index has its name.
             kept = (record.name, record.media_type)
         elif isinstance(record, Metadata):
             kept = (record.name,)

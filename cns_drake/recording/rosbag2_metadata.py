@@ -81,7 +81,7 @@ def make_bag_information(
         file_name: file name of the MCAP.
         topics: descriptions of topics, from `describe_topic`.
         start_ns, end_ns: times of the first and the last message.
-        custom_data: what `ros2 bag info` shows besides.
+        custom_data: key -> text, which `ros2 bag info` shows as well.
     """
     count = sum(topic["message_count"] for topic in topics)
     span = {

@@ -11,7 +11,8 @@ FRAME_PERIOD = 0.05
 # give other bytes at each run.
 START_NS = 1_700_000_000_000_000_000
 _NS_PER_S = 1_000_000_000
-# Finer than any clock: a period such as 1/30 s is found again in a double.
+# Largest denominator of a period in seconds: large enough to recover fractions
+# such as 1/30 from a double.
 _FINEST = 10**9
 
 

@@ -12,18 +12,19 @@ from shapely.geometry.base import BaseGeometry
 
 from cns_drake.roads.road import Arm, Junction, Road
 
-# Segments of a quarter circle in rounded outlines: a kerb of 13 m radius is
-# then true to 6 cm.
+# Segments per quarter circle in rounded outlines: a kerb of 13 m radius is then
+# exact to 6 cm.
 _QUADRANT_SEGMENTS = 8
-# Outlines have their vertices on a grid of this width [m].
+# Outlines have their vertices on a grid of this size [m].
 _GRID = 0.001
-# Vertices closer to the outline than this are dropped [m].
+# Vertices closer to an outline than this are dropped [m].
 _SIMPLIFY = 0.01
-# Areas are joined over slits up to twice this width; such slits stay open where
-# roads end beside one another at a slant [m].
+# Slits between areas are closed up to twice this width. They remain where roads
+# end beside one another at an angle [m].
 _SEAM = 0.25
-# Junctions are drawn this far into their roads, then cut off at the roads'
-# ends. Remains beside them of this thickness are dropped [m].
+# Junctions extend this far into their roads before they are cut off at the
+# roads' ends. Pieces that remain beside the roads are dropped if they are
+# thinner than this [m].
 _OVERLAP = 0.5
 # A parking bay keeps clear of the junction at each end of its road [m].
 _BAY_CLEARANCE = 3.0
@@ -36,9 +37,10 @@ class Areas:
     Attributes:
         carriageway: the area between the kerbs, where vehicles drive or park.
         lane_area: the carriageway without parking bays.
-        sidewalks: areas beside the road and round all corners, a kerb higher.
-        medians: kerbed strips between the directions.
-        parking_bays: bays by (road, "left" or "right" of `forward`).
+        sidewalks: areas beside the roads and around all corners, at the height
+            of the kerb.
+        medians: strips with kerbs between the two directions.
+        parking_bays: (road, "left" or "right" of `forward`) -> bays.
     """
 
     carriageway: MultiPolygon
@@ -55,15 +57,16 @@ def corner_setback(
 ) -> float:
     """Returns the distance from a junction at which a road must end [m].
 
-    There the kerb of radius r between two neighbouring roads touches the road's
-    edge. The edges meet at (b + a cos(angle)) / sin(angle) along the road,
-    where a and b are half the widths of the road and its neighbour, and the arc
-    begins r / tan(angle / 2) behind.
+    There, the rounded kerb (radius r) between the road and a neighbouring one
+    touches the road's edge. Along the road, the edges meet at (b + a
+    cos(angle)) / sin(angle), where a and b are half the widths of the road and
+    its neighbour. The arc of the kerb begins r / tan(angle / 2) behind this
+    point.
     """
-    # Roads on top of one another never part.
+    # Roads on top of one another never separate.
     if angle < 1e-6:
         return np.inf
-    # Towards a straight angle the corner, and with it the distance, vanishes.
+    # Towards a straight angle, the corner and thus the distance vanish.
     if angle > np.radians(150.0):
         return kerb_radius
     edge = (other_half_width + half_width * math.cos(angle)) / math.sin(angle)
@@ -78,7 +81,7 @@ def road_strip(road: Road) -> BaseGeometry:
 def _band(
     road: Road, right: float, left: float, clearance: float = 0.0
 ) -> BaseGeometry:
-    """Returns the area between two lateral offsets of the centreline."""
+    """Returns the area between two lateral offsets from the centreline [m]."""
     stations = road.stations(clearance=clearance)
     outline = [
         road.evaluate(stations, left)[:, :2],
@@ -92,10 +95,10 @@ def junction_area(
 ) -> BaseGeometry:
     """Returns the area between the ends of a junction's roads.
 
-    The roads are continued to the junction's position, and these continuations
-    are united. The corners between them are filled up to a kerb of the
-    junction's radius. The roads themselves are cut away. At a dead end, a disc
-    takes the place of the other roads.
+    The roads are continued to the junction's position and united, and the
+    corners between them are filled up to a kerb of the junction's radius. The
+    roads themselves are then cut off. At a dead end, a disc takes the place of
+    the other roads.
     """
     stubs = [_stub(roads[arm.road], arm) for arm in junction.arms]
     parts = [
@@ -108,7 +111,8 @@ def junction_area(
                 junction.kerb_radius, quad_segs=_QUADRANT_SEGMENTS
             )
         )
-    # Bends of a through road leave a wedge at the outside; close it.
+    # Where a through road bends, the stubs leave a wedge on the outside, which
+    # is closed.
     for (a, line_a), (b, line_b) in itertools.combinations(
         zip(junction.arms, stubs, strict=True), 2
     ):
@@ -122,7 +126,7 @@ def junction_area(
     )
     for arm in junction.arms:
         area = area.difference(road_strip(roads[arm.road]))
-    # Cutting can leave splinters and crumbs beside a road's end.
+    # Cutting can leave splinters beside a road's end.
     area = area.buffer(-_OVERLAP, join_style="mitre").buffer(
         _OVERLAP, join_style="mitre"
     )
@@ -132,7 +136,7 @@ def junction_area(
 
 
 def _stub(road: Road, arm: Arm) -> LineString:
-    """Returns an arm's centreline, from the junction past its setback."""
+    """Returns an arm's centreline, from the junction to beyond its setback."""
     reach = arm.setback + _OVERLAP
     stations = np.linspace(0.0, reach, int(np.ceil(reach)) + 1)
     if arm.end == "end":
@@ -143,7 +147,7 @@ def _stub(road: Road, arm: Arm) -> LineString:
 def make_areas(
     roads: Mapping[str, Road], junction_areas: Mapping[str, BaseGeometry]
 ) -> Areas:
-    """Returns the areas of a road network by road and by junction."""
+    """Returns the areas of a road network, from its roads and junctions."""
     lanes = {name: road_strip(road) for name, road in roads.items()}
     bays = {}
     for name, road in roads.items():
@@ -174,7 +178,7 @@ def make_areas(
 
 
 def _median(road: Road) -> BaseGeometry:
-    """Returns a median with round noses, between the ends of its road."""
+    """Returns a road's median with round ends, between the ends of the road."""
     half = road.median / 2
     shift = (
         road.lane_width * (road.lanes["forward"] - road.lanes["backward"]) / 2
@@ -185,9 +189,9 @@ def _median(road: Road) -> BaseGeometry:
 
 
 def _simplified(area: BaseGeometry) -> BaseGeometry:
-    """Returns an area without superfluous vertices of its outline.
+    """Returns an area without unnecessary vertices of its outline.
 
-    On an evenly sampled arc many vertices are equally dispensable. Rounding
+    On an evenly sampled arc, many vertices are equally unnecessary. Rounding
     first makes the choice independent of the last bits, which differ between
     versions of the numerical libraries.
 
@@ -203,14 +207,14 @@ def _simplified(area: BaseGeometry) -> BaseGeometry:
 
 
 def _join(parts: Iterable[BaseGeometry]) -> BaseGeometry:
-    """Returns the union, with the slits between neighbours closed."""
+    """Returns the union of areas, with the slits between neighbours closed."""
     grown = unary_union(
         [part.buffer(_SEAM, join_style="mitre") for part in parts]
     )
     joined = grown.buffer(-_SEAM, join_style="mitre")
     if joined.is_valid:
         return joined
-    # At a sharp corner GEOS lets a mitre cross itself.
+    # At a sharp corner, GEOS may return an outline that crosses itself.
     return make_valid(joined, method="structure", keep_collapsed=False)
 
 

@@ -1,4 +1,4 @@
-"""Plane curves of straight lines and arcs: the centrelines of roads."""
+"""The centrelines of roads: plane curves of straight lines and arcs."""
 
 from dataclasses import dataclass
 import math
@@ -9,14 +9,14 @@ from numpy.typing import ArrayLike
 from cns_drake.base.angles import wrapped
 from cns_drake.base.elementary import arctan2, cos, power, sin, tan
 
-# A fillet may overrun its segment by this much, so that two arcs can meet in
-# one point although corners are written down in centimetres [m].
+# A fillet may be longer than its segment by this much, so that two arcs can
+# meet in one point although corners are given in centimetres [m].
 _FIT_TOLERANCE = 0.02
 
 
 @dataclass(frozen=True)
 class _Piece:
-    """A line (zero curvature) or an arc from `start` with `heading`."""
+    """A line (curvature 0) or an arc that begins at `start` [m, rad, 1/m]."""
 
     start: np.ndarray
     heading: float
@@ -24,12 +24,12 @@ class _Piece:
     length: float
 
     def evaluate(self, s: np.ndarray) -> np.ndarray:
-        """Returns (N, 3) x, y [m] and heading [rad] at arc lengths s."""
+        """Returns x, y [m] and heading [rad], (N, 3), at arc lengths s (N,)."""
         heading = self.heading + self.curvature * s
-        # The length of an arc's chord follows from sin(x)/x, and it points to
-        # the mean heading. This form also holds for a line.
+        # The length of an arc's chord follows from sin(x)/x, and its direction
+        # is the mean heading. This form also holds for a line.
         half = self.curvature * s / 2
-        # As in `numpy.sinc`.
+        # As in `numpy.sinc`, 1e-20 avoids a division by zero.
         angle = np.pi * np.where(half == 0.0, 1e-20, half / np.pi)
         chord = s * (sin(angle) / angle)
         x = self.start[0] + chord * cos(self.heading + half)
@@ -41,10 +41,12 @@ class Centreline:
     """A polyline whose corners are rounded by arcs."""
 
     def __init__(self, points: ArrayLike, radii: ArrayLike) -> None:
-        """Rounds N - 2 inner corners, of N points, by arcs of some radii [m].
+        """Rounds the inner corners of N points (N, 2) by arcs.
+
+        `radii` has the N - 2 radii of the arcs [m].
 
         Raises:
-            ValueError: a corner's arc does not fit between its neighbours,
+            ValueError: the arc of a corner does not fit between its neighbours,
                 or two consecutive points coincide.
         """
         points = np.asarray(points, dtype=float)
@@ -92,13 +94,13 @@ class Centreline:
         return float(self._ends[-1])
 
     def evaluate(self, s: ArrayLike) -> np.ndarray:
-        """Returns (N, 3) x, y [m] and heading [rad] at arc lengths s."""
+        """Returns x, y [m] and heading [rad], (N, 3), at arc lengths s (N,)."""
         s = np.asarray(s, dtype=float).clip(0.0, self.length)
         index = np.searchsorted(self._ends, s, side="left")
         index = np.minimum(index, len(self._pieces) - 1)
         result = np.empty((len(s), 3))
-        # Sorted once: comparing all of s with each piece takes minutes if both
-        # are many.
+        # Sorted once, since comparing all of s with each piece takes minutes if
+        # there are many of both.
         order = np.argsort(index, kind="stable")
         found, first = np.unique(index[order], return_index=True)
         groups = np.split(order, first[1:])
@@ -112,7 +114,7 @@ class Centreline:
 def sample_stations(start: float, end: float, spacing: float) -> np.ndarray:
     """Returns evenly spaced arc lengths from start to end, both included [m].
 
-    Their distance is at most a spacing [m].
+    They are at most `spacing` apart [m].
     """
     count = max(2, int(np.ceil((end - start) / spacing - 1e-9)) + 1)
     return np.linspace(start, end, count)
@@ -126,17 +128,17 @@ def blend(
     spacing: float = 1.0,
     max_radius: float = np.inf,
 ) -> np.ndarray:
-    """Returns a smooth curve between directed points, (N, 2) with both ends.
+    """Returns a smooth curve (N, 2) from one directed point to another [m].
 
-    If the straight continuations meet ahead of the start and behind the end,
-    the curve is the widest allowed arc that touches both, with lines in front
-    of and behind it, as a driver turns. Otherwise (parallel lanes that are
+    Both points are included. If the line straight ahead of the start meets the
+    line behind the end, the curve consists of lines and the widest allowed arc
+    that touches both, as a driver turns. Otherwise (parallel lanes that are
     offset, S-bends) it is a cubic Hermite curve.
 
     Args:
         p_start, p_end: the points [m].
         heading_start, heading_end: directions there [rad].
-        spacing: distance between two points of the curve, about [m].
+        spacing: approximate distance between two points of the curve [m].
         max_radius: greatest radius of the arc [m].
     """
     p_start, p_end = np.asarray(p_start, float), np.asarray(p_end, float)

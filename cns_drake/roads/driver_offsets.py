@@ -1,8 +1,9 @@
 """How a driver departs from the line that a route or waypoints give.
 
-Two drives of people along one route differ by half a metre that stays alike for
-some 50 m, and by lanes. The offset along the way is a process of Ornstein and
-Uhlenbeck, smoothed so that a driver can steer it, with changes of lane on top.
+Two people who drive along the same route differ by about half a metre for some
+50 m at a time, and sometimes by a lane. Here, the offset from the line is an
+Ornstein-Uhlenbeck process over the distance, smoothed so that a driver can
+steer it. Changes of lane are added to it.
 """
 
 import math
@@ -17,30 +18,32 @@ from cns_drake.roads.network import RoadNetwork
 from cns_drake.roads.route import smooth_step
 from cns_drake.roads.u_turn import FRONT, HALF_WIDTH, REAR, directions, outlines
 
-# Spacing of the path that `depart` needs [m].
+# Distance between the points of the path that `depart` needs [m].
 FINE_SPACING = 0.5
 # Least and greatest length of an episode in another lane [m].
 SHORTEST_EPISODE, LONGEST_EPISODE = 15.0, 270.0
-# Length of the way from one lane to the other [m].
+# Length of a change from one lane to the other [m].
 _RAMP = 80.0
-# Farthest that the car wanders: a lane of 3.5 m leaves it as much [m].
+# Greatest offset of the car from its line; in a lane of 3.5 m, as much room is
+# left [m].
 _FARTHEST = 0.8
-# Least distance of the car to kerbs and other obstacles, and what the smoothed
-# path may lose of it [m].
+# Least distance of the car from kerbs and other obstacles, and by how much the
+# smoothed path may fall short of it [m].
 _CLEARANCE, _SLACK = 0.3, 0.1
-# Offsets that are tried, every so many metres of the path [m].
+# Offsets that are tried [m], at one of so many points of the path.
 _OFFSETS = np.linspace(-_FARTHEST, _FARTHEST, 33)
 _CHECKED = 4
-# Half of the length over which the wander is smoothed [m].
+# Half the length over which the offset is smoothed [m].
 _REACH = 20.0
-# Their error then is below 1e-9 for all lengths of scenarios.
+# After this many iterations the error is below 1e-9 for all lengths in
+# scenarios.
 _ITERATIONS = 40
 
 
 def kerbs(network: RoadNetwork) -> STRtree:
     """Returns the edges of lanes: kerbs, medians and bays of parked cars.
 
-    They are pieces of a few metres.
+    They are divided into pieces of a few metres.
     """
     outline = np.asarray(shapely.get_parts(network.areas.lane_area.boundary))
     corners, line = shapely.get_coordinates(outline, return_index=True)
@@ -61,17 +64,18 @@ def depart(
 ) -> LanePath:
     """Returns the path of a driver who wanders and changes lanes.
 
-    Where obstacles are near the line, seen from above, the car stays on the
-    line. Elsewhere, it keeps 0.3 m from all obstacles, mirrors included.
+    Near the line, obstacles seen from above keep the car on the line.
+    Elsewhere, the car keeps 0.3 m from all obstacles, mirrors included.
 
     Args:
         path: the line, with points every `FINE_SPACING`.
-        spacing: distance of the points of the result [m].
+        spacing: distance between the points of the result [m].
         obstacles: kerbs, walls and the like.
         source: the beginning of an error's message.
         wander: standard deviation of the offset in the lane [m].
-        wander_length: distance after which its correlation is 1/e [m].
-        lane_changes: rate of changes to another lane and back [1/km].
+        wander_length: distance after which the correlation of the offset is 1/e
+            [m].
+        lane_changes: number of changes to another lane and back per km.
         rng: the only source of variation.
 
     Raises:
@@ -91,7 +95,7 @@ def depart(
 def _moved(
     points: np.ndarray, line: np.ndarray, offset: np.ndarray
 ) -> np.ndarray:
-    """Returns (N, 3) points moved by offsets to the left of a line (N, 3)."""
+    """Returns points (N, 3), moved to the left of a line (N, 3) by offsets."""
     along = directions(line[:, :2])
     left = np.column_stack([-along[:, 1], along[:, 0]])
     xy = points[:, :2] + offset[:, None] * left
@@ -101,7 +105,7 @@ def _moved(
 def _is_free(
     points: np.ndarray, offsets: np.ndarray, obstacles: STRtree
 ) -> np.ndarray:
-    """Returns (N, K) whether a car has room at K offsets from N points."""
+    """Returns whether a car has room at K offsets from N points, (N, K)."""
     along = directions(points[:, :2])[:, None]
     left = np.stack([-along[..., 1], along[..., 0]], axis=-1)
     middle = points[:, None, :2] + offsets[:, None] * left
@@ -116,14 +120,14 @@ def _is_free(
 def _change_lanes(
     path: LanePath, obstacles: STRtree, rate: float, rng: np.random.Generator
 ) -> np.ndarray:
-    """Returns the (N, 3) points of the path with changes of lane.
+    """Returns the points (N, 3) of the path with changes of lane [m].
 
-    An episode reaches from the middle of the way out to the middle of the way
-    back. Its length is drawn evenly in the logarithm, and cut off where the
-    other lane ends. A short one goes only a part of the way over, as round an
-    obstacle.
+    An episode lasts from the middle of the change to the other lane to the
+    middle of the change back. The logarithm of its length is drawn uniformly,
+    and the episode is cut off where the other lane ends. In a short episode the
+    car moves over only in part, as around an obstacle.
     """
-    assert path.beside is not None  # Lanes belong to routes alone.
+    assert path.beside is not None  # Only routes have lanes.
     s = path.spacing * np.arange(len(path.points))
     points = path.points
     half = _RAMP / 2
@@ -154,9 +158,10 @@ def _change_lanes(
 
 
 def _stretch(beside: np.ndarray, place: int) -> slice:
-    """Returns the stretch about a place with one distance of a lane.
+    """Returns the stretch around a place on which the lane beside is constant.
 
-    It is of one point where there is no lane.
+    `beside` has its distance at each point. Where there is no lane, the stretch
+    is one point.
     """
     if not beside[place]:
         return slice(place, place + 1)
@@ -171,10 +176,11 @@ def _stretch(beside: np.ndarray, place: int) -> slice:
 def _room(
     points: np.ndarray, obstacles: STRtree
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Returns the (N,) least and greatest offsets to the left of a path [m].
+    """Returns the least and greatest offsets (N,) to the left of a path [m].
 
-    Each holds for the whole length over which offsets are smoothed. They are
-    those of the room nearest to the path; both are 0 where there is none.
+    They limit the free interval of offsets that is nearest to the path, over
+    the whole length over which offsets are smoothed. Both are 0 where there is
+    no room.
     """
     free = _is_free(points[::_CHECKED], _OFFSETS, obstacles)
     low, high = np.zeros((2, len(free)))
@@ -203,10 +209,10 @@ def _wander(
     length: float,
     rng: np.random.Generator,
 ) -> np.ndarray:
-    """Returns (N,) offsets between bounds that `_room` gives [m].
+    """Returns random offsets (N,) within the bounds from `_room` [m].
 
-    The driver's mean line keeps two standard deviations from both bounds, or
-    lies in their middle.
+    The mean of the process is at least two standard deviations away from both
+    bounds or, if these are too close together, in their middle.
     """
     weights = _kernel()
     reach = len(weights) // 2
@@ -227,7 +233,7 @@ def _wander(
     )
     wanted = np.clip(mean + spread * gain * np.array(values), low, high)
     num = len(low) - 2 * reach
-    # One by one: a dot product rounds differently on other processors.
+    # A loop, because a dot product is rounded differently on other processors.
     offset = np.zeros(num)
     for k, weight in enumerate(weights.tolist()):
         offset += weight * wanted[k : k + num]
@@ -235,21 +241,21 @@ def _wander(
 
 
 def _kernel() -> np.ndarray:
-    """Returns the weights of the smoothing, with two smooth derivatives."""
+    """Returns the weights of the smoothing; two derivatives are continuous."""
     half = round(_REACH / FINE_SPACING)
     u = np.arange(-half, half + 1) / (half + 1)
-    # A power would be rounded as the processor likes.
+    # Products, because how a power is rounded depends on the processor.
     weights = (1.0 - u * u) * (1.0 - u * u) * (1.0 - u * u)
     return weights / weights.sum()
 
 
 def _process(weights: np.ndarray, length: float) -> tuple[float, float]:
-    """Returns decay a step and gain of a process before it is smoothed.
+    """Returns the decay per step and the gain of a process to be smoothed.
 
-    An Ornstein-Uhlenbeck process of length a has the covariance exp(-d / a);
-    smoothed by weights w_i at x_i, it has sum_ij w_i w_j
-    exp(-|d + x_i - x_j| / a). Gain and a are such that the smoothed process
-    has a standard deviation of 1, and a correlation of 1/e at the length.
+    An Ornstein-Uhlenbeck process of length a has the covariance exp(-d / a).
+    Smoothed by weights w_i at x_i, it has the covariance sum_ij w_i w_j exp(-|d
+    + x_i - x_j| / a). The gain and a are chosen such that the smoothed process
+    has a standard deviation of 1, and a correlation of 1/e at `length`.
     """
     num = len(weights)
     pairs = [

@@ -1,4 +1,4 @@
-"""The line that a vehicle follows, and bounds of its speed."""
+"""The line that a vehicle follows, and the limits of its speed."""
 
 from dataclasses import dataclass
 from typing import Annotated
@@ -8,27 +8,27 @@ from pydantic import BaseModel, ConfigDict, Field
 
 from cns_drake.base.errors import InputError
 
-# A path must be longer than this for a trajectory to be made of it [m].
+# A path must be longer than this to become a trajectory [m].
 _MIN_LENGTH = 20.0
-# Longest path: planning takes time and memory for each metre [m].
+# Length of the longest path [m]: planning takes time and memory for each metre.
 _MAX_LENGTH = 100_000.0
-# Distance of control points along the path [m]. The curvature then changes over
-# about 10 m, as a driver turns the wheel. In the tightest bends of a town the
-# path is less than 10 cm from the middle of the lane.
+# Distance between control points along the path [m]. The curvature then changes
+# over about 10 m, as when a driver turns the wheel. In the tightest bends of a
+# town, the path deviates from the middle of the lane by less than 10 cm.
 POINT_SPACING = 2.0
 
 Acceleration = Annotated[float, Field(ge=0.05, le=9.81, allow_inf_nan=False)]
 
 
 class Speeds(BaseModel):
-    """The limits of a drive's speed and acceleration at every instant.
+    """The limits of speed and acceleration, which the car always keeps.
 
     Attributes:
-        cruise: highest speed [m/s]; the speed limits of the roads apply as
-            well.
-        longitudinal_acceleration: largest acceleration and braking along the
-            path [m/s^2].
-        lateral_acceleration: largest centripetal acceleration [m/s^2].
+        cruise: highest speed of the car [m/s]. The speed limits of the roads
+            apply as well.
+        longitudinal_acceleration: largest acceleration and deceleration along
+            the path [m/s^2].
+        lateral_acceleration: largest centripetal acceleration in bends [m/s^2].
     """
 
     model_config = ConfigDict(extra="forbid", frozen=True, strict=True)
@@ -40,14 +40,15 @@ class Speeds(BaseModel):
 
 @dataclass(frozen=True)
 class LanePath:
-    """The middle of the lanes of a drive, evenly sampled.
+    """The path of a drive along the middle of lanes, evenly sampled.
 
     Attributes:
         points: (N, 3) positions in the world, first and last included [m].
-        spacing: distance between neighbours along the path [m].
-        speed_limits: (N,) the limits there, infinite without one [m/s].
-        beside: (N, 2) distances to the middle of the lane to the left and to
-            the right, in the same direction; 0 where there is none [m]. None
+        spacing: distance between neighbouring points along the path [m].
+        speed_limits: (N,) speed limits at the points; infinite where there is
+            none [m/s].
+        beside: (N, 2) distances to the middle of the next lane on the left and
+            on the right in the same direction; 0 where there is none [m]. None
             along waypoints.
     """
 
@@ -58,7 +59,7 @@ class LanePath:
 
     @property
     def length(self) -> float:
-        """Length along the lanes [m]."""
+        """Length of the path [m]."""
         return self.spacing * (len(self.points) - 1)
 
 
@@ -88,13 +89,13 @@ def sample_lane_path(
     source: object,
     beside: np.ndarray | None = None,
 ) -> LanePath:
-    """Returns evenly spaced points along a polyline.
+    """Returns evenly spaced points along a polyline as a path.
 
     Args:
         points: (N, 3) corners of the polyline [m].
         speed_limits: (N,) limit at each corner [m/s]. On a segment, the lower
             limit of its two corners holds.
-        spacing: the distance of the points, rounded so that it divides the
+        spacing: distance between the points, rounded so that it divides the
             length of the polyline [m].
         source: the beginning of an error's message.
         beside: (N, 2) distances of the lanes beside each corner [m].
@@ -109,7 +110,8 @@ def sample_lane_path(
     count = max(1, round(length / spacing))
     wanted = np.linspace(0.0, length, count + 1)
     xyz = [np.interp(wanted, travelled, axis) for axis in points.T]
-    # A limit holds from its first point on; between two points the lower one.
+    # A limit holds from its first point on. Between two points the lower one
+    # holds.
     after = np.searchsorted(travelled, wanted).clip(1, len(points) - 1)
     if beside is not None:
         beside = np.minimum(beside[after - 1], beside[after])

@@ -1,4 +1,4 @@
-"""Roads and junctions of a town, with their lanes and areas."""
+"""The road network of a town: roads and junctions, with lanes and areas."""
 
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
@@ -32,19 +32,19 @@ Turn = Literal["left", "straight", "right"]
 # x, y, z [m] and heading [rad].
 _Pose = tuple[float, float, float, float]
 
-# Beyond this change of heading a way through a junction is a turn.
+# A path through a junction is a turn if its heading changes by more than this.
 _STRAIGHT_LIMIT_DEG = 35.0
-# Beyond this one it is a U-turn, which is not allowed.
+# Beyond this change of heading it is a U-turn, which is not allowed.
 _U_TURN_LIMIT_DEG = 150.0
-# Roads may touch by this much before they count as crossing [m^2].
+# Roads may overlap by this much before they count as crossing [m^2].
 _CROSSING_TOLERANCE = 1.0
 
 
 @dataclass(frozen=True)
 class Connection:
-    """A way through a junction from one lane to another.
+    """A path through a junction from one lane to another.
 
-    Its points (N, 3) include both lane ends [m].
+    Its points (N, 3) include the ends of both lanes [m].
     """
 
     junction: str
@@ -55,7 +55,7 @@ class Connection:
 
 
 class RoadNetwork:
-    """Roads by name, junctions by name, and their lanes and areas."""
+    """A road network: roads and junctions by name, their lanes and areas."""
 
     def __init__(self, roads: dict[str, Road], junctions: dict[str, Junction]):
         self.roads = roads
@@ -63,25 +63,25 @@ class RoadNetwork:
         self._lane_ends: dict[tuple[LaneRef, str], _Pose] = {}
 
     def exit_junction(self, lane: LaneRef) -> str:
-        """Returns the name of the junction that a lane leads to."""
+        """Returns the name of the junction to which a lane leads."""
         road = self.roads[lane.road]
         return road.end if lane.direction == "forward" else road.start
 
     def entry_junction(self, lane: LaneRef) -> str:
-        """Returns the name of the junction that a lane comes from."""
+        """Returns the name of the junction from which a lane comes."""
         road = self.roads[lane.road]
         return road.start if lane.direction == "forward" else road.end
 
     def connection(
         self, incoming: LaneRef, outgoing: LaneRef, spacing: float = 1.0
     ) -> Connection:
-        """Returns the path from one lane to another, legal or not.
+        """Returns the path from one lane to another, whether legal or not.
 
-        Its points are about a spacing apart [m].
+        Its points are about `spacing` apart [m].
 
         Raises:
             ValueError: a lane does not exist, the lanes do not meet in a
-                junction, or the way would be a U-turn.
+                junction, or the path would be a U-turn.
         """
         junction = self.exit_junction(incoming)
         if junction != self.entry_junction(outgoing):
@@ -97,7 +97,7 @@ class RoadNetwork:
         a, b = self._ends(incoming, outgoing)
         place = self.junctions[junction]
         turn = _classify(_turn_deg(a, b), len(place.arms))
-        # To the right, the outermost lane follows the kerb.
+        # In a right turn, the outermost lane follows the kerb.
         width = self.roads[outgoing.road].lane_width
         radius = place.kerb_radius + width / 2 if turn == "right" else np.inf
         xy = blend(a[:2], a[3], b[:2], b[3], spacing, radius)
@@ -107,10 +107,10 @@ class RoadNetwork:
         )
 
     def _is_u_turn(self, incoming: LaneRef, outgoing: LaneRef) -> bool:
-        """Returns whether two lanes that meet are a way back.
+        """Returns whether the second of two lanes that meet leads back.
 
-        They are on one road, and where its directions part, e.g. for a
-        roundabout.
+        Both are on the same road, and also where the directions of a road
+        separate, e.g. before a roundabout.
         """
         if incoming.road == outgoing.road:
             return incoming.direction != outgoing.direction
@@ -121,8 +121,8 @@ class RoadNetwork:
     def _ends(
         self, incoming: LaneRef, outgoing: LaneRef
     ) -> tuple[_Pose, _Pose]:
-        """Returns the end of one lane and the beginning of another."""
-        # Each pair of lanes asks for them.
+        """Returns the pose of one lane's end and of another one's beginning."""
+        # They are cached: each pair of lanes asks for them.
         wanted = (incoming, "exit"), (outgoing, "entry")
         for lane, end in wanted:
             if (lane, end) not in self._lane_ends:
@@ -140,11 +140,11 @@ class RoadNetwork:
     def is_legal(self, connection: Connection) -> bool:
         """Returns whether traffic may take a path through a junction.
 
-        A left turn leads from the innermost lane to the innermost lane, a right
-        turn from the outermost to the outermost; straight on, the lane keeps
-        its number, counted from the middle of the road. Between one-way roads,
-        those of a roundabout for example, the lane keeps its number counted
-        from the kerb on the right, on any turn.
+        A left turn leads from the innermost lane to the innermost lane, and a
+        right turn from the outermost to the outermost. Straight on, the lane
+        keeps its number, counted from the middle of the road. Between one-way
+        roads, such as those of a roundabout, the lane keeps its number on any
+        turn, counted from the kerb on the right.
         """
         incoming, outgoing = connection.incoming, connection.outgoing
         if all(self._is_one_way(lane) for lane in (incoming, outgoing)):
@@ -176,7 +176,7 @@ class RoadNetwork:
 
     @cached_property
     def junction_areas(self) -> dict[str, BaseGeometry]:
-        """Areas of junctions between the ends of roads and the kerbs."""
+        """Areas of junctions by name, up to the ends of roads and kerbs."""
         return {
             name: carriageway.junction_area(self.roads, junction)
             for name, junction in self.junctions.items()
@@ -193,12 +193,12 @@ class RoadNetwork:
 
 
 def _turn_deg(a: _Pose, b: _Pose) -> float:
-    """Returns the left turn from a's heading to b's."""
+    """Returns the angle from a's heading to b's, positive to the left."""
     return float(np.degrees(wrapped(b[3] - a[3])))
 
 
 def _classify(angle_deg: float, num_arms: int) -> Turn:
-    """Returns the kind of turn; None where two roads merely join."""
+    """Returns the kind of turn; None where two roads only join."""
     if num_arms == 2 or abs(angle_deg) <= _STRAIGHT_LIMIT_DEG:
         return "straight"
     return "left" if angle_deg > 0 else "right"
@@ -208,10 +208,10 @@ def load_road_network(path: Path | str) -> RoadNetwork:
     """Returns the road network of a `roads.yaml`, after checking it.
 
     Raises:
-        InputError: naming the file, the field and the fault; faults of form, a
-            road to an unknown junction, a junction with fewer than two roads, a
-            road without lanes, a corner or junction that does not fit, and
-            roads that cross without a junction.
+        InputError: naming the file, the field and the fault. Faults are those
+            of form, a road to an unknown junction, a junction with fewer than
+            two roads, a road without lanes, a corner or junction that does not
+            fit, and roads that cross without a junction.
     """
     path = Path(path)
     file = read_roads_file(path)
@@ -302,7 +302,7 @@ def _make_junction(
 def _derived_setback(
     ends: Sequence[tuple[float, str, End, float]], k: int, kerb_radius: float
 ) -> float:
-    """Returns the setback that the neighbours of the k-th arm call for."""
+    """Returns the k-th arm's setback, which its neighbours require [m]."""
     if len(ends) == 1:
         return kerb_radius
     heading, _, _, half_width = ends[k]

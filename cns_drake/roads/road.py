@@ -14,17 +14,17 @@ from cns_drake.base.errors import validated
 from cns_drake.base.yaml_files import read_yaml
 from cns_drake.roads.centreline import Centreline, sample_stations
 
-# Largest coordinate of a town, and greatest width in it [m].
+# Greatest coordinate in a town, and greatest width [m].
 _LARGEST = 100_000.0
 Finite = Annotated[float, Field(ge=-_LARGEST, le=_LARGEST, allow_inf_nan=False)]
 Positive = Annotated[float, Field(gt=0, le=_LARGEST, allow_inf_nan=False)]
 NonNegative = Annotated[float, Field(ge=0, le=_LARGEST, allow_inf_nan=False)]
 LaneCount = Annotated[int, Field(ge=0, le=4)]
-# YAML has lists where the models have tuples; numbers stay strict.
+# YAML has lists instead of tuples, so the tuple is not strict; its numbers are.
 Corner = Annotated[tuple[Finite, Finite, NonNegative], Strict(False)]
 ProfilePoint = Annotated[tuple[Positive, Finite], Strict(False)]
 
-# A part of the names of mesh files, which must not lead to another folder.
+# Part of the names of mesh files, so it must not lead to another folder.
 MeshStem = Annotated[str, Field(pattern=r"^[^/<>&\x00-\x1f\x7f]+$")]
 
 
@@ -33,18 +33,22 @@ class _Model(BaseModel):
 
 
 class RoadStyle(_Model):
-    """The style of roads. Each road can override the common one.
+    """The style of a road.
+
+    The field `defaults` of the file sets the style of all roads. Each road can
+    have these fields as well, and overrides the defaults.
 
     Attributes:
-        lanes: number of lanes along the centreline and against it, up to 4
-            each; a zero makes the road one-way.
+        lanes: numbers of lanes along the road's centreline and against it, each
+            from 0 to 4. A zero makes the road one-way.
         lane_width: width of a lane [m].
-        median: width of the kerbed strip between the directions [m].
-        parking: width of the parking bays cut into both sidewalks [m]; 0 for
+        median: width of the kerbed strip between the two directions [m]; 0 for
             none.
+        parking: width of the parking bays that are cut into the sidewalks on
+            both sides [m]; 0 for none.
         sidewalk: width of the sidewalk on each side [m].
-        kerb_height: height of sidewalks and medians above the lanes [m].
-        speed_limit: speed limit [m/s].
+        kerb_height: height of sidewalks and medians above the carriageway [m].
+        speed_limit: speed limit of the road [m/s].
     """
 
     lanes: tuple[LaneCount, LaneCount] = Field(default=(1, 1), strict=False)
@@ -60,16 +64,17 @@ class RoadEntry(RoadStyle):
     """One road between two junctions.
 
     Attributes:
-        start: name of the junction where the centreline begins.
-        end: name of the junction where the centreline ends.
-        via: corners on the way, each as `[x, y, radius of the bend]` [m].
-        heights: heights between the junctions, each as `[distance along the
-            centreline, height]` [m]. A monotone cubic interpolates them, and is
-            level where the road meets a junction.
+        start: name of the junction at which the road's centreline starts.
+        end: name of the junction at which the road's centreline ends.
+        via: corners of the centreline between the junctions, each as `[x, y,
+            radius of the bend]` [m].
+        heights: heights of the road between the junctions, each as `[distance
+            along the centreline, height]` [m]. A monotone cubic curve joins
+            them; it is level where the road meets a junction.
         start_setback: distance from the position of the first junction to the
-            begin of the road [m]; by default it follows from the kerb radius.
+            start of the road [m]. By default it follows from the kerb radius.
         end_setback: distance from the end of the road to the position of the
-            last junction [m]; by default it follows from the kerb radius.
+            last junction [m]. By default it follows from the kerb radius.
     """
 
     start: str
@@ -81,15 +86,15 @@ class RoadEntry(RoadStyle):
 
 
 class JunctionEntry(_Model):
-    """A junction of roads, or the joint between two different roads.
+    """A junction of roads, or the joint between two roads that differ.
 
     Attributes:
-        position: `[x, y]` where the centrelines meet [m].
-        height: height z of the whole area of the junction, which is level [m].
+        position: `[x, y]` of the point where the centrelines meet [m].
+        height: height z of the junction [m]. Its whole area is level.
         kerb_radius: radius of the kerb round each corner [m]. At a dead end,
-            radius of the disc in which the road ends.
-        dead_end: whether the only road that comes here ends, so that traffic
-            cannot go on.
+            the radius of the disc in which the road ends.
+        dead_end: whether this is the dead end of its only road. Traffic cannot
+            go on there.
     """
 
     position: tuple[Finite, Finite] = Field(strict=False)
@@ -99,12 +104,12 @@ class JunctionEntry(_Model):
 
 
 class RoadsFile(_Model):
-    """The file `roads.yaml`: common styles, junctions and roads.
+    """The file `roads.yaml`: a common style, junctions and roads.
 
     Attributes:
-        defaults: style of all roads, for the fields that a road does not give.
-        junctions: name -> junction. At least one.
-        roads: name -> road. At least one.
+        defaults: style of all roads. It sets the fields that a road leaves out.
+        junctions: junctions by name, at least one.
+        roads: roads by name, at least one.
     """
 
     defaults: RoadStyle = RoadStyle()
@@ -113,18 +118,21 @@ class RoadsFile(_Model):
 
 
 def read_roads_file(path: Path | str) -> RoadsFile:
-    """Reads and validates a `roads.yaml`.
+    """Returns the validated content of a `roads.yaml`.
 
     Raises:
-        InputError: the file cannot be read, is not YAML, or has an unknown
-            key, a missing one or a value of the wrong type.
+        InputError: the file cannot be read, is not YAML, or has an unknown key,
+            a missing one or a value of the wrong type.
     """
     path = Path(path)
     return validated(RoadsFile, _with_defaults(read_yaml(path)), path)
 
 
 def _with_defaults(content: Any) -> Any:
-    """Gives each road the file's defaults, leaving faults to validation."""
+    """Returns a file's content with its defaults copied to each road.
+
+    Faults are left for the validation to find.
+    """
     if not isinstance(content, dict):
         return content
     defaults, roads = content.get("defaults"), content.get("roads")
@@ -146,7 +154,7 @@ DIRECTIONS: tuple[Direction, Direction] = ("forward", "backward")
 
 
 class LaneRef(NamedTuple):
-    """A lane of a road; lane 1 is next to the middle of the road."""
+    """A lane of a road; number 1 is next to the middle of the road."""
 
     road: str
     direction: Direction
@@ -154,13 +162,13 @@ class LaneRef(NamedTuple):
 
 
 class Road:
-    """A road between two junctions, cut back where their areas begin.
+    """A road between two junctions, cut off where the junctions' areas begin.
 
     The centreline is the middle of the carriageway, also for a one-way road or
-    with more lanes in one direction. Arc lengths ("stations") are measured
+    one with more lanes in one direction. Arc lengths ("stations") are measured
     along the whole centreline, from the position of the start junction; the
-    road itself reaches from `first_station` to `last_station`. Lateral offsets
-    are positive to the left of `forward`.
+    road itself extends from `first_station` to `last_station`. Lateral offsets
+    are positive to the left of the direction `forward`.
     """
 
     def __init__(
@@ -175,7 +183,7 @@ class Road:
 
         Args:
             name: name of the road.
-            entry: what the plan says of it.
+            entry: its fields in `roads.yaml`.
             curve: its whole centreline.
             setbacks: distances of its two ends from their junctions [m].
             heights: heights of the two junctions [m].
@@ -212,14 +220,14 @@ class Road:
         stations, z = np.transpose(profile)
         if np.any(np.diff(stations) <= 0):
             raise ValueError("heights must lie between the junctions, in order")
-        # Slow to import, and not needed to describe or to list drives.
+        # This import is slow, and not needed to describe or list drives.
         from scipy.interpolate import PchipInterpolator
 
         self._height = PchipInterpolator(stations, z)
 
     @property
     def length(self) -> float:
-        """Length between the junction areas [m]."""
+        """Length of the road between the areas of its junctions [m]."""
         return self.last_station - self.first_station
 
     @property
@@ -237,8 +245,8 @@ class Road:
     ) -> np.ndarray:
         """Returns (N, 4): x, y, z [m] and heading of `forward` [rad].
 
-        Stations are (N,) arc lengths along the whole centreline, and the offset
-        is to the left, a number or (N,) [m].
+        Stations are (N,) arc lengths along the whole centreline. The offset is
+        positive to the left; it is a number or (N,) [m].
         """
         stations = np.asarray(stations, dtype=float)
         x, y, heading = self._curve.evaluate(stations).T
@@ -247,22 +255,22 @@ class Road:
         return np.stack([x, y, self._height(stations), heading], axis=1)
 
     def height(self, stations: ArrayLike) -> np.ndarray:
-        """Returns the (N,) heights at arc lengths of the centreline [m]."""
+        """Returns the heights (N,) at arc lengths along the centreline [m]."""
         return self._height(np.asarray(stations, dtype=float))
 
     def stations(
         self, spacing: float = 1.0, clearance: float = 0.0
     ) -> np.ndarray:
-        """Returns the (N,) evenly spaced stations of the road itself [m].
+        """Returns evenly spaced stations (N,) on the road itself [m].
 
-        They are at most a spacing apart, and keep clear of both ends.
+        They are at most `spacing` apart, and `clearance` away from both ends.
         """
         first = self.first_station + clearance
         last = self.last_station - clearance
         return sample_stations(first, last, spacing)
 
     def centreline(self, spacing: float = 1.0) -> np.ndarray:
-        """Returns the (N, 3) centreline between the junction areas [m]."""
+        """Returns the centreline (N, 3) between the junctions' areas [m]."""
         return self.evaluate(self.stations(spacing))[:, :3]
 
     def lane_offset(self, direction: Direction, lane: int) -> float:
@@ -277,7 +285,7 @@ class Road:
                 f"road {self.name} has {count} lane(s) {direction}, "
                 f"no lane {lane}"
             )
-        # Lanes count from the kerb inwards: forward lanes are on the right.
+        # Offsets count from the kerb inwards: forward lanes are on the right.
         from_kerb = (count - lane + 0.5) * self.lane_width
         right = self.half_width - from_kerb
         return -right if direction == "forward" else right
@@ -285,7 +293,7 @@ class Road:
     def lane_centreline(
         self, direction: Direction, lane: int, spacing: float = 1.0
     ) -> np.ndarray:
-        """Returns the (N, 3) middle of a lane in driving direction [m]."""
+        """Returns the middle (N, 3) of a lane in driving direction [m]."""
         points = self.evaluate(
             self.stations(spacing), self.lane_offset(direction, lane)
         )[:, :3]
@@ -294,9 +302,9 @@ class Road:
     def lane_end(
         self, direction: Direction, lane: int, end: str
     ) -> tuple[float, float, float, float]:
-        """Returns x, y, z [m] and the driving heading at a lane's end.
+        """Returns x, y, z [m] and the driving direction [rad] at a lane's end.
 
-        The end is "entry", where traffic comes in, or "exit".
+        The end is "entry" (where traffic enters the lane) or "exit".
         """
         at_first = (direction == "forward") == (end == "entry")
         station = self.first_station if at_first else self.last_station
@@ -307,10 +315,11 @@ class Road:
 
 @dataclass(frozen=True)
 class Arm:
-    """One end of a road, at a junction; its heading leads away [rad].
+    """One end of a road at a junction.
 
-    The half width is that of the carriageway, the setback the distance from
-    the junction's position to the road [m].
+    `heading` leads away from the junction [rad]. `half_width` is that of the
+    carriageway, and `setback` the distance from the junction's position to the
+    road [m].
     """
 
     road: str
@@ -322,7 +331,7 @@ class Arm:
 
 @dataclass(frozen=True)
 class Junction:
-    """A junction of roads; `arms` are ordered counter-clockwise."""
+    """A junction of roads; its arms are in counter-clockwise order."""
 
     name: str
     position: tuple[float, float]

@@ -1,4 +1,4 @@
-"""Lane-level routes over a road network, and the paths that they describe."""
+"""Routes along the lanes of a road network, and their paths."""
 
 from collections import Counter, defaultdict
 import math
@@ -16,17 +16,17 @@ from cns_drake.roads.u_turn import find_loop
 
 # Distance between the points from which the path is interpolated [m].
 _DENSE_SPACING = 0.25
-# Length of a lane change where the road has room for it, and least length for a
-# lane change [m].
+# Length of a lane change where the road has room for it, and the least length
+# of one [m].
 LANE_CHANGE_LENGTH = 50.0
 MIN_LANE_CHANGE_LENGTH = 20.0
-# Length in which a car moves aside [m], and least distance of the middle of its
-# rear axle from kerbs and medians, since its front swings out [m].
+# Length over which a car moves aside, and least distance of the middle of its
+# rear axle from kerbs and medians: its front swings out [m].
 _ASIDE_LENGTH = 25.0
 CAR_ROOM = 1.4
 
 # Greatest distance before a junction at which a car turns round, and distance
-# of the places that are tried [m].
+# between the places that are tried [m].
 _TURNING_LENGTH = 30.0
 _TURNING_STEP = 0.5
 
@@ -35,18 +35,20 @@ LaneChange = Annotated[tuple[LaneNumber, LaneNumber], Strict(False)]
 
 
 class RouteLeg(BaseModel):
-    """One road of a route.
+    """One leg of a route: a road and the lane to follow on it.
 
     Attributes:
         road: name of the road.
-        direction: `forward` along its centreline, or `backward`.
-        lane: number of the lane, 1 next to the middle of the road. Two numbers
-            change from the first lane to the second.
-        start: start of the drive, as a distance from where the leg enters the
-            road [m]. Only in the first leg.
-        end: end of the drive, as such a distance [m]. Only in the last leg, or
-            in a leg along which the next one leads back: there the car turns
-            round.
+        direction: direction of travel: `forward` along the road's centreline,
+            or `backward` against it.
+        lane: number of the lane, counted from 1 next to the middle of the road.
+            Two numbers, such as `[1, 2]`, make the car change from the first
+            lane to the second.
+        start: where the drive starts: the distance from the point where the
+            first leg enters its road [m]. Only in the first leg.
+        end: where the drive ends, or the car turns round: the distance from the
+            point where the leg enters the road [m]. Only in the last leg, or in
+            a leg after which the next one leads back along the same road.
     """
 
     model_config = ConfigDict(extra="forbid", frozen=True, strict=True)
@@ -88,24 +90,26 @@ def make_lane_path(
 
     Consecutive legs must meet in a junction, and the way through it must be
     legal: a left turn from the innermost lane to the innermost, a right turn
-    from the outermost lane to the outermost, straight on without a change of
-    lane (`RoadNetwork.is_legal`). Lanes change only along a leg. Within a
-    junction the lower one of the two roads' speed limits holds. If the next leg
+    from the outermost lane to the outermost, and straight on without a change
+    of lane (`RoadNetwork.is_legal`). Lanes change only along a leg. Within a
+    junction, the lower speed limit of the two roads holds. If the next leg
     leads back on the same road, the car turns round in a loop to the left: at
-    the leg's end, or as near to the junction as the room allows.
+    the leg's end, or as near to the junction as there is room.
 
     Args:
-        spacing: the distance of the points, rounded so that it divides the
+        network: the road network.
+        route: the legs of the route.
+        spacing: distance between the points, rounded so that it divides the
             length of the route [m].
         source: the file that errors name.
-        aside: offset of the path to the right of the lanes' middle along each
-            road, from one junction to the next, within the room of the road
-            [m].
+        aside: offset of the path to the right of the lanes' middle [m]. It
+            applies along each road between its junctions, as far as the road
+            has room.
 
     Raises:
-        InputError: a leg names no lane of the network, does not follow from
-            the one before it, is too short for its lane change or has no
-            room for turning round; or the whole route is too short.
+        InputError: a leg names no lane of the network, does not follow from the
+            one before it, is too short for its lane change or has no room for
+            turning round; or the whole route is too short.
     """
     pieces: list[np.ndarray] = []
     limits: list[np.ndarray] = []
@@ -156,9 +160,9 @@ def make_lane_path(
 
 
 def _lanes_beside(road: Road, leg: RouteLeg) -> np.ndarray:
-    """Returns the (2,) distances to the lanes to the left and right [m].
+    """Returns the distances (2,) to the next lanes on the left and right [m].
 
-    A leg that changes lanes counts as one without others.
+    They are 0 for a leg that changes lanes.
     """
     if not isinstance(leg.lane, int):
         return np.zeros(2)
@@ -167,7 +171,7 @@ def _lanes_beside(road: Road, leg: RouteLeg) -> np.ndarray:
 
 
 def leads_back(leg: RouteLeg, after: RouteLeg) -> bool:
-    """Returns whether the car turns round between two legs."""
+    """Returns whether the car turns round between two consecutive legs."""
     return leg.road == after.road and leg.direction != after.direction
 
 
@@ -196,10 +200,11 @@ def _check_ends(
 def _leg_points(
     network: RoadNetwork, leg: RouteLeg, start: float, end: float, aside: float
 ) -> np.ndarray:
-    """Returns the (N, 3) points of a leg on its road, from start to end [m].
+    """Returns the points (N, 3) of a leg on its road [m].
 
-    They count from the entry of the road, and are beyond it if the car turns
-    round in a junction. The path is aside to the right of the lanes' middle.
+    `start` and `end` are distances from the entry of the road; if the car turns
+    round in a junction, they extend beyond the road. The path lies `aside` to
+    the right of the lanes' middle.
 
     Raises:
         ValueError: the leg does not fit its road.
@@ -233,8 +238,8 @@ def _turn_round(
 ) -> tuple[np.ndarray, float]:
     """Returns the turn of the car at the end of a leg.
 
-    That is the (N, 3) points between the lanes, and the place where it leaves
-    the first lane, from the entry of the road [m].
+    It consists of the points (N, 3) between the lanes, and the distance from
+    the entry of the road at which the car leaves the first lane [m].
 
     Raises:
         ValueError: there is no room, or no such lane.
@@ -242,7 +247,7 @@ def _turn_round(
     road = network.roads[leg.road]
 
     def lanes_at(travelled: float) -> tuple[np.ndarray, float]:
-        """Returns the lane's pose and the other lane's distance to its left."""
+        """Returns the lane's pose, and how far left the other lane is."""
         offsets = [
             _moved_right(
                 road,
@@ -265,7 +270,7 @@ def _turn_round(
     if leg.end is not None:
         centres = np.array([leg.end])
     else:
-        # Places are tried from the middle of the junction backwards.
+        # Places are tried backwards, beginning in the middle of the junction.
         first, last = road.first_station, road.full_length - road.last_station
         beyond = last if leg.direction == "forward" else first
         farthest = road.length + beyond
@@ -287,10 +292,10 @@ def _moved_right(
     travelled: np.ndarray,
     aside: float,
 ) -> np.ndarray:
-    """Returns the offsets of a path beside a lane, on the carriageway [m].
+    """Returns the offsets (N,) of a path moved to the right of a lane [m].
 
-    At both ends of the road it is in the middle of the lane, on a short road
-    all the way.
+    The path stays on the carriageway. At both ends of the road, and all along a
+    short road, it is in the middle of the lane.
     """
     if aside == 0 or road.length < 2 * _ASIDE_LENGTH:
         return offset
@@ -305,15 +310,15 @@ def _moved_right(
 
 
 def smooth_step(u: np.ndarray) -> np.ndarray:
-    """Returns the quintic from 0 to 1 with two derivatives zero at its ends."""
+    """Returns a quintic from 0 to 1; two derivatives are zero at both ends."""
     return power(u, 3) * (10 - 15 * u + 6 * u**2)
 
 
 def _lane_change(travelled: np.ndarray, wanted: bool) -> np.ndarray:
-    """Returns the share of a lane change that is done, from 0 to 1.
+    """Returns the completed share of a lane change, from 0 to 1.
 
-    The change lies in the middle of the leg and follows the quintic whose
-    first and second derivatives vanish at both ends.
+    The change lies in the middle of the leg. It follows the quintic whose first
+    and second derivatives vanish at both ends.
     """
     if not wanted:
         return np.zeros_like(travelled)
@@ -329,10 +334,10 @@ def _lane_change(travelled: np.ndarray, wanted: bool) -> np.ndarray:
 
 
 def _way(network: RoadNetwork, previous: RouteLeg, leg: RouteLeg) -> Connection:
-    """Returns the way between two legs.
+    """Returns the connection from one leg to the next.
 
     Raises:
-        ValueError: there is no legal way.
+        ValueError: there is no legal connection.
     """
     way = network.connection(previous.exit_lane, leg.entry_lane, _DENSE_SPACING)
     if not network.is_legal(way):
@@ -349,19 +354,19 @@ def _way(network: RoadNetwork, previous: RouteLeg, leg: RouteLeg) -> Connection:
     return way
 
 
-# Strength with which roads that were driven before are avoided.
+# How strongly roads that were not driven before are preferred.
 _WEIGHT_OF_NEW = 6.0
 
 
 def draw_route(
     network: RoadNetwork, length: float, rng: np.random.Generator
 ) -> Route:
-    """Returns a random legal route that prefers new roads.
+    """Returns a random legal route that prefers roads not driven before.
 
-    The total length of its roads is at least a given one [m].
+    The total length of its roads is at least `length` [m].
 
     Raises:
-        InputError: the network has no route of any length.
+        InputError: no route in the network can be continued without end.
     """
     successors = _successors(network)
     if not successors:
@@ -384,7 +389,7 @@ def draw_route(
         exit_lane, after = choices[chosen]
         legs.append((lane, exit_lane))
         lane = after
-    # No road follows the last one, so the drive keeps its lane.
+    # No road follows the last one, so the drive stays in its lane.
     legs[-1] = (legs[-1][0], legs[-1][0].lane)
     return Route([_leg(entry, exit_lane) for entry, exit_lane in legs])
 
@@ -397,9 +402,9 @@ def _leg(entry: LaneRef, exit_lane: int) -> RouteLeg:
 def _successors(
     network: RoadNetwork,
 ) -> dict[LaneRef, list[tuple[int, LaneRef]]]:
-    """Returns for each lane its continuations: exit lane, next lane.
+    """Returns lane -> its continuations, as pairs: exit lane, next lane.
 
-    Lanes without an endless continuation are left out.
+    Lanes from which no endless route leads on are left out.
     """
     ways = defaultdict(list)
     for junction in network.junctions:

@@ -1,4 +1,4 @@
-"""Heights of the surface of streets."""
+"""The height of the surface of streets at any place."""
 
 from collections.abc import Callable
 from typing import Protocol
@@ -9,35 +9,35 @@ from scipy.spatial import cKDTree
 
 from cns_drake.roads.network import RoadNetwork
 
-# Returns the (N,) heights of sidewalks above the road at (N, 2) places [m].
+# Returns the heights (N,) of sidewalks above the road at places (N, 2) [m].
 KerbMap = Callable[[np.ndarray], np.ndarray]
 
 
 class SurfaceHeights(Protocol):
-    """The height of carriageways."""
+    """The interface of an object that returns heights of carriageways."""
 
     @property
     def is_level(self) -> bool:
         """Whether the surface is at z = 0 everywhere."""
 
     def heights(self, xy: ArrayLike) -> np.ndarray:
-        """Returns the (N,) heights at (N, 2) places [m]."""
+        """Returns the heights (N,) at places (N, 2) [m]."""
 
 
-# Distance of the places on the centrelines that are searched first [m].
+# Distance between the places on centrelines that are searched first [m].
 _SPACING = 0.5
 
 
 class RoadSurface:
-    """The height of the carriageway, continued to both sides of it.
+    """The height of carriageways, continued beyond their edges.
 
     A road is level across, so the height at a place is that of the nearest
-    point of a centreline. Away from the roads it steps where that point
-    changes from one road to another.
+    point on a centreline. Away from the roads, the height has a step where the
+    nearest road changes.
     """
 
     def __init__(self, network: RoadNetwork):
-        """Prepares the surface of a network."""
+        """Samples the centrelines of a network."""
         self._roads = list(network.roads.values())
         places, owners, stations = [], [], []
         for k, road in enumerate(self._roads):
@@ -57,14 +57,15 @@ class RoadSurface:
         return not self._places[:, 2].any()
 
     def heights(self, xy: ArrayLike) -> np.ndarray:
-        """Returns the (N,) heights at (N, 2) places [m]."""
+        """Returns the heights (N,) at places (N, 2) [m]."""
         xy = np.asarray(xy, dtype=float).reshape(-1, 2)
         _, index = self._tree.query(xy)
         x, y, _, heading = self._places[index].T
         ahead = (xy[:, 0] - x) * np.cos(heading) + (xy[:, 1] - y) * np.sin(
             heading
         )
-        # On the inside of a bend the tangent would lead past the neighbour.
+        # On the inside of a bend, the tangent would lead beyond the
+        # neighbouring place.
         ahead = np.clip(ahead, -_SPACING, _SPACING)
         stations = self._stations[index] + ahead
         z = np.empty(len(xy))

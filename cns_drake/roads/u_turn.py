@@ -1,4 +1,4 @@
-"""U-turns: the tightest loop that a car's steering allows."""
+"""U-turns: the tightest loops that a car's steering allows."""
 
 from collections.abc import Callable
 import math
@@ -13,23 +13,23 @@ from shapely.geometry.base import BaseGeometry
 from cns_drake.base.elementary import cos, sin
 from cns_drake.roads.centreline import Centreline, sample_stations
 
-# From the car in worlds/vehicle.sdf: its wheelbase, the distance from the
-# middle to a front wheel [m], and the greatest steering of the inner one [rad].
+# From the car in worlds/vehicle.sdf: its wheelbase, the distance from its
+# middle to a front wheel [m], and the greatest steering angle of the inner
+# wheel [rad].
 _WHEELBASE = 2.8
 _HALF_TRACK = 0.79
 _STEERING_LIMIT = 0.7
-# Its length behind the rear axle and ahead of it, and half its width with
-# mirrors [m].
+# Length of the car behind the rear axle and ahead of it, and half its width
+# with mirrors [m].
 REAR, FRONT, HALF_WIDTH = 1.0, 3.72, 1.03
 
-# Tightest radius of the middle of the rear axle [m].
+# Tightest radius on which the middle of the rear axle can drive [m].
 TIGHTEST_RADIUS = float(_WHEELBASE / math.tan(_STEERING_LIMIT) + _HALF_TRACK)
-# Radius of planned loops, whose curve is smoothed to the inside of its points
-# [m].
+# Radius of planned loops; smoothing makes the curve slightly tighter [m].
 LOOP_RADIUS = 4.4
-# Distance of the places at which the car's outline is drawn [m].
+# Distance between the places at which the outline of the car is tested [m].
 _STEP = 0.25
-# Radius of a dead end in which every street's loop has room [m].
+# Radius of a dead end that has room for the loop of every street [m].
 _DEAD_END_RADIUS = 8.0
 
 
@@ -43,10 +43,10 @@ def loop_corners(
 ) -> np.ndarray:
     """Returns the corners of a loop to the left, in which a car turns round.
 
-    Rounded by the loop's radius, the corners make a smooth path. A car comes
-    along a line, leaves it to the right, goes round the centre to the left, and
-    joins the line on which it leaves, again from the right. It turns by more
-    than 90 degrees. The bends at its ends have the loop's radius.
+    Rounded with the loop's radius, the corners make a smooth path. The car
+    leaves the line on which it comes to the right, goes around the centre to
+    the left by more than 90 degrees, and joins the line on which it leaves,
+    again from its right. The bends at both ends have the loop's radius, too.
 
     Args:
         centre: centre of the loop [m].
@@ -60,7 +60,7 @@ def loop_corners(
     turn = (heading_out - heading_in) % (2 * np.pi)
     round_ = turn + swing_in + swing_out
     share = round_ / 3
-    # Corners of the loop are outside it.
+    # The corners of the loop lie outside its circle.
     first = heading_in - swing_in - np.pi / 2 + share / 2
     angles = first + share * np.arange(3)
     reach = radius / math.cos(share / 2)
@@ -73,8 +73,8 @@ def loop_corners(
         if swing > 1e-6:
             along = np.array([math.cos(heading), math.sin(heading)])
             right = np.array([along[1], -along[0]])
-            # The bend begins 2 r sin(a) before the centre, and its corner
-            # lies r tan(a / 2) on from there.
+            # The bend begins 2 r sin(a) before the centre, and its corner is r
+            # tan(a / 2) further on.
             before = 2 * math.sin(swing) - math.tan(swing / 2)
             corner = centre + sign * before * radius * along + aside * right
             corners.insert(0 if sign < 0 else len(corners), corner[None])
@@ -82,9 +82,10 @@ def loop_corners(
 
 
 class Loop(NamedTuple):
-    """A car's turn, which begins at a distance along its lane [m].
+    """A car's U-turn, which begins at a distance along its lane [m].
 
-    From there (N, 2) points lead to the opposite place in the other lane [m].
+    The points (N, 2) lead from there to the opposite place in the other lane
+    [m].
     """
 
     begin: float
@@ -96,16 +97,16 @@ def find_loop(
     centres: np.ndarray,
     area: BaseGeometry,
 ) -> Loop:
-    """Returns the first loop with enough room.
+    """Returns the first loop for which there is room.
 
     Args:
         lanes_at: distance travelled [m] -> x, y and heading of the car, and the
-            distance of the way back to its left [m].
-        centres: (N,) possible distances of the loop's centre [m].
-        area: the area that the whole car must keep to.
+            distance to the opposite lane on its left [m].
+        centres: (N,) possible distances travelled to the loop's centre [m].
+        area: the area in which the whole car must stay.
 
     Raises:
-        ValueError: there is no room; the message gives the room it needs.
+        ValueError: there is no room; the message says how much is needed.
     """
     shapely.prepare(area)
     needed, widest = np.inf, 0.0
@@ -116,7 +117,7 @@ def find_loop(
         swept = swept_area(points)
         if area.covers(swept):
             return Loop(begin, points)
-        # From the middle of the loop to either side.
+        # From the middle of the loop to both sides.
         left = np.array([-math.sin(heading), math.cos(heading)])
         along = np.array([left[1], -left[0]])
         middle = np.array([x, y]) + _ahead(width) * along + width / 2 * left
@@ -134,13 +135,16 @@ def find_loop(
 
 
 def _ahead(width: float) -> float:
-    """Returns the distance from the start of a loop to its centre [m]."""
+    """Returns the distance from a loop's beginning to its centre [m]."""
     radius = max(LOOP_RADIUS, width / 2)
     return float(np.sqrt(4 * radius**2 - (radius + width / 2) ** 2))
 
 
 def _loop(start: np.ndarray, heading: float, width: float) -> np.ndarray:
-    """Returns the (N, 2) points of a loop into the lane beside it [m]."""
+    """Returns the points (N, 2) of a loop into the opposite lane [m].
+
+    That lane is `width` to the left.
+    """
     radius = max(LOOP_RADIUS, width / 2)
     along = np.array([math.cos(heading), math.sin(heading)])
     left = np.array([-along[1], along[0]])
@@ -158,7 +162,8 @@ def _loop(start: np.ndarray, heading: float, width: float) -> np.ndarray:
 def swept_area(points: ArrayLike) -> BaseGeometry:
     """Returns the area that a car covers while its rear axle follows points.
 
-    They are (N, 2), of the middle of the axle, close to one another [m].
+    The points (N, 2) are of the middle of the axle, and close to one another
+    [m].
     """
     points = np.asarray(points, dtype=float)
     along = directions(points)
@@ -168,7 +173,7 @@ def swept_area(points: ArrayLike) -> BaseGeometry:
 
 
 def directions(points: np.ndarray) -> np.ndarray:
-    """Returns the (N, 2) directions ahead at (N, 2) points of a path."""
+    """Returns unit vectors (N, 2) ahead at the points (N, 2) of a path."""
     along = np.gradient(points, axis=0)
     along /= np.sqrt(along[:, :1] ** 2 + along[:, 1:] ** 2)
     return along
@@ -181,11 +186,11 @@ def outlines(
     front: float,
     half_width: float,
 ) -> np.ndarray:
-    """Returns the (..., 4, 2) corners of cars seen from above [m].
+    """Returns the corners (..., 4, 2) of cars seen from above [m].
 
     Args:
-        places: (..., 2) positions of their frames [m].
-        ahead: (..., 2) unit vectors in which they head.
+        places: (..., 2) positions of the cars' frames [m].
+        ahead: (..., 2) unit vectors in the direction of the cars.
         rear, front: x coordinates of the cars' ends in their frames [m].
         half_width: half the width of the cars [m].
     """

@@ -1,4 +1,4 @@
-"""Drives along waypoints, for worlds without a road network."""
+"""Paths along waypoints, for worlds without a road network."""
 
 from collections.abc import Sequence
 import math
@@ -15,14 +15,14 @@ from cns_drake.roads.centreline import Centreline
 from cns_drake.roads.lane_path import LanePath, check_length, sample_lane_path
 from cns_drake.roads.u_turn import LOOP_RADIUS, loop_corners
 
-# Radius of the arcs that round corners, if it fits between the neighbouring
-# waypoints [m].
+# Radius of the arcs that round corners, where the neighbouring waypoints leave
+# room for it [m].
 _CORNER_RADIUS = 8.0
-# A car does not turn on the spot.
+# A car cannot turn on the spot: greatest turn at a waypoint.
 _SHARPEST_TURN_DEG = 150.0
-# Waypoints closer than this to the one before are taken for the same [m].
+# Waypoints closer than this to the one before count as the same [m].
 _SAME_PLACE = 1e-3
-# Beyond this a coordinate is a slip, not a place [m].
+# A greater coordinate is a mistake, not a place [m].
 _FARTHEST = 1_000_000.0
 # Distance between the points from which the path is interpolated [m].
 _DENSE_SPACING = 0.25
@@ -31,19 +31,20 @@ _DENSE_SPACING = 0.25
 def load_waypoint_path(
     path: Path | str, spacing: float, *, u_turns: bool = False
 ) -> LanePath:
-    """Reads waypoints and makes a path of them.
+    """Returns the path along the waypoints in a file.
 
-    The file is CSV, one waypoint a line: x, y, z or x, y of the vehicle
-    frame (on the ground, metres, in the world); without z it is 0. A first line
-    of names may give the columns another order, and have more columns.
+    The file is CSV with one waypoint per line: x, y, z or x, y of the vehicle
+    frame (on the ground, in the world, in metres). Without z it is 0. A first
+    line with names may give the columns in another order, and more columns.
 
-    The path is the line from waypoint to waypoint, with corners rounded by arcs
-    of 8 m radius, or less if half of the shorter neighbouring segment requires
-    it. At a right angle the path is up to 3.3 m from the corner. The height
-    follows a monotone cubic over the distance travelled.
+    The path is the line from waypoint to waypoint. Its corners are rounded by
+    arcs of 8 m radius, or less if half of the shorter neighbouring segment is
+    too short for this. At a right angle, the path is up to 3.3 m from the
+    corner. The height follows a monotone cubic over the distance travelled.
 
-    Its points are a spacing apart [m]. With `u_turns` the car turns round where
-    waypoints double back, in its tightest loop, whose far end is the waypoint.
+    The points of the path are about `spacing` apart [m]. With `u_turns`, the
+    car turns round in its tightest loop where waypoints double back. The far
+    end of the loop is the waypoint.
 
     Raises:
         InputError: naming file, line and fault, or that the file is too short
@@ -63,19 +64,19 @@ def make_waypoint_path(
     *,
     u_turns: bool = False,
 ) -> LanePath:
-    """Makes a path of waypoints, without speed limits.
+    """Returns the path along waypoints, without speed limits.
 
     Args:
         waypoints: (N, 3) positions of the vehicle frame [m].
-        spacing: distance of the points of the path [m].
+        spacing: distance between the points of the path [m].
         names: N names of the waypoints in errors.
-        source: their common name in errors.
+        source: name of all waypoints in errors.
         u_turns: whether turns by more than 150 degrees are driven as loops.
 
     Raises:
         InputError: fewer than two different waypoints, a turn by more than 150
-            degrees without `u_turns` or room, or a path that is too short or
-            too long.
+            degrees without `u_turns` or without room, or a path that is too
+            short or too long.
     """
     waypoints = np.asarray(waypoints, dtype=float)
     if names is None:
@@ -98,7 +99,7 @@ def make_waypoint_path(
                 f"deg; a car can turn by {_SHARPEST_TURN_DEG:.0f} deg at "
                 "most; with u_turns: true it turns round there in a loop"
             )
-    # The parts of the segments before and behind loops that these need.
+    # The lengths of the segments that loops need before and behind them.
     taken = np.where(is_loop, _loop_length(turns), 0.0)
     taken = np.concatenate([[0.0], taken, [0.0]])
     free = lengths - taken[:-1] - taken[1:]
@@ -132,7 +133,7 @@ def make_waypoint_path(
 def _rounded(
     corners: np.ndarray, radii: np.ndarray, spacing: float, source: object
 ) -> LanePath:
-    """Returns the path along (N, 3) corners with N - 2 inner radii [m]."""
+    """Returns the path along corners (N, 3), rounded with N - 2 radii [m]."""
     curve = Centreline(corners[:, :2], radii)
     check_length(curve.length, source)
     edges = np.diff(corners[:, :2], axis=0)
@@ -140,7 +141,7 @@ def _rounded(
     turns = np.abs(wrapped(np.diff(headings)))
     count = int(np.ceil(curve.length / _DENSE_SPACING)) + 1
     along = np.linspace(0.0, curve.length, count)
-    # The place where the curve passes each corner: the middle of its arc.
+    # The curve passes each corner in the middle of its arc.
     from scipy.interpolate import PchipInterpolator
 
     saved = 2 * radii * tan(turns / 2) - radii * turns
@@ -155,7 +156,7 @@ def _rounded(
 
 
 def _loop_length(turns: np.ndarray) -> np.ndarray:
-    """Returns the length that (N,) loops need before and behind them [m]."""
+    """Returns the lengths (N,) that loops need before and behind them [m]."""
     aside = cos(turns / 2)
     return LOOP_RADIUS * (
         np.abs(sin(turns / 2)) + np.sqrt(4 - (1 + aside) ** 2)
@@ -163,9 +164,10 @@ def _loop_length(turns: np.ndarray) -> np.ndarray:
 
 
 def _loop(place: np.ndarray, heading: float, turn: float) -> np.ndarray:
-    """Returns the corners of a loop whose far end is a waypoint, (2,) [m].
+    """Returns the corners of a loop whose far end is a waypoint (2,) [m].
 
-    The car turns there from a heading by an angle, positive to the left [rad].
+    The car arrives with a heading and turns by an angle, positive to the left
+    [rad].
     """
     if turn < 0:
         mirror = np.array([1.0, -1.0])
@@ -181,7 +183,7 @@ def _loop(place: np.ndarray, heading: float, turn: float) -> np.ndarray:
 
 
 def read_waypoints(path: Path) -> tuple[np.ndarray, list[int]]:
-    """Returns the (N, 3) waypoints of a file and the lines they are on.
+    """Returns the waypoints (N, 3) of a file, and their line numbers.
 
     Raises:
         InputError: naming file, line and fault.
@@ -216,7 +218,7 @@ def read_waypoints(path: Path) -> tuple[np.ndarray, list[int]]:
 
 
 def _columns(cells: list[str], where: str) -> list[int]:
-    """Returns the columns of x, y and, if given, z, from the first line."""
+    """Returns the columns of x, y and, if present, z, from the first line."""
     names = [cell.lower() for cell in cells]
     if {"x", "y"} <= set(names):
         wanted = ["x", "y", "z"] if "z" in names else ["x", "y"]

@@ -1,8 +1,8 @@
-"""The figures of a folder's drives, kept beside them in a table.
+"""The table of a map's drives and their figures, a CSV file.
 
 Planning a drive and reading a stage take seconds; a listing should not. Each
-row of `sequences.csv` therefore has a checksum of its input files, and is
-measured anew when they have changed.
+row of `sequences.csv` therefore has a checksum of its input files; if these
+change, the figures are computed again.
 """
 
 from collections.abc import Callable, Mapping
@@ -28,7 +28,7 @@ class DriveRow:
         checksum: checksum of the files on which the figures depend.
         length: length of the path [m].
         duration: duration of the drive [s].
-        structures, triangles: their numbers in the stage.
+        structures, triangles: numbers of structures and triangles in the stage.
     """
 
     sequence: str
@@ -51,8 +51,8 @@ def drive_rows(
     """Returns the rows of a map's drives whose stage is there.
 
     Args:
-        sizes: stage -> its structures and triangles; for other stages they are
-            counted in the world, which takes long to load.
+        sizes: stage -> its numbers of structures and triangles. For other
+            stages, the world is loaded to count them, which takes long.
 
     Raises:
         InputError: if a drive cannot be read or planned, or its stage cannot
@@ -109,7 +109,7 @@ def write_table(
 
 
 def _read(path: Path) -> list[DriveRow]:
-    """Returns the rows of a table; those of a bad one are measured anew."""
+    """Returns the rows of a table; empty if it is damaged."""
     types = get_type_hints(DriveRow)
     try:
         return [

@@ -25,10 +25,10 @@ from cns_drake.scenarios.shipped import suspension_file, vehicle_file
 from cns_drake.scene.perception_geometry import read_perception_geometry
 from cns_drake.scene.world import load_world
 
-# Heights above the path at which things are looked for: below the top of a
-# kerb, and up to the roof [m].
+# Heights above the path at which rays look for obstacles, from below the top of
+# a kerb up to the car's roof [m].
 _HEIGHTS = np.array([(0.0, 0.0, z) for z in (0.1, 0.3, 0.7, 1.2, 1.6)])
-# Directions of sight, how far it reaches [m], and greatest vertical part of the
+# Directions of these rays, their range [m], and the greatest z component of the
 # normal of an obstacle.
 _AROUND = np.array(
     [
@@ -48,9 +48,9 @@ def plan_drive(
     The route is a list of lanes or of waypoints.
 
     Args:
-        positions: (N,) distances along the path at even times [m], of a car
-            that follows others; see `TrafficPlan`. By default the car is as
-            fast as the limits allow.
+        positions: (N,) distances along the path at evenly spaced times [m], for
+            a car that follows others; see `TrafficPlan`. By default the car
+            drives as fast as the limits allow.
 
     Raises:
         InputError: the roads, the waypoints or the vehicle's springs cannot
@@ -71,7 +71,7 @@ def plan_drive(
         source = scenario.waypoints
         cure = "place waypoints farther apart, or leave some out"
     else:
-        assert scenario.route is not None  # One of both is given.
+        assert scenario.route is not None  # There is a route or waypoints.
         network = load_road_network(map_folder(scenario).roads)
         path = make_lane_path(
             network,
@@ -117,11 +117,11 @@ def plan_drive(
 
 
 def _things_beside(scenario: Scenario, points: np.ndarray) -> STRtree:
-    """Returns what stands beside a path in the world, seen from above.
+    """Returns obstacles beside a path in the world, seen from above.
 
     Rays in all directions, from near the ground to the height of the car, find
     kerbs and walls. An edge at which the ground only falls is not found. The
-    points (N, 3) of the path are close together [m].
+    points (N, 3) of the path [m] must be close together.
     """
     world = load_world(world_file(scenario), without=scenario.without)
     context = world.plant.CreateDefaultContext()
@@ -147,7 +147,7 @@ def _things_beside(scenario: Scenario, points: np.ndarray) -> STRtree:
     steep = np.isfinite(hits.ranges) & (np.abs(hits.normals_W[:, 2]) < _STEEP)
     p_WQ = np.tile(p_WR, (len(_AROUND), 1))[steep]
     p_WQ += hits.ranges[steep, None] * d_W[steep]
-    # One for each centimetre is enough.
+    # One point per centimetre is enough.
     xy = np.unique(np.round(p_WQ[:, :2], 2), axis=0)
     return STRtree(np.asarray(shapely.points(xy)))
 
@@ -170,8 +170,9 @@ def count_frames(scenario: Scenario, trajectory: Trajectory) -> int:
 def shown_beside(scenario: Scenario) -> tuple[Scenario | None, str]:
     """Returns the stage with which a drive's page compares its own stage.
 
-    This is the last stage, or the first one if the drive is in the last. If the
-    drive leaves out structures, it is the drive's own stage with them.
+    It is the last stage, or the first stage if the drive is in the last one. If
+    the drive leaves out structures, it is the drive's own stage including those
+    structures.
 
     Returns:
         The scenario in that stage, None if there is no other stage; and the

@@ -85,15 +85,15 @@ def digest_inputs(
 
 
 def combined_digest(inputs: dict[str, str]) -> str:
-    """Returns one digest for the digests from `digest_inputs`."""
+    """Returns one digest that combines the results of `digest_inputs`."""
     return hashlib.sha256(json.dumps(inputs).encode()).hexdigest()
 
 
 def recording_fingerprint(scenario: Scenario, inputs: dict[str, str]) -> str:
     """Returns a hash of everything that determines a scenario's recording.
 
-    It depends neither on the folder of the files nor on settings of the drive's
-    page.
+    The hash depends neither on the folder of the files nor on the settings of
+    the drive's page.
     """
     places: dict[str, object] = {
         field: Path(place).name
@@ -108,7 +108,7 @@ def recording_fingerprint(scenario: Scenario, inputs: dict[str, str]) -> str:
         places["traffic"] = scenario.traffic.replaced(**update)
     return fingerprint(
         {
-            # LiDARs become text, since their order matters.
+            # LiDARs become one text, because their order matters.
             "scenario": scenario.replaced(**places).model_dump_json(),
             "inputs": inputs,
             "code": recording_code(),

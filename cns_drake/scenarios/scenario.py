@@ -35,7 +35,7 @@ from cns_drake.sensors.sensor_config import (
 )
 
 Name = Annotated[str, StringConstraints(pattern=r"^[A-Za-z0-9][A-Za-z0-9_]*$")]
-# Defaults are checked as well: another field may require one.
+# Defaults are validated as well, because a rule may depend on another field.
 _Optional = Field(default=None, validate_default=True)
 # More vehicles or walkers than any map can hold.
 _MOST_TRAFFIC = 2000
@@ -45,8 +45,8 @@ def _not_both(one: bool, other: bool) -> bool:
     return not (one and other)
 
 
-# Field, an earlier one, whether the two fit by what is given, and the fault if
-# they do not.
+# Two fields, the second declared before the first; a function that says whether
+# the two may be combined, given whether each is set; the error if not.
 _ALTERNATIVES: tuple[tuple[str, str, Any, str], ...] = (
     ("stage", "map", operator.eq, "give a map and its stage together"),
     (
@@ -76,7 +76,7 @@ _ALTERNATIVES: tuple[tuple[str, str, Any, str], ...] = (
         "back on its road",
     ),
 )
-# Field -> fields that it takes the place of.
+# Field -> fields that are removed when it is set.
 _REPLACED: dict[str, tuple[str, ...]] = {
     "world": ("map", "stage", "route", "aside"),
     "map": ("world",),
@@ -90,10 +90,12 @@ class RideConfig(Section):
 
     Attributes:
         roughness: class of the road surface after ISO 8608, from `A` (new) to
-            `E` (very poor); `none` keeps the vehicle steady.
-        seed: seed of the unevenness of the road.
-        crossfall: slope of the road down to the car's right [m/m], such as
-            0.025 where cars keep right. Needs a `roughness` other than `none`.
+            `E` (very poor), which shakes the vehicle; `none` keeps it steady.
+        seed: seed of the random bumps of the road. Drives with the same seed
+            meet the same bumps.
+        crossfall: sideways slope of the road, down to the car's right [m/m];
+            0.025 is usual where cars keep right. Needs a `roughness` other than
+            `none`.
     """
 
     roughness: Literal["none", RoughnessClass] = "none"
@@ -117,17 +119,19 @@ class DriverConfig(Section):
     """How the driver departs from the middle of the lanes.
 
     Attributes:
-        wander: standard deviation of the car's offset from the middle of its
-            lane, where the road has room for it [m]. The offsets between two
-            such drives are larger by a factor of 1.4.
-        wander_length: distance after which the correlation of the offset has
-            fallen to 1/e [m].
-        lane_changes: rate of changes to a neighbouring lane, where there is one
-            [1/km]. The car returns after 15 to 270 m.
+        wander: standard deviation of the car's sideways distance from the
+            middle of its lane [m], where the road has room for it. Between two
+            drives with this value, the standard deviation is 1.4 times as
+            large.
+        wander_length: distance along the road after which the autocorrelation
+            of this sideways distance has fallen to 1/e [m].
+        lane_changes: average number of changes to a neighbouring lane per
+            kilometre [1/km], where there is such a lane. The car returns after
+            15 to 270 m.
         follows: whether the car moves among the vehicles of `traffic` and keeps
-            its distance to them.
-        seed: seed of all draws, a number or a name; by default the name of the
-            drive.
+            its distance to the vehicle ahead.
+        seed: seed of all random choices of the driver: a number or a text. By
+            default the name of the drive.
     """
 
     wander: float = Field(default=0.0, ge=0.0, le=1.0)
@@ -174,12 +178,13 @@ class TrafficConfig(Section):
     Attributes:
         vehicles: number of cars, vans, trucks, buses, motorcycles and bicycles
             that drive along the map's roads.
-        walkers: number of people that walk on its sidewalks and crossings.
-        seed: seed of their kinds, starting places and routes.
-        fcd: file of a SUMO trace (floating-car data) to play; no other traffic
-            is then possible.
+        walkers: number of people who walk on the map's sidewalks and crossings.
+        seed: seed of the kinds, starting places and routes of vehicles and
+            walkers.
+        fcd: file of a SUMO trace (floating-car data) to replay instead of
+            planned traffic; `vehicles` and `walkers` must then be 0.
         queues: whether vehicles stand in queues in all lanes, as in a rush
-            hour, except where the car itself drives; no other traffic is then
+            hour, except where the car itself drives. No other traffic is then
             possible.
     """
 
@@ -216,28 +221,32 @@ class TrafficConfig(Section):
 class TransientConfig(Section):
     """Temporary changes to a city, such as snow, that no stage contains.
 
-    The effect of each switch depends on the seed and on the names of
-    structures, but not on the other switches, except for `roadsides`.
+    `roadsides` is applied first, so the other switches change the objects that
+    it adds, too. Otherwise the switches do not depend on each other: the effect
+    of each depends only on the seed and on the names of structures.
 
     Attributes:
-        seed: seed of all draws.
-        parked_cars: share of the parked cars that changed. Of these, three in
-            ten have left, two in ten stand elsewhere in their bay, and another
-            car has replaced the rest.
-        leaves: share of the leaves and needles that are left on plants. Wood
-            stays; a shrub without wood keeps a tenth, as twigs.
-        snow: depth of the snow on surfaces that face the sky, within 120 m of
-            the drive [m]. Roads are cleared, with banks along their kerbs.
-        scaffolds: share of the fronts within 30 m of the drive that stand
-            behind a scaffold; four in ten of the scaffolds have a net.
+        seed: seed of all random draws.
+        parked_cars: share of the parked cars that are changed. Of the changed
+            cars, three in ten have left, two in ten stand elsewhere in their
+            bay, and another car has replaced the rest.
+        leaves: share of the leaves and needles that remain on plants; 0 is
+            winter. Wood stays. A shrub without wood keeps a tenth of its
+            leaves, as twigs.
+        snow: depth of the snow within 120 m of the drive, on surfaces that face
+            the sky [m]. Roads are cleared, and banks of snow lie along their
+            kerbs.
+        scaffolds: share of the building fronts within 30 m of the drive that
+            stand behind a scaffold. Four in ten of the scaffolds have a net.
         works: share of the stretches of kerb within 30 m of the drive that have
             road works: fences, skips or diggers beside the road, and a new kerb
-            stone 0.3 m into it.
-        furniture: share of the poles, lamps and signs that were replaced by
-            others within 2 m.
-        roadsides: share of the places beside kerbs, within 30 m of the drive,
-            that get hedges, garden walls, bushes, young trees, garages or
-            parked cars. Only the cars depend on the seed.
+            stone that reaches 0.3 m into the road.
+        furniture: share of the poles, lamps and signs that are replaced by new
+            ones up to 2 m away.
+        roadsides: share of the free places beside kerbs, within 30 m of the
+            drive, that get hedges, garden walls, bushes, young trees, garages
+            or parked cars. Only the cars depend on the seed; all else is the
+            same in every drive.
     """
 
     seed: int = Field(default=1, ge=0)
@@ -258,41 +267,47 @@ class TransientConfig(Section):
 class Scenario(Section):
     """A vehicle with sensors that follows a route through a stage.
 
-    The vehicle drives either in a stage of a map or in any SDF world. It
-    follows either lanes of the map's roads or waypoints.
+    The vehicle drives in a stage of a map, or in any SDF world. It follows
+    either lanes of the map's roads (`route`) or given points (`waypoints`).
 
     Attributes:
         name: name of the drive and its files, from letters, digits and
             underscores.
-        base: name or file of another drive, which provides all fields that this
-            one leaves out.
-        map: name of a shipped map, or a folder laid out like one.
-        stage: stage of the map.
-        world: SDF file of a world, instead of `map` and `stage`.
-        without: names of structures to leave out, from `structures.csv`.
-        title: what the drive shows, for readers.
-        route: lanes to follow, leg by leg; give this or `waypoints`.
-        waypoints: CSV file of places to pass. A `world` needs it, because it
-            has no roads.
-        u_turns: whether the car turns round where the waypoints double back.
-        aside: distance of the car to the right of the middle of its lanes [m];
-            negative to the left. It applies between junctions, as far as the
-            road has room.
+        base: name or file of another drive. Fields that you leave out here have
+            the values of that drive.
+        map: name of a shipped map, or a folder with the same layout.
+        stage: stage of the map, such as `"01"`.
+        world: SDF file of a world to drive in, instead of `map` and `stage`. It
+            needs `waypoints`.
+        without: names of structures to leave out of the world, as in the map's
+            `structures.csv`.
+        title: one line for readers that says what the drive shows.
+        route: lanes to follow, road by road. Give either `route` or
+            `waypoints`.
+        waypoints: CSV file of points for the car to pass. A drive through a
+            `world` needs it, because an SDF world has no roads.
+        u_turns: whether the car turns round where the waypoints lead straight
+            back.
+        aside: distance by which the car drives to the right of the middle of
+            its lane [m]; a negative one is to the left. It applies between
+            junctions, as far as the road has room.
         speeds: limits of speed and acceleration.
-        driver: how the driver departs from the middle of the lanes.
-        ride: how the car moves on its springs.
-        traffic: moving vehicles and walkers.
-        transient: temporary changes, such as parked cars or snow.
-        lidars: name -> LiDAR. Its frame and its topic have this name. By
-            default one LiDAR named `lidar`.
-        cameras: name -> camera. Its optical frame (x right, y down, z ahead)
-            and its topics have this name.
+        driver: how the driver leaves the middle of the lane.
+        ride: how an uneven road shakes the car.
+        traffic: vehicles and walkers that move.
+        transient: temporary changes to the city, such as other parked cars, or
+            snow.
+        lidars: LiDARs by name. The name of a LiDAR is also that of its frame
+            and its topic. By default there is one, named `lidar`.
+        cameras: cameras by name. The name of a camera is also that of its
+            optical frame (x right, y down, z ahead) and its topics. By default
+            there is none.
         imu: the inertial measurement unit.
         weather: fog, rain and snowfall for calibrated returns.
-        odometry: the recorded motion of the vehicle.
-        frames: number of frames to record, which are the scans of the first
-            LiDAR; by default the whole drive.
-        seed: seed of the noise of all LiDARs and the IMU.
+        odometry: how often the true motion of the vehicle is recorded.
+        frames: number of frames to record, from the start. A frame is a scan of
+            the first LiDAR. By default the whole drive.
+        seed: seed of the random noise of all LiDARs and the IMU.
 
     Example:
         from cns_drake import load_scenario
@@ -528,7 +543,7 @@ class Scenario(Section):
     def with_lidar_preset(self, preset: str) -> Scenario:
         """Returns the scenario with every LiDAR replaced by a unit of a preset.
 
-        Their poses and the settings of their measurements stay.
+        The LiDARs keep their poses and measurement settings.
 
         Raises:
             InputError: there is no such preset.

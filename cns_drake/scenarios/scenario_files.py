@@ -65,7 +65,7 @@ def load_scenario(name_or_file: str | Path) -> Scenario:
 
 
 def _name_drives(given: str | Path, folder: MapFolder) -> str:
-    """Returns the fault that a folder was given in place of one drive."""
+    """Returns the error for a folder that was given in place of a drive."""
     files = folder.drives()
     if not files:
         return f"{given}: a folder without a drive (sequence_NN.yaml)"
@@ -109,11 +109,11 @@ def read_scenario_file(path: Path) -> Scenario:
 def _find_base(
     base: object, path: Path, found: Collection[Path]
 ) -> Path | None:
-    """Returns the file of a base; None without one."""
+    """Returns the file of a scenario's base; None if it has no base."""
     if base is None:
         return None
     drives = shipped_drives()
-    # Only text is the name of a file.
+    # A value that is no text cannot be the name of a file.
     file = drives.get(str(base), path.parent / str(base))
     if not (isinstance(base, str) and os.path.isfile(file)):
         raise InputError(
@@ -129,10 +129,11 @@ def find_files(values: dict, path: Path) -> None:
     """Returns a scenario's or a family's fields with absolute paths.
 
     Args:
-        path: the file of these fields; paths are relative to it.
+        path: the file that contains the fields; relative paths start at its
+            folder.
 
     Raises:
-        InputError: a path cannot be one.
+        InputError: a value cannot be a path.
     """
 
     def find(fields: dict, field: str) -> dict:
@@ -156,7 +157,7 @@ def map_folder(scenario: Scenario) -> MapFolder:
     """
     if scenario.world is not None:
         return MapFolder(Path(scenario.world).parent)
-    assert scenario.map is not None  # One of both is given.
+    assert scenario.map is not None  # Either a map or a world is given.
     return MapFolder(shipped_maps().get(scenario.map, Path(scenario.map)))
 
 
@@ -174,7 +175,7 @@ def check_files(scenario: Scenario, source: object = None) -> None:
     scenario's file.
 
     Raises:
-        InputError: one of them does not exist.
+        InputError: one of these files does not exist.
     """
     source = source or scenario.source
     for field, file in (
@@ -218,9 +219,10 @@ def check_files(scenario: Scenario, source: object = None) -> None:
 def describe_scenario(scenario: Scenario, folder: Path | None = None) -> dict:
     """Returns the fields of a scenario that are given, ready for JSON.
 
-    Where the map, the world and the waypoints lie is no part of the drive; a
-    digest identifies their content (see `provenance`). The noise of an IMU is
-    in a file with a fixed name next to the scenario.
+    The locations of map, world and waypoints are not part of the drive's
+    description: digests identify the content of these files (see `provenance`).
+    The noise of an IMU is described in a file with a fixed name next to the
+    scenario.
 
     Args:
         folder: folder to which paths of files are relative. Without it, paths

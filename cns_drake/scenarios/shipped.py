@@ -1,4 +1,4 @@
-"""The places of the shipped worlds, which a wheel contains as one archive."""
+"""Finds the shipped worlds, which a wheel contains as one archive."""
 
 import functools
 import hashlib
@@ -135,7 +135,7 @@ def _unpack(archive: Path, folder: Path) -> None:
         try:
             part.rename(folder)
         except OSError:
-            if not folder.is_dir():  # Else another process was faster.
+            if not folder.is_dir():  # Otherwise another process was faster.
                 raise
     finally:
         shutil.rmtree(part, ignore_errors=True)

@@ -1,12 +1,12 @@
 """Families of scenarios, described by one small file.
 
-The city of a family decays from a place outwards: each member lacks a given
-part of the buildings and plants, those nearest to that place. The part may also
-be taken of the structures that an earlier stage lacks, which gives stages
-between the two. A member with a greater missing part lacks everything that one
-with a smaller part lacks. Besides, structures of chosen classes may be missing
-at random. Other draws of the city, random routes and other LiDARs multiply the
-family. Every member is a scenario.
+Every member of a family is a scenario. The members differ in how much of the
+city is missing: each lacks a given share of the buildings and plants, namely
+those nearest to a random place. A member with a greater share lacks everything
+that a member with a smaller share lacks. The share can also be one of only
+those structures that an earlier stage lacks; the members are then stages in
+between. In addition, structures of chosen classes can be missing at random.
+Several draws of the city, random routes and other LiDARs multiply the members.
 """
 
 from collections.abc import Callable, Mapping, Sequence, Set
@@ -32,20 +32,22 @@ from cns_drake.scene.world import load_world, structures_in
 from cns_drake.sensors.imu.config import ImuSection
 from cns_drake.sensors.sensor_config import Section
 
-# Tags of structures that can be missing; streets, ground and furniture stay.
+# Classes of structures that can be missing; streets, ground and street
+# furniture always stay.
 _REMOVABLE = ("building", "vegetation")
 # Farther than any city reaches [m].
 _FARTHEST = 1e6
 
 _Part = Annotated[float, Field(ge=0.0, le=1.0)]
 _Seed = Annotated[int, Field(ge=0)]
-# Draws the city of a map anew: the map's folder, the name of the stage, which
-# is the whole city, and seeds -> seed -> map folder of that city.
+# A function that draws the city of a map again. It takes the map's folder, the
+# name of the complete stage and seeds; it returns seed -> map folder of the
+# city drawn with that seed.
 Redraw = Callable[[Path, str, Sequence[int]], Mapping[int, Path]]
 
 
 def _spread(value: Any) -> Any:
-    """Turns {from, to, count} into the numbers themselves."""
+    """Turns {from, to, count} into evenly spaced numbers."""
     if not isinstance(value, dict):
         return value
     steps = _Steps.model_validate(value)
@@ -70,9 +72,9 @@ class DrawnRoutes(Section):
     """Routes that are drawn at random.
 
     Attributes:
-        count: number of routes.
-        length: least length of each route [m].
-        seed: seed of the draws.
+        count: number of routes to draw.
+        length: smallest length of each route [m].
+        seed: seed of the random draws.
     """
 
     count: int = Field(ge=1, le=10_000)
@@ -84,22 +86,25 @@ class Family(Section):
     """A family of drives: a base drive and what varies among its members.
 
     Attributes:
-        base: name or file of the drive that provides map, route, speeds and
-            sensors.
-        stage: stage from which structures are removed; by default the map's
-            last one.
-        towards: another stage. Only structures that it lacks are removed, and
-            structures that are lower in it keep their height.
-        missing: shares of the structures that are removed, each from 0 to 1, or
-            `{from: 0, to: 0.6, count: 20}` for evenly spaced ones.
-        scattered: class of structures, such as `pole` -> share of it that is
-            also removed at random.
-        seeds: seeds of the random draws. Each begins to remove structures at
-            another place.
-        city_seeds: seeds of other cities, drawn along the same streets.
-        routes: random routes, instead of the base's.
-        lidars: presets that replace the LiDARs of the base, such as `[cns,
-            os1-64]`.
+        base: name or file of the drive that provides the map, route, speeds and
+            sensors of all members.
+        stage: stage through which the members drive, and from which structures
+            are removed. By default the map's last one.
+        towards: another stage, usually an earlier one. Only structures that
+            this stage lacks are removed, and structures that are lower in it
+            keep their height.
+        missing: shares of the structures to remove. Each share makes a member:
+            give numbers from 0 to 1, or `{from: 0, to: 0.6, count: 20}` for
+            evenly spaced ones.
+        scattered: shares of single classes to remove at random in addition, by
+            the name of the class, such as `{pole: 0.3}`.
+        seeds: seeds of the random draws. Each seed makes a member, and begins
+            to remove structures at another place.
+        city_seeds: seeds of other cities along the same streets, each of which
+            makes a member.
+        routes: random routes for the members, instead of the base's route.
+        lidars: presets of LiDARs that replace those of the base, such as `[cns,
+            os1-64]`. Each preset makes a member.
         ride: ride of all members, instead of the base's.
         imu: IMU of all members, instead of the base's.
     """
@@ -130,7 +135,7 @@ def load_family(path: Path, redraw: Redraw | None = None) -> list[Scenario]:
 
     Args:
         redraw: function that draws cities, which only a family with
-            `city_seeds` needs. It is called last, after all checks.
+            `city_seeds` needs. The function is called last, after all checks.
 
     Raises:
         InputError: the file, or one that it names, cannot be used, the base has
@@ -252,7 +257,7 @@ def write_scenarios(scenarios: Sequence[Scenario], folder: Path) -> list[Path]:
 def _check_redrawable(
     base: Scenario, family: Family, last: str, source: Path | str
 ) -> None:
-    """Checks that the city can be drawn anew."""
+    """Checks that the base's city can be drawn again with other seeds."""
     why = (
         f"not with city_seeds: stages before the last one, {last}, are lists "
         "of names that another draw of the city need not have"
@@ -291,7 +296,7 @@ def _difference(
 def _decay_order(
     table: Path, seed: int, removable: Set[str] | None
 ) -> list[str]:
-    """Returns the structures that can be missing, the first to go first."""
+    """Returns structures that can be missing, in the order of removal."""
     rows = [
         row
         for _, row in read_records(table, ("name", "class"))
@@ -305,7 +310,7 @@ def _decay_order(
         raise InputError(f"{table}: none of its structures can be missing")
     try:
         xy = np.array([(float(row["x"]), float(row["y"])) for row in rows])
-        if not (np.abs(xy) <= _FARTHEST).all():  # Nor is NaN a place.
+        if not (np.abs(xy) <= _FARTHEST).all():  # NaN fails, too.
             raise ValueError
     except (KeyError, ValueError):
         raise InputError(
@@ -328,7 +333,8 @@ def _draw_losses(
 ) -> frozenset[str]:
     """Draws the missing structures, each class independently.
 
-    A greater part includes all structures of a smaller one. Parts are 0 to 1.
+    `parts` maps classes to shares from 0 to 1. The structures of a smaller
+    share are among those of a greater share.
     """
     records = [row for _, row in read_records(table, ("name", "class"))]
     rows = [row for row in records if not _is_on_a_lot(row)]

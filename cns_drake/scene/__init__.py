@@ -1,1 +1,1 @@
-"""SDF worlds, their structures, and the geometry that sensors perceive."""
+"""SDF worlds, their structures, and the geometry that sensors see."""

@@ -1,11 +1,11 @@
-"""Drake's messages about a file that it cannot read."""
+"""Handles Drake's messages about files that it cannot read."""
 
 from collections.abc import Iterator
 import contextlib
 import logging
 
-# Besides Drake's own errors there are those of the C++ library, for invalid or
-# too large numbers and too long texts. A failed condition in Drake raises
+# Besides Drake's own errors, these are errors of the C++ library, for invalid
+# or too large numbers and too long texts. A failed condition in Drake raises
 # SystemExit.
 PARSER_ERRORS = (
     RuntimeError,
@@ -21,8 +21,8 @@ PARSER_ERRORS = (
 def collected_errors() -> Iterator[list[str]]:
     """Collects errors that Drake would otherwise print to its log.
 
-    Warnings are passed on at the end, unless an exception was raised, since the
-    message of an error must be a single line.
+    Warnings are passed on at the end, but not after an exception, since an
+    error message must be a single line.
     """
     errors: list[str] = []
     records: list[logging.LogRecord] = []

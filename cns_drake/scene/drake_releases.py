@@ -1,4 +1,4 @@
-"""What differs between the supported releases of Drake, in one place."""
+"""Handles all differences between the supported releases of Drake."""
 
 import re
 from typing import Any
@@ -12,13 +12,14 @@ from cns_drake.base.version import installed_versions
 def find_bus(
     builder: DiagramBuilder, lcm_buses: LcmBuses, caller: str, bus: str
 ) -> Any:
-    """Returns the interface of an LCM bus, as `LcmBuses.Find` does.
+    """Returns the interface of an LCM bus, like `LcmBuses.Find`.
 
-    The bindings of Drake 1.58 return an unusable system from `Find`: any use of
-    it ends the process. This function takes the system from the builder.
+    With the bindings of Drake 1.58, `Find` returns an unusable system: any use
+    of it ends the process. This function takes the system from the builder
+    instead.
 
     Raises:
-        RuntimeError: there is no such bus; the caller is named.
+        RuntimeError: there is no such bus; the message names the caller.
     """
     found = lcm_buses.Find(caller, bus)
     name = f"LcmInterfaceSystem(bus_name={bus})"
@@ -28,10 +29,10 @@ def find_bus(
 
 
 def takes_screen_colours() -> bool:
-    """Returns whether the renderer takes colours of vertices for a screen's.
+    """Returns whether the renderer takes vertex colours as sRGB, not linear.
 
-    Up to Drake 1.53 it takes them for linear ones. A Drake that is not
-    installed as a package counts as newer.
+    Up to Drake 1.53 it takes them as linear. A Drake that was not installed as
+    a package counts as newer.
     """
     version = installed_versions(["drake"]).get("drake", "1.54")
     return tuple(map(int, re.findall(r"\d+", version)[:2])) >= (1, 54)

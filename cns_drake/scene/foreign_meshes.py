@@ -1,6 +1,6 @@
-"""Meshes in formats that Drake does not read, read by Open3D.
+"""Reads meshes in formats that Drake cannot read, using Open3D.
 
-Some of Open3D's parsers crash on damaged files, and print messages. They
+Some of Open3D's parsers crash on damaged files and print messages. They
 therefore run in a separate process, which is started only for worlds with such
 meshes.
 """
@@ -20,7 +20,7 @@ from cns_drake.base.errors import missing_library
 
 
 class ForeignMeshes:
-    """Reads mesh files by Open3D; a context manager."""
+    """Reads mesh files with Open3D in another process; a context manager."""
 
     def __init__(self) -> None:
         self._process: subprocess.Popen | None = None
@@ -32,14 +32,14 @@ class ForeignMeshes:
         self._end()
 
     def read(self, path: Path) -> tuple[np.ndarray, np.ndarray]:
-        """Returns a mesh from a file in another format.
+        """Returns the vertices and triangles of a mesh file.
 
         Returns:
-            (N, 3) float64 vertices [m]; (M, 3) int32 triangles, none if the
-            file is no mesh.
+            Vertices (N, 3), float64 [m], and triangles (M, 3), int32. There are
+            no triangles if the file is not a mesh.
 
         Raises:
-            ValueError: if Open3D crashes on it, or cannot be loaded.
+            ValueError: if Open3D crashes on the file, or cannot be loaded.
         """
         if self._process is None:
             self._process = subprocess.Popen(
@@ -48,7 +48,7 @@ class ForeignMeshes:
                 stdout=subprocess.PIPE,
                 stderr=subprocess.DEVNULL,
             )
-        # Both are pipes.
+        # Both are pipes, so they are not None.
         assert self._process.stdin is not None
         assert self._process.stdout is not None
         try:
@@ -70,12 +70,12 @@ class ForeignMeshes:
 
 
 def _serve() -> None:
-    """Reads the requested meshes until the requests end."""
+    """Reads requested meshes until there are no more requests."""
     # Messages of a parser must not mix with the answers.
     answers = os.fdopen(os.dup(1), "wb")
     os.dup2(2, 1)
-    # Its machine learning, which no mesh needs, takes longer to import than all
-    # the rest of it.
+    # Left out: Open3D's machine learning, which no mesh needs. Its import takes
+    # longer than all the rest.
     sys.modules["open3d.ml"] = ModuleType("open3d.ml")
     try:
         import open3d

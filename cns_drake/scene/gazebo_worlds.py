@@ -1,9 +1,9 @@
-"""Reduces Gazebo's worlds to their visuals, in SDF that Drake reads.
+"""Reduces Gazebo worlds to their visuals, as SDF that Drake can read.
 
-Drake refuses many elements of such worlds, and crashes on an endless collision
-plane among many others. Only the visuals are kept, at their places at the
-start: nothing in such a world moves here. Models and files that the worlds
-refer to are looked for in the folders that Gazebo searches.
+Drake rejects many elements of such worlds, and crashes on an infinite collision
+plane if there are many others. Only the visuals are kept, at their initial
+places: nothing in such a world moves here. Models and files to which a world
+refers are searched in the folders that Gazebo searches.
 """
 
 from collections import Counter
@@ -18,8 +18,8 @@ from cns_drake.base.errors import InputError
 from cns_drake.base.xml_elements import read_elements
 from cns_drake.scene.model_check import SIZES, check_model, lacks_size
 
-# Environment variables with folders of models, of old and new Gazebo and
-# libsdformat.
+# Environment variables of old and new Gazebo and of libsdformat that list
+# folders of models.
 _VARIABLES = (
     "GZ_SIM_RESOURCE_PATH",
     "SDF_PATH",
@@ -30,13 +30,13 @@ _SCHEMES = ("model://", "package://", "file://")
 
 
 class ModelFinder:
-    """Finds files by the URIs of a world."""
+    """Finds the files to which URIs in a world refer."""
 
     def __init__(self, world: Path, model_paths: Iterable[Path] = ()):
-        """Takes the folders to search; the first one wins.
+        """Takes the folders to search, in order of precedence.
 
-        They are the given ones, those of the environment, and last the world's
-        folder, the one above, and `models` in both.
+        They are the given ones, those of the environment variables, the world's
+        folder, the one above it, and `models` in these two.
         """
         folder = world.absolute().parent
         named = [
@@ -50,9 +50,10 @@ class ModelFinder:
         self._places = [*map(Path, model_paths), *named, *near]
 
     def find(self, uri: str, folder: Path) -> Path | None:
-        """Returns the file or folder of a URI, None if it is not there.
+        """Returns the file or folder of a URI; None if it does not exist.
 
-        It is absolute, `model://<name>/...`, or relative to the folder.
+        The URI is an absolute path, `model://<name>/...`, or relative to the
+        folder.
         """
         rest = uri
         for scheme in _SCHEMES:
@@ -66,7 +67,8 @@ class ModelFinder:
             path = place / rest
             if path.exists():
                 return path.resolve()
-            # A model may be in its own folder, or be that folder.
+            # The folder may contain the model's folder, or be that folder
+            # itself.
             name, _, within = rest.partition("/")
             if place.name == name and (place / within).exists():
                 return (place / within).resolve()
@@ -74,10 +76,10 @@ class ModelFinder:
 
 
 def model_file(path: Path) -> Path:
-    """Returns the SDF file of a model, given the file or its folder.
+    """Returns the SDF file of a model, given this file or its folder.
 
     Raises:
-        InputError: the folder has none.
+        InputError: the folder has no SDF file.
     """
     if not path.is_dir():
         return path
@@ -99,7 +101,7 @@ def model_file(path: Path) -> Path:
 
 
 def read_xml(path: Path) -> Element:
-    """Returns the tree of an XML file.
+    """Returns the root element of an XML file.
 
     Raises:
         InputError: it cannot be read, or is not the XML of a model.
@@ -108,7 +110,7 @@ def read_xml(path: Path) -> Element:
     return read_elements(path, encoding="utf-8")
 
 
-# Elements that Drake does not read as Gazebo does.
+# Elements that Drake reads differently from Gazebo.
 _SIGNS = (
     "include", "light", "plugin", "actor", "scene", "gui", "state", "sensor",
     "road", "population", "submesh", "transparency", "visibility_flags",
@@ -116,7 +118,7 @@ _SIGNS = (
 )  # fmt: skip
 _ENDLESS_COLLISION = ".//collision/geometry/plane"
 _SIZED_PLANE = ".//visual/geometry/plane/size"
-# Elements that are left out -> words for them in a note.
+# Elements that are left out -> how a note calls them.
 _SKIPPED = {
     "light": "lights",
     "plugin": "plugins",
@@ -127,7 +129,7 @@ _SKIPPED = {
     "particle_emitter": "particle emitters",
     "projector": "projectors",
 }
-# Element -> elements within it that are read, or that neither show nor move
+# Element -> child elements that are read, or that neither show nor move
 # anything.
 _KNOWN = {
     "world": (
@@ -162,21 +164,22 @@ _ATTRIBUTES = {
     "pose": ("relative_to", "rotation_format", "degrees", "frame"),
     "mesh": ("optimization",),
 }
-# Beginnings of names that SDF leaves to programs; Drake reads its own.
+# Prefixes of names that SDF leaves to programs; Drake reads its own.
 _CUSTOM = ("drake:", "gz:", "ignition:")
 _SHAPES = (
     "box", "sphere", "cylinder", "capsule", "ellipsoid", "plane", "mesh",
     "drake:capsule", "drake:ellipsoid",
 )  # fmt: skip
-# Gazebo's own models, which are at hand wherever it is.
+# Gazebo's own models, for which no file is needed.
 _SUN, _GROUND_PLANE = "model://sun", "model://ground_plane"
 _GROUND = """<model name="ground_plane"><link name="link"><visual name="visual">
 <geometry><plane><normal>0 0 1</normal></plane></geometry></visual></link>
 </model>"""
 _DEEPEST = 20
-# Thickness of a plane with a size, below its surface [m].
+# Thickness of the box for a plane of finite size, below its surface [m].
 _PLANE_THICKNESS = 1e-4
-# The single precision of rays would show on larger shapes [m].
+# Size of the box for an infinite plane. Larger shapes would show the single
+# precision of rays [m].
 _ENDLESS = 5000.0
 _EVERY_FLAG = 0xFFFFFFFF
 
@@ -202,11 +205,11 @@ def is_gazebo_world(path: Path, root: Element) -> bool:
 def simplify_world(
     path: Path, root: Element, model_paths: Iterable[Path] = ()
 ) -> tuple[str, tuple[str, ...]]:
-    """Returns a world of static models with visuals only, and notes.
+    """Returns a world with static models and visuals only, and notes.
 
     Raises:
-        InputError: a model that was found cannot be read, or something would
-            be at a wrong place.
+        InputError: a model that was found cannot be read, or something would be
+            at a wrong place.
     """
     simplifier = _Simplifier(path, model_paths)
     worlds = root.findall("world")
@@ -221,7 +224,7 @@ def simplify_world(
 
 
 class _Simplifier:
-    """One pass over a world and all included models."""
+    """One pass over a world and all models that it includes."""
 
     def __init__(self, path: Path, model_paths: Iterable[Path]):
         self._path = path
@@ -256,7 +259,7 @@ class _Simplifier:
             self._skipped[f"{what} {how}"] += count
 
     def add_world(self, root: Element, world: Element, target: Element) -> None:
-        """Adds the models of a world, which is in the file with this root."""
+        """Adds the models of a world; `root` is the root of its file."""
         self._note_references(root)
         saved = world.findall("state//model/pose")
         self.skip("saved places of models (state)", len(saved))
@@ -275,7 +278,7 @@ class _Simplifier:
     def _add_children(
         self, source: Element, target: Element, folder: Path, depth: int
     ) -> None:
-        """Adds what a world or a model shows, and the frames in it."""
+        """Adds the visible parts and the frames of a world or model."""
         if depth > _DEEPEST:
             raise InputError(f"{self._path}: models include each other")
         self._count_unknown(source)
@@ -360,7 +363,7 @@ class _Simplifier:
     def _merge(
         self, model: Element, target: Element, folder: Path, depth: int
     ) -> None:
-        """Adds the parts of a model as parts of the one that includes it."""
+        """Adds the parts of a model to the model that includes it (merge)."""
         if model.get("placement_frame"):
             raise InputError(
                 f"{self._path}: include of {model.get('name')}: a"
@@ -403,7 +406,7 @@ class _Simplifier:
         self._count_unknown(link)
         made = SubElement(target, "link", name=_name(link, target))
         self._copy_pose(link, made)
-        # An invisible element stays if others are placed relative to it.
+        # An invisible element is kept if others are placed relative to it.
         for visual in link.iterfind("visual"):
             self._add_visual(visual, made, target, folder)
 
@@ -459,7 +462,7 @@ class _Simplifier:
             self._add_material(material, made)
 
     def _is_invisible(self, visual: Element) -> bool:
-        """Returns whether Gazebo does not show a visual; counts doubts."""
+        """Returns whether Gazebo hides a visual; counts doubtful cases."""
         transparency = _number(visual.findtext("transparency"), 0.0)
         flags = _number(visual.findtext("visibility_flags"), _EVERY_FLAG)
         if transparency >= 1.0 or flags == 0:
@@ -492,29 +495,29 @@ class _Simplifier:
         if pose is None:
             return
         self._count_attributes(pose)
-        # Before version 1.7, `frame` had no meaning to Gazebo.
+        # Before SDF 1.7, Gazebo ignored `frame`.
         if pose.get("frame"):
             self.skip("frames of poses in SDF before 1.7")
         kept = {k: v for k, v in pose.attrib.items() if k != "frame"}
         if (pose.text or "").strip():
             SubElement(target, "pose", kept).text = pose.text
         elif pose.get("relative_to"):
-            # Without numbers it is the frame itself.
+            # A pose without numbers is the frame itself.
             SubElement(target, "pose", relative_to=kept["relative_to"])
 
 
 def _thin_box(
     plane: Element, visual: Element, link: Element, model: Element
 ) -> Element:
-    """Returns a box below a plane with a size, and places its visual.
+    """Returns a thin box for a plane of finite size, and places its visual.
 
-    As in Gazebo, the shortest turn from z to the normal turns its sides. The
-    numbers of the plane are valid.
+    As in Gazebo, the shortest rotation from z to the normal also rotates the
+    sides. The numbers of the plane must be valid.
     """
     words = (plane.findtext("normal") or "").split() or ["0", "0", "1"]
     normal = [float(word) for word in words]
     x, y, z = (value / math.hypot(*normal) for value in normal)
-    # The pose of the visual becomes that of a frame, with the box below it.
+    # The pose of the visual becomes a frame, and the box lies below it.
     own = link.get("name", "")
     frame = Element("frame", name=f"_plane_of_{own}", attached_to=own)
     frame.set("name", _name(frame, model))
@@ -536,7 +539,7 @@ def _thin_box(
 
 
 def _local_uri(uri: str) -> str:
-    """Returns the local name of a model on a server."""
+    """Returns the local URI of a model that is on a server."""
     if not uri.startswith(("http://", "https://")):
         return uri
     _, _, name = uri.rpartition("/models/")
@@ -544,7 +547,7 @@ def _local_uri(uri: str) -> str:
 
 
 def _number(text: str | None, default: float) -> float:
-    """Returns a number in a text; the default if it holds none."""
+    """Returns the number in a text, or the default if it has none."""
     for kind in (float, lambda word: int(word, 16)):
         with contextlib.suppress(ValueError):
             return float(kind((text or "").strip()))
@@ -552,7 +555,7 @@ def _number(text: str | None, default: float) -> float:
 
 
 def _name(element: Element, target: Element) -> str:
-    """Returns an element's name, or a similar one that is still free."""
+    """Returns an element's name, changed if it is already in use."""
     wanted = _legal(element.get("name", element.tag))
     taken = {sibling.get("name") for sibling in target}
     name, count = wanted, 1

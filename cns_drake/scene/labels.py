@@ -1,4 +1,4 @@
-"""Labels and instance ids of geometries, as points on them have them."""
+"""Labels and instance ids that points on geometries get."""
 
 from collections.abc import Sequence
 from typing import NamedTuple
@@ -7,9 +7,10 @@ import numpy as np
 
 from cns_drake.base.errors import InputError
 
-# The highest id of a structure.
+# Greatest instance id of a structure.
 MAX_INSTANCE = 2**16 - 1
-# SemanticKITTI's class of moving things of no other moving class.
+# SemanticKITTI's class of moving objects that have no moving class of their
+# own.
 OTHER_MOVING_ID = 259
 
 
@@ -28,9 +29,9 @@ class Labels(NamedTuple):
 
 
 def number_structures(names: Sequence[str]) -> Labels:
-    """Returns labels of structures without classes, by their names.
+    """Returns labels for structures without classes, by their names.
 
-    Instance ids are numbered from 1 on, in alphabetical order of the names.
+    Instance ids count from 1, in alphabetical order of the names.
 
     Raises:
         InputError: there are more structures than instance ids.

@@ -1,7 +1,7 @@
-"""Surfaces of meshes, from files or from memory.
+"""Reads the surfaces of meshes, from files or from memory.
 
-Checks of glTF and COLLADA find what Open3D, which reads them, would misread:
-https://registry.khronos.org/glTF/specs/2.0/glTF-2.0.html
+glTF and COLLADA files are checked for content that Open3D, which reads them,
+would misread: https://registry.khronos.org/glTF/specs/2.0/glTF-2.0.html
 """
 
 from collections import Counter
@@ -30,9 +30,9 @@ from cns_drake.scene.drake_errors import PARSER_ERRORS, collected_errors
 from cns_drake.scene.foreign_meshes import ForeignMeshes
 from cns_drake.scene.surfaces import LARGEST_SIZE, TriangleSurface
 
-# Endings of such files.
+# File name extensions of glTF.
 GLTF = (".gltf", ".glb")
-# Beginnings of the names of extensions without which shapes are the same.
+# Prefixes of glTF extensions that do not change shapes.
 _HARMLESS = (
     "KHR_materials_", "KHR_texture_", "EXT_texture_", "MSFT_texture_",
     "ADOBE_materials_", "KHR_lights_", "EXT_lights_", "KHR_techniques_",
@@ -40,25 +40,25 @@ _HARMLESS = (
     "EXT_mesh_features", "EXT_structural_metadata", "EXT_feature_metadata",
     "EXT_mesh_manifold", "KHR_physics", "KHR_implicit_shapes",
 )  # fmt: skip
-# Extensions that change shapes also where they are not required.
+# glTF extensions that change shapes even where they are not required.
 _CHANGING = (
     "EXT_mesh_gpu_instancing", "EXT_instance_features", "KHR_node_visibility",
     "KHR_mesh_quantization",
 )  # fmt: skip
-# Elements of COLLADA that would move or add shapes and are not read.
+# Elements of COLLADA that would move or add shapes, and are not read.
 _COLLADA = {
     re.compile(rb"<instance_controller\b"): "skins or morphs of COLLADA",
     re.compile(rb"<animation\b"): "animations of COLLADA",
     re.compile(rb"<(?:lines|linestrips)\b"): "lines of COLLADA",
 }
 _FLOAT = 5126
-# Kinds of primitives from 0 on that have no triangles: points and lines.
+# Modes of primitives below this number (points and lines) have no triangles.
 _FIRST_TRIANGLES = 4
 _JSON = 0x4E4F534A
 
 
 def unread_parts(path: Path) -> tuple[str, ...]:
-    """Returns a line for each kind of content in a mesh that is ignored.
+    """Returns one line for each kind of content of a mesh that is ignored.
 
     Raises:
         ValueError: its shapes would be misread.
@@ -75,14 +75,13 @@ def unread_parts(path: Path) -> tuple[str, ...]:
 
 
 def check_gltf(path: Path) -> tuple[str, ...]:
-    """Checks a glTF file, text or binary.
+    """Returns one line for each kind of content of a glTF file that is ignored.
 
-    Returns:
-        One line for each kind of thing that is not read.
+    The file is text or binary.
 
     Raises:
-        ValueError: it is no glTF, or its shapes would be misread; it names
-            what the file needs.
+        ValueError: it is not glTF, or its shapes would be misread; the message
+            names what the file needs.
         InputError: it cannot be read.
     """
     content = read_bytes(path, _LIMIT_BYTES)
@@ -129,7 +128,7 @@ def _names(top: Any, key: str) -> list[str]:
 
 
 def _unread(top: Any, nodes: list[Any], primitives: list[Any]) -> Counter[str]:
-    """Counts what would move or add shapes and is not read."""
+    """Counts what would move or add shapes, but is not read."""
     meshes = top.get("meshes", [])
     counts = Counter(
         {
@@ -153,23 +152,24 @@ def _unread(top: Any, nodes: list[Any], primitives: list[Any]) -> Counter[str]:
 
 
 _LIMIT_BYTES = 1 << 28
-# For a face with a missing vertex, Drake's reader reads foreign memory, and may
-# end the process.
+# If a face refers to a missing vertex, Drake's reader reads outside its memory
+# and may end the process.
 _VERTEX = re.compile(rb"^[ \t]*v[ \t]", re.MULTILINE)
 _FACE = re.compile(rb"^[ \t]*f[ \t]([^\n#]*)", re.MULTILINE)
-# A ray caster needs neither texture nor normals; Drake checks them.
+# A ray caster needs neither texture coordinates nor normals, but Drake checks
+# them.
 _OTHER_INDICES = re.compile(rb"/[^\s]*")
 _NO_INDICES = re.compile(rb"[^-\d\s]|\d-|\d{10}")
 
 
 def check_obj(path: Path) -> None:
-    """Raises an error if a face of an OBJ file has missing vertices.
+    """Checks that faces of an OBJ file only use vertices that exist.
 
     Raises:
-        ValueError: if so; it names the line.
-        InputError: if it cannot be read.
+        ValueError: one does not; the message names the line.
+        InputError: the file cannot be read.
     """
-    # Drake ends a line at either.
+    # Drake accepts both as line ends.
     content = read_bytes(path, _LIMIT_BYTES).replace(b"\r", b"\n")
     num_vertices = len(_VERTEX.findall(content))
     faces = b" \n".join(_FACE.findall(content))
@@ -188,7 +188,7 @@ def check_obj(path: Path) -> None:
 
 
 def _are_indices(text: bytes, num_vertices: int) -> bool:
-    """Returns whether a text has valid vertex numbers, from 1 or from -1."""
+    """Returns whether a text has valid vertex indices, from 1 or from -1."""
     if not text.strip():
         return True
     if _NO_INDICES.search(text):
@@ -197,8 +197,8 @@ def _are_indices(text: bytes, num_vertices: int) -> bool:
     return bool(((values != 0) & (np.abs(values) <= num_vertices)).all())
 
 
-# The faces of a tetrahedron, counter-clockwise seen from outside, if the first
-# three vertices are counter-clockwise seen from the fourth.
+# The faces of a tetrahedron, counter-clockwise seen from outside. This holds if
+# its first three vertices are counter-clockwise, seen from the fourth.
 _FACES = np.array([(0, 2, 1), (0, 1, 3), (1, 2, 3), (2, 0, 3)])
 
 
@@ -206,18 +206,18 @@ def read_vtk(path: Path) -> tuple[np.ndarray, np.ndarray]:
     """Returns the boundary surface of a volume mesh in a VTK file.
 
     Returns:
-        (N, 3) float64 vertices [m], also those inside; (M, 3) int32
-        triangles.
+        Vertices (N, 3), float64 [m], including inner ones, and triangles (M,
+        3), int32.
 
     Raises:
         RuntimeError: Drake cannot read the file.
     """
-    # Drake's reader converts all dialects of VTK to the one that it writes.
+    # Drake's reader converts all dialects of VTK to the one that Drake writes.
     words = RefineVolumeMeshIntoVtkFileContents(MeshSource(path)).split()
     vertices = _block(words, "POINTS", 3, 3).astype(float)
     cells = _block(words, "CELLS", 3, 5).astype(np.int32)[:, 1:]
     faces = cells[:, _FACES].reshape(-1, 3)
-    # A face between two tetrahedra is there twice.
+    # A face between two tetrahedra occurs twice.
     _, first, count = np.unique(
         np.sort(faces, axis=1), axis=0, return_index=True, return_counts=True
     )
@@ -227,23 +227,23 @@ def read_vtk(path: Path) -> tuple[np.ndarray, np.ndarray]:
 def _block(
     words: Sequence[str], keyword: str, header: int, columns: int
 ) -> np.ndarray:
-    """Returns the rows of numbers that follow a keyword and its header."""
+    """Returns the rows of numbers behind a keyword and its header."""
     at = words.index(keyword)
     rows, begin = int(words[at + 1]), at + header
     block = np.array(words[begin : begin + rows * columns])
     return block.reshape(rows, columns)
 
 
-# Formats whose y axis points up. Drake turns them, so that z does.
+# Formats whose y axis points up. Drake rotates them so that z does.
 _Y_UP = (*GLTF, ".dae")
-# What is larger is parsed at each reading, so that it does not stay in memory.
+# Larger files are parsed again each time, so that they do not stay in memory.
 _SMALL_BYTES = 1 << 18
 
 
 class MeshFiles:
-    """Reads meshes, each only once for all its geometries.
+    """Reads meshes, each only once for all geometries that use it.
 
-    One mesh at one scale has one surface.
+    A mesh at a given scale has one surface.
     """
 
     def __init__(self, foreign: ForeignMeshes):
@@ -252,17 +252,17 @@ class MeshFiles:
         self._surfaces: dict[tuple, TriangleSurface] = {}
 
     def read(self, name: str, shape: Mesh | Convex) -> TriangleSurface:
-        """Returns the surface of a mesh shape, in the geometry's frame G.
+        """Returns the surface of a mesh shape in the geometry's frame G.
 
         Raises:
             InputError: the mesh is missing, cannot be read, or is too large;
-                the geometry is named.
+                the message names the geometry.
         """
         key = mesh_shape_key(shape)
         if key in self._surfaces:
             return self._surfaces[key]
         try:
-            with collected_errors():  # The error is enough.
+            with collected_errors():  # The error alone is enough.
                 surface = (
                     _read_hull(shape)
                     if isinstance(shape, Convex)
@@ -294,7 +294,7 @@ class MeshFiles:
     def _read_source(self, source: MeshSource) -> TriangleSurface:
         if source.is_path():
             return self._read_file(Path(source.path()))
-        # Readers need files.
+        # Open3D can only read files.
         mesh = source.in_memory()
         with tempfile.TemporaryDirectory() as folder:
             path = Path(folder, f"mesh{source.extension()}")
@@ -323,7 +323,7 @@ class MeshFiles:
         p_GVset, triangles = _READERS.get(ending, self._foreign.read)(path)
         if len(triangles) == 0:
             raise ValueError("holds no triangles")
-        # Drake only warns; a ray caster would read foreign memory.
+        # Drake only warns; a ray caster would read outside its memory.
         if not 0 <= triangles.min() <= triangles.max() < len(p_GVset):
             raise ValueError("a face has a vertex that is not there")
         if ending in _Y_UP:
@@ -333,12 +333,12 @@ class MeshFiles:
 
 
 def mesh_shape_key(shape: Mesh | Convex) -> tuple:
-    """Returns a key that is equal only for equal meshes and hulls."""
+    """Returns a key that is equal only for equal meshes or hulls."""
     return type(shape), _source_key(shape.source()), tuple(shape.scale3())
 
 
 def _source_key(source: MeshSource) -> object:
-    """Returns a key that is equal for sources of the same mesh."""
+    """Returns a key that is equal only for sources of the same mesh."""
     if source.is_path():
         return str(source.path())
     mesh = source.in_memory()
@@ -350,7 +350,7 @@ def _source_key(source: MeshSource) -> object:
 
 
 def _read_hull(shape: Convex) -> TriangleSurface:
-    """Returns Drake's own convex hull, with the scale applied."""
+    """Returns Drake's convex hull, with the scale applied."""
     source = shape.source()
     if source.is_path() and source.extension() in GLTF:
         check_gltf(Path(source.path()))
@@ -380,7 +380,10 @@ def _read_obj(path: Path) -> tuple[np.ndarray, np.ndarray]:
 def _parse_small_obj(
     path: Path, identity: tuple[int, int, int]
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Returns what a file holds: the stages of a city share most files."""
+    """Returns the vertices and triangles of a file, from a cache.
+
+    The stages of a city share most of their files.
+    """
     del identity
     p_GVset, triangles = _parse_obj(path)
     for array in (p_GVset, triangles):

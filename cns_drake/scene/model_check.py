@@ -1,7 +1,7 @@
 """Checks models before Drake parses them.
 
-For text that is not a number or a valid size, libsdformat uses a part of it or
-1, or Drake ends the program. Long names end the process.
+For a text that is not a number or a valid size, libsdformat uses only a part of
+it or the value 1, or Drake ends the program. Long names end the process, too.
 """
 
 import math
@@ -18,7 +18,7 @@ from cns_drake.scene.surfaces import LARGEST_SIZE
 _MODELS = (".sdf", ".world", ".urdf")
 _LONGEST_NAME = 1000
 _NUMBER = re.compile(r"[-+]?(\d+\.?\d*|\.\d+)([eE][-+]?\d+)?")
-# Shape -> elements of its size, and the numbers in each.
+# Shape -> elements that give its size, and how many numbers each has.
 SIZES = {
     "box": {"size": 3},
     "sphere": {"radius": 1},
@@ -27,7 +27,7 @@ SIZES = {
     "ellipsoid": {"radii": 3},
     "drake:capsule": {"radius": 1, "length": 1},
     "drake:ellipsoid": {"a": 1, "b": 1, "c": 1},
-    # Without a size it is endless.
+    # A plane without a size is infinite.
     "plane": {"size": 2},
 }
 _OTHER_SHAPES = ("mesh", "heightmap", "polyline", "cone", "empty")
@@ -41,7 +41,7 @@ _OTHER_NUMBERS = {
 
 
 def lacks_size(shape: ElementTree.Element) -> bool:
-    """Returns whether an SDF shape gives no size of its own."""
+    """Returns whether an SDF shape has no size of its own."""
     if shape.tag == "plane" or shape.tag.startswith("drake:"):
         return False
     return any(shape.find(name) is None for name in SIZES.get(shape.tag, ()))
@@ -89,7 +89,7 @@ class _ModelCheck:
         elif element.tag == "geometry":
             shapes = [*SIZES, *_OTHER_SHAPES]
             found = [one.tag for one in element if one.tag in shapes]
-            # Polylines are the edges and holes of one shape.
+            # Several polylines are the edges and holes of one shape.
             if len(found) > 1 and set(found) != {"polyline"}:
                 fault = f"two shapes, {found[0]} and {found[1]}"
                 self._refuse(element, fault)
@@ -112,7 +112,7 @@ class _ModelCheck:
 
     def _check_sizes(self, shape: Element) -> None:
         for name, count in SIZES[shape.tag].items():
-            # SDF has children, URDF has attributes.
+            # The sizes are child elements in SDF, and attributes in URDF.
             texts = [one.text or "" for one in shape.findall(name)]
             if not texts and name in shape.attrib:
                 texts = [shape.attrib[name]]
@@ -134,7 +134,7 @@ class _ModelCheck:
     def _numbers(
         self, element: Element, text: str, where: str = ""
     ) -> list[float]:
-        """Returns the numbers in a text, all of which are finite."""
+        """Returns the numbers in a text; InputError if one is not finite."""
         numbers = []
         for word in text.split():
             number = float(word) if _NUMBER.fullmatch(word) else math.nan

@@ -1,4 +1,4 @@
-"""The geometry of one role in a SceneGraph, as seen by a LiDAR."""
+"""The geometry of one role in a SceneGraph, as a LiDAR sees it."""
 
 from collections.abc import Callable, Collection, Iterable, Sequence
 from dataclasses import dataclass
@@ -25,7 +25,7 @@ from cns_drake.scene.foreign_meshes import ForeignMeshes
 from cns_drake.scene.mesh_files import MeshFiles, mesh_shape_key
 from cns_drake.scene.surfaces import LARGEST_SIZE, Surface, TriangleSurface
 
-# The corners of a unit cube and its faces, counter-clockwise from outside.
+# The corners of a unit cube, and its faces, counter-clockwise from outside.
 _CUBE_CORNERS = np.array(
     [(x, y, z) for z in (-0.5, 0.5) for y in (-0.5, 0.5) for x in (-0.5, 0.5)]
 )
@@ -35,22 +35,22 @@ _CUBE_TRIANGLES = np.array(
         (2, 6, 7), (2, 7, 3), (0, 4, 6), (0, 6, 2), (1, 3, 7), (1, 7, 5),
     ]
 )  # fmt: skip
-# Sides of a cone, so that it is within 5e-6 of its radius.
+# Number of sides of a cone; its surface is then exact to 5e-6 of its radius.
 _CONE_SIDES = 1024
 
 
 @dataclass(frozen=True)
 class PerceptionGeometry:
-    """One geometry that rays can meet.
+    """One geometry that rays can hit.
 
     Attributes:
         geometry_id: id of the geometry in the SceneGraph.
         name: scoped name, `<model>::<visual>`.
-        frame_id: the frame F on which it is fixed.
+        frame_id: the frame F to which it is fixed.
         X_FG: pose of the geometry G in F.
         surface: shape of the geometry, in G.
         rgb: diffuse colour; None if the model has none.
-        reflectivity: the property ("lidar", "reflectivity"), 0 to 1; None
+        reflectivity: the property ("lidar", "reflectivity"), from 0 to 1; None
             without it.
     """
 
@@ -68,10 +68,10 @@ class PerceptionGeometry:
 
 
 def structure_name(geometry_name: str) -> str:
-    """Returns the name of a geometry's structure.
+    """Returns the name of the structure to which a geometry belongs.
 
     A visual named `tower_017/storey_03` belongs to `tower_017`; a visual
-    without a slash belongs to the model that it is in.
+    without a slash belongs to its model.
     """
     model, _, visual = geometry_name.rpartition("::")
     structure, slash, _ = visual.partition("/")
@@ -81,7 +81,7 @@ def structure_name(geometry_name: str) -> str:
 
 
 def check_shape(name: str, shape: Shape) -> None:
-    """Checks the size of a shape; a mesh has its size in its file.
+    """Checks the size of a shape; for a mesh, its file gives the size.
 
     Raises:
         InputError: it is too large; the message names the geometry.
@@ -103,7 +103,7 @@ def read_perception_geometry(
     inspector: SceneGraphInspector,
     keep_frame: Callable[[FrameId], bool] = lambda frame_id: True,
 ) -> tuple[PerceptionGeometry, ...]:
-    """Returns every geometry of `Role.kPerception` on the given frames.
+    """Returns every geometry with `Role.kPerception` on the wanted frames.
 
     Raises:
         InputError: see `GeometryReader.read`.
@@ -122,9 +122,9 @@ def merge_surfaces(
     geometries: Iterable[PerceptionGeometry],
     calc_X_TF: Callable[[FrameId], RigidTransform],
 ) -> TriangleSurface:
-    """Returns one surface in a frame T with the triangles of many geometries.
+    """Returns the triangles of many geometries as one surface in a frame T.
 
-    Curved shapes are tessellated.
+    `calc_X_TF` returns the pose of a frame in T. Curved shapes are tessellated.
     """
     members = [
         (
@@ -138,10 +138,10 @@ def merge_surfaces(
 
 
 class GeometryReader:
-    """Reads the geometry of a role, and later only its changes."""
+    """Reads the geometry of a role, and then only what has changed."""
 
     def __init__(self, role: Role):
-        """Reads nothing yet."""
+        """Takes the role, and reads nothing yet."""
         self._role = role
         self._known: dict[GeometryId, tuple[tuple, PerceptionGeometry]] = {}
 
@@ -150,11 +150,11 @@ class GeometryReader:
         inspector: SceneGraphInspector,
         hidden: Collection[GeometryId] = frozenset(),
     ) -> tuple[PerceptionGeometry, ...]:
-        """Returns every visible geometry of the role.
+        """Returns every geometry of the role that is not hidden.
 
         The order is that of `GetAllGeometryIds`, which Drake documents as
-        stable; the result depends only on the SceneGraph. Geometry that has not
-        changed since the last call is the same object.
+        stable, so the result depends only on the SceneGraph. A geometry that
+        has not changed since the last call is the same object.
 
         Raises:
             InputError: a geometry is deformable, a mesh file is missing or
@@ -175,7 +175,7 @@ class GeometryReader:
                     )
                 shape = inspector.GetShape(geometry_id)
                 frame_id = inspector.GetFrameId(geometry_id)
-                # A copy: Drake gives references.
+                # A copy, because Drake returns references.
                 X_FG = RigidTransform(inspector.GetPoseInFrame(geometry_id))
                 look = self._appearance(name, inspector, geometry_id)
                 pose = X_FG.GetAsMatrix34().tobytes()
@@ -195,7 +195,7 @@ class GeometryReader:
     def _appearance(
         self, name: str, inspector: SceneGraphInspector, geometry_id: GeometryId
     ) -> tuple[tuple[float, float, float] | None, float | None]:
-        """Returns colour and reflectivity; None if the model has none."""
+        """Returns colour and reflectivity, each None if the model has none."""
         properties = inspector.GetProperties(geometry_id, self._role)
         rgb = reflectivity = None
         if properties.HasProperty("lidar", "reflectivity"):
@@ -255,7 +255,7 @@ def _surface(name: str, shape: Shape, meshes: MeshFiles) -> Surface:
 
 
 def _cone(shape: shapes.MeshcatCone) -> TriangleSurface:
-    """Returns a pyramid for a cone; its apex is the origin."""
+    """Returns a pyramid with many sides for a cone; its apex is the origin."""
     angle = 2.0 * np.pi * np.arange(_CONE_SIDES) / _CONE_SIDES
     corners = np.zeros((2 + _CONE_SIDES, 3))
     corners[1:, 2] = shape.height()
@@ -280,21 +280,21 @@ _revisions = itertools.count(1)
 
 
 def geometry_revision_port(scene_graph: SceneGraph) -> OutputPort:
-    """Returns a port whose value changes when geometry does, and only then.
+    """Returns a port whose value changes when, and only when, geometry does.
 
-    There are two other ways to notice changes. SceneGraph's own
-    `geometry_version` covers only perception geometry that a render engine
-    accepted. Comparing all geometries takes longer than a scan.
+    There are two other ways to notice changes, with drawbacks: SceneGraph's own
+    `geometry_version` only covers perception geometry that a render engine has
+    accepted, and comparing all geometries takes longer than a scan.
 
     A Context holds the geometry as a parameter, which Drake's cache tracks. The
-    port depends on this parameter alone. It is therefore computed anew when
+    port depends only on this parameter. It is therefore computed again whenever
     geometry was added, removed, replaced, reshaped, renamed or given another
     role, in any way. The first call adds the port to the SceneGraph, and must
     come before a Diagram is built from it.
 
     Returns:
         An abstract port. Its value is an int, which is different for any other
-        geometry in this process, also in another Context.
+        geometry in this process, even in another Context.
 
     Raises:
         RuntimeError: the SceneGraph is already part of a Diagram.
@@ -305,6 +305,6 @@ def geometry_revision_port(scene_graph: SceneGraph) -> OutputPort:
         _PORT,
         lambda: Value(object()),
         lambda context, output: output.set_value(next(_revisions)),
-        # The only parameter that a SceneGraph has.
+        # A SceneGraph has only this parameter.
         {scene_graph.abstract_parameter_ticket(AbstractParameterIndex(0))},
     )

@@ -1,4 +1,4 @@
-"""Finds the files that a model refers to, and notices their changes."""
+"""Finds the files to which a model refers, and notices their changes."""
 
 import contextlib
 import os
@@ -11,9 +11,10 @@ from cns_drake.base.files import user_errors
 from cns_drake.base.xml_elements import readable_xml
 from cns_drake.scene.gazebo_worlds import ModelFinder
 
-# Files of a model's folder, besides meshes.
+# File name endings of the files of a model's folder, besides meshes.
 _MODEL_ENDINGS = (".sdf", ".urdf", ".config", ".xml")
-# Ending of mesh files -> pattern of references to materials, textures, buffers.
+# Ending of a mesh file -> pattern of its references to materials, textures,
+# buffers.
 _NAMING = {
     ".obj": re.compile(rb"^mtllib\s+(.+)$", re.MULTILINE),
     ".mtl": re.compile(rb"^\s*map_\w+.*?(\S+)\s*$", re.MULTILINE),
@@ -22,7 +23,7 @@ _NAMING = {
 
 
 class FileWatch:
-    """Notices a change of any of the files it was given.
+    """Notices whether any of some files have changed.
 
     Contents are not compared: a file counts as changed if its size, its times
     or its inode have changed.
@@ -32,9 +33,9 @@ class FileWatch:
         self._states: dict[str, tuple[int, ...]] = {}
 
     def take_down(self, path: str) -> os.stat_result | None:
-        """Notes the status of a file, for a later call of `changed`.
+        """Records the status of a file, for a later call of `changed`.
 
-        If called again for the same file, the first status is kept.
+        If this is called again for the same file, the first status is kept.
 
         Returns:
             The present status; None if the file does not exist.
@@ -44,9 +45,9 @@ class FileWatch:
         return status
 
     def changed(self) -> str | None:
-        """Returns the first file that has changed since its status was noted.
+        """Returns the first file that has changed since `take_down`.
 
-        None if none has.
+        It is None if no file has changed.
         """
         for path, state in self._states.items():
             if _state(_status(path)) != state:
@@ -57,7 +58,7 @@ class FileWatch:
 def _status(path: str) -> os.stat_result | None:
     try:
         return os.stat(path)
-    except (OSError, ValueError):  # It may be no name.
+    except (OSError, ValueError):  # It may not be a file name.
         return None
 
 
@@ -70,11 +71,11 @@ def _state(status: os.stat_result | None) -> tuple[int, ...]:
 def referenced_files(
     model: Path, watch: FileWatch
 ) -> dict[str, tuple[str, int]]:
-    """Returns the files that a model and the files that it names refer to.
+    """Returns the files to which a model refers, and those to which they refer.
 
     Returns:
-        The path relative to the model's folder, or the URI of a file elsewhere
-        -> file, and its size.
+        Path relative to the model's folder, or URI of a file elsewhere -> file,
+        and its size.
 
     Raises:
         InputError: a file cannot be read.
@@ -95,7 +96,7 @@ def referenced_files(
                 status = watch.take_down(place)
             for one, size in _files_at(place, status, watch):
                 key = name
-                if one != place:  # It lies in the folder of a model.
+                if one != place:  # It is inside a model's folder.
                     key = os.path.join(name, os.path.basename(one))
                 if key not in found:
                     found[key] = one, size
@@ -104,8 +105,8 @@ def referenced_files(
 
 
 def _find(finder: ModelFinder, uri: str, folder: str) -> str:
-    """Returns the file of a URI; "" if there is none."""
-    with contextlib.suppress(OSError, ValueError):  # It may be no name.
+    """Returns the file of a URI; "" if it does not exist."""
+    with contextlib.suppress(OSError, ValueError):  # It may not be a file name.
         return str(finder.find(uri, Path(folder)) or "")
     return ""
 
@@ -113,10 +114,7 @@ def _find(finder: ModelFinder, uri: str, folder: str) -> str:
 def _files_at(
     place: str, status: os.stat_result | None, watch: FileWatch
 ) -> list[tuple[str, int]]:
-    """Returns a file, or those that define the model in a folder.
-
-    Each comes with its size.
-    """
+    """Returns a file, or the files that define a folder's model, with sizes."""
     if status is not None and stat.S_ISDIR(status.st_mode):
         inside = [
             os.path.join(place, name)
@@ -128,14 +126,14 @@ def _files_at(
     found = []
     for path in inside:
         inner = status if path == place else watch.take_down(path)
-        # Only regular files count, no devices.
+        # Only regular files count, not devices.
         if inner is not None and stat.S_ISREG(inner.st_mode):
             found.append((path, inner.st_size))
     return found
 
 
 def _references(file: str) -> list[str]:
-    """Returns the references of a model or a mesh to other files."""
+    """Returns the references in a model or a mesh to other files."""
     ending = os.path.splitext(file)[1].lower()
     if ending in (*_MODEL_ENDINGS, ".dae"):
         return _xml_references(_read(file))
@@ -151,7 +149,7 @@ def _xml_references(content: bytes) -> list[str]:
 
     def start(tag: str, attributes: dict[str, str]) -> None:
         texts.clear()
-        if "filename" in attributes:  # A mesh of URDF.
+        if "filename" in attributes:  # A mesh in URDF.
             found.append(attributes["filename"])
 
     def end(tag: str) -> None:
@@ -163,7 +161,7 @@ def _xml_references(content: bytes) -> list[str]:
     parser.StartElementHandler = start
     parser.CharacterDataHandler = texts.append
     parser.EndElementHandler = end
-    # The loader refuses a file that is not XML.
+    # The loader will reject a file that is not XML.
     with contextlib.suppress(expat.ExpatError):
         parser.Parse(readable_xml(content), True)
     return found

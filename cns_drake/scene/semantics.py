@@ -2,9 +2,10 @@
 
 from cns_drake.scene.labels import OTHER_MOVING_ID
 
-# Name -> id of SemanticKITTI's published label table, so that tools and
-# networks for that dataset can use our labels unchanged; and the colour in
-# pictures and on the 3-D page, which differs in lightness as well as in hue.
+# Name -> id in SemanticKITTI's published label table, so that tools and
+# networks for that data set can use these labels unchanged; and the colour in
+# pictures and on the 3-D page. The colours differ in lightness as well as in
+# hue.
 _CLASSES = {
     "unlabeled": (0, (0.55, 0.55, 0.55)),
     "outlier": (1, (0.75, 0.78, 0.82)),
@@ -34,8 +35,8 @@ _CLASSES = {
 CLASS_IDS = {name: number for name, (number, _) in _CLASSES.items()}
 CLASS_RGB = {name: rgb for name, (_, rgb) in _CLASSES.items()}
 
-# SemanticKITTI's ids of moving objects, by our class; a class without a moving
-# kind gets its "moving-other-vehicle".
+# Class -> SemanticKITTI's id while it moves. A class without a moving
+# counterpart gets "moving-other-vehicle".
 MOVING_IDS = {
     "car": 252,
     "bicyclist": 253,
@@ -47,5 +48,5 @@ MOVING_IDS = {
 
 
 def moving_id(semantic_class: str) -> int:
-    """Returns SemanticKITTI's id of a class that moves."""
+    """Returns SemanticKITTI's id for a class while it moves."""
     return MOVING_IDS.get(semantic_class, OTHER_MOVING_ID)

@@ -17,13 +17,16 @@ from cns_drake.scene.semantics import CLASS_IDS, moving_id
 
 @dataclass(frozen=True)
 class StructureEntry:
-    """A structure as a LiDAR return refers to it.
+    """A structure's entry in a table, to which a LiDAR return refers by its id.
 
-    Its instance id is from 1 to 65535; 0 stands for no structure. Its class is
-    a key of `CLASS_IDS`. `reflectivity` is the reflectivity of its surfaces
-    near 900 nm, from 0 to 1; None if it follows from class and colours.
-    `causes` lists the switches of a scenario's `transient` by which the
-    structure differs from the stage's file.
+    Attributes:
+        instance: instance id, from 1 to 65535; 0 stands for no structure.
+        name: name of the structure.
+        semantic_class: a key of `CLASS_IDS`.
+        reflectivity: reflectivity of its surfaces near 900 nm, from 0 to 1;
+            None if it follows from class and colours.
+        causes: the switches of a scenario's `transient` that changed the
+            structure relative to the stage's file.
     """
 
     instance: int
@@ -38,11 +41,11 @@ class StructureEntry:
 
 
 class StructureTable:
-    """Structures by name.
+    """Structures by name, with instance ids and classes.
 
     Structures that the table does not name get the free ids, in alphabetical
-    order, and the class `unlabeled`. Structures can therefore be told apart
-    even in a world without a table.
+    order, and the class `unlabeled`. Structures can thus be distinguished even
+    in a world without a table.
     """
 
     def __init__(self, entries: Iterable[StructureEntry]):
@@ -58,15 +61,15 @@ class StructureTable:
 
     @property
     def last_instance(self) -> int:
-        """Highest instance id in use, 0 for none."""
+        """Greatest instance id in use; 0 if there is none."""
         return max((entry.instance for entry in self), default=0)
 
     def joined(self, other: StructureTable) -> StructureTable:
-        """Returns the table with the entries of another one added."""
+        """Returns the table with the entries of another table added."""
         return StructureTable([*self, *other])
 
     def completed(self, names: Iterable[str]) -> StructureTable:
-        """Returns the table with an entry for each of the names."""
+        """Returns the table with additional entries for names that it lacks."""
         entries = list(self)
         free = self.last_instance + 1
         for name in sorted(set(names) - self._by_name.keys()):
@@ -80,7 +83,7 @@ class StructureTable:
         return StructureTable(entries)
 
     def labels(self, names: Sequence[str]) -> Labels:
-        """Returns labels of geometries, by the names of their structures."""
+        """Returns labels of geometries, given the names of their structures."""
         table = self.completed(names)
         entries = [table[name] for name in names]
         columns = (
@@ -92,9 +95,9 @@ class StructureTable:
 
 
 def load_structure_table(path: Path) -> StructureTable:
-    """Reads a CSV file with columns `instance`, `name` and `class`.
+    """Returns the table in a CSV file with columns `instance`, `name`, `class`.
 
-    The column `reflectivity` is optional, and its cells can be empty.
+    The column `reflectivity` is optional, and its cells may be empty.
 
     Raises:
         InputError: the file lacks a column or a row is not usable.

@@ -1,4 +1,4 @@
-"""Surfaces that rays can meet, each in its geometry frame G, as triangles."""
+"""Surfaces that rays can hit, each in its geometry's frame G."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -15,9 +15,12 @@ LARGEST_SIZE = 1e7
 
 @dataclass(frozen=True)
 class TriangleSurface:
-    """Triangles by (N, 3) float64 vertex positions in the geometry frame G [m].
+    """A surface of triangles.
 
-    The (M, 3) int32 vertex indices are counter-clockwise seen from outside.
+    Attributes:
+        p_GVset: (N, 3) float64 vertices in the geometry frame G [m].
+        triangles: (M, 3) int32 indices of vertices, counter-clockwise seen from
+            outside.
     """
 
     p_GVset: np.ndarray
@@ -26,7 +29,7 @@ class TriangleSurface:
 
 @dataclass(frozen=True)
 class EllipsoidSurface:
-    """An ellipsoid (or sphere) centred on G with semi-axes along G's."""
+    """An ellipsoid (or sphere) centred on G; its axes are those of G."""
 
     semi_axes: tuple[float, float, float]
 
@@ -53,7 +56,7 @@ class CapsuleSurface:
 
 @dataclass(frozen=True)
 class HalfSpaceSurface:
-    """The plane z = 0 of G, which bounds a half space."""
+    """The plane z = 0 of G, the boundary of a half space."""
 
 
 Surface = (
@@ -65,9 +68,9 @@ Surface = (
 )
 
 
-# Sides of a round shape in pictures; lamp posts are many and thin.
+# Number of sides of a round shape in pictures; lamp posts are many and thin.
 _SIDES = 12
-# The shown part of an endless plane.
+# The part of an infinite plane that is shown.
 _PLANE_CORNERS = np.array(
     [(-100.0, -100.0, 0.0), (100.0, -100.0, 0.0),
      (100.0, 100.0, 0.0), (-100.0, 100.0, 0.0)]
@@ -83,7 +86,8 @@ def merge_triangles(
     Each member consists of an index, a pose X_TG and a surface.
 
     Returns:
-        The surface in T, and the (M,) int32 index of each of its triangles.
+        The surface in T, and (M,) int32 the index of the member of each
+        triangle.
     """
     vertices: list[np.ndarray] = [np.zeros((0, 3))]
     triangles: list[np.ndarray] = [np.zeros((0, 3), np.int32)]
@@ -105,8 +109,8 @@ def merge_triangles(
 def tessellate(surface: Surface, sides: int = _SIDES) -> TriangleSurface:
     """Returns triangles for any surface, inscribed where it is curved.
 
-    A plane becomes a square of 200 m about G. A circle about the z axis of G
-    has `sides` sides; a half sphere has half as many parallels.
+    A plane becomes a square of 200 m centred on G. A circle around the z axis
+    of G has `sides` sides; a half sphere has half as many circles of latitude.
     """
     if isinstance(surface, TriangleSurface):
         return surface

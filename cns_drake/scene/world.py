@@ -1,4 +1,4 @@
-"""Loading an SDF world, and the vehicle in it, into a SceneGraph."""
+"""Loads an SDF world, and a vehicle in it, into a SceneGraph."""
 
 from collections.abc import Collection, Iterator
 import contextlib
@@ -38,10 +38,10 @@ from cns_drake.scene.structure_table import StructureTable, load_structure_table
 
 
 def _parse_models(parser: Parser, path: Path) -> list[ModelInstanceIndex]:
-    """Parses the models of a file.
+    """Parses a file, and returns its models.
 
     Raises:
-        InputError: the file is missing or cannot be parsed, or holds none.
+        InputError: the file is missing, cannot be parsed, or has no models.
     """
     _check_file(path)
     check_model(path)
@@ -54,7 +54,7 @@ def _parse_models(parser: Parser, path: Path) -> list[ModelInstanceIndex]:
 
 @contextlib.contextmanager
 def _parse_faults(path: Path) -> Iterator[None]:
-    """Raises what Drake says of a file as an InputError."""
+    """Raises Drake's errors about a file as an InputError."""
     with collected_errors() as errors:
         try:
             yield
@@ -78,7 +78,7 @@ def _read_names(scene_graph: SceneGraph, sdf: Path) -> dict[GeometryId, str]:
 def _check_visible(
     scene_graph: SceneGraph, sdf: Path, notes: tuple[str, ...]
 ) -> set[str]:
-    """Checks what a LiDAR can see; returns the names of its structures."""
+    """Checks what a LiDAR can see; returns the names of visible structures."""
     inspector, structures = scene_graph.model_inspector(), set()
     for geometry_id in inspector.GetAllGeometryIds(Role.kPerception):
         name = inspector.GetName(geometry_id)
@@ -99,7 +99,7 @@ def _check_visible(
 def _parse_world(
     parser: Parser, path: Path, model_paths: Collection[Path]
 ) -> tuple[str, ...]:
-    """Parses a world, and returns notes on omitted parts."""
+    """Parses a world, and returns notes about omitted parts."""
     _check_file(path)
     root = None if path.suffix.lower() == ".urdf" else read_xml(path)
     if root is None or not is_gazebo_world(path, root):
@@ -114,7 +114,7 @@ def _parse_world(
 def _check_file(path: Path) -> None:
     if not path.is_file():
         raise InputError(f"{path}: no such file")
-    # Drake fails on quoting other text.
+    # Drake would fail when it quotes other text.
     content = read_bytes(path)
     try:
         content.decode("utf-8")
@@ -123,9 +123,9 @@ def _check_file(path: Path) -> None:
 
 
 def _parse_fault(path: Path, *texts: str) -> InputError:
-    """Returns the error with the first two of Drake's messages."""
-    # Drake and libsdformat begin with the path, which Drake makes absolute, a
-    # severity and a code.
+    """Returns an error that contains the first two of Drake's messages."""
+    # Messages of Drake and libsdformat begin with the path, which Drake makes
+    # absolute, a severity and a code.
     names = "|".join(re.escape(str(p)) for p in (path.absolute(), path))
     faults = [" ".join(text.split()) for text in texts[:2]]
     faults = [re.sub(r"^SDFormat Error .*?Msg: ", "", f) for f in faults]
@@ -141,10 +141,10 @@ def _parse_fault(path: Path, *texts: str) -> InputError:
 
 
 def _mesh_notes(scene_graph: SceneGraph) -> tuple[str, ...]:
-    """Returns what is not read of the visible meshes.
+    """Returns notes about content of the visible meshes that is not read.
 
     Raises:
-        InputError: the shapes of one would be misread.
+        InputError: the shapes of a mesh would be misread.
     """
     inspector = scene_graph.model_inspector()
     ids = inspector.GetAllGeometryIds(Role.kPerception)
@@ -166,8 +166,8 @@ class World:
     Attributes:
         scene_graph: the SceneGraph with their geometry; add it to a
             DiagramBuilder.
-        plant: the plant with their bodies and frames; finalized, not meant for
-            a Diagram.
+        plant: the plant with their bodies and frames. It is finalized, and not
+            meant to be part of a Diagram.
         vehicle: model instance of the vehicle; None without one.
         structures: class and instance id of every structure in the world,
             whether or not a table lists it.
@@ -201,16 +201,16 @@ def load_world(
 ) -> World:
     """Returns the parsed models of an SDF world and, if given, of a vehicle.
 
-    A world made for Gazebo keeps its visuals, at their initial places; the
-    notes list the parts that are left out.
+    Of a world made for Gazebo, only the visuals are kept, at their initial
+    places; the notes list the parts that are left out.
 
     Args:
         sdf: SDF file of the world or model.
         vehicle: file of the vehicle's model; None for no vehicle.
-        structures: table of structures; by default `structures.csv` beside
-            the world, if there is one.
+        structures: structure table; by default `structures.csv` beside the
+            world, if there is one.
         without: names of structures to leave out.
-        model_paths: folders in which to look for `model://`, before those of
+        model_paths: folders in which `model://` is searched, before those of
             GZ_SIM_RESOURCE_PATH and SDF_PATH.
 
     Raises:
@@ -224,9 +224,9 @@ def load_world(
     """
     sdf = Path(sdf)
     scene_graph = SceneGraph()
-    # The plant parses models and has their frames. It stays out of the
-    # Diagram: motion is prescribed, for which a plant has no port, and a
-    # plant of many models makes Build() slow.
+    # The plant parses models and holds their frames. It stays out of the
+    # Diagram for two reasons: a plant has no port for prescribed motion, and a
+    # plant with many models makes Build() slow.
     plant = MultibodyPlant(time_step=0.0)
     source = plant.RegisterAsSourceForSceneGraph(scene_graph)
     parser = Parser(plant)
@@ -261,9 +261,9 @@ def load_world(
 def _mismatches(
     table: Path, listed: set[str], found: set[str]
 ) -> tuple[str, ...]:
-    """Returns a note if a table has rows for only some of the structures.
+    """Returns a note if a table lacks some of the structures.
 
-    Rows without structures are normal: another stage may have these.
+    Rows without a structure are normal: another stage may have it.
     """
     unlabelled, unused = sorted(found - listed), sorted(listed - found)
     if not (unlabelled and unused):

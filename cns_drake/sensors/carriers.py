@@ -1,4 +1,4 @@
-"""The place of a sensor on its carrier, and the carrier's motion."""
+"""The pose of a sensor on its carrier, and the carrier's motion."""
 
 import math
 
@@ -24,7 +24,7 @@ def body_and_pose(
 
     Raises:
         RuntimeError: the plant is not finalized.
-        TypeError: the place is of another type.
+        TypeError: P is of another type.
     """
     if not isinstance(place, RigidBody | Frame):
         cure = ""
@@ -50,8 +50,9 @@ def connect_motion(
 ) -> None:
     """Connects inputs of a system to the motion of a plant's bodies.
 
-    Inputs are given by the names of output ports. The source has the kinematic
-    output ports of a MultibodyPlant; by default it is the body's plant itself.
+    The keys of `inputs` are names of output ports of `motion`, which has the
+    kinematic output ports of a MultibodyPlant. By default, `motion` is the
+    body's plant.
     """
     source = body.GetParentPlant() if motion is None else motion
     for name, port in inputs.items():

@@ -1,8 +1,9 @@
 """Sensors described as Drake describes its cameras.
 
-A struct that `pydrake.common.yaml` reads and writes, and a function that adds
-what it describes to a diagram and publishes it on LCM. The fields of a struct
-are those of the section of a scenario, which stays the only description.
+For each sensor there is a struct that `pydrake.common.yaml` reads and writes,
+and a function that adds the described sensor to a diagram and publishes its
+output on LCM. The fields of a struct are taken from the sensor's section of a
+scenario, so that they are defined only once.
 """
 
 from collections.abc import Callable
@@ -38,10 +39,10 @@ from cns_drake.sensors.odometry import odometry
 from cns_drake.sensors.odometry.config import OdometrySection
 from cns_drake.sensors.sensor_config import HIGHEST_RATE, Section
 
-# What messages are published on.
+# An interface on which messages are published.
 Interface: TypeAlias = DrakeLcmInterface | LcmInterfaceSystem
-# Fields of a section that a struct leaves out: `X_PB` stands for the place, a
-# layout is that of a recording, and a LiDAR may turn at any rate.
+# Fields of a section that a struct leaves out: `X_PB` replaces the mount, and a
+# layout concerns recordings only.
 _LEFT_OUT = ("xyz", "rpy_deg", "layout")
 # Messages a second of an IMU or odometry that names no rate.
 _RATE = 20
@@ -368,10 +369,10 @@ def _place(
 
 
 def _checked_rate(config: Config, rate: int | None) -> int:
-    """Returns the messages a second; 20 if it names none.
+    """Returns a description's messages per second; 20 if it gives no rate.
 
     Raises:
-        ValueError: there are none, or too many.
+        ValueError: the rate is not positive, or too high.
     """
     rate = _RATE if rate is None else rate
     if not 1 <= rate <= HIGHEST_RATE:
@@ -407,17 +408,17 @@ def _publish(
     lcm_buses: LcmBuses | None,
     lcm: Interface | None,
 ) -> None:
-    """Adds systems that make a message of ports, and publish it.
+    """Adds systems that convert ports to an LCM message and publish it.
 
     Args:
-        builder: holds the sensor.
-        config: its description.
+        builder: builder of a diagram with the sensor.
+        config: description of the sensor.
         kind: the channel is `DRAKE_<kind>_<name>`.
-        ports: what it measures.
-        to_lcm: makes a message of the ports.
+        ports: output ports of the sensor.
+        to_lcm: system that converts the ports' values to a message.
         period: time between two messages [s].
         lcm_buses: see `ApplyLidarConfig`.
-        lcm: likewise.
+        lcm: see `ApplyLidarConfig`.
 
     Raises:
         RuntimeError: there is no such bus.

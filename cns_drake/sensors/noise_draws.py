@@ -1,4 +1,4 @@
-"""Random numbers that depend only on a seed and their place."""
+"""Random numbers that depend only on a seed and on what they are used for."""
 
 import numpy as np
 
@@ -8,9 +8,9 @@ def noise_generator(
 ) -> np.random.Generator:
     """Returns the random generator for one piece of a sensor's noise.
 
-    A piece is a frame or a block, for example. The same arguments always give
-    the same numbers. Different names give different sensors different
-    numbers. The number of a purpose is at least 0.
+    A piece is, for example, a frame or a block of samples. Equal arguments give
+    equal numbers; sensors with different names get different numbers. `purpose`
+    is 0 or greater.
     """
     # Keys are never negative: pieces before time zero have other streams.
     stream = purpose if index >= 0 else 2**32 - 1 - purpose

@@ -1,4 +1,4 @@
-"""What the descriptions of all sensors share.
+"""Base classes and checks for the descriptions of all sensors.
 
 These descriptions are the sections of a scenario. Reading them needs no Drake,
 which is slow to import.
@@ -22,8 +22,8 @@ if TYPE_CHECKING:
 HIGHEST_RATE = 1000
 _NS_PER_S = 1_000_000_000
 
-# Greatest distance of a sensor on a vehicle [m]; rays are cast in single
-# precision.
+# Greatest distance of a sensor from the vehicle's origin [m]; rays are cast in
+# single precision.
 Place = Annotated[float, Field(ge=-1000.0, le=1000.0)]
 Triple = tuple[Place, Place, Place]
 Angle = Annotated[float, Field(ge=-3600.0, le=3600.0)]
@@ -66,8 +66,9 @@ class Mount(Section):
 class SensorConfig(Mount, abc.ABC):
     """A sensor that publishes one message at a time on one topic.
 
-    A kind of sensor derives from it. A field of a scenario that holds one is
-    added to its Diagram and recorded; the frame has the name of the field.
+    Derive a class from this one for each kind of sensor. A sensor in a field of
+    a scenario is added to the Diagram and recorded; its frame has the name of
+    the field.
 
     Attributes:
         xyz: position in base_link [m].
@@ -81,10 +82,7 @@ class SensorConfig(Mount, abc.ABC):
 
     @abc.abstractmethod
     def topic(self, name: str) -> Topic:
-        """Returns the topic of the sensor of a name.
-
-        Its second part is that name: `/<name>/...`.
-        """
+        """Returns the topic of a sensor: `/<name>/...`."""
 
     @abc.abstractmethod
     def add(
@@ -107,7 +105,7 @@ class SensorConfig(Mount, abc.ABC):
 
     @abc.abstractmethod
     def make_message(self, value: Any, frame_id: str, stamp_ns: int) -> Any:
-        """Returns the ROS 2 message of a value of the port."""
+        """Converts a value of the port to a ROS 2 message."""
 
 
 def check_rate(
@@ -115,12 +113,12 @@ def check_rate(
 ) -> None:
     """Checks that a rate of samples is possible.
 
-    Stamps are whole nanoseconds, so the rate must divide a billion. The name is
-    that of its field.
+    Stamps are whole nanoseconds, so the rate must divide a billion. Messages
+    name the field `name`.
 
     Raises:
-        ValueError: it is not allowed; the message has the nearest allowed
-            rates.
+        ValueError: the rate is not allowed; the message gives the nearest
+            allowed rates.
     """
     allowed = [
         one

@@ -38,16 +38,17 @@ from cns_drake.simulation.station import make_station
 from cns_drake.traffic.vehicles import room_for_vehicles
 from cns_drake.traffic.walkers import room_for_walkers
 
-# Images a second.
+# Images per second.
 RATE = 10
-# Behind the car and above it, in its frame; both look ahead and down.
+# Cameras behind and above the car, in its frame; both look ahead and down.
 _VIEWS = {
     "film_street": CameraSection(xyz=(-9.0, 0.0, 3.6), rpy=(0.0, 0.12, 0.0)),
     "film_above": CameraSection(xyz=(-28.0, 0.0, 40.0), rpy=(0.0, 0.8, 0.0)),
 }
-# A point this far behind what a camera sees is still drawn [m].
+# A point is drawn unless it lies farther than this behind the visible surface
+# [m].
 _BEHIND = 0.4
-# Where a shot may begin, every so often [s].
+# Interval of the times at which a shot may begin [s].
 _PLACES = 0.5
 _QUALITY = 50
 _TRAFFIC = 60
@@ -68,7 +69,7 @@ def check_film(path: Path, size: tuple[int, int]) -> None:
     """Checks, before a long run, that a film can be written.
 
     Raises:
-        InputError: it cannot.
+        InputError: the film cannot be written.
     """
     if path.suffix not in (".webp", ".mp4"):
         raise InputError(f"{path}: the name of a film ends in .webp or .mp4")
@@ -106,8 +107,8 @@ def make_film(
         path: file to write, .webp or .mp4.
         seconds: length of the film [s].
         size: width and height of its images [pixels].
-        start: time of the drive at which each shot begins [s]; by default
-            where the way ahead is straightest.
+        start: time of the drive at which each shot begins [s]; by default where
+            the road ahead is straightest.
         on_frame: called with the progress.
         on_note: called with notes for the user.
 
@@ -242,7 +243,7 @@ def _picture(
     camera: CameraSection,
     p_WQset: np.ndarray,
 ) -> np.ndarray:
-    """Returns what a camera sees, with the points (N, 3) in the world."""
+    """Returns a camera's image with points p_WQset (N, 3) drawn into it."""
     eye = diagram.GetSubsystemByName(f"{name}-colours")
     depth = eye.depth_image_32F_output_port().Eval(
         eye.GetMyContextFromRoot(context)
@@ -301,7 +302,7 @@ def _titled(pixels: np.ndarray, title: str) -> Image.Image:
 
 
 def _write(path: Path, files: Sequence[Path]) -> None:
-    """Writes a film of images, which gets its name when it is complete."""
+    """Writes a film from images; the file gets its name when it is complete."""
     with completing(path) as part:
         if path.suffix == ".webp":
             first, *others = map(Image.open, files)

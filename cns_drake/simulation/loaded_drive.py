@@ -1,4 +1,4 @@
-"""A scenario with all that its simulation needs: plan, stage, traffic."""
+"""A scenario with the inputs of its simulation: plan, stage, traffic."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
@@ -38,8 +38,8 @@ from cns_drake.transient.world_structures import GROUND_CLASSES, read_structures
 
 # Size of the car in worlds/vehicle.sdf, with mirrors and wheels [m].
 EGO_BOX = EgoBox(rear=-1.05, front=3.75, half_width=1.05)
-# A car that follows others takes at most this multiple of its own time, and
-# this time besides [s].
+# A car that follows others takes at most this multiple of the time that it
+# would need alone, plus this time [s].
 _SLOWEST, _WAITS = 6.0, 600.0
 # Distance from the car's middle line to its sides, with a margin [m].
 _HALF_WIDTH = 1.3
@@ -93,7 +93,8 @@ def load_drive(scenario: Scenario) -> LoadedDrive:
     changed = watch.changed()
     if changed is not None:
         raise InputError(f"{changed}: changed while it was being read")
-    # `frames` is set for the whole drive as well, so that both are the same.
+    # `frames` is set even for the whole drive, so that giving its number
+    # explicitly makes no difference.
     whole = num_frames == frames_within(
         trajectory.duration, scenario.frame_period
     )
@@ -167,7 +168,7 @@ def load_stage(
 
 
 def _in_the_way(scenario: Scenario) -> Sequence[str]:
-    """Returns the names of what stands where the traffic drives."""
+    """Returns the names of structures that stand where traffic drives."""
     if scenario.traffic.is_off or scenario.map is None:
         return ()
     folder = scenario_files.map_folder(scenario)
@@ -273,9 +274,9 @@ def plan_scenario_traffic(
 
 
 def _things(world: World) -> list[BaseGeometry]:
-    """Returns what stands on sidewalks, seen from above [m].
+    """Returns footprints of objects that can stand on sidewalks [m].
 
-    Walkways lead along buildings, which need no regard.
+    Buildings are left out, because walkways lead along them.
     """
     passed = GROUND_CLASSES | {"building"}
     things = read_structures(
@@ -299,7 +300,7 @@ def load_ways(folder: MapFolder) -> LaneFile:
 
 @functools.lru_cache(maxsize=1)
 def _ways_along(roads: Path, content: bytes) -> LaneFile:
-    """Returns the ways along roads; a ladder asks for them again and again."""
+    """Returns lanes and walkways along roads; cached for repeated use."""
     network = load_road_network(roads)
     graph = make_lane_graph(network)
     return LaneFile(graph, make_walkways(network, graph))

@@ -11,7 +11,7 @@ from cns_drake.recording.rosbag2_metadata import Topic
 from cns_drake.recording.schedule import Schedule, make_schedule
 from cns_drake.scenarios.scenario import Scenario
 
-# Greatest error of a time as a multiple of a period, in periods.
+# Tolerance, in periods, for a time to count as a multiple of a period.
 _TOLERANCE = 1e-6
 
 
@@ -37,7 +37,7 @@ def _further_topics(scenario: Scenario) -> dict[str, Topic]:
 
 
 def _camera_rates(scenario: Scenario) -> dict[Topic, int]:
-    """Returns the images a second on each topic of a camera."""
+    """Returns topic -> images per second, for the topics of a camera."""
     return {
         camera_topic(name, kind): camera.rate
         for name, camera in scenario.cameras.items()

@@ -40,7 +40,7 @@ def still_scene(
 ) -> RayCastingScene:
     """Returns the world's models in their initial state, to cast rays on.
 
-    Rays start within some kilometres of S.
+    Rays must start within some kilometres of S.
     """
     lidar, context = _stand(world, X_WS, pattern)
     return lidar.EvalScene(context)
@@ -50,7 +50,7 @@ def check_ending(path: Path) -> None:
     """Checks that `save_scan` can write the format of a file.
 
     Raises:
-        InputError: it does not.
+        InputError: the ending is not .pcd, .bin or .npy.
     """
     if path.suffix not in _ENCODERS:
         raise InputError(
@@ -90,7 +90,7 @@ def _stand(
     pattern: BeamPattern,
     returns: CalibratedReturns | None = None,
 ) -> tuple[Lidar, Context]:
-    """Returns a LiDAR that stands in a world, and its Context."""
+    """Returns a LiDAR at a fixed pose in a world, and its Context."""
     lidar = Lidar(
         world.scene_graph.world_frame_id(),
         X_WS,

@@ -39,10 +39,10 @@ def add_mcap_recorder(
 
     Every LiDAR has a topic `/<name of the system>/points`; every camera
     `/<name>/color`, `depth`, `label` and `camera_info`; an IMU `/imu/data`,
-    odometry `/odometry`. Sensors on the body of the odometry have their pose on
-    it in `/tf_static`; all others have their pose in `/tf`.
+    odometry `/odometry`. The poses of sensors on the same body as the odometry
+    are in `/tf_static`; those of all other sensors are in `/tf`.
 
-    `rates` gives sensors a rate of their own, and an IMU may have one already.
+    `rates` sets the rates of single sensors; an IMU may already have a rate.
     Without a period, each LiDAR is recorded once for each of its turns.
 
     Args:
@@ -148,7 +148,7 @@ def _periods(
     cameras: Mapping[str, RgbdSensor],
     imu: Imu | None,
 ) -> dict[str, float]:
-    """Returns name of a sensor -> time between its messages [s]."""
+    """Returns sensor name -> time between its messages [s]."""
     turns = {lidar.get_name(): lidar.pattern.period for lidar in lidars}
     if period is None and not turns:
         raise ValueError("period: a recording without a LiDAR needs one")

@@ -35,7 +35,7 @@ from cns_drake.simulation.station import make_station
 
 @dataclass(frozen=True)
 class DriveSimulation:
-    """Opens a scenario's drive, as seen by its first LiDAR."""
+    """Calling it simulates a scenario's drive for its first LiDAR."""
 
     scenario: Scenario
 
@@ -43,7 +43,7 @@ class DriveSimulation:
         return SimulatedDrive(self.scenario)
 
     def identity(self) -> dict:
-        """Returns the scenario, with digests of its files and of the code."""
+        """Returns scenario, digests of files and digest of code as a key."""
         return {
             "simulated": self.scenario.model_dump(mode="json"),
             "inputs": digest_inputs(self.scenario),
@@ -85,8 +85,8 @@ class SimulatedDrive(Drive):
             scenario, world=world, trajectory=trajectory, traffic=traffic
         )
         self._context = self._diagram.CreateDefaultContext()
-        # The vehicle's motion, which the station computes with its wheels, is
-        # known beforehand.
+        # The station would compute the vehicle's motion and its wheels; here
+        # the motion is known beforehand.
         self._base = world.plant.GetBodyByName("base_link", world.vehicle)
         poses = self._diagram.GetSubsystemByName("frame_poses")
         context = poses.GetMyMutableContextFromRoot(self._context)
@@ -151,10 +151,10 @@ class SimulatedDrive(Drive):
         return self._lidar.GetOutputPort("scan").Eval(self._at(index))
 
     def look(self, index: int) -> tuple[RayCastingScene, RigidTransform]:
-        """Returns the scene around a scan's LiDAR, and its pose X_WS.
+        """Returns the scene to cast rays on, and the LiDAR's pose X_WS.
 
-        The pose is that at the stamp. You can cast any rays in the scene, until
-        the next scan or look changes it.
+        Both are those at the stamp of scan `index`. The scene is valid until
+        the next call of `look` or `scan`.
         """
         scene = self._lidar.EvalScene(self._at(index))
         return scene, self.X_WBs[index] @ self.X_BS

@@ -175,7 +175,7 @@ def simulate(
 def _make_bag(
     drive: loaded_drive.LoadedDrive, folder: Path, *, overwrite: bool = False
 ) -> BagWriter:
-    """Makes the recording of a drive, so far without messages."""
+    """Makes the recording of a drive, still without messages."""
     scenario, inputs = drive.scenario, drive.inputs
     described = describe_scenario(scenario)
     kalibr = scenario.imu.describe_kalibr(scenario.fastest_rate)

@@ -1,4 +1,4 @@
-"""The Diagram: the one place where systems are wired."""
+"""The Diagram of a scenario: the only place where systems are connected."""
 
 import numpy as np
 from pydrake.common.value import AbstractValue, Value
@@ -53,7 +53,7 @@ def make_station(
 ) -> Diagram:
     """Makes the Diagram of a scenario.
 
-    These systems move things: `scene_graph` holds the stage and the vehicle,
+    These systems move objects: `scene_graph` holds the stage and the vehicle,
     `vehicle_motion` prescribes the vehicle's pose, and `geometry_pose` passes
     it on to the SceneGraph. `traffic` moves other objects, and `frame_poses`
     has the poses of all frames.
@@ -145,7 +145,7 @@ def make_station(
     for name, config in scenario.lidars.items():
         moving_bodies = None
         if moving is not None and config.motion_distortion:
-            # They keep moving during a turn.
+            # These frames keep moving during a turn.
             moving_bodies = moving.moving_frames
         lidar = add_described_lidar(
             config,
@@ -261,7 +261,7 @@ def make_station(
 def _copy_for_cameras(
     scene_graph: SceneGraph, world: World, classes: bool, with_vehicle: bool
 ) -> CameraScene:
-    """Returns what cameras on the vehicle see."""
+    """Copies the scene for the cameras on the vehicle."""
     plant, inspector = world.plant, scene_graph.model_inspector()
     context = plant.CreateDefaultContext()
     world_frame = inspector.world_frame_id()
@@ -285,10 +285,11 @@ def _copy_for_cameras(
 
 
 class _FramePoses(LeafSystem):
-    """Joins the poses of a plant's bodies and those of the traffic's limbs.
+    """Joins the poses of a plant's bodies and of the traffic's parts.
 
-    A LiDAR that has all of them does not ask the SceneGraph, which would
-    compute those of all geometry: 5 % of a scan's time, with traffic a third.
+    With all poses at hand, a LiDAR need not ask the SceneGraph, which would
+    compute the poses of all geometry. That would take 5 % of a scan's time, and
+    a third with traffic.
     """
 
     def __init__(self, plant: MultibodyPlant, traffic: TrafficMotion | None):

@@ -30,22 +30,22 @@ from cns_drake.traffic.vehicles import room_for_vehicles
 from evaluation.recognition.protocol import RetrievalProtocol
 from evaluation.results.table import LAST, OWN
 
-# Fields of a side that are no fields of a scenario.
+# Fields of a side (`both`, `database`, `query`) that no scenario has.
 FAMILY_FIELDS = ("missing", "scattered", "towards")
-# Those of a side that only the database, or only the query, has.
+# Fields that only the database, or only the query, can have.
 _QUERY_FIELDS = ("turn_queries", "tilt_queries", "hide_sector")
 _DATABASE_FIELDS = ("distractors", "lateral")
-# Sections whose draws follow the seed of a condition.
+# Sections whose random draws depend on the seed of the condition.
 _SEEDED = ("transient", "traffic", "ride", "driver")
 _RETURNS = ("ideal", "calibrated")
-# Stages by their place in the life of a map.
+# Names of stages by their position among the stages of a map.
 FIRST, EARLIER = "first", "earlier "
 # Number of names for earlier stages: `earlier 1` to `earlier 4`.
 _STEPS = 4
-# No driver keeps exactly to a line: the LiDAR of the database is this far ahead
-# of the query's [m].
+# The LiDAR of the database is this far ahead of the query's [m], because no two
+# drives stop at exactly the same places.
 _AHEAD = 1.25
-# Where it is besides: its offset to the left [m], and its heading [deg].
+# Named viewpoints of the database: offset to the left [m] and heading [deg].
 VIEWPOINTS: Mapping[str, tuple[float, float]] = {
     "near": (0.5, 0.0),
     "lane": (5.0, 0.0),
@@ -53,14 +53,14 @@ VIEWPOINTS: Mapping[str, tuple[float, float]] = {
 }
 # Greatest share of the roads' room for traffic: the car needs some, too.
 _MOST_ROOM = 0.5
-# Likewise for a car that follows others, since all wait for each other.
+# The same for a car that follows others, because then all wait for each other.
 _FOLLOWED_ROOM = 0.25
 # Columns of a table of frozen drives.
 _FROZEN = ("map", "level", "drives")
 
 
 class MissingError(Exception):
-    """A map lacks what a condition needs; the message says what."""
+    """A map cannot have a condition; the message says what it lacks."""
 
 
 @dataclass(frozen=True)
@@ -68,11 +68,11 @@ class Compared:
     """A database and a query in one condition.
 
     Attributes:
-        database: the drive that makes the database.
-        query: the drive that asks.
-        protocol: protocol by which the query asks.
+        database: the drive of the database.
+        query: the drive of the queries.
+        protocol: protocol of the queries.
         distractors: number of places elsewhere that are added to the database.
-        asked: fields of the protocol that the condition changes.
+        asked: fields of the protocol that the condition sets.
     """
 
     database: Scenario
@@ -93,10 +93,11 @@ class Compared:
         )
 
 
-# Returns the folder of a map that is some years older, and its stage: of a
-# drive, its years, their rates and a seed.
+# A function that takes a drive, years, rates of change and a seed. It returns
+# folder and stage of the drive's map, aged by these years.
 Age = Callable[[Scenario, int, Any, int], tuple[str, str]]
-# Returns the folder of a map drawn anew, and its stage: of a drive and a seed.
+# A function that takes a drive and a seed. It returns folder and stage of the
+# drive's map, drawn anew.
 Redraw = Callable[[Scenario, int], tuple[str, str]]
 
 
@@ -105,9 +106,10 @@ class PairOfDrives:
     """The two drives of a map whose conditions are built.
 
     Attributes:
-        database: the drive that makes the database in the unchanged map.
-        query: the drive that asks.
-        same_route: whether the database has the query's route, beside it.
+        database: the drive of the database, in the unchanged map.
+        query: the drive of the queries.
+        same_route: whether the database drives the query's route, at another
+            viewpoint.
         source: file of the experiment, for errors.
         age, redraw: functions that make the maps of a condition.
         on_note: takes notes on what was left out.
@@ -144,7 +146,7 @@ class PairOfDrives:
         """Returns the drives of a condition.
 
         Raises:
-            MissingError: the map lacks what the condition needs.
+            MissingError: the map cannot have the condition.
             InputError: a field is unknown or not usable.
         """
         chosen: list[Mapping[str, Changes]] = [condition.changes]
@@ -181,7 +183,8 @@ class PairOfDrives:
                 )
         for side, changes in sides.items():
             self._check_side(side, changes)
-            # What one drive is older, the other one's city has lived on.
+            # `years` says how much older one drive is: the other drive's city
+            # is aged by this number of years.
             other = sides["query" if side == "database" else "database"]
             age = other.get("years", 0), other.get("rates", 1.0)
             drive = self._changed(side, changes, age, seed)
@@ -198,7 +201,8 @@ class PairOfDrives:
             {**fields.get("protocol", {}), **changed}, self.source
         )
         if lateral := sides["database"].get("lateral"):
-            # On a straight road, as many places match at any offset.
+            # On a straight road, the number of matches does not depend on the
+            # offset.
             radius = math.hypot(protocol.radius, lateral)
             protocol = replace(protocol, radius=radius)
         number = sides["database"].get("distractors", 0)
@@ -207,10 +211,10 @@ class PairOfDrives:
         )
 
     def _possible(self, fields: Mapping[str, Changes]) -> dict[str, Changes]:
-        """Returns the fields of a case that the map allows.
+        """Returns those fields of a case that are possible on the map.
 
         Raises:
-            MissingError: it allows none.
+            MissingError: none of them is possible.
         """
         missing: MissingError | None = None
         found: dict[str, Changes] = {}
@@ -273,7 +277,8 @@ class PairOfDrives:
     ) -> Scenario:
         """Returns a drive with its changed fields.
 
-        The age is the years that its city has lived on, and their rates.
+        `age` is the number of years by which its city is aged, with the rates
+        of change.
         """
         drive = self._unchanged[side]
         left = dict(changes)
@@ -339,7 +344,8 @@ class PairOfDrives:
         if left:
             drive = drive.with_fields(left, f"{self.source}: {side}")
         for name in set(_SEEDED) & set(left):
-            # No seed tells sections apart that draw nothing.
+            # Sections without random draws get no seed, so that equal ones stay
+            # equal.
             plain = type(getattr(drive, name))()
             if getattr(drive, name).replaced(seed=plain.seed) == plain:
                 drive = drive.replaced(**{name: plain})
@@ -352,7 +358,7 @@ class PairOfDrives:
         make: Callable[..., tuple[str, str]],
         *arguments: Any,
     ) -> Scenario:
-        """Returns a drive through a map that is made."""
+        """Returns a drive moved to the map and stage that `make` returns."""
         try:
             folder, stage = make(drive, *arguments)
         except InputError as error:
@@ -375,7 +381,7 @@ class PairOfDrives:
         )
 
     def _stage(self, side: str, drive: Scenario, wanted: Any) -> str:
-        """Returns the stage that a name or a place among stages means."""
+        """Returns the stage for a stage's name or for a word such as `last`."""
         own, last = str(drive.stage), self._last_stage
         stages = sorted(map_folder(drive).stages())
         if wanted in (OWN, LAST, FIRST):
@@ -407,7 +413,7 @@ class PairOfDrives:
     def _decayed(
         self, side: str, drive: Scenario, fields: Changes, seed: int
     ) -> Scenario:
-        """Returns a drive through a city that lacks a part of itself."""
+        """Returns a drive through a city with some structures missing."""
         values = {**fields, "base": drive.name, "stage": drive.stage}
         values["missing"] = [fields.get("missing", 0.0)]
         family = validated(
@@ -417,7 +423,7 @@ class PairOfDrives:
         return drive.replaced(without=member.without)
 
     def _fit(self, drive: Scenario, fields: dict[str, Any]) -> None:
-        """Limits traffic to the roads, and drivers to what a drive has."""
+        """Reduces traffic to the roads' room; drops impossible lane changes."""
         driver, traffic = (
             one if isinstance(one := fields.get(name), Mapping) else {}
             for name in ("driver", "traffic")
@@ -466,8 +472,8 @@ class PairOfDrives:
 def control_drive(drive: Scenario, stage: str) -> Scenario:
     """Returns a drive on the same route through another stage.
 
-    It serves as a control: between it and the own drive of that stage, only the
-    routes differ, and not the city. The driver is the same.
+    The drive serves as a control: compared with the own drive of that stage,
+    only the route differs, not the city. The driver is the same.
     """
     driver = drive.driver
     if driver.departs and driver.seed is None:
@@ -481,7 +487,7 @@ def control_drive(drive: Scenario, stage: str) -> Scenario:
 
 
 def _ending(side: str, condition: Condition, seed: int) -> str:
-    """Returns the end of the name of a drive with changes."""
+    """Returns the suffix of the name of a changed drive."""
     factors = dict(condition.factors)
     labels = []
     cause, level = factors.pop(CAUSE, NO_CAUSE), factors.pop(LEVEL, 0)
@@ -497,7 +503,7 @@ def _ending(side: str, condition: Condition, seed: int) -> str:
 
 
 def beside(drive: Scenario) -> Scenario:
-    """Returns a drive whose LiDARs have a database's default poses."""
+    """Returns a drive with LiDARs at the default viewpoint of a database."""
     return moved(drive, _AHEAD, *VIEWPOINTS["near"])
 
 
@@ -536,11 +542,11 @@ def check_frozen(
     Maps that the table lacks are not checked.
 
     Args:
-        table: a file of the shipped worlds.
+        table: a file in the folder of the shipped worlds.
         compared: (map, level) -> fingerprints of the compared drives.
 
     Raises:
-        InputError: one is another.
+        InputError: a fingerprint differs from the table's.
     """
     frozen = frozen_drives(table)
     for (name, level), prints in compared.items():

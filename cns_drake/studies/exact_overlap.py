@@ -1,13 +1,14 @@
 """Exact overlap of the scans of two simulated drives.
 
-Where the world is at hand, rays decide what a place's sensor sees of a query's
-scan, see `evaluation.recognition.overlap_truth`. A point is seen if
+For simulated drives, rays cast in the world decide which points of a query's
+scan the place's sensor sees (see `evaluation.recognition.overlap_truth`). A
+point is seen if
 
-- it is within the LiDAR's ranges and the protocol's,
-- the place's beams cover its direction,
-- the straight line to it is free, and meets a surface within `TOLERANCE` of it.
+- it is within the ranges of the LiDAR and of the protocol, - the place's beams
+cover its direction, - nothing hides it, and a surface lies within `TOLERANCE`
+of it on the line of sight.
 
-The place's sensor sees the world as it was then: at its stage, with its
+The place's sensor sees the world of its own drive, with that drive's stage and
 traffic.
 """
 

@@ -1,4 +1,4 @@
-"""Experiments: what differs between two drives, and what is asked of them.
+"""Experiments: what differs between two drives, and what is measured.
 
 An experiment is a YAML file. It names maps, fields of the drive that makes the
 database and of the drive that queries it, and the tasks to measure. A field
@@ -44,7 +44,7 @@ _LISTS: Mapping[str, tuple[type, ...]] = {
     "xyz": (int, float),
     "rpy_deg": (int, float),
 }
-# A list of so many evenly spaced numbers.
+# A list of evenly spaced numbers.
 _SPREAD = {"from", "to", "count"}
 # The factor of the fresh versions of the shipped maps.
 FRESH = "both.fresh"
@@ -110,17 +110,18 @@ class MadeMap(Section):
     """A map that an experiment makes: an aged city or an imported one.
 
     Attributes:
-        name: name of the map.
-        age: name of the map that is aged by `years`.
-        years: number of years by which the map is aged.
-        import_file: file of the real city to import, in the folder `files` of
-            the experiment.
-        sha256: SHA-256 digest of that file.
+        name: name of the new map.
+        age: name of the map to age. Give either `age` or `import`.
+        years: number of years by which to age the map.
+        import_file: file of a real city to import, in the folder `files` of the
+            experiment.
+        sha256: SHA-256 digest of the imported file, so that everyone imports
+            the same one.
         grow: share of the imported buildings that the first stage lacks.
-        plain: whether an imported city stays without the windows, roofs and
-            kerbs that its file lacks; else they are drawn, as by
+        plain: whether to leave out the windows, roofs and kerbs that the file
+            does not contain. By default they are drawn at random, as by
             `cns-drake import`.
-        seed: seed of all draws.
+        seed: seed of all random draws.
     """
 
     name: Name
@@ -163,40 +164,50 @@ class Experiment(Section):
     """A question about two drives: what varies, and what is measured.
 
     Attributes:
-        name: name of the experiment, in all its tables.
+        name: name of the experiment, which stands in all its tables.
         about: the question in words.
-        maps: names or folders of maps, folders of recordings, or maps to make;
-            by default the shipped maps.
-        files: folder with the files that `maps` import.
+        maps: maps to use: names of shipped ones, folders of maps, folders of
+            recordings, or maps to make. By default the shipped maps.
+        files: folder with the files of real cities that `maps` import.
         drives: which drives of a map are compared. `same-route`: the last drive
-            queries a database recorded on its own route. `stages`: the last
-            drive queries each earlier drive. `both-ways`: likewise, and if a
-            map has two drives, each queries the other. `first-and-last`: the
-            last drive, through the last stage, queries the first drive.
-        both: fields of both drives. A list makes the field a factor.
-        database: fields of the drive that makes the database.
-        query: fields of the drive that makes the queries.
-        cases: name of a case -> fields of one or both drives, or names of other
-            cases to combine. Lists are the levels of the case, the weakest
-            first. Each case is measured by itself and compared with the case
-            `none`.
-        levels: levels of the cases to measure; by default all.
-        design: `product`: each value of a factor with every value of the
-            others. `one-at-a-time`: each value with the baseline's values of
-            the others.
-        tasks: names of tasks, or name -> settings.
-        methods: names of methods or Python files, or name -> settings. Lists of
-            settings are factors. By default all shipped methods.
-        seeds: seeds of all random draws in a condition; each is measured.
-        protocol: `fair`, `paper` or `recorded`, or fields of a protocol; `base`
-            then names the protocol that provides the other fields.
-        baseline: values of the factors in the condition with which all others
-            are compared; by default the first value of each factor.
-        frozen: table of the fingerprints that the drives of each level must
-            have, so that shipped worlds stay the same.
-        charts: charts on the page of the experiment.
-        quick: fields that replace those above if `--quick` is given: `tasks`,
-            `methods` and lists as a whole, other mappings field by field.
+            is the query, and the database is recorded along the same route.
+            `stages`: the last drive is the query for each earlier drive.
+            `both-ways`: as `stages`, but if a map has two drives, each is also
+            the query for the other. `first-and-last`: the last drive, through
+            the last stage, is the query for the first drive.
+        both: scenario fields of both drives. A list of values makes the field a
+            factor, which varies.
+        database: scenario fields of the drive that makes the database. A list
+            of values makes the field a factor.
+        query: scenario fields of the drive that makes the queries. A list of
+            values makes the field a factor.
+        cases: kinds of change by name. Each has fields of one or both drives,
+            or is a list of other cases to combine. A list of values gives the
+            levels of a case, the weakest first. Each case is measured by itself
+            and compared with the case `none`, in which nothing differs.
+        levels: numbers of the levels of the cases to measure; by default all.
+        design: how factors are combined. `product`: each value of a factor with
+            each value of all other factors. `one-at-a-time`: each value of a
+            factor, while all other factors have the baseline's values.
+        tasks: tasks to measure: a list of names, or settings by the name of the
+            task.
+        methods: methods to run: a list of names or Python files, or settings by
+            the name of the method. A list of values makes a setting a factor.
+            By default all shipped methods.
+        seeds: seeds of all random draws. Each condition is measured with each
+            seed.
+        protocol: protocol of place recognition: `fair`, `paper` or `recorded`;
+            or fields of a protocol of your own. Its field `base` then names the
+            protocol from which the other fields come.
+        baseline: values of the factors in the condition with which all other
+            conditions are compared. By default the first value of each factor.
+        frozen: table with the fingerprint of the drives of each level. Use it
+            to keep shipped worlds the same: an error names a drive that no
+            longer has its fingerprint.
+        charts: charts to show on the page of the experiment.
+        quick: fields to replace if `--quick` is given. `tasks`, `methods` and
+            lists are replaced as a whole; in other mappings, only the fields
+            that you name.
     """
 
     name: Annotated[str, Field(pattern=r"^[A-Za-z0-9][\w.-]*$")]
@@ -350,7 +361,7 @@ def merged(values: Any, changes: Any) -> Any:
 
 
 def _chosen_anew(values: Changes, changes: Changes) -> dict[str, Any]:
-    """Returns `merged` fields, in which new tasks or methods stand alone."""
+    """Returns `merged` fields; new tasks or methods replace all old ones."""
     chosen = {n: changes[n] for n in ("tasks", "methods") if n in changes}
     return {**merged(values, changes), **chosen}
 
@@ -449,7 +460,7 @@ def _factors(
 def _split(
     fields: Changes, above: tuple[str, ...]
 ) -> tuple[dict[str, Any], dict[str, list[Any]]]:
-    """Returns path -> value of single fields, and path -> values of factors."""
+    """Returns path -> value of fixed fields, and path -> values of factors."""
     single: dict[str, Any] = {}
     varied: dict[str, list[Any]] = {}
     for path, value in _leaves(fields, above):
@@ -475,7 +486,7 @@ class _Values(list):
 def _leaves(
     fields: Mapping[Any, Any], above: tuple[str, ...]
 ) -> Iterator[tuple[str, Any]]:
-    """Yields path -> value, or values, of nested fields."""
+    """Yields (path, value or values) for each leaf of nested fields."""
     for name, value in fields.items():
         place = (*above, str(name))
         path = ".".join(place)

@@ -1,4 +1,4 @@
-"""Maps that an experiment makes: older ones, others, imported ones.
+"""Maps that an experiment makes: aged, drawn anew or imported.
 
 Also drives through other cities, for a crowded database.
 """
@@ -46,13 +46,13 @@ from evaluation.drives.sampling import sample_frames
 _FACTOR = "factor"
 # The only stage of a city that is drawn anew.
 _STAGE = "01"
-# A search for places elsewhere is noted after each so many drives.
+# Number of drives after which a note reports the search for places elsewhere.
 _NOTED_DRIVES = 20
 
 
 @dataclass(frozen=True)
 class AgeCity(MakeMap):
-    """Lets a city live for some years, with a stage after each of them."""
+    """Ages a city, with a stage after each given number of years."""
 
     source: Path
     years: tuple[int, ...]
@@ -125,7 +125,8 @@ class MadeMaps:
         """Notes that a drive's city must be aged by some years.
 
         Returns:
-            The drive's own map and stage, as long as there is no other.
+            The drive's own map and stage, because the aged map does not exist
+            yet.
 
         Raises:
             InputError: years, or a rate, are out of range.
@@ -153,13 +154,13 @@ class MadeMaps:
     def aged(
         self, drive: Scenario, years: int, rates: Any, seed: int
     ) -> tuple[str, str]:
-        """Returns where a drive's city is aged: map folder and stage."""
+        """Returns map folder and stage of a drive's aged city."""
         key = self._key(drive, rates, seed)
         number = sorted(self._ages[key]).index(years)
         return str(self._aged_folder(*key)), f"{number + 2:02d}"
 
     def redrawn(self, drive: Scenario, seed: int) -> tuple[str, str]:
-        """Returns where a drive's city is drawn anew: map folder and stage."""
+        """Returns map folder and stage of a drive's city, drawn anew."""
         source = map_folder(drive).path.resolve()
         return str(self.folder / f"{source.name}_c{seed}"), _STAGE
 
@@ -218,8 +219,8 @@ def made_map_step(
     """Returns the step that makes a map of an experiment in a folder.
 
     Raises:
-        InputError: its file is missing, or another one; or its source is no
-            map.
+        InputError: the file to import is missing or has another digest, or the
+            map to age does not exist.
     """
     if made.age is not None:
         assert made.years is not None
@@ -266,11 +267,11 @@ def distracting_drives(
     Args:
         query: the drive whose LiDARs measure all of them, and whose city is
             left out.
-        number: number of places, about.
+        number: approximate number of places.
         spacing: distance between two places [m].
         output: folder for cities that are drawn anew.
         cluster: runs the jobs.
-        on_note: takes what a user should know.
+        on_note: takes notes for the user.
 
     Raises:
         InputError: a shipped map cannot be used.

@@ -18,7 +18,7 @@ _STAGE_COST = 10.0
 
 @dataclass(frozen=True)
 class _ReadFile:
-    """A file whose content counts, with the files that it names."""
+    """An input of a job: the content of a file and of the files it names."""
 
     path: Path
 
@@ -28,7 +28,7 @@ class _ReadFile:
 
 @dataclass(frozen=True)
 class _ShownDrive:
-    """A drive that counts with the files that its scenario names."""
+    """An input of a job: a scenario and the content of its files."""
 
     scenario: Scenario
 

@@ -1,24 +1,25 @@
-"""Exact labels of two maps of one place: what is gone, new, or not looked at.
+"""Exact labels of two maps of one place: gone, new, kept or not observed.
 
-Rays decide, cast in the worlds that both drives saw.
+Rays that are cast in the worlds of both drives decide.
 
 - A drive **observes** a point if, from one of its poses, the point is within
   the LiDAR's ranges, its beams cover the direction, and no surface hides it. A
   surface hides a point that lies more than `NEAR` behind it along the line of
-  sight; but within `_GRAZING` along that line, only a point that lies more than
-  `_SKIN` behind it, measured across the surface. Thus a wall that has moved a
-  little does not hide its old place: the drive sees that it stands elsewhere.
+  sight. There is an exception at grazing angles: if the point lies less than
+  `_GRAZING` behind the surface along that line, it is hidden only if it also
+  lies more than `_SKIN` behind, measured perpendicular to the surface. A wall
+  that has moved a little therefore does not hide its old position.
 - A surface is **there** if it passes within `NEAR` of the point, measured
-  across it. Moving objects are no surfaces.
+perpendicular to the surface. Moving objects do not count.
 
 A point of the older map A is `kept` if B's drive observes it and a surface of
 B's world is there, `gone` if B's drive observes it and none is there, and
-`unobserved` if B's drive does not observe it. A point of the newer map B is
-`kept`, `new` or `newly seen` likewise, by A's drive and A's world. With A and B
-swapped, gone and new swap.
+`unobserved` if B's drive does not observe it. In the same way, A's drive and
+A's world decide whether a point of the newer map B is `kept`, `new` or `newly
+seen`.
 
 The poses are those of the sessions' scans. Surfaces are ideal: glass and leaves
-are where the geometry has them.
+count as solid geometry.
 """
 
 from collections import Counter
@@ -66,13 +67,15 @@ from evaluation.results.drawing import GONE, NEW
 
 # A surface this near to a point is its own [m].
 NEAR = 0.1
-# A surface hides what lies this far behind it, across it [m].
+# A surface hides points that lie this far behind, perpendicular to it [m].
 _SKIN = 0.3
-# Greatest distance along a line in which that holds [m].
+# Greatest distance behind a surface, along the line of sight, up to which
+# `_SKIN` applies [m].
 _GRAZING = 1.0
-# Way between the first poses that look [m]: most points are seen from them.
+# Distance driven between the first poses to be tried [m]; most points are seen
+# from these.
 _FIRST_LOOKS = 32.0
-# Points that are cast on at a time.
+# Number of points per cast.
 _CHUNK = 1 << 15
 # Sides of the tiles in which points are found, and in which rays to them are
 # neighbours [m].
@@ -94,7 +97,7 @@ _REACH = 1.25 * NEAR
 # one within 15 deg of each.
 _SPIRAL = 64
 
-# Drawn in this order: what changed lies on top.
+# Drawing order of the labels: changes are on top.
 _RGB = {
     Label.UNOBSERVED: (178, 182, 190),
     Label.NEWLY_SEEN: (120, 170, 230),
@@ -117,7 +120,7 @@ _MOST_ROWS = 200
 
 @dataclass(frozen=True)
 class Survey:
-    """One of both drives, recorded or simulated, and the same in its world."""
+    """One of the two drives, recorded or simulated, with its simulation."""
 
     drive: Drive
     simulated: SimulatedDrive
@@ -200,7 +203,7 @@ def write_truth(
             aged map has.
 
     Returns:
-        Side -> label -> number of points; and what became of each structure.
+        Side -> label -> number of points; and the change of each structure.
 
     Raises:
         InputError: the drives are of different worlds, or the folder cannot be
@@ -250,7 +253,7 @@ def label_points(
 ) -> np.ndarray:
     """Returns a label for each point of a map, (N,) uint8.
 
-    Labels say what the other drive sees there from its frames (K,).
+    The other drive observes the points from its frames (K,).
     """
     unobserved, kept, changed = SIDES[session.side]
     labels = np.full(len(session.points), unobserved, np.uint8)
@@ -269,7 +272,7 @@ def observed(
 ) -> np.ndarray:
     """Returns which points (N, 3) in W [m] a drive observes, (N,) bool.
 
-    It looks from its frames (K,).
+    The drive observes them from its frames (K,).
     """
     result = np.zeros(len(points), bool)
     pattern = drive.pattern
@@ -336,7 +339,7 @@ class _Look:
 
 
 class _Tiles:
-    """Points by square tiles of the ground; `left` has rows not yet seen."""
+    """Points sorted into square tiles; `left` has rows not yet observed."""
 
     def __init__(self, points: np.ndarray):
         cells = np.floor(points[:, :2] / _TILE).astype(np.int64)
@@ -416,10 +419,10 @@ def _check_instances(drive: McapDrive, path: Path) -> None:
 
 
 def _check_unchanged(drive: McapDrive, path: Path, scenario: Scenario) -> None:
-    """Refuses a recording of another scenario, or whose world has changed.
+    """Refuses a recording of another scenario, or of a changed world.
 
-    The files beside a recording may be of another one; the MCAP itself says
-    what it shows.
+    The files beside an MCAP can belong to another recording, so the MCAP's own
+    data decide.
     """
     if drive.scenario is None or not isinstance(drive.inputs, dict):
         raise InputError(
@@ -440,9 +443,9 @@ def _check_unchanged(drive: McapDrive, path: Path, scenario: Scenario) -> None:
 
 
 def _check_same_map(a: Survey, b: Survey) -> None:
-    """Refuses surveys of two folders, whose names may be the same.
+    """Refuses drives of different map folders, even of the same name.
 
-    Worlds without a map are stages of one place, if the user says so.
+    For worlds without a map, the user must know that they show one place.
     """
     if (a.scenario.map is None) != (b.scenario.map is None):
         raise InputError(

@@ -1,7 +1,8 @@
 """Sets of scans for trainers of place recognition, with exact truth.
 
-Nothing is recorded in between. Drives through one city are one another's
-places. Cities lie `CITY_DISTANCE` apart, which keeps them apart by any radius.
+The drives are simulated without recording them. Scans of drives through the
+same city can match each other. Cities are put `CITY_DISTANCE` apart, so that
+their scans never match.
 """
 
 from __future__ import annotations
@@ -47,8 +48,8 @@ CITY_DISTANCE = 100_000.0
 # positives, of what is no negative, and of matches in the evaluation [m].
 _POINTS = 4096
 _POSITIVE, _NON_NEGATIVE, _MATCH = 10.0, 50.0, 25.0
-# The sets that MinkLoc3Dv2's evaluation reads, by name, each of one city; and
-# the number of places that it asks for at a time.
+# Names of the sets that MinkLoc3Dv2's evaluation reads, one city each; and the
+# number of nearest places that it asks for.
 _LOCATIONS = ("oxford", "university", "residential", "business")
 _ASKED = 25
 # Clouds are thinned to this first, so that far walls keep points [m].
@@ -60,7 +61,7 @@ _DRIVE_COST, _PAIR_COST = 20.0, 60.0
 
 @dataclass(frozen=True)
 class ExportOptions:
-    """What is exported of each drive.
+    """Settings of the export of each drive.
 
     Attributes:
         format: format of the program that trains.
@@ -122,9 +123,9 @@ def export_pairs(
         held_out: drives for evaluation only; without any, all drives are
             evaluated.
         output: the folder of the set.
-        options: what is exported.
+        options: format and spacing of the exported clouds.
         cluster: runs the work.
-        on_note: takes notes on what the set lacks.
+        on_note: takes notes on missing parts of the set.
 
     Raises:
         InputError: there is no drive to learn from, two drives have one name,
@@ -274,7 +275,8 @@ def _write_pickles(
     """Writes the pickles of PointNetVLAD, as MinkLoc3Dv2 reads them.
 
     Returns:
-        Those of all drives, without those of single cities.
+        The pickles that cover all drives; those of single cities are not
+        listed.
     """
     contents: dict[str, Any] = {}
     for name, runs in (("training", learned), ("test", tested)):
@@ -305,10 +307,11 @@ def _locations(
 ) -> dict[str, list[Run]]:
     """Returns the drives of each location of MinkLoc3Dv2's evaluation.
 
-    A location is a city; of fewer cities, some are there twice. The evaluation
-    divides by the number of pairs of drives, and for each of these by the
-    number of queries with a match. Cities for which that is impossible are left
-    out, with a note; without any city, there is no location.
+    A location is a city; if there are fewer cities than locations, some cities
+    occur twice. The evaluation divides by the number of pairs of drives, and
+    for each of these by the number of queries with a match. Cities for which
+    that is impossible are left out, with a note; without any city, there is no
+    location.
     """
     cities: dict[int, list[Run]] = {}
     for run in runs:

@@ -63,8 +63,9 @@ def plan_recordings(
 ) -> list[Job]:
     """Returns a job for each unfinished recording; notes the finished ones.
 
-    The job has the recording's name; `overwrite` lets it replace another one.
-    A recording without its web page in `pages`, if given, is not finished.
+    Each job has the recording's name. `overwrite` allows it to replace another
+    recording of this name. If `pages` is given, a recording without its web
+    page there is not finished.
 
     Raises:
         InputError: two have one name, or a folder must not be used.
@@ -139,8 +140,7 @@ class Record(Step):
     def _place(self, is_new: bool) -> Iterator[tuple[Path, bool]]:
         """Yields the folder for the recording, and whether to overwrite there.
 
-        A recording that is up to date stays as it is when its page is made
-        anew.
+        If only the page must be made, an existing recording is not changed.
         """
         if is_new:
             yield self.folder, self.overwrite
@@ -188,7 +188,7 @@ def is_recorded(scenario: Scenario, folder: Path) -> bool:
     if not files.is_finished() or not files.mcap.is_file():
         return False
     try:
-        # Recordings that were damaged later do not count.
+        # A recording that was damaged later does not count as finished.
         read_yaml(files.scenario)
         read_yaml(files.metadata)["rosbag2_bagfile_information"]
         known = read_bytes(files.fingerprint).decode().split()

@@ -1,12 +1,13 @@
-"""Redraws a map's city: the same streets, another draw of all the rest.
+"""Redraws a map's city: the same streets, but everything else drawn anew.
 
 Roads and plan stay, and only the plan's seed changes: buildings, plants, cars
 and furniture are drawn anew. Each such city is a map folder.
 
-Fresh cities are versions of the shipped maps that no method's making saw. They
-also have the map's stages, and its drives by real drivers. Some are turned as a
-whole, so that their streets lie off the axes of the world. `worlds/fresh.csv`
-holds the seeds and turns, drawn before any method ran.
+Fresh cities are versions of the shipped maps that were not used to develop any
+method. They also have the map's stages, and its drives with realistic drivers.
+Some are rotated as a whole, so that their streets are not parallel to the axes
+of the world. `worlds/fresh.csv` contains the seeds and rotations, which were
+drawn before any method ran.
 """
 
 import abc
@@ -295,9 +296,9 @@ class DrawFreshCity(RedrawCity):
     turn_deg: float = 0.0
 
     def inputs(self) -> dict[str, bytes]:
-        """Returns the inputs of the city, but for its stages.
+        """Returns name -> content of the city's inputs, without `stages.yaml`.
 
-        Each drive has a driver like a real one.
+        Each drive has a realistic driver.
         """
         source = MapFolder(self.map_folder)
         texts = redrawn_inputs(self.map_folder, self.stage, self.seed)
@@ -356,7 +357,7 @@ def _turned_place(place: Sequence[float], turn_deg: float) -> list[float]:
 
 
 def _turned_bounds(bounds: Sequence[float], turn_deg: float) -> list[float]:
-    """Returns the box, along the axes, about a turned one."""
+    """Returns the axis-aligned bounding box of a rotated box."""
     x0, y0, x1, y1 = bounds
     corners = [
         _turned_place((x, y), turn_deg) for x in (x0, x1) for y in (y0, y1)
@@ -367,7 +368,7 @@ def _turned_bounds(bounds: Sequence[float], turn_deg: float) -> list[float]:
 def kept_names(stages: Any, names: Sequence[str]) -> Any:
     """Returns a `stages.yaml` without the structures that a city lacks.
 
-    Rows in another draw have another number of houses. Groups without any
+    A row can have fewer houses in another draw. Groups that would have no
     structure are left out.
     """
     if isinstance(stages, list):

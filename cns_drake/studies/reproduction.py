@@ -50,16 +50,16 @@ def reproduce_maps(
     not recorded.
 
     Args:
-        maps: names or folders; all shipped ones if None.
+        maps: names or folders of maps; all shipped maps if None.
         output: folder for all results.
         cluster: runs the jobs.
         with_pages: whether drives get web pages.
         quick: whether only the report is made.
         protocol: protocol of place recognition.
         own_methods: Python files of further methods.
-        settings: `METHOD.NAME=VALUE` each.
+        settings: settings of methods, each `METHOD.NAME=VALUE`.
         with_costs: whether times are measured.
-        on_note: takes what a user should know.
+        on_note: takes notes for the user.
 
     Raises:
         InputError: a map is unknown, the folder cannot be made, or a step

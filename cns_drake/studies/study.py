@@ -98,7 +98,7 @@ _FORMER = (
 
 @dataclass(frozen=True)
 class _Measured:
-    """A pair of drives in a condition, with what its tasks write."""
+    """A pair of drives in a condition, with the parts that tasks write."""
 
     map_name: str
     names: tuple[str, str]
@@ -209,7 +209,7 @@ class Study:
                     " another folder"
                 )
         drives = list(self._drives(maps))
-        # Faults of the file come before all slow work.
+        # Errors in the file are found before all slow work.
         for some in drives:
             for _ in self._simulated(some, made=False):
                 pass
@@ -325,7 +325,8 @@ class Study:
         kind = self.experiment.drives
         if kind == "first-and-last":
             stages = sorted(MapFolder(folder).stages())
-            # An imported city has another way at each stage.
+            # In an imported city, the drives of the stages have different
+            # routes.
             last = (sorted(folder.glob("other_*.yaml")) or files)[-1]
             return [
                 (
@@ -346,7 +347,7 @@ class Study:
     def _plan(
         self, drives: Iterable[_Drives]
     ) -> tuple[dict[str, Job], list[_Measured]]:
-        """Returns the jobs, and what they measure."""
+        """Returns the jobs, and the pairs that they measure."""
         jobs: dict[str, Job] = {}
         notes: dict[str, None] = {}
         measured: list[_Measured] = []
@@ -414,7 +415,7 @@ class Study:
     ) -> Iterator[_Measured]:
         """Yields the pairs of a map in all conditions that it allows.
 
-        As long as the maps of conditions are not made, these are noted.
+        Without `made`, the maps that conditions need are only noted.
         """
         noted: dict[str, None] = {}
         age, redraw = self._made.want_age, self._made.want_redrawn
@@ -487,7 +488,7 @@ class Study:
         )
 
     def _recorded(self, city: City) -> Iterator[_Measured]:
-        """Yields the pairs of recordings; nothing but their stage varies."""
+        """Yields the pairs of recordings; only their stage can vary."""
         self._check_recordable(city)
         pairs = city.change_pairs()
         if self.experiment.drives == "both-ways" and len(pairs) == 1:
@@ -563,7 +564,7 @@ class Study:
             )
 
     def _rows(self, measured: Sequence[_Measured]) -> Iterator[Row]:
-        """Yields all numbers."""
+        """Yields all rows of the table of results."""
         # The values of the baseline of a map, its drives and protocol, by
         # seed and task.
         baselines: dict[tuple, dict[int, dict[str, Any]]] = {}
@@ -634,7 +635,7 @@ def _base_name(database: Scenario) -> str:
 
 
 def _place(one: _Measured) -> tuple:
-    """Returns what has one baseline: a map, its drives, and a protocol."""
+    """Returns a key of map, drives and protocol; each key has one baseline."""
     fixed = [
         (name, value)
         for name, value in one.factors.items()

@@ -1,10 +1,11 @@
 """Trains the method `learned` on scans of drawn cities.
 
-A batch asks scans of one drive for places of another drive through the same
-city. Scores are those of the method. The loss is the cross entropy between a
-softmax over all places of the batch and weights of the right places. These
-weights grow with the exact overlap of two scans, or fall with their distance:
-the best place ranks first, and lesser ones behind it.
+In a batch, scans of one drive are queries for places of another drive through
+the same city. Scores are those of the method. The loss is the cross entropy
+between a softmax over all places of the batch and the weights of the right
+places. These weights grow with the exact overlap of two scans, or fall with
+their distance, so that the best place ranks first and less similar ones after
+it.
 """
 
 from collections.abc import Callable, Mapping, Sequence
@@ -46,18 +47,20 @@ from evaluation.study.parts import MakePart, Part
 _CITIES, _CLUSTERS, _QUERIES = 2, 4, 5
 # The queries of a cluster lie within this distance [m].
 _CLUSTER = 40.0
-# Farthest right place, and nearest wrong one [m]; between them, none counts.
+# Greatest distance of a right place, and least distance of a wrong one [m];
+# places in between do not count.
 _RIGHT, _WRONG = 7.5, 11.0
-# Farthest of the places further along [m].
+# Greatest distance of the places further along [m].
 _ALONG = 35.0
-# The weights of right places fall with distance by this deviation [m].
+# Standard deviation of the Gaussian by which weights fall with distance [m].
 _DEVIATION = 4.0
-# Least overlap with the best place of a query that counts. Right places have at
-# least this part of its overlap; weights grow with this power of that part.
+# A query counts if its best place has at least this overlap. Right places have
+# at least this share of the best place's overlap; their weights are this power
+# of the share.
 _SHARED, _NEAR_BEST, _POWER = 0.2, 0.9, 16
 _TEMPERATURE = 0.05
-# Parts of the images with a hidden sector, of which angles [deg], and with
-# lost pixels, and how many of these.
+# Share of the images with a hidden sector, and its angles [deg]; share of the
+# images with lost pixels, and the share of their pixels that are lost.
 _HIDDEN, _HIDDEN_DEG = 0.4, (30.0, 120.0)
 _LOST, _MOST_LOST = 0.3, 0.3
 _RATE, _LEAST_RATE, _WARM_UP = 2e-3, 2e-5, 30
@@ -74,7 +77,7 @@ class TrainingScans:
 
     Attributes:
         images: (N, RINGS, SECTORS, CHANNELS) uint8.
-        xy: (N, 2) places of the sensors [m].
+        xy: (N, 2) positions of the sensors [m].
         cities: (N,) number of the city.
         drives: (N,) number of the drive in its city.
         overlaps: (N, N) share of each scan that is visible from the place of
@@ -117,10 +120,10 @@ class Batch:
 
 
 class Sampler:
-    """Draws batches; a step's batch depends on seed and step alone."""
+    """Draws batches; each depends only on the seed and its step."""
 
     def __init__(self, scans: TrainingScans, seed: int):
-        """Finds what can be paired.
+        """Finds the pairs of drives that meet.
 
         Raises:
             InputError: no city has two drives that meet.
@@ -213,7 +216,7 @@ class Sampler:
 
 
 def _augment(images: np.ndarray, rng: np.random.Generator) -> None:
-    """Turns images at random, hides sectors, loses pixels; in place."""
+    """Augments images in place: random turns, hidden sectors, lost pixels."""
     is_mirrored = rng.random() < 0.5
     for number, image in enumerate(images):
         if is_mirrored:
@@ -283,9 +286,9 @@ def features(parameters: Parameters, images: Any) -> Any:
 
 
 def scores(queries: Any, places: Any) -> Any:
-    """Returns how alike queries and places are, (Q, P), in JAX.
+    """Returns the similarity of queries and places, (Q, P), in JAX.
 
-    Both are feature maps.
+    Queries and places are feature maps.
     """
     import jax.numpy as jnp
 
@@ -356,8 +359,8 @@ def train(
             second: running means of their squares.
             step: number of the step, from 0.
             images: images of the scans of a batch.
-            weights: targets: how much each pair of scans shows one place.
-            counts: pairs that count.
+            weights: targets, see `Batch.weights`.
+            counts: see `Batch.counts`.
         """
         (value, right), slope = jax.value_and_grad(loss, has_aux=True)(
             values, images, weights, counts
@@ -450,7 +453,7 @@ _CITIES_A_MINUTE, _STEPS_A_MINUTE = 0.3, 60
 
 @dataclass(frozen=True)
 class TrainingPlan:
-    """What a training sees, and for how long.
+    """The data and the length of a training.
 
     With `change`, drives see different stages and temporary changes. With
     `returns`, some drives have calibrated returns and weather. With `driver`,
@@ -470,13 +473,13 @@ class TrainingPlan:
 
     @classmethod
     def of_minutes(cls, minutes: float, **fields: Any) -> "TrainingPlan":
-        """Returns a plan that takes about so many minutes on one core."""
+        """Returns a plan that takes about the given minutes on one core."""
         cities = max(2, round(_CITIES_A_MINUTE * minutes))
         steps = max(10, round(_STEPS_A_MINUTE * minutes))
         return cls(**{"cities": cities, "steps": steps, **fields})
 
     def drawn(self) -> list[DrawnCity]:
-        """Returns the cities."""
+        """Returns the cities of the training, with their drives."""
         return [
             DrawnCity(
                 DRAWN_STREETS

@@ -1,9 +1,8 @@
 """Drives for training: cities, stages and effects, all drawn at random.
 
-A city keeps the streets of a map, or has streets drawn at random as well;
-everything else is drawn anew, and so are two younger stages. Several drives
-follow one route, with what comes between two visits: other stages, other
-effects, another LiDAR, another driver.
+A city has the streets of a map, or streets drawn at random. Everything else is
+drawn anew, including two younger stages. Several drives follow the same route
+and differ as real visits do: in stage, effects, LiDAR and driver.
 """
 
 from collections.abc import Sequence
@@ -36,9 +35,9 @@ from cns_drake.studies.redrawing import redrawn_inputs, to_yaml, turned
 from evaluation.drives.sampling import gather, sample_frames
 from evaluation.methods.learned import polar_image
 
-# Far from the seeds of levels, ladders and clean tests.
+# First seed, far from the seeds of all experiments and tests.
 _FIRST_SEED = 500_000
-# Seeds of one training are this far from those of the next.
+# Distance between the seeds of successive trainings.
 _MOST_CITIES = 1000
 # Length of a route, and between two scans [m].
 _LENGTH, _SPACING = 1600.0, 6.0
@@ -46,21 +45,21 @@ _LENGTH, _SPACING = 1600.0, 6.0
 _MAX_RANGE = 100.0
 _STAGES = ("01", "02", "03")
 _PRESETS = ("os1-64", "hdl-64e", "os1-32", "vlp-16", "os1-128")
-# Stands for a map in cities whose streets are drawn.
+# Takes the place of a map's name in cities whose streets are drawn.
 DRAWN_STREETS = "drawn"
 # Purpose of the random numbers of streets; cities and drives have the least.
 _STREETS = 2**32 - 1
 # The map whose first drive has the car and the LiDAR of all drives there.
 _CAR_OF = "riverside"
-# Scans farther apart are taken to share nothing [m]. So many points of a scan
-# say how much of it another place sees.
+# Scans farther apart count as having no overlap [m]. The overlap is estimated
+# from this number of points of a scan.
 _FARTHEST_OVERLAP = 50.0
 _OVERLAP_POINTS = 1000
 
 
 @dataclass(frozen=True)
 class DrawnCity:
-    """A city with its drives, as a seed draws them.
+    """A city with its drives, all drawn from a seed.
 
     `map_name` is the shipped map that has its streets, or `DRAWN_STREETS`. With
     `graded`, the overlap of each scan with the places of the other scans is
@@ -119,7 +118,8 @@ class DrawnCity:
         return [self._drive(base, number) for number in range(self.num_drives)]
 
     def _drive(self, base: Scenario, number: int) -> Scenario:
-        # Without one kind of change all others stay the same draws.
+        # If one kind of change is left out, the draws of all others stay the
+        # same.
         rng = self._rng(2 + number)
         drive = base.replaced(name=f"{self.map_name}_{self.number}_{number}")
         aside = float(rng.uniform(-1.0, 1.0))
@@ -159,7 +159,7 @@ def scan_city(
 
     Returns:
         `images` (N, RINGS, SECTORS, CHANNELS) uint8, `xy` (N, 2) places of the
-        sensors [m], `drives` (N,) number of the drive, and of a graded city
+        sensors [m], `drives` (N,) number of the drive, and, for a graded city,
         `overlaps` (N, N) float16, see `_overlaps`.
     """
     images, xy, numbers = [], [], []
@@ -206,10 +206,10 @@ def _few(points: np.ndarray) -> np.ndarray:
 
 
 def _overlaps(scans: Sequence[_Taken], reporter: Reporter) -> np.ndarray:
-    """Returns the share of each scan that the place of each other one sees.
+    """Returns the share of each scan that is seen from each other scan.
 
-    Rays decide (`exact_overlap`). Of two scans of one drive, and of those over
-    50 m apart, the share is 0.
+    The share is exact (see `exact_overlap`). It is 0 for two scans of one drive
+    and for scans over 50 m apart.
 
     Returns:
         (N, N) float16: a row for each scan, a column for each place.
@@ -240,8 +240,9 @@ def _overlaps(scans: Sequence[_Taken], reporter: Reporter) -> np.ndarray:
 def draw_streets(rng: np.random.Generator) -> dict[str, Any]:
     """Returns the content of a `roads.yaml` that no map has.
 
-    Streets run along the lines of a bent grid with random spacings, as a whole
-    turned at random. Some cross streets are missing, some bend.
+    Streets run along the lines of a bent grid with random spacings; the whole
+    grid has a random orientation. Some cross streets are missing, others are
+    bent.
     """
     columns, rows = rng.integers(3, 6), rng.integers(3, 5)
     x = np.cumsum(rng.uniform(70.0, 170.0, columns))
@@ -295,7 +296,7 @@ def draw_streets(rng: np.random.Generator) -> dict[str, Any]:
 
 
 def draw_stages(city: City, rng: np.random.Generator) -> dict[str, dict]:
-    """Returns stages of a city: some buildings absent, lower, trees young.
+    """Returns random stages of a city: absent or lower buildings, small trees.
 
     Returns:
         The content of `stages.yaml`, in which the last one is the whole city.
@@ -348,7 +349,7 @@ def _some(
 def _nearest(
     structures: Sequence[Any], share: float, rng: np.random.Generator
 ) -> list[str]:
-    """Returns about half at random and half of those nearest to a place."""
+    """Returns a share of structures: half at random, half near a place."""
     xy = np.array([s.xyz[:2] for s in structures])
     center = xy[int(rng.integers(len(xy)))]
     order = np.argsort(np.linalg.norm(xy - center, axis=1), kind="stable")
@@ -357,7 +358,7 @@ def _nearest(
 
 
 def _draw_changes(rng: np.random.Generator, number: int) -> dict[str, Any]:
-    """Returns fields of a drive: its stage, and what comes and goes."""
+    """Returns random changes of a drive: stage, temporary changes, ride."""
     ends = {
         "parked_cars": (0.0, 1.0),
         "leaves": (0.1, 1.0),
@@ -373,7 +374,7 @@ def _draw_changes(rng: np.random.Generator, number: int) -> dict[str, Any]:
     }
     rough = "ABC"[int(rng.integers(3))]
     changes: dict[str, Any] = {
-        # The whole city, its first stage, and between them.
+        # The last stage, the first, the one in between, and the last again.
         "stage": (_STAGES[-1], _STAGES[0], _STAGES[1], _STAGES[-1])[number % 4],
         "transient": {"seed": int(rng.integers(2**31)), **parts},
     }

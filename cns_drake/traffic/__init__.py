@@ -1,5 +1,5 @@
-"""Vehicles and walkers that move while a drive is recorded.
+"""Vehicles and pedestrians (walkers) that move while a drive is recorded.
 
-They are planned once, before the drive, as a function of roads and seed. During
-the drive their poses are looked up by time.
+Their motion is planned once, before the drive, from the roads and a seed.
+During the drive, their poses are looked up by time.
 """

@@ -26,7 +26,7 @@ _METAL: Rgb = (0.3, 0.31, 0.33)
 
 
 class BodyShape(NamedTuple):
-    """One shape of a body, in the frame L of its limb, and its colour."""
+    """One shape of a body and its colour, in the frame L of its limb."""
 
     name: str
     shape: Shape
@@ -35,10 +35,10 @@ class BodyShape(NamedTuple):
 
 
 class Limb(NamedTuple):
-    """A part of a body that moves as one: it swings about its y axis.
+    """A rigid part of a body, which swings about its y axis.
 
-    Its origin in the body's frame is the joint [m]. The swing is the amplitude
-    at a walk, negative if it begins backwards [rad].
+    Its origin in the body's frame is the joint [m]. `swing` is the amplitude of
+    its swing at walking speed, negative if it first swings backwards [rad].
     """
 
     name: str
@@ -64,7 +64,7 @@ def _round(
     rgb: Rgb,
     kind: type[Capsule] | type[Cylinder] = Capsule,
 ) -> BodyShape:
-    """Returns a capsule, or a cylinder, about an axis from start to end."""
+    """Returns a capsule, or a cylinder, around the axis from start to end."""
     p, q = np.array(start, float), np.array(end, float)
     shape = kind(radius, math.dist(start, end))
     R = RotationMatrix.MakeFromOneVector(q - p, 2)
@@ -74,7 +74,10 @@ def _round(
 def vehicle_limbs(
     kind: VehicleKind, rng: np.random.Generator
 ) -> tuple[Limb, ...]:
-    """Returns a vehicle's only limb, in a frame on the ground below its box."""
+    """Returns the only limb of a vehicle.
+
+    Its frame is on the ground below the middle of the vehicle's box.
+    """
     paint = PAINTS[int(rng.integers(len(PAINTS)))]
     if kind.name in ("bicycle", "motorcycle"):
         shapes = _two_wheeler(kind.name, paint, rng)
@@ -145,10 +148,10 @@ def _two_wheeler(
 
 
 def walker_limbs(rng: np.random.Generator) -> tuple[Limb, ...]:
-    """Returns the five limbs of a walker, of ten capsules together.
+    """Returns the five limbs of a walker, which have ten capsules.
 
-    The body's frame is on the ground, x in the walker's heading. An arm swings
-    with the leg of the other side.
+    The body's frame is on the ground, with x in the walker's heading. An arm
+    swings together with the leg on the other side.
     """
     h = float(rng.uniform(0.92, 1.06))
     coat, trousers = (

@@ -1,4 +1,4 @@
-"""Traffic of a trace of SUMO: floating-car data at even times.
+"""Plays traffic from a trace of SUMO: floating-car data at even times.
 
 Format: https://sumo.dlr.de/docs/Simulation/Output/FCDOutput.html
 """
@@ -21,16 +21,20 @@ from cns_drake.traffic.traffic_plan import EgoPath, Tracks, TrafficPlan
 from cns_drake.traffic.vehicle_kinds import KINDS, VehicleKind
 from cns_drake.traffic.walkers import WALKER_LENGTH, WALKER_WIDTH, gait_rate
 
-# Greatest deviation from even times, by rounding in the file [s].
+# Greatest deviation of times from even spacing, because of rounding in the file
+# [s].
 _TIME_TOLERANCE = 2e-3
-# Half of the vehicles of a map's own trace are nearer to its lanes [m].
+# In a trace that belongs to the map, at least half of the vehicles are closer
+# than this to its lanes [m].
 _OFF_ROAD = 5.0
-# A person is in a vehicle whose front is so near [m].
+# A person this close to a vehicle's front is in the vehicle [m].
 _RIDING = 0.1
-# Roads lie at two heights where the next places of lanes differ by more [m], of
-# so many, this near [m]; the cosine of the turn between a vehicle and its lane.
+# Two heights belong to different roads if they differ by more than the first
+# number [m]. They are those of the nearest points on lanes, at most so many,
+# within a radius [m]. The last number is the least cosine of the angle between
+# a vehicle and its lane.
 _LEVELS, _CANDIDATES, _REACH, _ALIKE = 1.5, 24, 6.0, 0.7
-# Part of the name of a type -> kind; the first that fits counts.
+# Part of the name of a type -> kind; the first one that matches applies.
 _KINDS_BY_WORD = (
     ("bicycle", "bicycle"),
     ("bike", "bicycle"),
@@ -48,14 +52,16 @@ _CARS = tuple(kind for kind in KINDS if kind.semantic_class == "car")
 
 @dataclass(frozen=True)
 class TracedObject:
-    """A vehicle or a person of a trace; the type is "" if it has none.
+    """A vehicle or a person in a trace.
 
     Attributes:
+        name: its id.
+        type_name: its type; "" if it has none.
         steps: (M,) numbers of the times at which it is there, ascending.
         xy: (M, 2) position of a vehicle's front, or of a person's middle [m].
         yaw: (M,) heading, from x towards y [rad].
-        slope: (M,) slope of the road, upwards positive [rad].
-        z: (M,) heights in the trace [m]; NaN where it gives none.
+        slope: (M,) slope of the road, positive upwards [rad].
+        z: (M,) heights in the trace [m]; NaN if it has none.
     """
 
     name: str
@@ -69,10 +75,14 @@ class TracedObject:
 
 @dataclass(frozen=True)
 class FcdTrace:
-    """A trace of `num_steps` times: the first [s], and their distance [s].
+    """A trace of SUMO with evenly spaced times.
 
-    Vehicles and persons are in the order in which they come; notes name what is
-    left out.
+    Attributes:
+        begin: the first time [s].
+        dt: distance from one time to the next [s].
+        num_steps: number of times.
+        vehicles, persons: in the order in which they appear.
+        notes: what is left out, for the user.
     """
 
     begin: float
@@ -89,11 +99,11 @@ class FcdTrace:
 
 
 def read_fcd(path: Path) -> FcdTrace:
-    """Reads a trace.
+    """Returns the trace in a file.
 
     Raises:
         InputError: the file cannot be read or is not a trace, its times are not
-            even, or it is empty.
+            evenly spaced, or it is empty.
     """
     root = read_elements(path, "fcd-export")
     steps = list(root.all("timestep"))
@@ -111,12 +121,13 @@ def read_fcd(path: Path) -> FcdTrace:
 
 
 def _leave_out(path: Path, steps: list[Element]) -> tuple[str, ...]:
-    """Removes persons while they ride in vehicles; notes what is left out.
+    """Removes persons while they ride in vehicles; returns notes about it.
 
-    SUMO writes riders at the front of their vehicle, which new versions name.
+    SUMO writes a rider at the front of the vehicle. Newer versions also name
+    the vehicle.
 
     Raises:
-        ValueError: one lacks a value.
+        ValueError: an object lacks a value.
     """
     riders, others = set(), set()
     for step in steps:
@@ -147,10 +158,10 @@ def _leave_out(path: Path, steps: list[Element]) -> tuple[str, ...]:
 
 
 def _even(path: Path, times: np.ndarray) -> tuple[float, float]:
-    """Returns the first time and the distance of the times.
+    """Returns the first of evenly spaced times, and their distance [s].
 
     Raises:
-        InputError: they are not even.
+        InputError: they are not evenly spaced.
     """
     if len(times) < 2:
         raise InputError(
@@ -170,10 +181,10 @@ def _even(path: Path, times: np.ndarray) -> tuple[float, float]:
 
 
 def _objects(steps: list[Element], tag: str) -> tuple[TracedObject, ...]:
-    """Returns the vehicles or persons.
+    """Returns the vehicles or persons, by the tag of their elements.
 
     Raises:
-        ValueError: one lacks a value, or is there twice at a time.
+        ValueError: one lacks a value, or is there twice at the same time.
     """
     found: dict[str, list[tuple[float, ...]]] = {}
     types: dict[str, str] = {}
@@ -192,7 +203,8 @@ def _objects(steps: list[Element], tag: str) -> tuple[TracedObject, ...]:
     objects = []
     for name, rows in found.items():
         number, x, y, angle, slope, z = np.transpose(rows)
-        # Angles are degrees from north, clockwise; y is north.
+        # In the file, angles are in degrees, clockwise from north, where y is
+        # north.
         yaw = np.unwrap(np.pi / 2 - np.radians(angle))
         at, xy = number.astype(int), np.column_stack([x, y])
         objects.append(
@@ -213,24 +225,25 @@ def play_trace(
     ego: EgoPath,
     ego_box: EgoBox,
 ) -> TrafficPlan:
-    """Returns the traffic of a trace, whose first time is that of the drive.
+    """Returns the traffic in a trace, whose first time is that of the drive.
 
-    Road users that would collide with the ego car, which is not part of SUMO's
-    simulation, are left out.
+    SUMO's simulation does not contain the ego car. Road users that would
+    collide with it are left out.
 
     Args:
         trace: the trace that SUMO wrote.
         path: file of the trace, for errors.
         graph, walkways: lanes and walkways of the map, from which heights
             follow.
-        seed: seed of the kinds of cars.
+        seed: seed that draws kinds of cars.
         duration: time of the last frame [s].
         end: time at which the ego car arrives [s].
         ego: motion of the ego car.
         ego_box: size of the ego car.
 
     Raises:
-        InputError: the trace is shorter than the drive, or is of another map.
+        InputError: the trace is shorter than the drive, or belongs to another
+            map.
     """
     if trace.duration < duration - 1e-6:
         raise InputError(
@@ -252,7 +265,8 @@ def play_trace(
     rows = [_person_rows(one, ground, trace.dt) for one in trace.persons]
     walkers = _make_tracks(trace, trace.persons, rows)
     half = [(kind.size[0] / 2, kind.size[1] / 2) for kind in kinds]
-    # Steps are short enough to notice all that cross the car's way.
+    # The steps are short enough to notice everything that crosses the ego car's
+    # path.
     step = min(trace.dt, 0.1)
     times = np.arange(0.0, min(trace.duration, end) + step, step)
     kept = ~_meet_ego(vehicles, half, times, ego, ego_box)
@@ -268,7 +282,7 @@ def play_trace(
 
 
 def _check_place(trace: FcdTrace, path: Path, lanes: np.ndarray) -> None:
-    """Checks that vehicles are on lanes, or persons near them.
+    """Checks that vehicles are on lanes, or persons near lanes.
 
     Raises:
         InputError: they are not.
@@ -291,7 +305,7 @@ def _extent(places: np.ndarray) -> str:
 
 
 class Heights:
-    """Heights of the ground at places.
+    """Returns heights of the ground, interpolated between points on lanes.
 
     Attributes:
         zero: height of the ground where a trace has z = 0 [m].
@@ -300,14 +314,17 @@ class Heights:
     zero = 0.0
 
     def __init__(self, points: np.ndarray):
-        """Takes (N, 3) points on the ground, along lanes [m]."""
+        """Takes points (N, 3) on the ground along lanes [m]."""
         self._tree = cKDTree(points[:, :2])
         self._z = points[:, 2]
         steps = np.diff(points[:, :2], axis=0, prepend=points[:1, :2])
         self._heading = np.arctan2(steps[:, 1], steps[:, 0])
 
     def at(self, xy: np.ndarray) -> np.ndarray:
-        """Returns the heights of the nearest points, weighted by distance."""
+        """Returns heights (N,) at places (N, 2), from the nearest points [m].
+
+        Nearer points have more weight.
+        """
         distance, near = self._tree.query(xy, k=min(4, len(self._z)))
         distance, near = (
             np.reshape(values, (len(xy), -1)) for values in (distance, near)
@@ -319,9 +336,10 @@ class Heights:
     ) -> np.ndarray:
         """Returns the heights (M,) of a road user along places (M, 2) [m].
 
-        Where roads cross at two heights, the height in the trace shows on which
-        road the road user is. If the trace gives none (NaN), it is the road on
-        which the road user came, or one with a lane in its direction [rad].
+        Where roads cross at two heights, the heights `z` in the trace show on
+        which road the road user is. If the trace has none (NaN), it is the road
+        on which the road user came, or the one with a lane in the direction
+        `yaw` [rad].
         """
         found = self.at(xy)
         count = min(_CANDIDATES, len(self._z))
@@ -358,7 +376,7 @@ class Heights:
 
 
 def _zero(trace: FcdTrace, heights: Heights) -> float:
-    """Returns the map's height where a trace has z = 0 [m]."""
+    """Returns the height in the map where a trace has z = 0 [m]."""
     some = [one for one in trace.vehicles if np.isfinite(one.z).all()]
     if not some:
         return 0.0
@@ -369,7 +387,7 @@ def _zero(trace: FcdTrace, heights: Heights) -> float:
 
 
 def _kind(one: TracedObject, seed: int) -> VehicleKind:
-    """Returns the kind of a vehicle: by its type, or else a random car."""
+    """Returns the kind of a vehicle: from its type, or else a random car."""
     text = one.type_name.lower().replace("default_biketype", "bicycle")
     for word, name in _KINDS_BY_WORD:
         if word in text:
@@ -384,16 +402,16 @@ def _kind(one: TracedObject, seed: int) -> VehicleKind:
 def _vehicle_rows(
     one: TracedObject, kind: VehicleKind, heights: Heights
 ) -> np.ndarray:
-    """Returns the (M, 5) coordinates of a vehicle; see `TrafficPlan`."""
+    """Returns the coordinates (M, 5) of a vehicle; see `TrafficPlan`."""
     ahead = np.column_stack([cos(one.yaw), sin(one.yaw)])
     xy = one.xy - kind.size[0] / 2 * ahead
-    # An upward slope turns about -y.
+    # An upward slope is a rotation about -y.
     z = heights.along(xy, one.z, one.yaw)
     return np.column_stack([xy, z, one.yaw, -one.slope])
 
 
 def _person_rows(one: TracedObject, heights: Heights, dt: float) -> np.ndarray:
-    """Returns the (M, 5) coordinates of a walker; see `TrafficPlan`."""
+    """Returns the coordinates (M, 5) of a walker; see `TrafficPlan`."""
     steps = np.linalg.norm(np.diff(one.xy, axis=0), axis=1)
     turned = dt * gait_rate(steps / dt)
     start = zlib.crc32(one.name.encode()) % 1000 * 2e-3 * np.pi
@@ -405,12 +423,13 @@ def _person_rows(one: TracedObject, heights: Heights, dt: float) -> np.ndarray:
 def _make_tracks(
     trace: FcdTrace, traced: Sequence[TracedObject], rows: Sequence[np.ndarray]
 ) -> Tracks:
-    """Returns tracks of objects that are there at some of the times."""
+    """Returns tracks of objects, each of which is there at some times only."""
     values = np.zeros((trace.num_steps, len(traced), 5))
     present = np.zeros((trace.num_steps, len(traced)), bool)
     times = np.arange(trace.num_steps)
     for k, (one, own) in enumerate(zip(traced, rows, strict=True)):
-        # It comes and goes in motion, for a LiDAR that is turning then.
+        # It already moves when it appears and disappears, for a LiDAR that is
+        # turning then.
         steps = np.concatenate(
             [one.steps[:1] - 1, one.steps, one.steps[-1:] + 1]
         )
@@ -431,7 +450,7 @@ def _meet_ego(
     ego: EgoPath,
     box: EgoBox,
 ) -> np.ndarray:
-    """Returns (N,) whether each overlaps the ego car at any of the times."""
+    """Returns (N,) which bodies overlap the ego car at any of the times."""
     num = len(half)
     poses = np.full((len(times), 1 + num, 3), np.nan)
     poses[:, 0] = box.middles(*ego(times))

@@ -1,4 +1,4 @@
-"""Files of lanes and walkways, for maps without a `roads.yaml`."""
+"""Reads and writes lane files: lanes and walkways without a `roads.yaml`."""
 
 from collections.abc import Sequence
 import json
@@ -15,7 +15,7 @@ from cns_drake.base.json_text import parse_json
 from cns_drake.traffic import lane_graph
 from cns_drake.traffic.lane_graph import LaneGraph, Piece, Walkway, resampled
 
-# Between the points of a lane in a file [m].
+# Distance between the points of a lane in a file [m].
 _FILE_SPACING = 1.0
 _FARTHEST = 1e6
 _MOST = 20_000
@@ -64,10 +64,10 @@ class _File(_Model):
 
 
 class LaneFile(NamedTuple):
-    """The content of a file of lanes.
+    """The content of a lane file.
 
-    Structures that are `in_the_way`, such as parked cars, stand where vehicles
-    drive. A drive with traffic leaves them out.
+    `in_the_way` names structures, such as parked cars, that stand where
+    vehicles drive. A drive with traffic leaves them out.
     """
 
     graph: LaneGraph
@@ -80,7 +80,7 @@ def lane_text(
     walkways: Sequence[Walkway],
     in_the_way: Sequence[str] = (),
 ) -> str:
-    """Returns the text of a lane file, see `LaneFile`."""
+    """Returns the text of a lane file; see `LaneFile` for its content."""
     content: dict[str, Any] = {
         "lanes": [
             {
@@ -108,7 +108,7 @@ def lane_text(
         content["crossings"] = [
             {
                 "line": np.round(crossing.line, 3).tolist(),
-                # That of the rectangle about its line.
+                # The width of the rectangle around its line.
                 "width": round(
                     crossing.area.area / math.dist(*crossing.line[:, :2]), 3
                 ),
@@ -121,16 +121,16 @@ def lane_text(
 
 
 def _known(one: Piece | Walkway, *names: str) -> dict[str, int]:
-    """Returns the numbers of some names, without those that are -1."""
+    """Returns the fields of an object with these names, except those of -1."""
     values = {name: getattr(one, name) for name in names}
     return {name: value for name, value in values.items() if value != -1}
 
 
 def read_lanes(path: Path) -> LaneFile:
-    """Returns the lanes of a file that `lane_text` made.
+    """Returns the content of a file that `lane_text` wrote.
 
     Raises:
-        InputError: the file cannot be read or is not a file of lanes.
+        InputError: the file cannot be read or is not a lane file.
     """
     with value_errors(f"{path}: not JSON"):
         found = validated(_File, parse_json(read_bytes(path)), path)

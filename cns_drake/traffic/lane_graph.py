@@ -1,4 +1,4 @@
-"""Lanes of vehicles, the ways between them, crossings and walkways."""
+"""Lanes for vehicles, ways through junctions, crossings and walkways."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
@@ -10,24 +10,26 @@ import shapely
 from shapely.geometry import LineString
 from shapely.geometry.base import BaseGeometry
 
-# Distance of the points of a piece at most [m].
+# Greatest distance between the points of a piece [m].
 SPACING = 0.5
-# Walkers' middles keep so far from things that their boxes clear them in any
-# direction; where that takes more than this part of a walkway, as far as their
+# Walkers' middles keep the first distance from objects, so that their boxes
+# clear them in any direction. Where this takes more than the second number, a
+# share of a walkway's width, they keep the third distance, as far as their
 # sides need [m].
 _AROUND, _NARROW, _BESIDE = 0.53, 0.5, 0.36
-# Walkers begin a walkway this many points before its first one, at most.
+# Walkers begin a walkway at most this many points before its first one.
 _BEFORE = 4
 # Number of places across a walkway, and least number of points along it.
 _ACROSS, _ALONG = 21, 4
-# Walkers step aside by this number of places from point to point.
+# Walkers move aside by at most this many places from one point to the next.
 _ASIDE = 2
-# A crossing without marks leads over so many lanes at most; it keeps this
-# distance from the ends of lanes, so that no vehicle on it has its front in
-# another one, from ways, and from the ends of walkways [m].
+# A crossing without marks leads over at most this many lanes. It keeps these
+# distances: from the ends of lanes, so that the front of a vehicle on it is not
+# yet in another lane; from ways; and from the ends of walkways [m].
 _MOST_LANES, _FROM_ENDS, _FROM_WAYS, _FROM_NODES = 4, 15.0, 5.0, 4.0
-# Its width, half the width of the walkers' way and of a lane, the greatest
-# distance of a walkway from a lane, and that of the places tried [m].
+# Width of a crossing without marks; half the width of the walkers' path and of
+# a lane; greatest distance of a walkway from a lane; distance between the
+# places tried [m].
 _WIDTH, _HALF_WAY, _HALF_LANE, _REACH, _TRIED = 2.4, 0.5, 1.75, 20.0, 2.0
 
 
@@ -35,19 +37,20 @@ _WIDTH, _HALF_WAY, _HALF_LANE, _REACH, _TRIED = 2.4, 0.5, 1.75, 20.0, 2.0
 class Piece:
     """A piece of a vehicle's path: part of a lane, or a way through a junction.
 
-    A vehicle enters a way only as a whole: it waits in the lane before it until
-    all crossing ways are free.
+    A vehicle enters a way only if it can drive through all of it: it waits in
+    the lane before the way until all crossing ways are free.
 
     Attributes:
-        points: (N, 3) its middle in driving direction, evenly spaced [m].
+        points: (N, 3) points on its middle in driving direction, evenly spaced
+            [m].
         limit: speed limit [m/s].
-        is_way: whether it is a way, not a lane.
+        is_way: whether it is a way; otherwise it is a lane.
         after: numbers of the pieces that follow it.
-        left, right: numbers of the lanes beside it, in the same direction;
-            -1 for none.
+        left, right: numbers of the lanes beside it in the same direction; -1
+            for none.
         junction: number of the junction in which a way is, or to which a lane
             leads.
-        phase: signal phase in which a way is green; -1 without a signal.
+        phase: signal phase in which a way has green; -1 without a signal.
     """
 
     points: np.ndarray
@@ -66,13 +69,13 @@ class Piece:
 
 @dataclass(frozen=True)
 class Crossing:
-    """A walkers' crossing of the lanes at one road end, or elsewhere.
+    """A place where walkers cross the lanes, at the end of a road or elsewhere.
 
     Attributes:
         line: (2, 3) from kerb to kerb, or from sidewalk to sidewalk [m].
-        area: where walkers are on it [m].
-        marked: whether vehicles give way to walkers who wait. A crossing
-            without marks is not at a road's end, and walkers wait for a gap.
+        area: where walkers are while they cross.
+        marked: whether vehicles give way to waiting walkers. A crossing without
+            marks is not at the end of a road; walkers wait there for a gap.
     """
 
     line: np.ndarray
@@ -83,24 +86,24 @@ class Crossing:
 def make_crossing(
     line: np.ndarray, width: float, marked: bool = True
 ) -> Crossing:
-    """Returns a crossing of a width [m] about a line (2, 3) [m]."""
+    """Returns a crossing of a given width around a line (2, 3) [m]."""
     course = LineString(line[:, :2])
     return Crossing(line, course.buffer(width / 2, cap_style="flat"), marked)
 
 
 @dataclass(frozen=True)
 class Walkway:
-    """A strip between two places where others begin.
+    """A strip on which people walk, between two places where others begin.
 
     Attributes:
         points: (N, 3) points along its middle, evenly spaced [m].
         half_width: greatest distance of a walker from the middle [m].
         start, end: numbers of the places at its ends.
-        crossing: number of the crossing that it leads over, -1 for none.
-        free: (N, 2) least and greatest offset to the right between which no
+        crossing: number of the crossing over which it leads; -1 for none.
+        free: (N, 2) least and greatest offset to the right, between which no
             objects stand, at each point [m]; None if the whole width is free.
-        narrow: (N,) bool, where walkers have to face along it; None for
-            nowhere.
+        narrow: (N,) whether there is only room for walkers who face along the
+            walkway; None if there is more room everywhere.
     """
 
     points: np.ndarray
@@ -113,7 +116,7 @@ class Walkway:
 
     @property
     def limits(self) -> np.ndarray:
-        """(N, 2) least and greatest offset of walkers to the right [m]."""
+        """Least and greatest offset of walkers to the right, (N, 2) [m]."""
         if self.free is not None:
             return self.free
         sides = self.half_width * np.array([-1, 1])
@@ -121,7 +124,7 @@ class Walkway:
 
     @property
     def is_narrow(self) -> np.ndarray:
-        """(N,) bool, where walkers only have room if they face along it."""
+        """Where (N,) walkers only have room if they face along the walkway."""
         if self.narrow is not None:
             return self.narrow
         return np.zeros(len(self.points), bool)
@@ -132,8 +135,8 @@ def kept_clear(
 ) -> list[Walkway]:
     """Returns walkways that lead around objects, or end at them.
 
-    The objects are seen from above [m]. No crossing stays without a walkway at
-    both ends.
+    The objects are seen from above [m]. Crossings that do not have a walkway at
+    both ends are left out.
     """
     tree, found = shapely.STRtree(things), []
     node = 1 + max((max(way.start, way.end) for way in walkways), default=0)
@@ -149,14 +152,15 @@ def kept_clear(
             each.flat[tree.query(seen, "dwithin", reach)[0]] = 1
         narrow = around.mean(axis=1) > _NARROW
         barred[~narrow] = around[~narrow]
-        # What bars the whole way there stands behind those who begin it.
+        # What blocks the whole width also stands in the way of walkers who
+        # begin there.
         for line in (barred, barred[::-1]):
             for row in line[:_BEFORE][::-1]:
                 if not (line[_BEFORE] | row).all():
                     line[_BEFORE] |= row
         barred = barred[_BEFORE:-_BEFORE]
         narrow = maximum_filter1d(narrow, 3)[_BEFORE:-_BEFORE]
-        # A walker is longer than wide, and needs a way to step aside.
+        # A walker is longer than wide, and needs some distance to move aside.
         barred = maximum_filter1d(barred, 3, axis=0)
         for step in (1, -1):
             line = barred[::step]
@@ -198,13 +202,13 @@ def kept_clear(
                     narrow=narrow[rows],
                 )
             )
-    # No crossing leads to where there is no walkway.
+    # No crossing leads to a place without a walkway.
     reached = {n for w in found if w.crossing < 0 for n in (w.start, w.end)}
     return [w for w in found if w.crossing < 0 or {w.start, w.end} <= reached]
 
 
 def _lengthened(points: np.ndarray, count: int) -> np.ndarray:
-    """Returns points (N, 2) with some more straight on at either end."""
+    """Returns points (N, 2), continued straight by `count` at both ends."""
     more = np.arange(1, count + 1)[:, None]
     before = points[0] - more[::-1] * (points[1] - points[0])
     return np.concatenate(
@@ -214,7 +218,7 @@ def _lengthened(points: np.ndarray, count: int) -> np.ndarray:
 
 @dataclass(frozen=True)
 class LaneGraph:
-    """Pieces by number, and the walkers' crossings over them."""
+    """The pieces of vehicles' paths by number, and the crossings over them."""
 
     pieces: tuple[Piece, ...]
     crossings: tuple[Crossing, ...] = ()
@@ -230,15 +234,15 @@ def with_unmarked_crossings(
     walkways: Sequence[Walkway],
     things: Sequence[BaseGeometry] = (),
 ) -> tuple[LaneGraph, list[Walkway]]:
-    """Adds places between crossings where walkers may cross narrow streets.
+    """Returns a graph with places where walkers may cross narrow streets.
 
-    Each place is as near to the middle of a lane as possible. On both sides
-    there must be a walkway, and nothing may stand in between, seen from above.
-    A walkway has one such place at most.
+    Each place is as near to the middle of a lane as possible. There must be a
+    walkway on both sides, and nothing may stand in between, seen from above. A
+    walkway has at most one such place.
 
     Returns:
-        The graph with the additional crossings; and the walkways, which are cut
-        at these places, with additional ones over the crossings.
+        The graph with the additional crossings. The walkways, which are cut at
+        these places, and additional ones over the crossings.
     """
     sides = [k for k, way in enumerate(walkways) if way.crossing < 0]
     lines = [LineString(walkways[k].points[:, :2]) for k in sides]
@@ -247,12 +251,12 @@ def with_unmarked_crossings(
         shapely.STRtree, (lines, lanes, things)
     )
     crossings, found = list(graph.crossings), list[Walkway]()
-    # Walkway -> the row where it is cut, and the number of the place there.
+    # Walkway -> the row at which it is cut, and the number of the place there.
     cuts: dict[int, tuple[int, int]] = {}
     node = 1 + max((max(way.start, way.end) for way in walkways), default=0)
 
     def beside(p: np.ndarray, reach: np.ndarray) -> tuple[int, int] | None:
-        """Returns the first walkway on one side, and its row there."""
+        """Returns the first walkway on one side, and its nearest row."""
         ray = LineString([p, p + reach])
         near = side_tree.query(ray, "intersects")
         if not len(near):
@@ -266,7 +270,7 @@ def with_unmarked_crossings(
         return (k, row) if is_inside and k not in cuts else None
 
     def course(p: np.ndarray, q: np.ndarray, z: float) -> np.ndarray | None:
-        """Returns a way (4, 3) over lanes at a height, None if it is barred."""
+        """Returns a path (4, 3) across lanes at height z; None if blocked."""
         line = LineString([p[:2], q[:2]])
         ahead = (q - p)[:2] / line.length
         over = lane_tree.query(line, "intersects")
@@ -339,7 +343,7 @@ def resampled(points: np.ndarray, spacing: float = SPACING) -> np.ndarray:
     """Returns evenly spaced points (N, 3) along a polyline (M, 3) [m].
 
     Neighbouring points are at most `spacing` apart [m]. A corner that coincides
-    with the corner before it is dropped.
+    with the one before it is dropped.
     """
     steps = np.linalg.norm(np.diff(points, axis=0), axis=1)
     points = points[np.append(True, steps > 1e-6)]
@@ -355,16 +359,16 @@ def length_of(points: np.ndarray) -> float:
 
 
 def distances_along(points: np.ndarray) -> np.ndarray:
-    """Returns the (N,) distances of points (N, 2 or 3) along their line [m]."""
+    """Returns the distances (N,) of points (N, 2 or 3) along their line [m]."""
     steps = np.linalg.norm(np.diff(points, axis=0), axis=1)
     return np.append(0.0, np.cumsum(steps))
 
 
 def without_dead_ends(pieces: Sequence[Piece]) -> list[Piece]:
-    """Returns pieces on which a vehicle can drive for ever.
+    """Returns the pieces on which a vehicle can drive forever.
 
-    Lanes that lead nowhere are removed, with the pieces that lead only to them,
-    and lanes that nothing leads to.
+    Removed are lanes that lead nowhere, the pieces that lead only to them, and
+    lanes to which no piece leads.
     """
     alive = set(range(len(pieces)))
     while True:

@@ -8,19 +8,20 @@ import numpy as np
 from cns_drake.traffic import lane_graph
 from cns_drake.traffic.lane_graph import SPACING, LaneGraph, Piece, resampled
 
-# A lane must have room for any vehicle; a shorter one is part of the ways
-# that lead over it [m].
+# A lane must have room for any vehicle. A shorter one is part of the ways that
+# lead over it [m].
 _SHORTEST_LANE = 14.0
-# Distance of stop lines from the end of a lane, in steps of `SPACING`.
+# Distance from a stop line to the end of its lane, in steps of `SPACING`.
 _STOP_STEPS = 2
 # Greatest number of short lanes in a way, and of ways from a lane.
 _MOST_SHORT, _MOST_WAYS = 8, 12
 
 
 class DirectedLane(NamedTuple):
-    """A lane in one direction: the (N, 3) points of its middle [m].
+    """A lane in one direction, by the points (N, 3) of its middle [m].
 
-    It has a speed limit [m/s], and connects lanes if it is in a junction.
+    `limit` is its speed limit [m/s]. `connects` says whether it is in a
+    junction, where it connects lanes.
     """
 
     points: np.ndarray
@@ -33,12 +34,12 @@ def join_lanes(
     links: Iterable[tuple[int, int]],
     right_of: Mapping[int, int] | None = None,
 ) -> LaneGraph:
-    """Returns the graph of lanes of a map, cut at its own places.
+    """Returns the graph of lanes of a map, cut into pieces for traffic.
 
     The second lane of a link follows the first. `right_of` maps the number of a
-    lane to the number of the lane on its right, in the same direction. Without
-    it, vehicles do not change lanes. The graph has neither signals nor
-    crossings. It is empty if vehicles cannot drive for ever anywhere.
+    lane to that of the lane on its right in the same direction; without it,
+    vehicles do not change lanes. The graph has no signals and no crossings. It
+    is empty if vehicles cannot drive forever anywhere.
     """
     merged, after, beside = _merge(lanes, links, right_of or {})
     points = [resampled(lane.points) for lane in merged]
@@ -49,7 +50,7 @@ def join_lanes(
     ]
     number = {k: row for row, k in enumerate(long)}
     left_of = {right: left for left, right in beside.items()}
-    # Places that are in one junction, as trees: place -> its parent.
+    # Places in the same junction, as trees: place -> its parent.
     parents: dict[tuple[int, str], tuple[int, str]] = {}
 
     def cluster(place: tuple[int, str]) -> tuple[int, str]:
@@ -102,7 +103,7 @@ def _merge(
     links: Iterable[tuple[int, int]],
     right_of: Mapping[int, int],
 ) -> tuple[list[DirectedLane], list[list[int]], dict[int, int]]:
-    """Returns joined lanes, their successors, and the lanes to their right."""
+    """Returns joined lanes, their successors, and the lanes on their right."""
     after: list[list[int]] = [[] for _ in lanes]
     before: list[list[int]] = [[] for _ in lanes]
     for first, second in links:
@@ -123,7 +124,7 @@ def _merge(
         for k in range(len(lanes))
         if len(before[k]) != 1 or not goes_on(before[k][0])
     ]
-    # Only rings are left after the heads, and begin anywhere.
+    # After the heads, only rings are left, which may begin anywhere.
     for head in (*heads, *range(len(lanes))):
         if head in placed:
             continue
@@ -157,7 +158,7 @@ def _merge(
 def _ways(
     first: int, after: Sequence[Sequence[int]], long: set[int]
 ) -> Iterator[tuple[tuple[int, ...], int]]:
-    """Yields short lanes and the long lane to which they lead."""
+    """Yields short lanes that follow a lane, and the long lane behind."""
     waiting: list[tuple[int, ...]] = [()]
     found = 0
     while waiting and found < _MOST_WAYS:

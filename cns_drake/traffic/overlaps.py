@@ -11,13 +11,13 @@ from cns_drake.base.compiled import compiled
 def boxes_overlap(a: Any, b: Any, half_a: Any, half_b: Any) -> bool:
     """Returns whether two rectangles overlap.
 
-    Two rectangles overlap if their projections on all their axes overlap. Each
-    rectangle has (3,) x, y of its middle [m] and heading [rad], and (2,) half
-    its length and half its width [m].
+    They do if their projections on the axes of both rectangles overlap. A
+    rectangle is given by x, y of its middle [m] and its heading [rad], (3,),
+    and by half its length and half its width (2,) [m].
     """
     dx, dy = b[0] - a[0], b[1] - a[1]
     square = (half_a[0] + half_b[0]) ** 2 + (half_a[1] + half_b[1]) ** 2
-    # The half diagonals together are at most sqrt(2) times as long.
+    # The half diagonals together are at most sqrt(2) times as long as this.
     if dx**2 + dy**2 > 2.0 * square:
         return False
     turn = b[2] - a[2]
@@ -40,10 +40,10 @@ def boxes_overlap(a: Any, b: Any, half_a: Any, half_b: Any) -> bool:
 def find_overlaps(
     poses: np.ndarray, half: np.ndarray, found: np.ndarray
 ) -> None:
-    """Marks in `found` (N, N) bool which pairs of bodies ever overlap.
+    """Marks in `found` (N, N) which pairs of bodies overlap at any time.
 
-    Poses are (K, N, 3) x, y [m], heading [rad], NaN while a body is absent;
-    half lengths and half widths (N, 2) [m].
+    Poses (K, N, 3) are x, y [m] and heading [rad]; NaN while a body is absent.
+    `half` (N, 2) has half lengths and half widths [m].
     """
     reach = np.sqrt(half[:, 0] ** 2 + half[:, 1] ** 2)
     for k in range(len(poses)):

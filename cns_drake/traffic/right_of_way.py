@@ -1,10 +1,11 @@
-"""The right to enter a junction: one after the other, by arrival.
+"""Who may enter a junction: first come, first served.
 
-A vehicle may enter its whole way under three conditions: those on ways that
-meet it will have passed when it comes there, there is room for it behind the
-way, and its signal is green, or it has stopped before the line. If another one
-is slower than expected, it waits on its way for those that entered before it,
-which never wait for it: none waits for ever.
+A vehicle may enter its way through a junction under three conditions: vehicles
+on conflicting ways will have passed when it gets there; there is room for it
+behind the way; and its signal is green or, without a signal, it has stopped at
+the line. If a vehicle with the right of way is slower than expected, later
+vehicles wait for it on their ways. Earlier ones never wait for later ones, so
+no vehicle waits forever.
 """
 
 from typing import Any
@@ -29,53 +30,56 @@ from cns_drake.traffic.vehicles import (
     rear_on_way,
 )
 
-# Where there is no signal, a driver has to stand for a while before the line
-# [s]: to be slower than this [m/s], and this near [m].
+# Where there is no signal, a driver must stand for a while before the line: for
+# the first time [s], slower than the second number [m/s], and within the third
+# distance [m].
 _STOPS, _STANDS, _AT_LINE = 3.0, 0.5, 4.0
-# Traffic ahead of the ego car, if it comes within this time, goes first and
-# does not wait for signals [s].
+# Traffic ahead of the ego car goes first and does not wait for signals if the
+# ego car comes within this time [s].
 _EGO_IS_NEAR = 80.0
 _GOES_FIRST = 1e6
-# Expected wait on a way for vehicles and for walkers at most [s]; after this
-# time at a stop line no later driver enters a way that meets one's own [s].
-# Accelerations that are assumed for a driver and others [m/s^2], and the
-# others' part of the allowed speed.
+# Greatest expected wait on a way for vehicles, and for walkers [s]. After the
+# third time at a stop line, no later driver may enter a conflicting way [s].
+# Then the accelerations that are assumed for the driver and for others [m/s^2],
+# and the others' share of the allowed speed.
 _SLACK, _YIELDS, _LONG = 2.0, 6.0, 20.0
 _OWN, _OTHERS, _PACE = 2.0, 1.0, 0.8
-# If the ego car comes within this time, a vehicle enters its way only once no
-# other is in its way [s].
+# If the ego car comes within this time, a vehicle enters its way only after all
+# others have left the conflicting ways [s].
 _EGO_COMES = 20.0
 # No vehicle enters a way if the ego car will be there within this time [s].
 _EGO_MARGIN = 3.0
-# Assumed wait at the end of a lane of a driver who goes first [s].
+# Assumed wait at the end of a lane for a driver who goes first [s].
 _SHORT_WAIT = 5.0
-# Gap between standing vehicles [m], and greatest braking of the last one
-# [m/s^2].
+# Gap between standing vehicles [m], and greatest braking of the last vehicle
+# ahead [m/s^2].
 _ROOM, _LAST_BRAKES = 2.5, 4.0
-# Drivers request their way from this distance [m], or from this multiple of
-# their braking distance; from farther away, by this time [s], if there is a
-# signal, since none brakes before a green one.
+# Drivers request their way within this distance [m], or within this multiple of
+# their braking distance. At a signal they request it this much earlier [s],
+# since nobody brakes before a green signal.
 _ASKED_FROM, _ASKED_BRAKING, _ASKED_FOR = 10.0, 1.4, 3.0
 # After this time without room, a driver takes another way [s].
 _PATIENCE = 3.0
-# Walkers whose green is too short begin to cross in its first part [s].
+# If the green of walkers is too short for them, they may begin to cross within
+# its first part of this length [s].
 _LATE = 2.0
-# Time for a group of walkers to start [s], their assumed speed [m/s], and
+# Time in which a group of walkers starts [s], their assumed speed [m/s], and a
 # reserve [s].
 WALK_GROUP = 3.0
 _WALKING, _DAWDLING = 1.0, 3.0
-# Time for vehicles after a group has left a crossing [s].
+# Time that vehicles have after a group of walkers has left a crossing [s].
 _REST = 30.0
-# Where there are no marks, walkers begin if no vehicle comes so soon [s].
+# Where there are no marks, walkers begin to cross if no vehicle comes within
+# this time [s].
 _WALKERS_GAP = 6.0
 
 
 @compiled
 def grant_ways(traffic: Traffic, k: int) -> None:
-    """Grants vehicles their ways through junctions, first come first served.
+    """Gives vehicles permission for their ways: first come, first served.
 
-    Walkers are granted crossings in the same way. The present time step is the
-    k-th.
+    Walkers get permission for crossings in the same way. The present time step
+    is the k-th.
     """
     streets, cars, crossings = traffic.streets, traffic.cars, traffic.crossings
     t, pieces, num_cars = k * STEP, streets.pieces, len(cars)
@@ -92,13 +96,14 @@ def grant_ways(traffic: Traffic, k: int) -> None:
                 or _is_ready(streets, cars[i], k)
             ):
                 continue
-            # Its signal has changed, and it can stop.
+            # The signal has changed, and the vehicle can still stop.
             cars[i].granted, cars[i].held = False, -1
         if first[lane] < 0 or cars[i].s > cars[first[lane]].s:
             first[lane] = i
         other = cars[i].left_lane
         if cars[i].guided and other >= 0:
-            # It is the last one, and counts in both of its lanes.
+            # The ego car is the last of the vehicles, and counts in both lanes
+            # while it changes.
             s = cars[i].s * (pieces[other].length / pieces[lane].length)
             if first[other] < 0 or s > cars[first[other]].s:
                 first[other] = i
@@ -111,7 +116,7 @@ def grant_ways(traffic: Traffic, k: int) -> None:
         ahead = cars[first[lane]]
         scale = pieces[lane].length / pieces[ahead.path[CURRENT]].length
         if ahead.s * scale > cars[i].s:
-            # Behind one without a permit, a driver cannot use it.
+            # Behind a vehicle without permission, a driver cannot use it.
             cars[i].granted, cars[i].held = False, -1
     since = np.full(num_cars + len(crossings), np.inf)
     for lane in range(len(pieces)):
@@ -136,7 +141,7 @@ def grant_ways(traffic: Traffic, k: int) -> None:
             if 0.0 < streets.until[k, lane] < _EGO_IS_NEAR:
                 since[first[lane]] = streets.until[k, lane] - _GOES_FIRST
             elif phase < 0 and car.since == np.inf:
-                # Every driver stops where there is no signal.
+                # Every driver stops at the line where there is no signal.
                 if car.v > _STANDS or left > _AT_LINE:
                     continue
             else:
@@ -149,7 +154,7 @@ def grant_ways(traffic: Traffic, k: int) -> None:
         one = crossings[c]
         if one.users == 0 and (one.is_open or one.waits > t):
             one.order, one.is_open = 0, False
-    # What small and what large vehicles must not enter now.
+    # Pieces that small, and large, vehicles must not enter now.
     taken = np.zeros((2, len(pieces)), np.bool_)
     last = 1
     for i in range(num_cars):
@@ -176,18 +181,18 @@ def grant_ways(traffic: Traffic, k: int) -> None:
             continue
         if not _has_room(traffic, who, k):
             if car.guided and t > since[who] + _LONG:
-                # It cannot take another way: the next room is for it.
+                # It has no other way to take: the next room is for it.
                 for other in range(len(pieces)):
                     first_after = streets.after[pieces[other].after_first]
                     blocked[other] |= first_after == car.path[CURRENT + 2]
             continue
-        # The ego car's plan leaves no time to wait on a way.
+        # The ego car's plan has no time to wait on a way.
         is_near = streets.until[k, way] < _EGO_COMES
         if taken[int(is_large), way] and (
             is_near or not _is_soon_free(traffic, who, way, t)
         ):
             if is_near or t > since[who] + _LONG:
-                # Later arrivals must not always go first.
+                # Later arrivals must not go first again and again.
                 clear = streets.clear[int(is_large), way]
                 blocked |= clear[: len(pieces)] > 0.0
             continue
@@ -199,10 +204,10 @@ def grant_ways(traffic: Traffic, k: int) -> None:
 
 @compiled
 def _is_soon_free(traffic: Traffic, i: int, way: int, t: float) -> bool:
-    """Returns whether the i-th vehicle need hardly wait on the way before it.
+    """Returns whether the i-th vehicle would hardly have to wait on its way.
 
-    Walkers, and vehicles on other ways, will have passed the places where they
-    meet it when it comes there.
+    It would not if walkers and vehicles on other ways will have passed the
+    conflicting places when it gets there.
     """
     streets, cars, crossings = traffic.streets, traffic.cars, traffic.crossings
     car, pieces = cars[i], streets.pieces
@@ -234,7 +239,7 @@ def _is_soon_free(traffic: Traffic, i: int, way: int, t: float) -> bool:
         if streets.joint[size, way, held] == SPLIT and rear > 0.0:
             continue
         if streets.joint[size, way, held] == MERGE:
-            # Behind it the vehicle follows it.
+            # Behind this place, it follows the other vehicle.
             last = min(last, streets.begin[size, held, way] + other.length)
         arrives = _duration(place - front, car.v, _OWN, pace)
         its_pace = _PACE * streets.speed[pieces[held].first]
@@ -246,7 +251,10 @@ def _is_soon_free(traffic: Traffic, i: int, way: int, t: float) -> bool:
 
 @compiled
 def _duration(distance: float, v: float, a: float, pace: float) -> float:
-    """Returns the time for a distance, from a speed up to a pace [s]."""
+    """Returns the time to cover a distance [s].
+
+    The speed grows from `v` up to `pace` with the acceleration `a`.
+    """
     if distance <= 0.0:
         return 0.0
     v = min(v, pace)
@@ -258,9 +266,9 @@ def _duration(distance: float, v: float, a: float, pace: float) -> float:
 
 @compiled
 def _serve(traffic: Traffic, c: int, k: int, last: int) -> int:
-    """Opens a crossing for walkers once the vehicles before them have passed.
+    """Opens a crossing for walkers once earlier vehicles have passed.
 
-    Takes the highest `order` so far, and returns it.
+    `last` is the highest `order` so far; the result is the new one.
     """
     streets, cars = traffic.streets, traffic.cars
     one, place, t = traffic.crossings[c], len(streets.pieces) + c, k * STEP
@@ -290,16 +298,16 @@ def _serve(traffic: Traffic, c: int, k: int, last: int) -> int:
         clear = streets.clear[size, car.held, place]
         if rear < clear and ahead < _stops_within(car):
             return last
-    # A placeholder holds the permit until the group has begun to walk.
+    # A placeholder holds the permission until the group begins to walk.
     one.users, one.opened, one.is_open = 1, t, True
-    # Vehicles that are not yet there wait for it, whenever they came.
+    # Vehicles that have not arrived yet wait for it, whatever their order.
     one.order = 1
     return last
 
 
 @compiled
 def _is_gap(traffic: Traffic, c: int) -> bool:
-    """Returns whether no vehicle is on the c-th crossing, or will be soon."""
+    """Returns whether the c-th crossing is free of vehicles for some time."""
     for i in range(len(traffic.cars)):
         car = traffic.cars[i]
         _, enters, leaves = lane_over(traffic.streets, car, c)
@@ -311,9 +319,9 @@ def _is_gap(traffic: Traffic, c: int) -> bool:
 
 @compiled
 def _until_red(streets: Streets, place: int, t: float) -> float:
-    """Returns for how long a way or a crossing is still green [s].
+    """Returns how long a way or a crossing stays green [s].
 
-    That is 0 or less while it is red, and inf without a signal.
+    It is 0 or less during red, and inf without a signal.
     """
     cycle, green_from, green_for = streets.signals
     if green_for[place] == cycle:
@@ -323,7 +331,7 @@ def _until_red(streets: Streets, place: int, t: float) -> float:
 
 @compiled
 def _stops_within(car: Any) -> float:
-    """Returns the way on which a driver can stop in comfort [m]."""
+    """Returns the distance in which a driver can stop comfortably [m]."""
     return 1.0 + car.v + car.v**2 / (2.0 * car.b)
 
 
@@ -331,9 +339,9 @@ def _stops_within(car: Any) -> float:
 def _take(
     streets: Streets, taken: np.ndarray, place: int, is_large: bool, rear: float
 ) -> None:
-    """Notes what a vehicle on a way excludes, by the place of its rear [m].
+    """Marks the ways that a vehicle excludes, given the place of its rear [m].
 
-    What small and what large vehicles must not enter is `taken`, (2, P).
+    `taken` (2, P) says which pieces small, and large, vehicles must not enter.
     """
     size = int(is_large)
     for other in range(taken.shape[1]):
@@ -343,7 +351,7 @@ def _take(
 
 @compiled
 def _take_crossing(traffic: Traffic, taken: np.ndarray, c: int) -> None:
-    """Notes the ways that walkers on the c-th crossing exclude."""
+    """Marks the ways that walkers on the c-th crossing exclude."""
     begin, num_pieces = traffic.streets.begin, taken.shape[1]
     for way in range(num_pieces):
         for size in range(2):
@@ -353,7 +361,7 @@ def _take_crossing(traffic: Traffic, taken: np.ndarray, c: int) -> None:
 
 @compiled
 def _is_ready(streets: Streets, car: Any, k: int) -> bool:
-    """Returns whether a vehicle has waited for a signal, or at a stop line."""
+    """Returns whether a vehicle has waited at its signal or stop line."""
     t, way = k * STEP, car.path[CURRENT + 1]
     row = streets.pieces[way]
     if 0.0 < streets.until[k, car.path[CURRENT]] < _EGO_IS_NEAR:
@@ -365,9 +373,10 @@ def _is_ready(streets: Streets, car: Any, k: int) -> bool:
 
 @compiled
 def _has_room(traffic: Traffic, i: int, k: int) -> bool:
-    """Returns whether there is room beyond the i-th vehicle's way.
+    """Returns whether there is room behind the i-th vehicle's way.
 
-    Without room for some time it draws another way; see `grant_ways`.
+    If there has been none for some time, the vehicle draws another way; see
+    `grant_ways`.
     """
     streets, cars = traffic.streets, traffic.cars
     car, pieces = cars[i], streets.pieces

@@ -14,29 +14,32 @@ from cns_drake.roads.road import ENDS, End, Junction, LaneRef, Road
 from cns_drake.traffic import lane_graph
 from cns_drake.traffic.lane_graph import LaneGraph, Piece, Walkway, resampled
 
-# Distance of stop lines from the end of a road with and without a crossing;
-# distance of a crossing's middle from the end, and its width [m].
+# Distance of stop lines from the end of a road with a crossing, and without
+# one; distance of a crossing's middle from the end of the road; width of a
+# crossing [m].
 _STOP_LINE = 4.5
 _STOP_LINE_ALONE = 1.0
 _CROSSING_PLACE = 1.7
 _CROSSING_WIDTH = 2.4
-# Between its stop lines a lane must have room for any vehicle; a shorter one
-# is part of the ways through the junctions at its ends [m].
+# Between its stop lines, a lane must have room for any vehicle. A shorter one
+# becomes part of the ways through the junctions at its ends [m].
 _SHORTEST_LANE = 14.0
 # Greatest number of junctions in one way.
 _MOST_JUNCTIONS = 4
-# Wider roads have signals at their junctions, as in the city generator.
+# Roads with more lanes have signals at their junctions, as in the city
+# generator.
 _LANES_WITHOUT_SIGNAL = 2
-# Distance of walkers from kerbs and walls, and from the edges of a crossing
-# [m].
+# Distance of walkers from kerbs and walls; half the width in which they walk on
+# a crossing; the least such half width [m].
 _MARGIN = 0.45
 _CROSSING_HALF_WIDTH = 0.8
 _LEAST_HALF_WIDTH = 0.3
-# Distance from the kerb at which walkers wait, and the least length of a way
+# Distance from the kerb at which walkers wait, and least length of a walkway
 # from the walked strip to there [m].
 _BEFORE_KERB, _SHORTEST_SPUR = 1.4, 1.5
-# Distance of the walked strip from the kerb on any sidewalk; furniture is
-# beside the kerb or the houses [m].
+# Distance of the walked strip from the kerb on a wide sidewalk. Furniture
+# stands at the kerb or at the houses [m]. Then the least length of a walkway
+# [m].
 _WIDEST = 3.0
 _SHORTEST = 1.0
 
@@ -87,7 +90,8 @@ def make_lane_graph(network: RoadNetwork) -> LaneGraph:
         junction = clusters[network.exit_junction(ref)]
         phase = -1
         if _has_signals(network, clusters, junction):
-            # 0 along the junction's first arm, either way, and 1 across.
+            # Phase 0 is along the junction's first arm, in both directions, and
+            # phase 1 across it.
             heading = network.roads[ref.road].lane_end(*ref[1:], "exit")[3]
             across = abs(np.sin(heading - axes[junction]))
             phase = int(across > np.sin(np.pi / 4))
@@ -127,7 +131,7 @@ def _stop_line(network: RoadNetwork, road: Road, end: End) -> float:
 def _trims_of(
     ref: LaneRef, trims: dict[tuple[str, End], float]
 ) -> tuple[float, float]:
-    """Returns the lengths cut off a lane's entry and exit [m]."""
+    """Returns the lengths that are cut off a lane's entry and exit [m]."""
     start, end = trims[ref.road, "start"], trims[ref.road, "end"]
     return (start, end) if ref.direction == "forward" else (end, start)
 
@@ -142,7 +146,7 @@ def _cut(line: np.ndarray, start: float, end: float) -> np.ndarray:
 
 
 def _clusters(network: RoadNetwork, long: set[str]) -> dict[str, int]:
-    """Returns junction numbers; junctions joined by short roads share one."""
+    """Returns junction -> number; junctions joined by short roads share one."""
     group = {name: {name} for name in network.junctions}
     for road in network.roads.values():
         if road.name not in long:
@@ -173,9 +177,9 @@ def _ways(
     ref: LaneRef,
     long: Collection[str],
 ) -> Iterator[tuple[list[Connection], LaneRef]]:
-    """Yields the ways from a lane to the next that are long enough.
+    """Yields the ways from a lane to the next lanes that are long enough.
 
-    They pass no junction twice.
+    No way passes a junction twice.
     """
     waiting: list[tuple[list[Connection], LaneRef]] = [([], ref)]
     while waiting:
@@ -202,7 +206,7 @@ def _crossings(
 
 
 def _crossing_line(road: Road, end: End) -> np.ndarray:
-    """Returns where walkers cross at a road's end, (2, 3), left first [m]."""
+    """Returns the line (2, 3) of a road end's crossing, left end first [m]."""
     offsets = np.array([road.half_width, -road.half_width])
     return road.evaluate([_station(road, end)] * 2, offsets)[:, :3]
 
@@ -251,7 +255,7 @@ def make_walkways(network: RoadNetwork, graph: LaneGraph) -> list[Walkway]:
                     ahead = kerb[:2] - start[:2]
                     distance = math.dist(kerb[:2], start[:2])
                     if distance > _BEFORE_KERB + _SHORTEST_SPUR:
-                        # Where a sidewalk is wide, walkers wait at the kerb.
+                        # On a wide sidewalk, walkers wait at the kerb.
                         part = 1.0 - _BEFORE_KERB / distance
                         stop = np.append(start[:2] + part * ahead, start[2])
                         node, number = number, 2 * len(nodes) + len(found)
@@ -266,7 +270,7 @@ def make_walkways(network: RoadNetwork, graph: LaneGraph) -> list[Walkway]:
                 found.append(
                     Walkway(line, _CROSSING_HALF_WIDTH, left, right, k)
                 )
-    # At unusual junctions, not every corner has a sidewalk.
+    # At unusual junctions, some corners have no sidewalk.
     lanes = network.areas.lane_area
     shapely.prepare(lanes)
     return [
@@ -296,9 +300,10 @@ def _walked_width(road: Road) -> float:
 
 
 def _offset(road: Road) -> float:
-    """Returns the distance of the sidewalk's strip from the centreline [m].
+    """Returns the distance of the walked strip from the centreline [m].
 
-    The strip is on the far side, away from objects along the kerb.
+    The strip is on the far side of the sidewalk, away from objects along the
+    kerb.
     """
     return (
         road.half_width + road.sidewalk - min(_walked_width(road), _WIDEST) / 2
@@ -306,7 +311,7 @@ def _offset(road: Road) -> float:
 
 
 def _place(road: Road, end: End, side: int) -> np.ndarray:
-    """Returns x, y, z and heading towards the junction of a sidewalk's end."""
+    """Returns x, y, z of a sidewalk's end, and the heading to the junction."""
     place = road.evaluate([_station(road, end)], side * _offset(road))[0]
     place[2] += road.kerb_height
     if end == "start":
@@ -320,15 +325,15 @@ def _corners(
     nodes: dict[tuple[str, End, int], int],
     places: dict[tuple[str, End, int], np.ndarray],
 ) -> list[Walkway]:
-    """Returns the ways round the corners between neighbouring arms."""
+    """Returns the walkways around the corners between neighbouring arms."""
     found = []
     arms = junction.arms
     for k, arm in enumerate(arms):
         after = arms[(k + 1) % len(arms)]
         if arm is after:
             continue
-        # Counter-clockwise: the left side of an arm, seen from the junction,
-        # then the right side of the next.
+        # Counter-clockwise: seen from the junction, the left side of an arm,
+        # then the right side of the next arm.
         a = (arm.road, arm.end, 1 if arm.end == "start" else -1)
         b = (after.road, after.end, -1 if after.end == "start" else 1)
         if a not in nodes or b not in nodes:

@@ -1,8 +1,9 @@
-"""Lanes, programs of signals and the ego car's way, as arrays for loops.
+"""Lanes, signal programs and the ego car's path, as arrays for fast loops.
 
-All signals have one cycle. Green is split among the phases of a junction by the
-flow that comes in, and offsets of the junctions are such that vehicles which
-leave one on green wait little at the next (a green wave, where there is one).
+All signals have the same cycle. Its green is divided among the phases of a
+junction by the incoming flow. The offsets of the junctions are chosen so that
+vehicles that leave one junction on green wait little at the next one (a green
+wave, where possible).
 """
 
 import math
@@ -17,31 +18,31 @@ from cns_drake.roads.u_turn import outlines
 from cns_drake.traffic.lane_graph import LaneGraph, Piece, distances_along
 from cns_drake.traffic.vehicle_kinds import LARGEST, SMALL_SIZE
 
-# Duration of a cycle at least, of red for all after each phase, and of a phase
-# at least [s].
+# Least duration of a cycle, of red for all after each phase, and of a phase
+# [s].
 _CYCLE, _RED, _LEAST = 60.0, 4.0, 14.0
-# Speed of a column of vehicles at most [m/s], and the parts of its green at
-# which vehicles leave a junction.
+# Greatest speed of a column of vehicles [m/s], and the shares of its green
+# after which vehicles leave a junction.
 _PACE, _LEAVE = 9.0, np.array([0.1, 0.25, 0.4, 0.6])
-# Distance of the offsets that are tried [s], and number of rounds.
+# Distance between the offsets that are tried [s], and number of rounds.
 _OFFSET_STEP, _ROUNDS = 2.0, 3
-# A crossing so near to the stop line lies before it [m].
+# A crossing within this distance of the stop line lies before the line [m].
 _AT_LINE = 6.0
-# Steps of a vehicle that takes any way.
+# Number of steps of a vehicle that takes random ways.
 _WANDERS = 200
-# Drivers who go straight on, and who turn round, for each one who turns; and
-# the cosine of the least turn.
+# Number of drivers who go straight on, and who turn round, for each one who
+# turns; and the cosine of the least turn.
 _STRAIGHT, _ROUND, _TURN = 3.0, 0.02, 0.7
 
 
 class Signals(NamedTuple):
-    """The program of P pieces and C crossings.
+    """The signal program of P pieces and C crossings.
 
     Attributes:
         cycle: duration of a cycle [s].
         green_from, green_for: (P + C,) time in the cycle at which green begins,
-            for vehicles or for walkers, and how long it lasts [s]. Without a
-            signal it lasts the whole cycle.
+            for vehicles or for walkers, and its duration [s]. Without a signal,
+            green lasts the whole cycle.
     """
 
     cycle: float
@@ -52,7 +53,8 @@ class Signals(NamedTuple):
 def make_signals(graph: LaneGraph, begin: np.ndarray) -> Signals:
     """Returns the program of all traffic lights.
 
-    Where ways begin to meet crossings is (P + C, P + C), see `find_conflicts`.
+    `begin` (P + C, P + C) says where ways begin to meet crossings; see
+    `find_conflicts`.
     """
     pieces = graph.pieces
     flow = _flows(graph)
@@ -65,9 +67,9 @@ def make_signals(graph: LaneGraph, begin: np.ndarray) -> Signals:
     cycle = max(_CYCLE, (phase.max() + 1) * (_RED + _LEAST))
     green_from, green_for = np.zeros(len(begin)), np.full(len(begin), cycle)
     place = begin[: len(pieces), len(pieces) :]
-    # No walker goes before vehicles that start.
+    # Walkers must not have green together with vehicles that start.
     cost = flow[:, None] * np.where(place < _AT_LINE, 1e3, np.isfinite(place))
-    # The junction whose signal each way and crossing has, -1 for none.
+    # The junction whose signal each way and crossing has; -1 for none.
     owner = np.full(len(begin), -1)
     owner[: len(pieces)][phase >= 0] = junction[phase >= 0]
     for c, column in enumerate(place.T, len(pieces)):
@@ -88,7 +90,8 @@ def make_signals(graph: LaneGraph, begin: np.ndarray) -> Signals:
         for ways, start, lasts in zip(own, starts, green, strict=True):
             green_from[ways], green_for[ways] = start, lasts
         for column in np.flatnonzero(owner[len(pieces) :] == j):
-            # Walkers cross while the least flow leads over.
+            # Walkers have green in the phase in which the least flow crosses
+            # their way.
             crossed = [cost[ways, column].sum() for ways in own]
             k, row = int(np.argmin(crossed)), len(pieces) + column
             green_from[row], green_for[row] = starts[k], green[k]
@@ -100,7 +103,7 @@ def make_signals(graph: LaneGraph, begin: np.ndarray) -> Signals:
 
 
 def way_shares(graph: LaneGraph, lane: int) -> np.ndarray:
-    """Returns the shares of drivers that take each way after a lane."""
+    """Returns the share of drivers that takes each way behind a lane."""
     after = graph.pieces[lane].after
     likes = []
     for way in after:
@@ -114,9 +117,9 @@ def way_shares(graph: LaneGraph, lane: int) -> np.ndarray:
 
 
 def _flows(graph: LaneGraph) -> np.ndarray:
-    """Returns the (P,) shares of vehicles that take any way at each junction.
+    """Returns (P,) the share of vehicles on each piece, over a long time.
 
-    They are the mean over a long time.
+    At each junction, vehicles choose any way, with the shares of `way_shares`.
     """
     pieces = graph.pieces
     step = np.zeros((len(pieces), len(pieces)))
@@ -133,14 +136,14 @@ def _flows(graph: LaneGraph) -> np.ndarray:
 def _offsets(
     graph: LaneGraph, flow: np.ndarray, owner: np.ndarray, signals: Signals
 ) -> np.ndarray:
-    """Returns the (J,) offsets of the junctions' cycles [s].
+    """Returns the offsets (J,) of the junctions' cycles [s].
 
-    One junction after the other takes the offset with which the (P,) flow of
-    vehicles waits least. The junction whose signal each place has is (P + C,),
-    -1 for none.
+    One junction after the other takes the offset with which the flow (P,) of
+    vehicles waits least. `owner` (P + C,) is the junction whose signal a piece
+    or crossing has; -1 for none.
     """
     cycle, green_from, green_for = signals
-    # Behind a way are a lane and its first way.
+    # Behind each way, a lane and its first way.
     lane = np.array([(*p.after, k)[0] for k, p in enumerate(graph.pieces)])
     after, number = lane[lane], len(lane)
     time = np.array([p.length / min(p.limit, _PACE) for p in graph.pieces])
@@ -170,35 +173,36 @@ def _offsets(
     return offsets
 
 
-# Greatest acceleration in bends, and braking before them [m/s^2].
+# Greatest lateral acceleration in bends, and braking before them [m/s^2].
 _LATERAL = 2.2
 _BEFORE_BENDS = 1.5
-# Least speed in a bend [m/s].
+# Speed below which bends do not reduce it [m/s].
 _SLOWEST = 2.5
-# Number of points to both sides whose chords give the curvature.
+# The curvature is that of chords over this many points to both sides.
 _CHORD = 4
-# Distance of the places at which a vehicle's outline is drawn, and free space
-# around it [m].
+# Distance between the places at which a vehicle's outline is tested, and free
+# space around it [m].
 _STEP = 1.0
 _CLEARANCE = 0.25
-# Half the width of a vehicle's strip of its lane, with its distance from the
-# ego car [m].
+# Half the width of the strip of a lane that vehicles need, including their
+# distance from the ego car [m].
 _HALF_LANE = 1.45
-# A lane must be empty when the ego car enters it. Drivers assume this part of
-# the speed limit, and this wait at its end [s].
+# When the ego car enters a lane, the lane must be empty. Drivers assume that
+# they drive at this share of the speed limit, and wait for this time at the
+# lane's end [s].
 _SLOW_PART, WAIT = 0.6, 20.0
 
-# The step of planning [s].
+# Time step of the plan [s].
 STEP = 0.1
-# How two ways meet that share the lane before them, or that behind them.
+# Two ways share the lane before them (split), or the lane behind them (merge).
 SPLIT, MERGE = 1, 2
 
-# A piece of the lane graph: see `Piece`.
+# A piece of the lane graph as a record; see `Piece`.
 PIECE = np.dtype(
     [
         ("first", int),  # Row of its first point.
         ("num_points", int),
-        ("step", float),  # Distance of its points [m].
+        ("step", float),  # Distance between points [m].
         ("length", float),  # [m]
         ("is_way", bool),
         ("after_first", int),  # Row of its first successor.
@@ -218,19 +222,20 @@ class Streets(NamedTuple):
     Attributes:
         pieces: (P,) records `PIECE`.
         points: (M, 3) points of all pieces [m].
-        speed: (M,) allowed speed there, with regard to bends [m/s].
+        speed: (M,) allowed speed there, bends included [m/s].
         after: numbers of the pieces that follow each piece.
-        liked: for each of these, the share of drivers that take it or one of
-            those before it.
+        liked: for each entry of `after`, the cumulated share of drivers that
+            take it or an earlier one.
         signals: their program.
         begin, clear, joint: (2, P + C, P + C) see `find_conflicts`.
-        over: (P, C) place on a crossing's line where a way leads over it, NaN
+        over: (P, C) place on a crossing's line where a way leads over it; NaN
             if it does not [m].
-        until: (K, P + C) float32 time until the ego car is there, 0 while it
+        until: (K, P + C) float32 time until the ego car is there; 0 while it
             is, inf if it never will be [s].
-        ego_rear, ego_front: (K, P) float32 distance of its ends along a piece
-            while it is there [m].
-        ego_speed: (K, P) float32 along the piece, negative against it [m/s].
+        ego_rear, ego_front: (K, P) float32 distances of the ego car's ends
+            along a piece while it is there [m].
+        ego_speed: (K, P) float32 its speed along the piece; negative against it
+            [m/s].
     """
 
     pieces: np.ndarray
@@ -250,7 +255,10 @@ class Streets(NamedTuple):
 
 
 class EgoBox(NamedTuple):
-    """The ego car's box on the ground, from rear to front in its frame [m]."""
+    """The ego car's box on the ground; `rear` and `front` are x in its frame.
+
+    All lengths are in [m].
+    """
 
     rear: float
     front: float
@@ -264,16 +272,16 @@ class EgoBox(NamedTuple):
     def middles(self, xy: np.ndarray, yaw: np.ndarray) -> np.ndarray:
         """Returns x, y [m] and yaw (N, 3) of the box's middle.
 
-        The car's frame is at places (N, 2) with headings (N,).
+        The car's frame is at places `xy` (N, 2) with headings `yaw` (N,).
         """
         ahead = np.column_stack([cos(yaw), sin(yaw)])
         middle = (self.rear + self.front) / 2
         return np.column_stack([xy + middle * ahead, yaw])
 
     def corners(self, xy: np.ndarray, yaw: np.ndarray) -> np.ndarray:
-        """Returns the box's corners (N, 4, 2) as the car moves.
+        """Returns the corners (N, 4, 2) of the box [m].
 
-        The car's frame is at places (N, 2) with headings (N,).
+        The car's frame is at places `xy` (N, 2) with headings `yaw` (N,).
         """
         ahead = np.column_stack([cos(yaw), sin(yaw)])
         return outlines(xy, ahead, -self.rear, self.front, self.half_width)
@@ -282,7 +290,7 @@ class EgoBox(NamedTuple):
 def make_streets(
     graph: LaneGraph, box: EgoBox, xy: np.ndarray, yaw: np.ndarray
 ) -> Streets:
-    """Returns the arrays of a graph of lanes, and of the ego car at K steps.
+    """Returns the arrays of a lane graph, and of the ego car at K steps.
 
     Args:
         graph: the lanes.
@@ -317,7 +325,7 @@ def make_streets(
 
 
 def _places_on_crossings(graph: LaneGraph) -> np.ndarray:
-    """Returns `Streets.over`."""
+    """Returns `Streets.over` of a graph."""
     ways = [shapely.LineString(piece.points[:, :2]) for piece in graph.pieces]
     lines = [shapely.LineString(one.line[:, :2]) for one in graph.crossings]
     over = np.full((len(ways), len(lines)), np.nan)
@@ -357,18 +365,19 @@ def find_conflicts(
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Returns where pieces and crossings exclude each other.
 
-    Two different ways exclude each other if their swept areas meet; lanes
-    exclude nothing but crossings without marks. The matrices are over pieces
-    and then crossings, first while all vehicles are small, and then while one
+    Two different ways exclude each other if the areas that vehicles sweep on
+    them meet. Lanes exclude nothing except crossings without marks. Rows and
+    columns of the matrices are the pieces and then the crossings. The first
+    matrix is for small vehicles only; in the second one, at least one vehicle
     is large.
 
     Returns:
-        (2, P + C, P + C) places of a front along a, where the area of a first
-        meets that of b, inf if the two never meet [m];
-        those of a rear along a, from which on b is free again, 0 if the two
-        never meet, or if a is a crossing [m];
-        and `SPLIT` or `MERGE` where two ways meet at their beginning or end
-        alone, in the lane that they share.
+        Three arrays (2, P + C, P + C) for a row a and a column b. First, the
+        place of a front along a at which the area of a begins to meet that of
+        b; inf if they never meet [m]. Second, the place of a rear along a from
+        which on b is free again; 0 if they never meet, or if a is a crossing
+        [m]. Third, `SPLIT` or `MERGE` where two ways meet only at their
+        beginning or end, in a lane that they share.
     """
     small_axles = (-1.6, 1.75)
     num_pieces = len(graph.pieces)
@@ -424,16 +433,16 @@ def swept_hulls(
 ) -> tuple[np.ndarray, np.ndarray]:
     """Returns the areas that a vehicle sweeps on a way, step by step.
 
-    It has a length and a width, and its rear and front axle at x from its
-    middle [m]. There are (N + 1,) places of its front bumper [m], and (N,)
-    areas between two.
+    `size` is the vehicle's length and width; `axles` are x of its rear and
+    front axle from its middle [m]. The result has places (N + 1,) of its front
+    bumper [m], and the areas (N,) between two of these.
     """
     line = piece.points[:, :2]
     along = distances_along(line)
     length = along[-1]
 
     def at(s: np.ndarray) -> np.ndarray:
-        """Returns places on the way, continued straight beyond its ends."""
+        """Returns places on the way, which goes straight on beyond its ends."""
         inside = np.clip(s, 0.0, length)
         xy = np.column_stack([np.interp(inside, along, x) for x in line.T])
         first = (line[1] - line[0]) / math.dist(line[1], line[0])
@@ -458,7 +467,7 @@ def _find_ego(
     graph: LaneGraph, box: EgoBox, xy: np.ndarray, yaw: np.ndarray
 ) -> tuple[np.ndarray, ...]:
     """Returns the fields of `Streets` from `until` on; see `make_streets`."""
-    # A car that stands is looked at once.
+    # A car that stands is processed only once.
     poses = np.column_stack([xy, yaw])
     is_new = np.append(True, (np.diff(poses, axis=0) != 0.0).any(axis=1))
     corners = box.corners(xy[is_new], yaw[is_new])
@@ -507,7 +516,7 @@ def places_on(
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Returns x, y and z (...) at distances (...) along pieces (...) [m].
 
-    Before its beginning and after its end a piece goes straight on.
+    Beyond its ends, a piece goes straight on.
     """
     rows = streets.pieces[pieces]
     at = s / rows["step"]
@@ -542,7 +551,7 @@ def is_ego_far(
     """
     until = streets.until[k, lane]
     if until == 0.0:
-        # A vehicle may follow behind the ego car.
+        # A vehicle may follow the ego car.
         return streets.ego_speed[k, lane] >= 0.0 and (
             streets.ego_rear[k, lane] > s + 2.0
         )

@@ -1,4 +1,4 @@
-"""Traffic in a diagram: vehicles and walkers on their planned tracks."""
+"""Traffic in a diagram: moves vehicles and walkers as planned."""
 
 from collections.abc import Sequence
 from typing import Any, NamedTuple
@@ -27,24 +27,24 @@ from cns_drake.scene.structure_table import StructureEntry, StructureTable
 from cns_drake.traffic.body_shapes import Limb, vehicle_limbs, walker_limbs
 from cns_drake.traffic.traffic_plan import WALKER_SIZE, TrafficPlan
 
-# Faster bodies are labelled as moving, slower ones as standing [m/s].
+# Faster bodies are labelled as moving, all others as standing [m/s].
 MOVING_SPEED = 0.5
-# Speed of the full swing of limbs [m/s].
+# Speed at which limbs swing with their full amplitude [m/s].
 _FULL_SWING = 1.2
-# Place of bodies that are absent now [m].
+# Place of bodies that are absent [m].
 _AWAY = np.array([0.0, 0.0, -10_000.0])
 
 
 class BodyStates(NamedTuple):
-    """N bodies at a time: vehicles, then walkers.
+    """The states of N bodies at a time: vehicles, then walkers.
 
     Attributes:
-        p_WB: (N, 3) middle of each box on the ground [m].
+        p_WB: (N, 3) middle of each body's box on the ground [m].
         v_WB: (N, 3) velocity [m/s].
         yaw, pitch: (N,) [rad].
         yaw_rate: (N,) [rad/s].
-        present: (N,) whether it is there.
-        swing: (N,) from -1 to 1, position of a walker in its gait.
+        present: (N,) whether the body is there.
+        swing: (N,) position of a walker in its gait, from -1 to 1.
     """
 
     p_WB: np.ndarray
@@ -57,13 +57,13 @@ class BodyStates(NamedTuple):
 
     @property
     def up_W(self) -> np.ndarray:
-        """The (N, 3) upward axes."""
+        """The upward axes (N, 3) of the bodies."""
         (cy, sy), (cp, sp) = ((cos(a), sin(a)) for a in (self.yaw, self.pitch))
         return np.stack([cy * sp, sy * sp, cp], axis=-1)
 
     @property
     def quat_xyzw(self) -> np.ndarray:
-        """The (N, 4) orientations as unit quaternions."""
+        """The orientations (N, 4) of the bodies as unit quaternions."""
         (cy, sy), (cp, sp) = (
             (cos(a / 2), sin(a / 2)) for a in (self.yaw, self.pitch)
         )
@@ -71,12 +71,12 @@ class BodyStates(NamedTuple):
 
     @property
     def is_moving(self) -> np.ndarray:
-        """Whether each of the (N,) bodies is labelled as moving."""
+        """Which bodies (N,) are labelled as moving."""
         return np.linalg.norm(self.v_WB, axis=-1) > MOVING_SPEED
 
 
 def bodies_at(plan: TrafficPlan, t: float) -> BodyStates:
-    """Returns the bodies at a time [s]."""
+    """Returns the states of all bodies at a time [s]."""
     vehicles, vehicle_rates = plan.vehicles.at(t)
     walkers, walker_rates = plan.walkers.at(t)
     both = np.concatenate([vehicles[:, :4], walkers[:, :4]])
@@ -97,7 +97,7 @@ def bodies_at(plan: TrafficPlan, t: float) -> BodyStates:
 
 
 class LimbTable:
-    """The M limbs of N bodies, one body after the other.
+    """The M limbs of N bodies, in the order of the bodies.
 
     Attributes:
         body: (M,) number of the body to which each limb belongs.
@@ -113,10 +113,10 @@ class LimbTable:
     def poses(self, states: BodyStates) -> np.ndarray:
         """Returns the poses X_WL (M, 4, 4) of all limbs.
 
-        They turn about y, then z.
+        Limbs turn about y, then about z.
         """
         body, p = self.body, self._joint.T
-        # A forward swing turns about -y.
+        # A forward swing is a rotation about -y.
         pitch = states.pitch[body] - self._swing * states.swing[body]
         cy, sy = cos(states.yaw)[body], sin(states.yaw)[body]
         X_WLs = np.zeros((len(body), 4, 4))
@@ -145,7 +145,7 @@ class TrafficBody(NamedTuple):
 
 
 class TrafficMotion(LeafSystem):
-    """Moves vehicles and walkers; it has no state.
+    """A system that moves vehicles and walkers; it has no state.
 
     .. pydrake_system::
 
@@ -157,13 +157,13 @@ class TrafficMotion(LeafSystem):
         - moving_instances
         - objects
 
-    `geometry_pose` is for the SceneGraph with which the bodies are
-    registered. `frame_poses` is abstract, `KnownPoses`: the same poses X_WL
-    as one array over all limbs. `body_spatial_velocities` is abstract, a list
-    over all limbs of V_WL, expressed in the world. From them, a LiDAR computes
-    where a limb is later in its turn.
-    `moving_instances` is abstract, the (N,) instance ids of bodies faster than
-    `MOVING_SPEED`; `objects` the `RecordedObjects`. All depend only on time.
+    All outputs depend only on time. `geometry_pose` is for the SceneGraph in
+    which the bodies are registered. The others are abstract. `frame_poses` is a
+    `KnownPoses`: the same poses X_WL in one array over all limbs.
+    `body_spatial_velocities` is a list over all limbs of V_WL, expressed in W;
+    from it, a LiDAR computes where a limb is later in its turn.
+    `moving_instances` has the instance ids (N,) of bodies faster than
+    `MOVING_SPEED`, and `objects` is the `RecordedObjects`.
     """
 
     def __init__(
@@ -173,14 +173,17 @@ class TrafficMotion(LeafSystem):
         source_id: SourceId,
         turn: float,
     ):
-        """Takes the plan's vehicles, then walkers, and a LiDAR's turn [s]."""
+        """Takes a plan, and its vehicles and then its walkers as bodies.
+
+        `turn` is the duration of a LiDAR's turn [s].
+        """
         super().__init__()
         self.source_id = source_id
         self._plan = plan
         self.bodies = tuple(bodies)
         self._limbs = LimbTable([body.limbs for body in bodies])
         frames = (frame for body in self.bodies for frame in body.frames)
-        # Limb's frame -> its row in the ports of all limbs.
+        # Frame of a limb -> its row in the ports of all limbs.
         self.moving_frames: dict[FrameId, int] = {
             frame: row for row, frame in enumerate(frames)
         }
@@ -230,7 +233,7 @@ class TrafficMotion(LeafSystem):
     def _calc_velocities(self, context: Context, output: AbstractValue) -> None:
         now: BodyStates = self._states.Eval(context)
         later = bodies_at(self._plan, context.get_time() + self._turn)
-        # A body that comes or goes does so between two turns.
+        # A body appears and disappears only between two turns.
         later = later._replace(present=now.present)
         X_0, X_1 = map(self._limbs.poses, (now, later))
         R_0, R_1 = X_0[:, :3, :3].copy(), X_1[:, :3, :3].copy()
@@ -264,7 +267,9 @@ class TrafficMotion(LeafSystem):
 
 
 def traffic_structures(plan: TrafficPlan, first: int = 1) -> StructureTable:
-    """Returns name, instance id and class of all bodies in a plan.
+    """Returns a table with name, instance id and class of all planned bodies.
+
+    The first id is `first`.
 
     Raises:
         InputError: there are not enough ids.
@@ -295,17 +300,18 @@ def make_traffic(
     turn: float = 0.05,
     name: str = "traffic",
 ) -> TrafficMotion:
-    """Adds vehicles and walkers to a SceneGraph.
+    """Adds vehicles and walkers to a SceneGraph; returns their system.
 
-    Returns the system that moves them.
+    The system, which moves them, is not yet part of a diagram.
 
     Args:
-        scene_graph: takes the geometry, on frames of a source of its own.
+        scene_graph: gets the geometry, on frames of a source of its own.
+        plan: the planned traffic.
         seed: seed of colours and sizes.
         structures: table with an instance id for each body; by default
             `traffic_structures` of the plan.
         turn: duration of a LiDAR's turn with motion distortion [s].
-        name: name of the source of geometry.
+        name: name of the geometry source.
     """
     if structures is None:
         structures = traffic_structures(plan)
@@ -337,8 +343,8 @@ def add_traffic(
 ) -> TrafficMotion:
     """Adds moving vehicles and walkers to a diagram; returns their system.
 
-    Options are further arguments of `make_traffic`. The system has the name of
-    the source of geometry, and its port `geometry_pose` is connected to the
+    `options` are further arguments of `make_traffic`. The system has the name
+    of the geometry source. Its port `geometry_pose` is connected to the
     SceneGraph.
 
     Example:
@@ -361,14 +367,15 @@ def connect_traffic(
     lidar: System,
     goes_on: bool = False,
 ) -> None:
-    """Connects a LiDAR to traffic, so that it labels moving bodies as such.
+    """Connects a LiDAR to traffic, so that it labels moving bodies as moving.
 
     Args:
         builder: builder of a diagram with both systems.
         traffic: system that moves the traffic.
         lidar: LiDAR, whose port `frame_poses` may be connected already.
-        goes_on: whether bodies keep moving during a turn of the LiDAR. Its
-            `moving_bodies` must then be the `moving_frames` of `traffic`.
+        goes_on: whether bodies keep moving during a turn of the LiDAR. If so,
+            the LiDAR's `moving_bodies` must be the `moving_frames` of
+            `traffic`.
     """
     for name in ("moving_instances", "frame_poses", "body_spatial_velocities"):
         if goes_on or name != "body_spatial_velocities":
@@ -380,7 +387,7 @@ def connect_traffic(
 def _register(
     scene_graph: SceneGraph, source: SourceId, name: str, limbs: Sequence[Limb]
 ) -> tuple[FrameId, ...]:
-    """Registers limbs; returns their frames."""
+    """Registers a geometry frame for each limb, and returns these frames."""
     frames = []
     for limb in limbs:
         frame = geometry.GeometryFrame(f"{name}_{limb.name}")

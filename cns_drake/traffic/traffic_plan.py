@@ -1,4 +1,4 @@
-"""Plans the motion of all traffic before a drive, of the ego car as well."""
+"""Plans the motion of all traffic before a drive, also that of the ego car."""
 
 from __future__ import annotations
 
@@ -28,32 +28,36 @@ from cns_drake.traffic.vehicle_kinds import (
 from cns_drake.traffic.vehicles import CURRENT, SIGHT, Traffic, find_ahead
 from cns_drake.traffic.walkers import WALKER_LENGTH, WALKER_WIDTH, Crowd
 
-# Distance of the places at which the car's lane is known [m].
+# Distance between the places at which the ego car's lane is determined [m].
 _STEP = 1.0
-# The car's lane is at most this far away [m], in its direction within 45 deg.
+# The car's lane is at most this far away [m], and its direction within 45 deg
+# (cosine).
 _REACHES, _ALIGNED = 3.0, 0.7
-# Cost of a metre on no lane, as that of a lane's square distance [m^2], and of
-# a change of lane, and to no lane or back.
+# Costs when lanes are fitted to the path: of a metre on no lane, as the square
+# of a lane's distance [m^2]; of a change of lanes; and of leaving all lanes or
+# coming back.
 _NO_LANE, _SIDEWAYS, _AWAY = 4.0, 8.0, 20.0
-# The car is in both lanes for this distance before and behind a change [m], and
-# asks for a way from its lane, in which it is for this distance before [m].
+# Before and after a change of lanes, the car counts in both lanes for the first
+# distance. It requests a way from a lane in which it is for the second distance
+# before the way [m].
 _CHANGES, _ASKS = 12.0, 25.0
-# Parameters of the Intelligent Driver Model, and the part of the drive's
+# Parameters of the Intelligent Driver Model, and the share of the drive's
 # greatest acceleration that it uses.
 _ACCELERATION, _DECELERATION, _HEADWAY, _PART_OF_BOUND = 1.5, 1.8, 1.3, 0.95
-# The bounds of speed are looked up at least this far ahead [m].
+# The bounds of the speed are taken at least this far ahead [m].
 _AHEAD = 0.05
 
 
 class _Run(NamedTuple):
-    """A part of the way on one piece.
+    """A part of the ego car's path that lies on one piece.
 
     Attributes:
-        piece: its number, -1 on no lane.
-        first, last: where the front bumper enters and leaves it [m].
+        piece: number of the piece; -1 on no lane.
+        first, last: where on the path the front bumper enters and leaves the
+            piece [m].
         s: place on the piece where it enters [m].
-        beside: the lane from which the car changes to this one, or -1.
-        parts: where the car has left that lane [m].
+        beside: the lane from which the car changes to this one; -1 for none.
+        parts: where on the path the car has left that lane [m].
     """
 
     piece: int
@@ -65,9 +69,9 @@ class _Run(NamedTuple):
 
 
 def find_runs(graph: LaneGraph, points: np.ndarray) -> list[_Run]:
-    """Returns the pieces of lanes that best fit a car's path.
+    """Returns the pieces of lanes that fit a car's path best.
 
-    The path is through (N, 2) points, `_STEP` apart [m].
+    The path leads through points (N, 2), `_STEP` apart [m].
     """
     lines = [shapely.LineString(piece.points[:, :2]) for piece in graph.pieces]
     tree = shapely.STRtree(lines)
@@ -103,7 +107,7 @@ def find_runs(graph: LaneGraph, points: np.ndarray) -> list[_Run]:
         ):
             change[row, :off][np.isin(near, others)] = cost
     np.fill_diagonal(change, 0.0)
-    # The cheapest sequence of pieces, by dynamic programming.
+    # Dynamic programming finds the sequence of pieces with the least cost.
     cost, before = misfit[0], np.zeros(misfit.shape, int)
     for row in range(1, len(points)):
         costs = cost[:, None] + change
@@ -118,7 +122,7 @@ def find_runs(graph: LaneGraph, points: np.ndarray) -> list[_Run]:
     firsts, s = _STEP * starts, place[starts, best[starts]]
     for k, (before_it, piece) in enumerate(pairwise(pieces), 1):
         if before_it >= 0 and piece in graph.pieces[before_it].after:
-            # The boundary is between two of the points.
+            # The boundary is between two points.
             firsts[k], s[k] = firsts[k] - s[k], 0.0
     firsts = np.append(firsts, _STEP * len(points))
     runs: list[_Run] = []
@@ -143,30 +147,30 @@ def find_runs(graph: LaneGraph, points: np.ndarray) -> list[_Run]:
 
 
 class Follower:
-    """The ego car in a simulation of traffic.
+    """The ego car in a simulation of traffic, which follows other vehicles.
 
-    It follows its path by the Intelligent Driver Model, asks for its ways as
-    the others do, and keeps the bounds of its drive. At each step so far it was
-    at the place u on the path [m]; it has arrived when it stands at the end.
+    It follows its path by the Intelligent Driver Model, requests its ways like
+    other vehicles, and keeps the bounds of its drive. `u` has its place on the
+    path at each step so far [m]. It has arrived when it stands at the end.
     """
 
     def __init__(
         self, graph: LaneGraph, trajectory: Trajectory, box: EgoBox, start: int
     ):
-        """Puts a car to the beginning of its path.
+        """Places a car at the beginning of its path.
 
-        Its drive has the bounds of a trajectory, and begins at the step of a
-        number.
+        The path and the bounds are those of a trajectory. The drive begins at
+        the step `start`.
         """
         self._path, self._profile = trajectory.path, trajectory.speed_profile
         self._square = self._profile.speed**2
-        # The way of the front bumper, which goes on straight beyond the path.
+        # The front bumper's path, which continues straight beyond the end.
         u = _STEP * np.arange(int((self._path.end + box.front) / _STEP) + 1)
         jet = self._path.evaluate(u)
         beyond = np.maximum(u - self._path.end, 0.0)[:, None]
         self._runs = find_runs(graph, jet.p[:, :2] + beyond * jet.dp[:, :2])
         self._box, self._start = box, start
-        # The drive begins with a rest, as any other.
+        # Like any other, the drive begins at rest.
         self._leaves = start + round(REACH * KNOT_PERIOD / STEP)
         self._run = 0
         self._held: _Run | None = None
@@ -194,10 +198,7 @@ class Follower:
         return car
 
     def step(self, traffic: Traffic, k: int) -> None:
-        """Moves the car by one step.
-
-        It is the last of the vehicles; the step is the k-th.
-        """
+        """Moves the car, the last of the vehicles, by the k-th step."""
         car, u = traffic.cars[-1], self.u[-1]
         if k < self._leaves or self.arrived:
             self.u.append(u)
@@ -227,9 +228,10 @@ class Follower:
     def _ahead(
         self, traffic: Traffic, car: np.void
     ) -> tuple[float, float, float]:
-        """Returns the gap to the car ahead [m], its speed, and the stop line.
+        """Returns gap and speed of the car ahead, and how far the stop line is.
 
-        The distance of the stop line is inf where the car may go on [m].
+        The gap and the distance are in [m], the speed in [m/s]. The distance is
+        inf if the car need not stop.
         """
         front = self.u[-1] + self._box.front
         who, pieces = len(traffic.cars) - 1, traffic.streets.pieces
@@ -253,7 +255,7 @@ class Follower:
         return gap, speed, np.inf
 
     def _place(self, streets: Streets, car: np.void) -> None:
-        """Notes the pieces on which the car is now."""
+        """Sets the pieces on which the car is now."""
         front, runs = self.u[-1] + self._box.front, self._runs
         while self._run < len(runs) - 1 and front >= runs[self._run].last:
             self._run += 1
@@ -298,7 +300,7 @@ class Follower:
         path[CURRENT + 1 + (not is_way)] = streets.after[first]
 
     def poses(self, steps: np.ndarray) -> np.ndarray:
-        """Returns (N, 3) x, y [m], yaw of the box's middle at (N,) steps."""
+        """Returns x, y [m], yaw (N, 3) of the box's middle at steps (N,)."""
         u = np.interp(steps, np.arange(len(self.u)), self.u)
         jet = self._path.evaluate(u)
         return self._box.middles(jet.p[:, :2], jet.yaw)
@@ -317,42 +319,44 @@ def _leads(streets: Streets, piece: int, other: int) -> bool:
     return other in streets.after[first : first + row["after_count"]]
 
 
-# A walker's box, with limbs that swing [m].
+# A walker's box, which contains swinging limbs [m].
 WALKER_SIZE = (WALKER_LENGTH, WALKER_WIDTH, 1.8)
-# Steps for which traffic has moved when the drive begins.
+# Number of steps for which traffic has moved when the drive begins.
 _FIRST = 200
-# Steps for which it goes on after a car that follows others has arrived.
+# Number of steps for which traffic moves on after an ego car that follows
+# others has arrived.
 _AFTER = 20
-# Share of vehicles and walkers that are planned in excess, since some are left
-# out; and number of trials.
+# Share of vehicles and walkers that are planned in addition, because some will
+# be left out; and number of trials.
 _SPARE, _TRIES = 0.06, 4
-# Steps after which a trial is given up if it has to leave out too many.
+# After every so many steps, a trial is given up if it has to leave out too many
+# bodies.
 _PART = 200
-# Boxes keep this distance, since they are compared only now and then [m].
+# Boxes keep this distance, because they are compared only at some times [m].
 _APART = 0.1
-# Least and greatest gap between vehicles of a queue, and their least distance
-# from the ego car, which they let pass [m].
+# Range of the gap between vehicles in a queue, and least distance of a vehicle
+# from the ego car that passes it [m].
 _GAPS = (1.5, 3.5)
 _LETS_PASS = 0.4
 
-# The ego car's motion: (K,) times -> (K, 2) places [m], (K,) headings [rad].
+# The ego car's motion: times (K,) -> places (K, 2) [m] and headings (K,) [rad].
 EgoPath = Callable[[np.ndarray], tuple[np.ndarray, np.ndarray]]
 
 
 @dataclass(frozen=True)
 class Tracks:
-    """N bodies with D coordinates each, known at evenly spaced times.
+    """The tracks of N bodies: D coordinates each, at evenly spaced times.
 
     Between two of these times, every coordinate is a cubic polynomial with a
-    continuous rate (Catmull and Rom's spline). In the first and the last
-    interval of a body it is a parabola. Before the first and after the last
-    time of all bodies it is a straight line.
+    continuous rate (Catmull-Rom spline). In the first and the last interval of
+    a body it is a parabola, and before the first and after the last time it is
+    a straight line.
 
     Attributes:
-        dt: distance of the times [s].
-        values: (K, N, D), angles without jumps.
-        present: (K, N) whether a body is there; None if all always are. A body
-            is there between two times if it is there at both.
+        dt: distance between the times [s].
+        values: (K, N, D) coordinates; angles have no jumps.
+        present: (K, N) whether a body is there; None if all bodies always are.
+            Between two times, a body is there if it is there at both.
     """
 
     dt: float
@@ -360,9 +364,9 @@ class Tracks:
     present: np.ndarray | None = None
 
     def at(self, t: float | np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Returns coordinates and their rates, (N, D) each.
+        """Returns coordinates and their rates at a time, (N, D) each.
 
-        At (T,) times instead of one they are (T, N, D) [s].
+        At several times (T,), they are (T, N, D) [s].
         """
         k, u, beyond = self._interval(t)
         p0, p1 = self.values[k], self.values[k + 1]
@@ -378,10 +382,10 @@ class Tracks:
         return value + beyond * rate, rate / self.dt
 
     def _there(self, k: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Returns coordinates at (...) times, and whether bodies are there.
+        """Returns coordinates at times (...), and whether bodies are there.
 
-        They are (..., N, D), and bool that fit it. There is no body before the
-        first time and after the last.
+        The coordinates are (..., N, D), and the second array fits them. No body
+        is there before the first time and after the last one.
         """
         row = np.clip(k, 0, len(self.values) - 1)
         there = (k == row)[..., None]
@@ -390,16 +394,17 @@ class Tracks:
         return self.values[row], there[..., None]
 
     def is_present(self, t: float | np.ndarray) -> np.ndarray:
-        """Returns whether each body is there at a time, (N,) or (T, N)."""
+        """Returns which bodies are there at a time (N,), or at times (T, N)."""
         k, *_ = self._interval(t)
         if self.present is None:
             return np.ones((*k.shape, self.values.shape[1]), bool)
         return self.present[k] & self.present[k + 1]
 
     def _interval(self, t: float | np.ndarray) -> tuple[np.ndarray, ...]:
-        """Returns each time's interval, place in there, and steps beyond all.
+        """Returns each time's interval, its place there, and the steps beyond.
 
-        The place and the steps have two more axes than the times.
+        Steps beyond are those before the first time or after the last. Place
+        and steps have two more axes than the times.
         """
         last = len(self.values) - 1
         steps = np.asarray(t, float) / self.dt
@@ -423,12 +428,13 @@ class TrafficPlan:
 
     Attributes:
         kinds: kind of each of the N vehicles.
-        vehicles: x, y, z of the middle of each box on the ground [m], yaw and
-            pitch [rad].
+        vehicles: x, y, z of the middle of each vehicle's box on the ground [m],
+            yaw and pitch [rad].
         walkers: x, y, z on the ground [m], yaw and phase of the gait [rad].
-        left_out: number of wanted bodies left out because they would collide.
+        left_out: number of wanted bodies that are left out because they would
+            collide.
         positions: places of the ego car on its path at each `KNOT_PERIOD` [m],
-            if it was one of the vehicles.
+            if it follows other vehicles; else None.
         notes: notes for the user.
     """
 
@@ -444,12 +450,12 @@ class _Task(NamedTuple):
     """What all trials of a plan have in common; see `plan_traffic`.
 
     Attributes:
-        streets: the graph, and the ego car at K steps, which begin before the
-            drive.
-        ego_track: (2 K - 1, 3) x, y [m], heading [rad] of the middle of the
-            ego car's box at half steps.
-        drive: the ego car's, if it follows other vehicles; it then stands in
-            `streets` and `ego_track`.
+        streets: the graph, and the ego car at K steps, the first of which are
+            before the drive.
+        ego_track: (2 K - 1, 3) x, y [m], heading [rad] of the middle of the ego
+            car's box at steps and half steps.
+        drive: the ego car's drive, if it follows other vehicles; it then stands
+            still in `streets` and `ego_track`.
     """
 
     graph: LaneGraph
@@ -474,25 +480,26 @@ def plan_traffic(
     ego_box: EgoBox,
     drive: Trajectory | None = None,
 ) -> TrafficPlan:
-    """Plans traffic of wanted numbers for a drive.
+    """Returns planned traffic for a drive, with the wanted numbers if possible.
 
-    Equal arguments give an equal plan. The plan has no collisions, but maybe
+    Equal arguments give an equal plan. The plan has no collisions, but may have
     fewer bodies than wanted.
 
     Args:
         graph: lanes and crossings.
-        walkways: sidewalks, where walkers walk, and crossings.
+        walkways: sidewalks on which walkers walk, and crossings.
         vehicles, walkers: wanted numbers.
         seed: seed of kinds, places and ways.
-        duration: duration of the drive [s]; the longest if the ego car follows
+        duration: duration of the drive [s]; the longest one if the ego car
+            follows others.
+        ego: motion of the ego car; it stays at its first place if it follows
             others.
-        ego: motion of the ego car; at its first place if it follows others.
         ego_box: size of the ego car.
-        drive: path and speeds of the ego car if it follows others, else None.
+        drive: path and speeds of the ego car if it follows others; else None.
     """
-    # Traffic goes on after the drive, for a LiDAR that is turning then.
+    # Traffic continues after the drive, for a LiDAR that is still turning.
     num_steps = _FIRST + int(np.ceil(duration / STEP)) + 4
-    # The ego car waits until its drive begins.
+    # The ego car stands until its drive begins.
     half_steps = np.arange(2 * num_steps - 1) - 2 * _FIRST
     times = STEP / 2 * np.maximum(half_steps, 0)
     task = _Task(
@@ -506,7 +513,8 @@ def plan_traffic(
         drive,
     )
     if drive is not None:
-        # The car is in the way at its first place, and then a vehicle.
+        # The car blocks its first place at first; after that it is one of the
+        # vehicles.
         task.streets.until[1:] = np.inf
     best: TrafficPlan | None = None
     for attempt in range(_TRIES):
@@ -523,7 +531,7 @@ def plan_traffic(
 def _try(
     task: _Task, rng: np.random.Generator, best: TrafficPlan | None
 ) -> TrafficPlan:
-    """Returns a new plan, or the best so far as soon as that is no worse."""
+    """Returns a new plan, or the best one so far if the new is no better."""
     trial = Trial(task, rng)
     num_steps = len(task.streets.until)
     for first in range(0, num_steps, _PART):
@@ -532,15 +540,15 @@ def _try(
             return best
         if trial.is_over(first + _PART):
             return trial.plan()
-    # A car that follows others has not arrived.
+    # An ego car that follows others has not arrived in this trial.
     return best if best is not None and task.drive is not None else trial.plan()
 
 
 class Trial:
-    """One trial of a plan, and the bodies it has to leave out so far."""
+    """One trial of a plan; it knows which bodies it must leave out so far."""
 
     def __init__(self, task: _Task, rng: np.random.Generator):
-        """Puts vehicles and walkers to their first places."""
+        """Places vehicles and walkers for the first time."""
         number = min(
             _with_spare(task.vehicles),
             max(task.vehicles, motion.room_for_vehicles(task.graph)),
@@ -565,10 +573,10 @@ class Trial:
         )
         num_steps = len(task.streets.until)
         num_walkers = len(self._crowd.walkers)
-        # See `TrafficPlan` for their columns.
+        # The columns are those of `TrafficPlan`.
         self._vehicles = np.zeros((num_steps, len(found), 5))
         self._walkers = np.zeros((num_steps, num_walkers, 5))
-        # The ego car, the vehicles, the walkers.
+        # Ego car, vehicles, walkers.
         self._half_sizes = _APART / 2 + np.array(
             [
                 task.ego_box.half_size,
@@ -579,7 +587,7 @@ class Trial:
         self._overlaps = np.zeros((len(self._half_sizes),) * 2, bool)
 
     def run(self, steps: range) -> None:
-        """Moves all bodies for the next steps; notes which of them overlap."""
+        """Moves all bodies by the next steps; notes which of them overlap."""
         traffic, crowd = self._traffic, self._crowd
         cars = traffic.cars
         past_cars = np.empty((len(steps), len(self._kinds)), cars.dtype)
@@ -600,7 +608,7 @@ class Trial:
         rows = slice(steps.start, steps.stop)
         self._vehicles[rows] = motion.vehicle_poses(traffic.streets, past_cars)
         self._walkers[rows] = crowd.poses(past_walkers)
-        # The step before, for the half step between.
+        # From the step before, because of the half step in between.
         first = max(steps.start - 1, 0)
         rows = slice(first, steps.stop)
         half_steps = np.arange(2 * first, 2 * steps.stop - 1)
@@ -617,14 +625,14 @@ class Trial:
         self._num_steps = steps.stop
 
     def is_over(self, num_steps: int) -> bool:
-        """Returns whether the ego car has arrived, and some time has passed."""
+        """Returns whether the ego car arrived some time ago."""
         if self._follower is None:
             return False
         u = self._follower.u
         return self._follower.arrived and u[num_steps - _AFTER] == u[-1]
 
     def _kept(self) -> tuple[np.ndarray, np.ndarray]:
-        """Returns the vehicles and the walkers that meet no other body."""
+        """Returns the vehicles and the walkers that overlap no other body."""
         kept = np.ones(len(self._half_sizes), bool)
         kept[whom_to_leave_out(self._overlaps, 1)] = False
         vehicles, walkers = (
@@ -634,7 +642,7 @@ class Trial:
         return vehicles[: self._task.vehicles], walkers[: self._task.walkers]
 
     def left_out(self) -> int:
-        """Returns how many of the wanted bodies do not fit into the plan."""
+        """Returns how many of the wanted bodies have to be left out."""
         vehicles, walkers = self._kept()
         wanted = self._task.vehicles + self._task.walkers
         return wanted - len(vehicles) - len(walkers)
@@ -658,10 +666,11 @@ class Trial:
 
 
 def _smooth(values: np.ndarray) -> np.ndarray:
-    """Returns a uniform cubic B-spline's values (K - F, N, D) at its knots.
+    """Returns the values (K - F, N, D) of a cubic B-spline at its knots.
 
-    It is controlled by points (K, N, D) at all steps, of which F are before the
-    drive. A spline through its values has no greater accelerations than those.
+    Its control points are (K, N, D), at all steps; F steps are before the
+    drive. A spline through the values has no greater accelerations than the
+    control points.
     """
     before, here, after = (
         values[_FIRST + k : len(values) - 1 + k] for k in (-1, 0, 1)
@@ -674,7 +683,7 @@ def _with_spare(number: int) -> int:
 
 
 def _at_half_steps(values: np.ndarray) -> np.ndarray:
-    """Returns x, y, yaw (2 K - 1, N, 3) of (K, N, 5) at and between K times."""
+    """Returns x, y, yaw (2 K - 1, N, 3) at steps and half steps."""
     xy_yaw = values[:, :, [0, 1, 3]]
     xy_yaw[:, :, 2] = np.unwrap(xy_yaw[:, :, 2], axis=0)
     result = np.empty((2 * len(xy_yaw) - 1, *xy_yaw.shape[1:]))
@@ -684,10 +693,10 @@ def _at_half_steps(values: np.ndarray) -> np.ndarray:
 
 
 def whom_to_leave_out(overlaps: np.ndarray, kept: int) -> list[int]:
-    """Returns the bodies to remove until none overlap, the most involved first.
+    """Returns the bodies to remove until none overlap.
 
-    A symmetric matrix (N, N) bool says which bodies overlap. The first bodies
-    are kept.
+    Those with most overlaps are removed first. `overlaps` (N, N), symmetric,
+    says which bodies overlap. The first `kept` bodies are never removed.
     """
     overlaps = overlaps.copy()
     out: list[int] = []
@@ -711,7 +720,7 @@ def plan_queues(
 ) -> TrafficPlan:
     """Returns vehicles that stand in queues in all lanes between junctions.
 
-    A vehicle is not there while the ego car is at its place.
+    A vehicle is absent while the ego car is at its place.
 
     Args:
         graph: lanes and crossings.
@@ -731,7 +740,7 @@ def plan_queues(
             begin = end - kind.size[0]
             if begin < 0.0:
                 break
-            # Axles stand on the lane; slopes are gentle.
+            # Both axles stand on the lane; slopes are assumed to be small.
             rear, front = (
                 shapely.get_coordinates(
                     lane.interpolate(begin + kind.size[0] / 2 + axle),

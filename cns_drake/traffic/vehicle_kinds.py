@@ -13,18 +13,18 @@ from cns_drake.base.yaml_files import parse_yaml
 class VehicleKind:
     """A kind of vehicle.
 
-    The parameters are those of the Intelligent Driver Model: Treiber,
-    Hennecke, Helbing, "Congested traffic states in empirical observations
-    and microscopic simulations", Phys. Rev. E 62 (2000).
+    The driving parameters are those of the Intelligent Driver Model: Treiber,
+    Hennecke, Helbing, "Congested traffic states in empirical observations and
+    microscopic simulations", Phys. Rev. E 62 (2000).
 
     Attributes:
         name: name of the kind; the names of its meshes begin with it.
         semantic_class: a key of `cns_drake.scene.semantics.CLASS_IDS`.
-        share: part of all vehicles, relative to the other kinds.
-        size: length, width, height of the box about the vehicle, mirrors and
-            rider included [m].
+        share: weight in the random choice of kinds.
+        size: length, width and height of the vehicle's box, mirrors and rider
+            included [m].
         axles: x of the rear and front axle from the middle of the box [m].
-        speed_factor: speed on a free road, as a part of the limit.
+        speed_factor: speed on a free road, as a share of the limit.
         top_speed: greatest speed of the kind [m/s].
         acceleration: a_max of the model [m/s^2].
         deceleration: b of the model, the comfortable one [m/s^2].
@@ -44,11 +44,11 @@ class VehicleKind:
 
     @property
     def is_large(self) -> bool:
-        """Whether it sweeps more than its lane in a turn."""
+        """Whether it needs more than the width of its lane in a turn."""
         return self.size[0] > 5.8
 
 
-# Gap to the vehicle ahead at standstill, s0 of the model [m].
+# Gap to a standing vehicle ahead, s0 of the model [m].
 STANDSTILL_GAP = 2.0
 
 _TABLE = parse_yaml(Path(__file__).with_name("vehicle_kinds.yaml").read_bytes())
@@ -56,11 +56,11 @@ KINDS = TypeAdapter(tuple[VehicleKind, ...]).validate_python(
     [{"name": name, **fields} for name, fields in _TABLE.items()]
 )
 LARGEST = max(KINDS, key=lambda kind: kind.size[0])
-# Box that contains every small vehicle [m].
+# Length and width of a box that contains every small vehicle [m].
 SMALL_SIZE = (5.6, 2.26)
 
 
 def draw_kinds(count: int, rng: np.random.Generator) -> np.ndarray:
-    """Returns the (count,) indices into `KINDS` of a mix of vehicles."""
+    """Returns a random mix of vehicles, as (count,) indices into `KINDS`."""
     shares = np.array([kind.share for kind in KINDS])
     return rng.choice(len(KINDS), size=count, p=shares / shares.sum())

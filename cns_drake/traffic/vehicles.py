@@ -1,9 +1,9 @@
-"""Vehicles in lanes: how they follow each other, change lanes and move on.
+"""Vehicles in lanes: car following, lane changes, and choice of ways.
 
-They follow the Intelligent Driver Model of Treiber, Hennecke, Helbing (see
-`VehicleKind`), and change lanes by MOBIL of Kesting, Treiber, Helbing (2007): a
-driver changes lane if that gains more acceleration than it costs others, and no
-other vehicle has to brake hard.
+Vehicles follow each other by the Intelligent Driver Model of Treiber, Hennecke,
+Helbing (see `VehicleKind`). They change lanes by MOBIL of Kesting, Treiber,
+Helbing (2007): a driver changes lanes if this gains more acceleration than it
+costs others, and no other vehicle has to brake hard.
 """
 
 from collections.abc import Sequence
@@ -25,100 +25,101 @@ from cns_drake.traffic.streets import (
 )
 from cns_drake.traffic.vehicle_kinds import KINDS, STANDSTILL_GAP, VehicleKind
 
-# Columns of a vehicle's path: the piece of the front bumper, with as many
-# pieces before it, for the rear, and after it.
+# Column of a vehicle's path with the piece of its front bumper. The columns
+# before it are for the rear, those behind it for pieces ahead.
 CURRENT = 5
 NUM_PIECES = 8
-# Stands for the ego car among occupants.
+# Number of the ego car among occupants.
 EGO = -1
-# Greatest number of pieces under a vehicle.
+# Greatest number of pieces that one vehicle is on.
 _MOST_ENTRIES = 8
 
-# Greatest braking, and that in an emergency [m/s^2].
+# Greatest braking, and greatest braking in an emergency [m/s^2].
 HARDEST_BRAKING, EMERGENCY_BRAKING = 3.2, 5.5
-# Smaller gaps count as this one [m].
+# Smaller gaps count as this gap [m].
 _NO_GAP = 0.05
 # Distance kept from the stop line [m].
 BEFORE_LINE = 0.5
 # Greatest distance that drivers look ahead [m].
 SIGHT = 120.0
-# The gap for which drivers brake as in an emergency [m].
+# At this gap, drivers brake as in an emergency [m].
 _LEAST_GAP = 0.5
 
-# Small and large vehicles pass a walker whose middle is this far beyond the
-# middle of their way [m].
+# Small, and large, vehicles may pass a walker whose middle is this far beyond
+# the middle of their way [m].
 _PASSED = (2.0, 3.5)
 
-# A driver considers a change of lane only at every such step.
+# A driver considers a change of lanes once in this many steps.
 _THINKS = 10
-# Politeness, least gain, and the most that others brake [m/s^2].
+# MOBIL's politeness, least gain, and greatest braking of others [m/s^2].
 _POLITENESS, _GAIN, _OTHERS_BRAKE = 0.2, 0.25, 2.5
-# Duration of a change [s], its least length, and least rest of the lane behind
-# it [m].
+# Duration of a change of lanes [s], its least length, and least length of the
+# lane that remains behind it [m].
 _DURATION, _LEAST_LENGTH, _BEYOND = 4.0, 20.0, 30.0
-# Least speed of a change [m/s], and least gap [m].
+# Least speed during a change of lanes [m/s], and least gap [m].
 _SLOWEST, _GAP = 3.0, 4.0
 
-# At the start a vehicle needs this length of lane besides its own [m], and has
-# this part of the allowed speed.
+# At the start, a vehicle needs this length of lane in addition to its own [m],
+# and drives at this share of the allowed speed.
 _SPACE = 9.0
 _PART_OF_SPEED = 0.5
-# Number of places that are drawn before a vehicle is given up.
+# Number of random places that are tried for a vehicle.
 _TRIES = 200
 
-# A vehicle: its constants, and its present state.
+# A vehicle as a record: its constants and its present state.
 VEHICLE = np.dtype(
     [
         ("length", float),  # [m]
         ("rear_axle", float),  # x from the middle [m].
         ("front_axle", float),
-        ("factor", float),  # Wanted part of the allowed speed.
+        ("factor", float),  # Wanted share of the allowed speed.
         ("top", float),  # Greatest speed [m/s].
-        ("a", float),  # Car-following model, with b and headway.
+        ("a", float),  # Car-following model: a, b, headway.
         ("b", float),
         ("headway", float),
         ("guided", bool),  # Whether it is the ego car, which `Follower` moves.
-        ("large", bool),  # Whether it sweeps more than its lane in turns.
+        ("large", bool),  # Whether it leaves its lane in turns.
         ("path", int, NUM_PIECES),  # Pieces, -1 for none.
         ("s", float),  # The front bumper's place on the current piece [m].
         ("v", float),  # Speed [m/s].
         ("granted", bool),  # Whether it may leave its lane.
-        ("held", int),  # The way that is kept free for it, -1 for none.
-        ("order", int),  # Among the vehicles with a way: lower ones go first.
-        ("since", float),  # Start of its wait for its way, inf for none [s].
+        ("held", int),  # The way that is kept free for it; -1 for none.
+        ("order", int),  # Order among vehicles with a way: lowest first.
+        ("since", float),  # When it began to wait for its way; inf: never [s].
         ("refused", float),  # Time without room beyond its way [s].
-        ("left_lane", int),  # The lane that it is changing from, or -1.
+        ("left_lane", int),  # The lane that it is leaving; -1 for none.
         ("change_start", float),  # Where a lane change begins, on the lane [m].
         ("change_length", float),
-        ("draws", int),  # Number of random numbers that it has drawn.
+        ("draws", int),  # Count of the random numbers it has drawn.
     ],
     align=True,
 )
-# An entry in the list of the vehicles on a piece, with their parts.
+# An entry in the list of vehicles on a piece: the part of a vehicle on this
+# piece.
 _ENTRY = np.dtype(
     [
-        ("after", int),  # The next entry on the same piece, -1 for none.
+        ("after", int),  # The next entry on the piece; -1 for none.
         ("who", int),  # Number of a vehicle, or `EGO`.
         ("rear", float),  # Along the piece [m].
         ("front", float),
         ("speed", float),  # [m/s]
     ]
 )
-# A crossing, and the walkers on it.
+# A crossing as a record, with the walkers on it.
 CROSSING = np.dtype(
     [
-        ("waits", float),  # Time since which walkers wait, inf for none [s].
-        ("opened", float),  # Time at which it was opened [s].
+        ("waits", float),  # When walkers began to wait; inf: none [s].
+        ("opened", float),  # Time at which it was last opened [s].
         ("closed", float),  # Time at which it was last left [s].
         ("start", float, 2),  # Where its line begins [m].
         ("along", float, 2),  # Unit vector along it.
         ("length", float),  # [m]
-        ("users", int),  # Number of walkers with a permit.
-        ("order", int),  # As of `VEHICLE`, 0 while no walkers ask.
+        ("users", int),  # Number of walkers with permission.
+        ("order", int),  # As in `VEHICLE`; 0 while no walkers ask.
         ("is_open", bool),  # Whether walkers are on it.
         ("marked", bool),  # See `Crossing`.
-        # Places on its line from which walkers have yet to go on to its end,
-        # and to its beginning [m].
+        # Walkers who go to the end, and to the beginning, of its line have yet
+        # to walk beyond these places [m].
         ("to_end", float),
         ("to_start", float),
     ]
@@ -128,9 +129,10 @@ CROSSING = np.dtype(
 class Traffic(NamedTuple):
     """Vehicles and crossings while they are simulated.
 
-    There are (N,) cars `VEHICLE` and (C,) crossings `CROSSING`. `head` (P,) is
-    the first `_ENTRY` in the list of vehicles on each piece, -1 for none; see
-    `find_occupants`. The seed is that of the draws of ways.
+    There are N `cars`, records `VEHICLE`, and C `crossings`, records
+    `CROSSING`. `head` (P,) is the first entry in the list of vehicles on each
+    piece; -1 for none. `entries` are all records `_ENTRY`; see
+    `find_occupants`. `seed` draws ways.
     """
 
     streets: Streets
@@ -144,7 +146,7 @@ class Traffic(NamedTuple):
 def begin_traffic(
     streets: Streets, cars: np.ndarray, crossings: np.ndarray, seed: int
 ) -> Traffic:
-    """Returns the traffic at the start, with room for all vehicles' entries."""
+    """Returns the traffic at the start, with room for all entries."""
     num_pieces = len(streets.pieces)
     entries = np.zeros(_MOST_ENTRIES * len(cars) + num_pieces, _ENTRY)
     head = np.full(num_pieces, -1)
@@ -152,7 +154,7 @@ def begin_traffic(
 
 
 def make_crossings(graph: LaneGraph) -> np.ndarray:
-    """Returns the (C,) records `CROSSING` of a graph, without walkers."""
+    """Returns the records `CROSSING` (C,) of a graph, without walkers."""
     crossings = np.zeros(len(graph.crossings), CROSSING)
     crossings["waits"] = np.inf
     crossings["opened"] = crossings["closed"] = -np.inf
@@ -167,7 +169,7 @@ def make_crossings(graph: LaneGraph) -> np.ndarray:
 
 
 def room_for_vehicles(graph: LaneGraph) -> int:
-    """Returns the number of vehicles for which lanes have room to move."""
+    """Returns the number of vehicles that can move in the lanes of a graph."""
     mean = sum(kind.share * kind.size[0] for kind in KINDS)
     mean /= sum(kind.share for kind in KINDS)
     return int(
@@ -178,7 +180,7 @@ def room_for_vehicles(graph: LaneGraph) -> int:
 def place_vehicles(
     kinds: Sequence[VehicleKind], streets: Streets, rng: np.random.Generator
 ) -> tuple[np.ndarray, list[int]]:
-    """Puts vehicles of N kinds into lanes, away from the ego car's first place.
+    """Places vehicles of N kinds in lanes, away from the ego car's first place.
 
     Returns:
         Records `VEHICLE` of the vehicles for which a place was found, and the
@@ -225,17 +227,17 @@ def place_vehicles(
     points = lanes["first"] + (cars["s"] / lanes["step"]).astype(int)
     allowed = streets.speed[points]
     v = _PART_OF_SPEED * np.minimum(cars["top"], cars["factor"] * allowed)
-    # Vehicles can stop before the stop line, or behind the one ahead.
+    # Vehicles must be able to stop before the line or behind the vehicle ahead.
     left = np.minimum(lanes["length"] - cars["s"], _SPACE / 2)
     cars["v"] = np.minimum(v, np.sqrt(1.5 * left))
     return cars, found
 
 
 def vehicle_poses(streets: Streets, cars: np.ndarray) -> np.ndarray:
-    """Returns the poses of (...) records `VEHICLE`.
+    """Returns the poses (..., 5) of records `VEHICLE` (...).
 
-    They are (..., 5): x, y, z of the middle of each box on the ground [m], yaw
-    and pitch [rad].
+    They are x, y, z of the middle of each box on the ground [m], yaw and pitch
+    [rad].
     """
     half = 0.5 * cars["length"]
     front = _places(streets, cars, half - cars["front_axle"])
@@ -253,7 +255,7 @@ def vehicle_poses(streets: Streets, cars: np.ndarray) -> np.ndarray:
 def _places(
     streets: Streets, cars: np.ndarray, back: np.ndarray
 ) -> tuple[np.ndarray, ...]:
-    """Returns x, y, z at a distance behind each front bumper [m]."""
+    """Returns x, y, z at a distance `back` behind each front bumper [m]."""
     s = cars["s"] - back
     path, column = cars["path"], np.full(cars.shape, CURRENT)
 
@@ -284,9 +286,10 @@ def _places(
 
 @compiled
 def find_occupants(traffic: Traffic, k: int) -> None:
-    """Enters each vehicle in the lists of the pieces of lanes that it is on.
+    """Makes the list of vehicles on each piece, at the k-th time step.
 
-    The lists begin in `traffic.head` and describe the k-th time step.
+    The lists begin in `traffic.head`. A vehicle is in the lists of all pieces
+    that it is on.
     """
     streets, cars = traffic.streets, traffic.cars
     pieces = streets.pieces
@@ -331,7 +334,7 @@ def _enter(
     front: float,
     speed: float,
 ) -> int:
-    """Fills in an entry of a number; returns the next number."""
+    """Writes an entry with a number; returns the next number."""
     entry = traffic.entries[number]
     entry.after = traffic.head[piece]
     entry.who, entry.rear, entry.front, entry.speed = who, rear, front, speed
@@ -343,10 +346,10 @@ def _enter(
 def find_ahead(
     traffic: Traffic, piece: int, s: float, who: int
 ) -> tuple[float, float]:
-    """Returns the gap [m] to the next vehicle ahead, and its speed [m/s].
+    """Returns the gap to the next vehicle ahead [m], and its speed [m/s].
 
-    The two vehicles are on the same piece. The one behind has the number `who`,
-    and its front bumper is at s [m].
+    The vehicle ahead is on the same piece. The vehicle behind it has the number
+    `who`, and its front bumper is at `s` [m].
     """
     gap, speed = np.inf, 0.0
     at = traffic.head[piece]
@@ -363,7 +366,7 @@ def find_ahead(
 def free_acceleration(car: Any, v0: float) -> float:
     """Returns a vehicle's acceleration on a free road [m/s^2].
 
-    Above the wanted speed v0 [m/s] it is at most the comfortable braking.
+    Above the wanted speed v0 [m/s], the vehicle brakes comfortably at most.
     """
     if v0 < 0.01:
         return -car.b
@@ -372,10 +375,10 @@ def free_acceleration(car: Any, v0: float) -> float:
 
 @compiled
 def interaction(car: Any, gap: float, approach: float) -> float:
-    """Returns how much a vehicle ahead reduces acceleration [m/s^2].
+    """Returns by how much a vehicle ahead reduces the acceleration [m/s^2].
 
-    It is a (s* / gap)^2 with s* = s0 + max(0, v T + v dv / (2 sqrt(a b))),
-    where the gap is that from bumper to bumper [m], and dv is the speed minus
+    This is a (s* / gap)^2 with s* = s0 + max(0, v T + v dv / (2 sqrt(a b))).
+    The gap is from bumper to bumper [m], and dv (`approach`) is the speed minus
     that of the vehicle ahead [m/s].
     """
     wanted = STANDSTILL_GAP + max(
@@ -389,7 +392,7 @@ def interaction(car: Any, gap: float, approach: float) -> float:
 def is_walked(traffic: Traffic, c: int, way: int, is_large: bool) -> bool:
     """Returns whether walkers on the c-th crossing have yet to pass a way.
 
-    The size of the vehicle on the way, small or large, is taken into account.
+    It depends on whether the vehicle on the way is large.
     """
     one, place = traffic.crossings[c], traffic.streets.over[way, c]
     passed = _PASSED[int(is_large)]
@@ -400,13 +403,12 @@ def is_walked(traffic: Traffic, c: int, way: int, is_large: bool) -> bool:
 
 @compiled
 def lane_over(streets: Streets, car: Any, c: int) -> tuple[int, float, float]:
-    """Returns the place where a vehicle's lane meets the c-th crossing.
-
-    The crossing has no marks.
+    """Returns where a vehicle's lane meets the c-th crossing, without marks.
 
     Returns:
-        The lane that leads over it, -1 for none on the vehicle's path; the
-        distances until it enters the crossing and leaves it, inf for none [m].
+        The lane that leads over it, -1 if the vehicle's path has none; and the
+        distances to the places where the vehicle enters the crossing and leaves
+        it, inf for none [m].
     """
     begin, number = -car.s, len(streets.pieces) + c
     for column in range(CURRENT, NUM_PIECES):
@@ -426,17 +428,16 @@ def lane_over(streets: Streets, car: Any, c: int) -> tuple[int, float, float]:
 def find_prior(traffic: Traffic, i: int) -> tuple[float, float, float]:
     """Returns what the i-th vehicle has to wait for on the way it holds.
 
-    It stops before a crossing that walkers use, in lanes as well. It also stops
-    before the place where its way meets the way of a vehicle that got its way
-    earlier and has not yet passed the place. Where both vehicles leave or enter
-    the same lane, it follows the other one. Vehicles thus wait only for
-    vehicles with a lower `order`, and the first waits for none. No vehicle
-    waits for ever.
+    It stops before a crossing that walkers use, also in lanes. It stops before
+    the place where its way meets that of a vehicle which got its way earlier
+    and has not passed this place yet. If both vehicles leave or enter the same
+    lane, it follows the other one. Vehicles thus wait only for vehicles with a
+    lower `order`, and the first one waits for none: no vehicle waits forever.
 
     Returns:
         The distance to the place where the vehicle has to stop, inf for none
         [m]; the gap to a vehicle that it follows, inf for none [m]; and the
-        speed of that vehicle.
+        speed of that vehicle [m/s].
     """
     line, gap, speed = np.inf, np.inf, 0.0
     streets, cars, crossings = traffic.streets, traffic.cars, traffic.crossings
@@ -485,7 +486,7 @@ def find_prior(traffic: Traffic, i: int) -> tuple[float, float, float]:
 
 @compiled
 def rear_on_way(streets: Streets, car: Any) -> float:
-    """Returns the place of a vehicle's rear along the way it holds [m]."""
+    """Returns the place of a vehicle's rear along the way that it holds [m]."""
     rear = car.s - car.length
     if car.path[CURRENT] == car.held:
         return rear
@@ -496,7 +497,7 @@ def rear_on_way(streets: Streets, car: Any) -> float:
 
 @compiled
 def accelerations(traffic: Traffic) -> np.ndarray:
-    """Returns the accelerations of all vehicles, (N,) [m/s^2]."""
+    """Returns the accelerations (N,) of all vehicles [m/s^2]."""
     streets, cars = traffic.streets, traffic.cars
     pieces = streets.pieces
     result = np.zeros(len(cars))
@@ -533,7 +534,7 @@ def accelerations(traffic: Traffic) -> np.ndarray:
         line = min(line, stop)
         if gap_2 < gap:
             gap, speed = gap_2, speed_2
-        # The driver brakes as for a vehicle behind the stop line.
+        # The driver brakes as if a vehicle stood behind the stop line.
         loss = interaction(car, line + STANDSTILL_GAP - BEFORE_LINE, v)
         needed = v**2 / (2.0 * max(line, _NO_GAP))
         if gap < SIGHT:
@@ -549,7 +550,7 @@ def accelerations(traffic: Traffic) -> np.ndarray:
 
 @compiled
 def change_lanes(traffic: Traffic, k: int) -> None:
-    """Lets at most one vehicle begin to change lanes, at the k-th time step."""
+    """Lets at most one vehicle begin to change lanes in the k-th step."""
     cars, pieces = traffic.cars, traffic.streets.pieces
     for i in range(len(cars)):
         car = cars[i]
@@ -570,7 +571,7 @@ def change_lanes(traffic: Traffic, k: int) -> None:
             continue
         for target in (pieces[lane].left, pieces[lane].right):
             if target >= 0 and _is_better(traffic, k, i, target):
-                # The vehicle goes on as fast; only its lane is shorter or
+                # The vehicle keeps its speed; only its lane is shorter or
                 # longer.
                 scale = pieces[target].length / pieces[lane].length
                 car.s *= scale
@@ -579,7 +580,7 @@ def change_lanes(traffic: Traffic, k: int) -> None:
                 car.path[CURRENT + 1] = car.path[CURRENT + 2] = -1
                 car.since = np.inf
                 car.left_lane = lane
-                # The change begins with the front axle.
+                # The change begins at the front axle.
                 car.change_start, car.change_length = car.s, length
                 return
 
@@ -597,7 +598,7 @@ def _is_better(traffic: Traffic, k: int, i: int, target: int) -> bool:
     ):
         return False
     rear = there - car.length
-    # The next one behind; no vehicle may be beside it, ahead or behind.
+    # The next vehicle behind. No vehicle may be beside it, ahead or behind.
     behind, who, is_beside = np.inf, -2, False
     at = traffic.head[target]
     while at >= 0:
@@ -633,10 +634,7 @@ def _is_better(traffic: Traffic, k: int, i: int, target: int) -> bool:
 
 @compiled
 def advance(traffic: Traffic, accelerations: np.ndarray) -> None:
-    """Moves all vehicles by one time step.
-
-    Their accelerations are (N,) [m/s^2].
-    """
+    """Moves all vehicles by one time step, with accelerations (N,) [m/s^2]."""
     cars, pieces = traffic.cars, traffic.streets.pieces
     for i in range(len(cars)):
         car = cars[i]
@@ -661,7 +659,7 @@ def advance(traffic: Traffic, accelerations: np.ndarray) -> None:
                 choose_way(traffic, i)
         car.s, car.v = s, v
         rear = s - car.length
-        # A vehicle still before its way keeps the permit it has just got.
+        # A vehicle before its way keeps the permission that it has just got.
         is_before = car.held == car.path[CURRENT + 1] and car.granted
         if car.held >= 0 and not (piece.is_way or rear < 0.0 or is_before):
             car.held = -1
@@ -673,8 +671,8 @@ def advance(traffic: Traffic, accelerations: np.ndarray) -> None:
 def choose_way(traffic: Traffic, i: int) -> None:
     """Draws the next way of the i-th vehicle, which is in a lane.
 
-    It draws two ways, and takes the one that leads to the emptier lane, so that
-    no street stays empty while vehicles queue in others.
+    It draws two ways and takes the one to the emptier lane, so that no street
+    stays empty while vehicles queue in others.
     """
     streets, cars = traffic.streets, traffic.cars
     car = cars[i]
@@ -703,10 +701,10 @@ def choose_way(traffic: Traffic, i: int) -> None:
 
 @compiled
 def uniform(seed: int, who: int, draw: int) -> float:
-    """Returns the draw-th random number of a road user, from 0 to 1.
+    """Returns the `draw`-th random number of a road user, from 0 to 1.
 
     It is SplitMix64's finalizer (Steele, Lea, Flood, OOPSLA 2014) of the seed,
-    the user's number and the draw.
+    the number of the road user and `draw`.
     """
     z = np.uint64(seed) * np.uint64(0x9E3779B97F4A7C15)
     z += np.uint64(who) * np.uint64(0xD1B54A32D192ED03)

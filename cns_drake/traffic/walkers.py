@@ -1,7 +1,7 @@
-"""Walkers on walkways: the social force model.
+"""Moves walkers along walkways by the social force model.
 
 Helbing, Molnar, "Social force model for pedestrian dynamics", Phys. Rev. E 51
-(1995): walkers relax to their wanted speed, and keep away from each other and
+(1995): walkers approach their wanted speed, and keep away from each other and
 from the edges of their walkway.
 """
 
@@ -18,24 +18,27 @@ from cns_drake.traffic.right_of_way import WALK_GROUP
 from cns_drake.traffic.streets import STEP
 from cns_drake.traffic.vehicles import uniform
 
-# The model's wanted speed, and its spread [m/s]; relaxation [s]; strength
-# [m/s^2] and reach [m] of the repulsion by walkers, and by edges.
+# Mean and spread of the model's wanted speed [m/s]; relaxation time [s];
+# strength [m/s^2] and range [m] of the repulsion by walkers, then by edges.
 _SPEED, _SPREAD = 1.34, 0.26
 _RELAXATION = 0.5
 _STRENGTH, _REACH = 7.0, 0.3
 _EDGE_STRENGTH, _EDGE_REACH = 10.0, 0.2
-# Greatest speed, as a multiple of the wanted speed.
+# Greatest speed as a multiple of the wanted speed.
 _HURRY = 1.3
-# The least distance of two walkers' middles, and the radius of neighbours [m].
+# Least distance between two walkers' middles, and radius within which walkers
+# are neighbours [m].
 _APART = 0.95
 _NEAR = 4.0
-# Boxes of walkers with swinging limbs [m], and least space between them [m].
+# Length and width of a walker's box, which contains swinging limbs, and least
+# space between boxes [m].
 WALKER_LENGTH, WALKER_WIDTH, _GAP = 0.84, 0.6, 0.15
-# A walker steps aside for one ahead with this acceleration [m/s^2], unless the
-# other is at least this far to the side [m].
+# A walker steps aside for another one ahead with this acceleration [m/s^2],
+# unless that one is at least this far to the side [m]. The third number is a
+# small bias to the right.
 _ASIDE, _PASSING = 4.0, 0.85
 _TO_THE_RIGHT = 0.3
-# Distance ahead of a walker's aim, in points of a walkway.
+# A walker aims at a point of the walkway this many points ahead.
 _AHEAD = int(2.0 / SPACING)
 # A walker turns to its direction of motion at this rate [rad/s], if it is at
 # least this fast [m/s].
@@ -44,20 +47,20 @@ _TURN_RATE, _GOING = 2.5, 0.2
 _AT_NODE = 1.0
 # Greatest acceleration, in any direction [m/s^2].
 _STRONGEST = 2.5
-# A walker turns back after being blocked for this time [s], and so does one
-# who waits within this distance [m].
+# A walker that was blocked for this time turns back [s], and so does one that
+# waits within this distance of a blocked one [m].
 _PATIENCE, _BESIDE = 4.0, 1.5
-# Walkers that cross, for each one that goes straight on, if both are possible:
-# at crossings, and elsewhere.
+# Number of walkers that cross for each one that goes straight on, if both are
+# possible: at marked crossings, and elsewhere.
 _CROSSES, _CROSSES_ELSEWHERE = 0.25, 0.05
-# Time after which a walker waits no longer for a gap [s].
+# After this time, a walker no longer waits for a gap [s].
 _GIVES_UP = 10.0
-# Length of sidewalk for one walker [m].
+# Length of sidewalk per walker [m].
 _WALKER_SPACE = 3.0
-# Share of walkers with a companion behind them, which makes a third of them
-# walk in groups, and its distance in points of a walkway.
+# Share of walkers with a companion behind them, so that about a third walk in
+# groups; and the companion's distance in points of the walkway.
 _COMPANIONS, _BEHIND = 0.2, 3
-# Number of places that are drawn before a walker is given up.
+# Number of random places that are tried for a walker.
 _TRIES = 200
 
 _WALKER = np.dtype(
@@ -67,16 +70,17 @@ _WALKER = np.dtype(
         ("yaw", float),  # Heading [rad].
         ("phase", float),  # Place in the gait [rad].
         ("path", int),  # Number of the walkway, in walking direction.
-        ("at", int),  # Row of its points that the walker has reached.
+        ("at", int),  # Row of the point that the walker has reached.
         ("speed", float),  # Wanted [m/s].
-        ("aside", float),  # Offset to the right, part of the half width.
+        ("aside", float),  # Offset to the right, as a share of half the width.
         ("next_path", int),  # -1 if not drawn yet.
         ("stuck", float),  # Time for which the walker has been blocked [s].
-        ("group", int),  # Number of the walker whose ways it takes.
+        ("group", int),  # Number of the walker whom it follows.
         ("draws", int),  # Number of random numbers drawn.
     ]
 )
-# A walkway in one of its directions; that back is its number ^ 1.
+# A walkway in one direction as a record; the number of the opposite one is its
+# own ^ 1.
 _PATH = np.dtype(
     [
         ("first", int),  # Row of its first point.
@@ -88,15 +92,15 @@ _PATH = np.dtype(
 
 
 class Paths(NamedTuple):
-    """W walkways in both of their directions.
+    """W walkways in both directions, as arrays.
 
     Attributes:
         paths: (2 W,) records `_PATH`.
-        points: (M, 3) in walking direction [m].
-        tangents: (M, 2) unit vectors from each point to the next; that of the
-            last point of a path is the one before.
+        points: (M, 3) points in walking direction [m].
+        tangents: (M, 2) unit vectors from each point to the next; the last
+            point of a path has that of the point before.
         limits: (M, 2) least and greatest offset to the right [m].
-        narrow: (M,) bool, where walkers face along their path.
+        narrow: (M,) where walkers must face along their path.
     """
 
     paths: np.ndarray
@@ -107,24 +111,24 @@ class Paths(NamedTuple):
 
 
 def room_for_walkers(walkways: Sequence[Walkway]) -> int:
-    """Returns the number of walkers for whom sidewalks have room."""
+    """Returns the number of walkers for whom there is room on sidewalks."""
     length = sum(length_of(way.points) for way in walkways if way.crossing < 0)
     return int(length // _WALKER_SPACE)
 
 
 def gait_rate(speed: np.ndarray) -> np.ndarray:
-    """Returns how fast the phase of walkers' steps changes [rad/s].
+    """Returns the rate at which the phase of walkers' gait changes [rad/s].
 
-    A stride, of two steps, is as long as 0.7 s of a walk at that speed and 0.4
-    m more.
+    A stride, of two steps, is 0.4 m longer than the distance walked in 0.7 s.
     """
     return 2.0 * np.pi * speed / (0.7 * speed + 0.4)
 
 
 class Crowd:
-    """All `walkers` while they are planned, (N,) records.
+    """All walkers while they are planned.
 
-    There are fewer than wanted if there is no room for all.
+    `walkers` (N,) are records. There are fewer than wanted if there is no room
+    for all.
     """
 
     def __init__(
@@ -134,7 +138,10 @@ class Crowd:
         crossings: np.ndarray,
         rng: np.random.Generator,
     ):
-        """Puts a number of walkers onto walkways, except (C,) `CROSSING`."""
+        """Places `count` walkers on walkways, except on crossings.
+
+        `crossings` (C,) are records `CROSSING`.
+        """
         self._crossings = crossings
         self._paths = _make_paths(walkways)
         # Place -> the paths that begin there.
@@ -148,12 +155,12 @@ class Crowd:
     def step(self, t: float, seed: int) -> None:
         """Moves all walkers by one step from a time [s].
 
-        A seed draws their ways.
+        The seed draws their next paths.
         """
         crossings, walkers = self._crossings, self.walkers
         opened = crossings["opened"]
         begun = (opened >= 0.0) & (opened + WALK_GROUP <= t)
-        # The placeholder's permit ends when the group begins to walk.
+        # The placeholder gives up its permission when the group begins to walk.
         crossings["users"][begun] -= 1
         opened[begun] = -np.inf
         crossings["closed"][begun] = t
@@ -169,13 +176,13 @@ class Crowd:
         speed = np.sqrt(x * x + y * y)
         walkers["phase"] += gait_rate(speed) * STEP
         paths = self._paths.paths[walkers["path"]]
-        # Others may push one back.
+        # Others may push a walker back.
         along = self._paths.tangents[paths["first"] + walkers["at"]]
         gets_on = x * along[:, 0] + y * along[:, 1] > _GOING
         is_stuck = ~gets_on & ~is_waiting
         walkers["stuck"] = np.where(is_stuck, walkers["stuck"] + STEP, 0.0)
         back = walkers["stuck"] > _PATIENCE
-        # Likewise one who waits where the other wants to leave a crossing.
+        # Also one that waits where another wants to leave a crossing.
         apart = walkers["xy"][back, None] - walkers["xy"][is_waiting]
         square = apart[..., 0] ** 2 + apart[..., 1] ** 2
         back[is_waiting] |= (square < _BESIDE**2).any(axis=0)
@@ -186,7 +193,7 @@ class Crowd:
         walkers["next_path"][back] = -1
 
     def _note_crossers(self) -> None:
-        """Notes the parts of crossings that walkers have yet to pass."""
+        """Records which parts of crossings walkers have yet to pass."""
         crossings, walkers = self._crossings, self.walkers
         crossings["to_end"], crossings["to_start"] = np.inf, -np.inf
         on = self._paths.paths["crossing"][walkers["path"]]
@@ -204,7 +211,7 @@ class Crowd:
         crossings["to_start"][begins] = np.inf
 
     def _follow_paths(self) -> np.ndarray:
-        """Notes the points that walkers pass; returns who is near the end."""
+        """Updates the points that walkers reach; returns who is near an end."""
         walkers, (_, points, tangents, *_) = self.walkers, self._paths
         paths = self._paths.paths[walkers["path"]]
 
@@ -226,10 +233,10 @@ class Crowd:
     def _go_on(self, i: int, t: float, seed: int, waited: np.ndarray) -> bool:
         """Lets the i-th walker begin its next path, unless it has to wait.
 
-        A crossing that it asks for is noted in `waited`, (C,) bool.
+        If it asks for a crossing, this is recorded in `waited` (C,).
 
         Returns:
-            Whether it has begun.
+            Whether it has begun its next path.
         """
         walkers, paths = self.walkers, self._paths.paths
         if walkers["next_path"][i] < 0:
@@ -237,7 +244,7 @@ class Crowd:
         after = int(walkers["next_path"][i])
         crossings = self._crossings
         c = paths["crossing"][after]
-        # One who turns back on a crossing has its permit.
+        # A walker that turns back on a crossing already has permission.
         if c >= 0 and c != paths["crossing"][walkers["path"][i]]:
             if crossings["users"][c] == 0:
                 crossings["waits"][c] = min(crossings["waits"][c], t)
@@ -258,13 +265,13 @@ class Crowd:
         return True
 
     def _draw_next(self, i: int, seed: int) -> int:
-        """Draws the next path; that back only if there is no other."""
+        """Returns a random next path; it leads back only if no other exists."""
         path = int(self.walkers["path"][i])
         choices = self._after[int(self._paths.paths["node"][path])]
         if len(choices) == 1:
             return path ^ 1
         self.walkers["draws"][i] += 1
-        # Few walkers cross, none goes back.
+        # Few walkers cross, and none goes back.
         marked = self._crossings["marked"]
         likings = []
         for other in choices:
@@ -280,10 +287,9 @@ class Crowd:
         return path ^ 1 if other // 2 == path // 2 else other
 
     def poses(self, walkers: np.ndarray) -> np.ndarray:
-        """Returns the poses of (...) records, such as those of several times.
+        """Returns the poses (..., 5) of records (...), e.g. of several times.
 
-        They are (..., 5): x, y, z on the ground [m], yaw, phase of the gait
-        [rad].
+        They are x, y, z on the ground [m], yaw, and phase of the gait [rad].
         """
         paths, points, *_ = self._paths
         path = paths[walkers["path"]]
@@ -334,7 +340,7 @@ def _place_walkers(
     rows: list[tuple[int, int, np.ndarray, float, int]] = []
 
     def place(way: int, forward: bool, at: int, group: int) -> bool:
-        """Puts a walker there, unless another one is near."""
+        """Places a walker unless another one is near; returns if it did."""
         points = walkways[way].points
         line = points if forward else points[::-1]
         x, y = (line[at + 1] - line[at])[:2]
@@ -376,9 +382,9 @@ def _place_walkers(
 def _forces(
     paths: Paths, walkers: np.ndarray, is_waiting: np.ndarray
 ) -> np.ndarray:
-    """Returns the (N, 2) forces on all walkers, as accelerations [m/s^2].
+    """Returns the forces (N, 2) on all walkers, as accelerations [m/s^2].
 
-    Some of them wait for a crossing, (N,) bool.
+    `is_waiting` (N,) says which walkers wait for a crossing.
     """
     force = np.zeros((len(walkers), 2))
     for i in range(len(walkers)):
@@ -388,7 +394,7 @@ def _forces(
         right = (paths.tangents[here, 1], -paths.tangents[here, 0])
         force[i] -= one.velocity / _RELAXATION
         if is_waiting[i]:
-            # Edges would shake it in a narrow gap.
+            # In a narrow gap, the edges would push it to and fro.
             continue
         target = path.first + min(one.at + _AHEAD, path.num_points - 1)
         left, most = paths.limits[target]
@@ -416,7 +422,8 @@ def _forces(
                 continue
             distance = max(np.sqrt(square), 1e-3)
             push = _STRENGTH * np.exp(-max(distance - _APART, 0.0) / _REACH)
-            # A little to the right, or two walkers who meet head on would stop.
+            # Slightly to the right; otherwise two walkers who meet head-on
+            # would stop.
             push_x = push * (x - _TO_THE_RIGHT * y) / distance
             push_y = push * (y + _TO_THE_RIGHT * x) / distance
             force[i, 0] += push_x
@@ -424,7 +431,7 @@ def _forces(
             force[j, 0] -= push_x
             force[j, 1] -= push_y
             for k, sign in ((i, -1.0), (j, 1.0)):
-                # The other one's place, in the walker's own frame.
+                # The other walker's place in the walker's own frame.
                 c, s = np.cos(walkers[k].yaw), np.sin(walkers[k].yaw)
                 ahead = sign * x * c + sign * y * s
                 aside = sign * y * c - sign * x * s
@@ -432,7 +439,8 @@ def _forces(
                     continue
                 push = _ASIDE * (1.0 - distance / _NEAR)
                 push *= 1.0 - abs(aside) / _PASSING
-                # Away from the other one; to the right if it is straight ahead.
+                # Away from the other one; to the right if that one is straight
+                # ahead.
                 side = -1.0 if aside >= -0.05 else 1.0
                 force[k, 0] -= side * push * s
                 force[k, 1] += side * push * c
@@ -441,11 +449,11 @@ def _forces(
 
 @compiled
 def _move(paths: Paths, walkers: np.ndarray, force: np.ndarray) -> None:
-    """Moves each walker as far as its way is free, by (N, 2) forces [m/s^2].
+    """Moves each walker as far as its path is free, by forces (N, 2) [m/s^2].
 
-    A walker takes a step if it can stop thereafter on its path, and beside the
-    places where all others can stop. Otherwise it brakes: the place where it
-    stops is free since the step before.
+    A walker takes a step if it can then stop on its path, away from the places
+    where all others can stop. Otherwise it brakes; the place where it stops has
+    been free since the step before.
     """
     for i in range(len(walkers)):
         one = walkers[i]
@@ -455,7 +463,7 @@ def _move(paths: Paths, walkers: np.ndarray, force: np.ndarray) -> None:
         change_x, change_y = force[i, 0] * STEP, force[i, 1] * STEP
         for attempt in range(3):
             if attempt == 1:
-                # Try the lateral part of the step only, and a little back.
+                # Try only the lateral part of the step, and slightly back.
                 c, s = np.cos(one.yaw), np.sin(one.yaw)
                 aside = change_y * c - change_x * s
                 back = vx * c + vy * s + 0.5 * abs(aside)
@@ -480,7 +488,7 @@ def _move(paths: Paths, walkers: np.ndarray, force: np.ndarray) -> None:
             if paths.narrow[row] or speed > _GOING:
                 turn = np.arctan2(new_vy, new_vx) - yaw
                 if paths.narrow[row]:
-                    # Along the path, forwards or backwards.
+                    # Facing along the path, forwards or backwards.
                     ahead = np.cos(yaw) * tx + np.sin(yaw) * ty
                     turn = np.arctan2(ty, tx) - yaw + np.pi * (ahead < 0.0)
                 turn = (turn + np.pi) % (2 * np.pi) - np.pi
@@ -501,14 +509,17 @@ def _move(paths: Paths, walkers: np.ndarray, force: np.ndarray) -> None:
 
 @compiled
 def _stop(x: float, y: float, vx: float, vy: float) -> tuple[float, float]:
-    """Returns where a walker of some place and velocity stops if it brakes."""
+    """Returns x and y at which a walker stops if it brakes now.
+
+    (x, y) is its place, and (vx, vy) its velocity.
+    """
     time = np.sqrt(vx * vx + vy * vy) / (2.0 * _STRONGEST)
     return x + vx * time, y + vy * time
 
 
 @compiled
 def _nearest(paths: Paths, walker: Any, x: float, y: float) -> int:
-    """Returns the row of the point nearest to a place on a walker's path."""
+    """Returns the row of the point on a walker's path nearest to a place."""
     path, points = paths.paths[walker.path], paths.points
     best, nearest = np.inf, path.first
     for at in range(max(walker.at - 3, 0), min(walker.at + 4, path.num_points)):
@@ -522,7 +533,7 @@ def _nearest(paths: Paths, walker: Any, x: float, y: float) -> int:
 
 @compiled
 def _distance_off(paths: Paths, walker: Any, x: float, y: float) -> float:
-    """Returns the distance of a place from a walker's path [m]."""
+    """Returns the distance from a place to a walker's path [m]."""
     path, points = paths.paths[walker.path], paths.points
     row = _nearest(paths, walker, x, y)
     nearest = row - path.first
@@ -549,7 +560,8 @@ def _is_free(
 ) -> bool:
     """Returns whether the i-th walker's box would be free, now and later.
 
-    It would be at a place with a heading, and stop elsewhere if it braked then.
+    The box would be at `place` with a heading and, if the walker braked, then
+    at `stop`.
     """
     half = (WALKER_LENGTH / 2 + _GAP / 2, WALKER_WIDTH / 2 + _GAP / 2)
     for j in range(len(walkers)):

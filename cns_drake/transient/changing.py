@@ -1,4 +1,4 @@
-"""Applies all passing changes to a world: cars, snow, furniture, leaves."""
+"""Applies all temporary changes to a world: cars, snow, furniture, leaves."""
 
 from dataclasses import replace
 import math
@@ -38,21 +38,22 @@ from cns_drake.transient.world_structures import (
 
 _PARKED_CARS = "parked_cars"
 _PARKED = frozenset({"car", "truck", "bus"})
-# Shares of changed bays: the car is gone; the car has moved. The rest have
-# another car.
+# Share of the changed bays whose car has gone, and of those whose car has
+# moved. All others get another car.
 _GONE = 0.3
 _MOVED = 0.2
-# Greatest room of a bay before and behind a car, and beside it [m].
+# Greatest free length of a bay in front of a car and behind it, and beside it
+# [m].
 _LENGTHWISE = 0.5
 _SIDEWAYS = 0.25
-# Greatest turn of a car against its bay [rad].
+# Greatest turn of a car relative to its bay [rad].
 _SKEW = 0.03
-# Distance of cars from all other things [m].
+# Distance between cars and all other objects [m].
 _GAP = 0.05
-# Least distance of a moved car from its old place [m].
+# Least distance between the new and the old place of a moved car [m].
 _LEAST_MOVE = 0.1
 _CAR_TRIES = 12
-# Kinds of parked vehicles, with relative shares.
+# Body types of parked vehicles -> weight in the random choice.
 _FORMS = {
     "city_car": 3,
     "hatchback": 4,
@@ -65,17 +66,17 @@ _FORMS = {
 
 
 class Bay:
-    """The room of a parked car, which overlaps no other bay.
+    """The room of a parked car, which does not overlap other bays.
 
     Attributes:
         middle: (2,) middle of the car [m].
         yaw: heading of its long axis [rad].
-        reach: (4,) distance from there to the front, back, left and right end
-            of the bay [m].
+        reach: (4,) distances from the middle to the front, back, left and right
+            end of the bay [m].
     """
 
     def __init__(self, car: Structure):
-        """A bay as large as the car."""
+        """Makes a bay of the size of the car."""
         hull = shapely.MultiPoint(car.p_WPs[:, :2])
         corners = shapely.get_coordinates(hull.minimum_rotated_rectangle)[:4]
         sides = np.diff(corners, axis=0)[:2]
@@ -86,9 +87,10 @@ class Bay:
         self.reach = np.repeat([lengths.max() / 2, lengths.min() / 2], 2)
 
     def box(self, beyond: np.ndarray | float = 0.0) -> Polygon:
-        """Returns the enlarged bay as a rectangle seen from above [m].
+        """Returns the bay, enlarged on each side, as seen from above [m].
 
-        `beyond` has lengths at front, back, left and right [m].
+        `beyond` has the lengths by which it grows at the front, back, left and
+        right [m].
         """
         front, back, left, right = self.reach + beyond
         c, s = math.cos(self.yaw), math.sin(self.yaw)
@@ -119,9 +121,10 @@ class Bay:
     def place(
         self, half_size: np.ndarray, rng: np.random.Generator
     ) -> tuple[np.ndarray, float] | None:
-        """Returns middle and yaw of a car in the bay; None if it is too big.
+        """Returns a random middle (2,) and yaw of a car in the bay [m, rad].
 
-        It has (2,) half its length and width [m].
+        `half_size` (2,) is half the length and half the width of the car [m].
+        The result is None if the car is too big.
         """
         skew = float(rng.uniform(-_SKEW, _SKEW))
         across, turned = rng.uniform(size=2), rng.uniform() < 0.5
@@ -138,7 +141,7 @@ class Bay:
 
 
 def make_bays(around: Surroundings) -> dict[str, Bay]:
-    """Returns the bays of all parked cars, by the cars' names."""
+    """Returns the bays of all parked cars, by the name of the car."""
     cars = {car.name: car for car in around.of_classes(_PARKED)}
     bays = {name: Bay(car) for name, car in cars.items()}
     if not bays:
@@ -149,7 +152,7 @@ def make_bays(around: Surroundings) -> dict[str, Bay]:
     for name, car in cars.items():
         grown[name] = Bay(car)
         grown[name].grow(car, standing, others)
-    # Two bays that meet at a corner both stay as they are.
+    # Two bays that meet at a corner both keep their size.
     boxes = [bay.box() for bay in grown.values()]
     names = list(grown)
     first, second = shapely.STRtree(boxes).query(boxes, "intersects")
@@ -160,7 +163,7 @@ def make_bays(around: Surroundings) -> dict[str, Bay]:
 
 
 def change_parked_cars(around: Surroundings, share: float) -> None:
-    """Changes a share of the parked cars, from 0 to 1."""
+    """Changes a share (from 0 to 1) of the parked cars."""
     editing, bays = around.editing, make_bays(around)
     if not bays:
         editing.note("parked_cars: the world has no car, truck or bus")
@@ -179,10 +182,10 @@ def change_parked_cars(around: Surroundings, share: float) -> None:
 def _moved_car(
     bay: Bay, car: Structure, ground: GroundSurface, rng: np.random.Generator
 ) -> RigidTransform:
-    """Returns the transformation of a moved car's points."""
+    """Returns the transform X_new of a car's points to its new place in W."""
     own = Bay(car)
     half_size = own.reach[::2]
-    middle, yaw = own.middle, own.yaw + np.pi  # At least turned round.
+    middle, yaw = own.middle, own.yaw + np.pi  # At least, it turns round.
     for _ in range(_CAR_TRIES):
         found = bay.place(half_size, rng)
         if (
@@ -200,7 +203,7 @@ def _moved_car(
 def _replace_car(
     around: Surroundings, car: Structure, bay: Bay, rng: np.random.Generator
 ) -> None:
-    """Puts another car into a bay, or none if the bay is too small."""
+    """Puts another car in a bay; leaves the bay empty if it is too small."""
     editing, forms = around.editing, list(_FORMS)
     shares = np.array(list(_FORMS.values()), float)
     for k in rng.choice(len(forms), len(forms), False, shares / shares.sum()):
@@ -229,7 +232,7 @@ def _replace_car(
 
 
 def _extent(model: Model) -> tuple[np.ndarray, np.ndarray]:
-    """Returns the lowest and highest x and y of a car's model [m]."""
+    """Returns the least and the greatest x and y (2,) of a car's model [m]."""
     corners = np.concatenate(
         [part_triangles(part, model.meshes)[0] for part in model.parts]
     )[:, :2]
@@ -237,9 +240,9 @@ def _extent(model: Model) -> tuple[np.ndarray, np.ndarray]:
 
 
 _SNOW = "snow"
-# Snow near 900 nm: Warren, "Optical properties of snow", 1982.
+# Reflectivity of snow near 900 nm: Warren, "Optical properties of snow", 1982.
 _LOOK = Look((0.93, 0.95, 0.97), 0.9)
-# Snow slides from steeper surfaces: cosine of 45 degrees.
+# Snow slides off steeper surfaces: cosine of 45 degrees.
 _LEAST_UP = 0.707
 # Smaller surfaces bear no snow [m^2].
 _LEAST_AREA = 0.3
@@ -248,20 +251,21 @@ _BARE = frozenset(
 )
 # Longest side of triangles at the edge of a cleared road [m].
 _FINE = 0.7
-# A bank along a kerb: its reach to both sides as a multiple of its height, its
-# greatest height in depths of snow, and in [m].
+# A bank of snow along a kerb: distances from the kerb of its edge on the road,
+# of its crest, and of its edge beyond the kerb [m]; its greatest height as a
+# multiple of the depth of snow, and above the snow [m].
 _INSIDE, _CREST, _OUTSIDE = 0.3, 0.3, 1.1
 _HIGHEST, _MOST_HEIGHT = 2.5, 0.9
 _SPACING = 1.5
-# Wave lengths of its height along the street [m].
+# Wavelengths of the bank's height along the street [m].
 _WAVES = (9.0, 3.7)
 
 
 def lay_snow(around: Surroundings, ground: GroundSurface, depth: float) -> None:
     """Lays snow of a depth [m], except on roads, plants and thin objects.
 
-    The snow raises `ground`, the surface before all earlier changes. Roads are
-    cleared, with banks along their kerbs.
+    The snow raises `ground`, the surface before all other changes. Roads are
+    cleared, and have banks of snow along their kerbs.
     """
     editing = around.editing
     for thing in around.things.values():
@@ -289,7 +293,7 @@ def lay_snow(around: Surroundings, ground: GroundSurface, depth: float) -> None:
 
 
 def _is_below_road(part: StructurePart, ground: GroundSurface) -> bool:
-    """Returns whether ground continues below a carriageway."""
+    """Returns whether a piece of ground continues below a carriageway."""
     corners = turned_up(triangle_corners(part))
     corners = corners[unit_normals(corners)[:, 2] > 0.0]
     inner = ground.carriageway.buffer(-0.5)
@@ -306,7 +310,10 @@ def _cover(
     depth: float,
     is_ground: bool,
 ) -> bool:
-    """Puts a slab on a part's faces below the sky; returns if it has any."""
+    """Covers the faces of a part that are open to the sky with snow.
+
+    It returns whether there are any.
+    """
     corners = triangle_corners(part)
     if is_ground:
         corners = turned_up(corners)
@@ -340,7 +347,7 @@ def _cover(
 
 
 def _beside(corners: np.ndarray, ground: GroundSurface) -> np.ndarray:
-    """Returns triangles beside the carriageway, finer along its edge."""
+    """Returns the triangles beside the carriageway, finer along its edge."""
     corners = corners[shapely.intersects(from_above(corners), ground.near)]
     road = ground.carriageway
     shapely.prepare(road)
@@ -363,7 +370,7 @@ def _beside(corners: np.ndarray, ground: GroundSurface) -> np.ndarray:
 
 
 def _merged(corners: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Returns vertices and triangles, equal corners as one vertex."""
+    """Returns vertices and triangles; equal corners become one vertex."""
     rounded = np.round(corners.reshape(-1, 3), 4)
     _, first, inverse = np.unique(
         rounded, axis=0, return_index=True, return_inverse=True
@@ -372,7 +379,7 @@ def _merged(corners: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
 
 
 def _is_large(vertices: np.ndarray, triangles: np.ndarray) -> np.ndarray:
-    """Returns the triangles of connected areas that bear snow."""
+    """Returns which triangles belong to areas large enough to bear snow."""
     edges = triangles[:, [0, 1, 1, 2]].reshape(-1, 2)
     graph = coo_matrix(
         (np.ones(len(edges)), (edges[:, 0], edges[:, 1])),
@@ -402,7 +409,8 @@ def _lay_banks(
         ) / 4
         most = min(_HIGHEST * depth, _MOST_HEIGHT + depth)
         crest = beside + depth + (most - depth) * (0.6 + 0.4 * waves)
-        # A profile: on the road, on the crest, on the snow beside it.
+        # The profile of the bank: on the road, on the crest, on the snow beside
+        # it.
         profile = np.stack(
             [
                 np.column_stack([xy - _INSIDE * out, road]),
@@ -429,14 +437,15 @@ def _lay_banks(
 
 
 _FURNITURE = frozenset({"pole", "traffic-sign"})
-# Greatest move of furniture [m].
+# Least and greatest distance by which furniture moves [m].
 _NEAREST, _FARTHEST = 0.3, 2.0
 _TURN = 0.15  # [rad]
-# Ground that differs by more in height is beyond a kerb [m].
+# If the height of the ground differs by more than this, there is a kerb in
+# between [m].
 _KERB = 0.1
 _TRIES = 24
 _LEAVES = ("crown", "lea", "foliage", "canopy", "plants", "hedge")
-# Share of the surface of a shrub without separate wood that stays, as twigs.
+# Of a shrub without wood of its own, this share of the surface stays as twigs.
 _TWIGS = 0.1
 
 
@@ -449,10 +458,10 @@ def change_world(
     """Returns a world in which time has passed.
 
     Args:
-        world: not yet a part of a diagram; its SceneGraph is changed.
+        world: the world, not yet part of a diagram; its SceneGraph is changed.
         config: the changes.
-        drive, kept_free: the way of the vehicle, and the area that stays free
-            of new things, seen from above [m].
+        drive, kept_free: the path of the vehicle, and the area that must stay
+            free of new objects, seen from above [m].
 
     Raises:
         InputError: a mesh cannot be read, or there are more structures than
@@ -468,7 +477,7 @@ def change_world(
         config.seed,
     )
     if config.roadsides > 0.0:
-        # What stands there changes as all else does.
+        # New objects along roadsides are changed like all others.
         putting_up.fill_roadsides(around, config.roadsides)
         rest = config.replaced(roadsides=0.0)
         return change_world(around.editing.finish(), rest, drive, kept_free)
@@ -483,7 +492,7 @@ def change_world(
     if config.works > 0.0:
         putting_up.put_up_works(around, config.works)
     if config.snow > 0.0:
-        # Snow comes last, so that it covers new things as well.
+        # Snow comes last, so that it covers new objects as well.
         ground, world = around.ground, around.editing.finish()
         around = replace(
             around, editing=SceneEditing(world), things=read_structures(world)
@@ -493,7 +502,7 @@ def change_world(
 
 
 def _move_furniture(around: Surroundings, share: float) -> None:
-    """Replaces a share of poles, lamps and signs within 2 m.
+    """Moves a share of poles, lamps and signs by up to 2 m.
 
     An object without room around it stays, and none crosses a kerb.
     """
@@ -526,10 +535,10 @@ def _move_furniture(around: Surroundings, share: float) -> None:
 
 
 def _thin_leaves(around: Surroundings, share: float) -> None:
-    """Takes leaves off all vegetation, but for a share of them.
+    """Removes the leaves of all vegetation except for a share of them.
 
-    Plants of one mesh lose the same leaves of it; turned and stretched as
-    they are, they differ.
+    Plants with the same mesh lose the same leaves of it, but look different
+    because they are turned and scaled.
     """
     changed = False
     for plant in around.of_classes({"vegetation"}):
@@ -541,8 +550,8 @@ def _thin_leaves(around: Surroundings, share: float) -> None:
             surface = part.geometry.surface
             assert isinstance(surface, TriangleSurface)
             count = len(surface.triangles)
-            # The key is the mesh's size, not its file, whose place must not
-            # matter.
+            # The key is the size of the mesh, not its path, so that the result
+            # does not depend on where the file is.
             order = draws(around.seed, "leaves", str(count)).permutation(count)
             around.editing.keep_triangles(
                 part, np.sort(order[: round(left * count)])
@@ -558,7 +567,7 @@ def _thin_leaves(around: Surroundings, share: float) -> None:
 
 
 def _is_leafy(part: StructurePart) -> bool:
-    """Returns whether a part is leaves and not wood, by name or by colour."""
+    """Returns whether a part is leaves, not wood, by its name or colour."""
     if not isinstance(part.geometry.surface, TriangleSurface):
         return False
     name = part.name.lower()

@@ -1,4 +1,4 @@
-"""Puts up scaffolds, roadworks, and hedges and the like, along a drive."""
+"""Puts up scaffolds, roadworks and roadside objects along a drive."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
@@ -30,15 +30,16 @@ from cns_drake.transient.world_structures import (
     draws,
 )
 
-# Greatest distance of fronts from the drive [m].
+# Greatest distance between a front and the drive [m].
 _FARTHEST = 30.0
-# A scaffold's inner and outer row of standards, from the front [m].
+# Distance of a scaffold's inner and outer uprights from the front [m].
 _ROW_INNER, _ROW_OUTER = 0.25, 1.15
-# Height of lifts, length of bays, and greatest size of a scaffold [m].
+# Scaffolds: height of a lift, length of a bay, and greatest length and height
+# [m].
 _LIFT, _BAY = 2.0, 2.5
 _LONGEST, _HIGHEST = 25.0, 16.0
 _LEAST_LENGTH, _LEAST_HEIGHT = 4.0, 3.5
-# Part of the scaffolds with a net.
+# Share of the scaffolds that have a net.
 _NETTED = 0.4
 _STEEL = (0.6, 0.61, 0.62)
 _WOOD = (0.62, 0.5, 0.35)
@@ -47,9 +48,9 @@ _NOT_THROUGH = frozenset({"building", "car", "truck", "bus", "other-structure"})
 
 
 def put_up_scaffolds(around: Surroundings, share: float) -> None:
-    """Puts scaffolds before a share of the fronts along a drive.
+    """Puts up scaffolds in front of a share of the buildings along a drive.
 
-    A front without room before it gets none.
+    A front without room gets no scaffold.
     """
     fronts = [
         thing
@@ -73,7 +74,7 @@ def put_up_scaffolds(around: Surroundings, share: float) -> None:
             )
         ]  # fmt: skip
         area = shapely.Polygon([corner[:2] for corner in corners])
-        # A quay beside the front is not below it.
+        # A quay beside the front does not count as the foot of the building.
         foot = max(around.ground.lowest(area, building.bottom), building.bottom)
         height = min(float(building.p_WPs[:, 2].max()) - foot, _HIGHEST)
         if (
@@ -93,10 +94,10 @@ def put_up_scaffolds(around: Surroundings, share: float) -> None:
 def _front(
     building: Structure, drive: BaseGeometry
 ) -> tuple[RigidTransform, float]:
-    """Returns the pose of the front that faces a drive, and its length.
+    """Returns the pose of the front that faces a drive, and its length [m].
 
-    The pose is that of the front's middle at z = 0, x along it and y away
-    from the building.
+    The pose is in W: in the middle of the front at z = 0, with x along the
+    front and y away from the building.
     """
     rectangle = shapely.MultiPoint(
         shapely.get_coordinates(building.footprint)
@@ -112,7 +113,7 @@ def _front(
 
 
 def scaffold(length: float, height: float, rng: np.random.Generator) -> Model:
-    """Returns a scaffold along x: standards, ledgers, decks, perhaps a net."""
+    """Returns a scaffold along x: uprights, ledgers, decks, perhaps a net."""
     lifts = max(int(height / _LIFT), 1)
     bays = max(round(length / _BAY), 1)
     xs = np.linspace(-length / 2, length / 2, bays + 1)
@@ -154,21 +155,21 @@ def scaffold(length: float, height: float, rng: np.random.Generator) -> Model:
     return assemble(*parts)
 
 
-# Distance of points along a kerb [m].
+# Distance between points along a kerb [m].
 _SPACING = 1.0
-# Greatest ratio of a stretch's length to its chord: a bent one is not used.
+# A stretch is not used if its length is more than this times its chord.
 _MOST_BENT = 1.05
 
 
 class _Stretch:
-    """A straight piece of kerb, named by the switch that uses it and its cell.
+    """A straight piece of kerb, named after the switch that uses it.
 
-    At its middle (2,) [m] is a frame at `yaw` [rad], whose x axis runs along it
-    and whose y axis points away from the carriageway.
+    Its frame is at its middle (2,) [m], at `yaw` [rad]; the x axis runs along
+    the kerb, and the y axis points away from the carriageway.
     """
 
     def __init__(self, name: str, points: np.ndarray, outward: np.ndarray):
-        """Takes (N, 2) points along the kerb [m] and the direction of y."""
+        """Takes points (N, 2) along the kerb [m], and the direction of y."""
         self.name = name
         chord = points[-1] - points[0]
         self.middle = (points[0] + points[-1]) / 2
@@ -176,14 +177,14 @@ class _Stretch:
         self.yaw = math.atan2(outward[1], outward[0]) - np.pi / 2
 
     def place(self, x: float, y: float) -> np.ndarray:
-        """Returns the (2,) place x along the kerb and y away from it [m]."""
+        """Returns the place (2,) in W of a point x, y in the frame [m]."""
         c, s = math.cos(self.yaw), math.sin(self.yaw)
         return self.middle + np.array([c * x - s * y, s * x + c * y])
 
     def rectangle(
         self, x: float, length: float, y0: float, y1: float
     ) -> shapely.Polygon:
-        """Returns an area along the kerb, about x, from y0 to y1 away [m]."""
+        """Returns an area along the kerb, centred on x, from y0 to y1 [m]."""
         x0, x1 = x - length / 2, x + length / 2
         return shapely.Polygon(
             [self.place(*at) for at in ((x0, y0), (x1, y0), (x1, y1), (x0, y1))]
@@ -192,7 +193,7 @@ class _Stretch:
     def footprint(
         self, model: Model, x: float, y: float, turn: float = 0.0
     ) -> BaseGeometry:
-        """Returns the footprint of a model at a place, turned [m, rad]."""
+        """Returns the footprint in W of a model at a place, turned [m, rad]."""
         at = self.place(x, y).tolist()
         return placed(model.footprint, at, turn + self.yaw)
 
@@ -207,18 +208,18 @@ class _Stretch:
         turn: float = 0.0,
         length: float = 0.0,
     ) -> None:
-        """Adds a thing at a place, both ends on the ground.
+        """Adds an object at a place, with both ends on the ground.
 
-        Without ground it is left out.
+        If there is no ground, the object is left out.
 
         Args:
             around: the ground and what stands on it.
-            suffix: suffix of its name.
+            suffix: end of its name.
             semantic_class: its class.
             model: its shape.
             x, y: its place [m].
-            turn: its heading [rad].
-            length: distance of its two ends [m]; without one it stands upright.
+            turn: its heading relative to the kerb [rad].
+            length: distance between its two ends [m]; at 0 it stands upright.
         """
         ground, yaw = around.ground, self.yaw + turn
         middle = self.place(x, y)
@@ -228,10 +229,10 @@ class _Stretch:
         at = float(z[0])
         if length == 0.0:
             at = ground.lowest(self.footprint(model, x, y, turn), at)
-        if not np.isfinite(at):  # No ground beside the road.
+        if not np.isfinite(at):  # There is no ground beside the road.
             edge = self.place(x, -0.1)[None]
             at = float(ground.heights(edge, of_road=True)[0])
-        if not np.isfinite(at):  # Both are in slits of the ground.
+        if not np.isfinite(at):  # Both are in gaps of the ground.
             return
         pitch = 0.0
         if length > 0.0 and np.isfinite(z).all():
@@ -250,8 +251,8 @@ def _stretches(
 ) -> list[_Stretch]:
     """Returns the longest straight piece of kerb in each cell near a drive.
 
-    They are within 30 m of it, and at least that long; a cell has a size [m].
-    A note is kept if there is none.
+    The cells have the size `cell`. Pieces are at most 30 m from the drive and
+    at least `shortest` long [m]. If there are none, a note says so.
     """
     best: dict[tuple[int, int], _Stretch] = {}
     for kerb in around.ground.kerbs(_SPACING):
@@ -284,24 +285,24 @@ def _stretches(
     return found
 
 
-# Cell size of the world's grid of kerb stretches [m].
+# Cell size of the grid, in W, of kerb stretches [m].
 _WORKS_CELL = 20.0
 _LENGTHS = (6.0, 14.0)
 _TRIES = 6
-# Sites reach from this distance from the kerb to one of these [m].
+# Sites extend from the first distance from the kerb to one of the others [m].
 _SITE_INNER = 0.4
 _WIDTHS = (4.6, 2.7)
-# New kerb stones narrow the carriageway by this [m].
+# Width and height of new kerb stones, which narrow the carriageway [m].
 _KERB_WIDTH, _KERB_HEIGHT = 0.3, 0.13
 _KERB_RGB = (0.8, 0.8, 0.78)
-# Things on a site, with the room they need [m] and relative shares.
+# Objects on wide and on narrow sites -> weight in the random choice.
 _WIDE = {"excavator": 3, "skip": 2, "soil_heap": 1, "brick_pallets": 1}
 _NARROW = {"skip": 3, "brick_pallets": 2, "portable_toilet": 1}
 _OPEN = frozenset({"pole", "traffic-sign", "vegetation"}) | GROUND_CLASSES
 
 
 def put_up_works(around: Surroundings, share: float) -> None:
-    """Puts roadworks along a share of the kerbs near a drive.
+    """Puts up roadworks along a share of the kerbs near a drive.
 
     Kerbs without room beside them get none.
     """
@@ -328,7 +329,7 @@ def put_up_works(around: Surroundings, share: float) -> None:
 
 @dataclass
 class _Site:
-    """One site under construction: its place x, length and width [m]."""
+    """One roadworks site, at the place x of a stretch of kerb [m]."""
 
     around: Surroundings
     stretch: _Stretch
@@ -338,7 +339,7 @@ class _Site:
     rng: np.random.Generator
 
     def build(self, every: Obstacles) -> None:
-        """Puts up fences, machines clear of obstacles, and new kerb stones."""
+        """Adds fences, machines where there is room, and new kerb stones."""
         x, length, width = self.x, self.length, self.width
         middle, across = (_SITE_INNER + width) / 2, width - _SITE_INNER
         sides = (
@@ -371,7 +372,7 @@ class _Site:
             turn = float(self.rng.uniform(-0.15, 0.15))
             model = OBJECTS[name].build(self.rng)
             if name == "brick_pallets":
-                turn += np.pi / 2  # Its row runs along y.
+                turn += np.pi / 2  # Its row of panels runs along y.
             area = self.stretch.footprint(model, x, y, turn)
             inside = self.stretch.rectangle(
                 self.x, self.length, _SITE_INNER, self.width
@@ -388,16 +389,16 @@ class _Site:
                 taken.append(area)
 
 
-# Size of the cells of the world's grid of kerb stretches, and least length of a
-# stretch [m].
+# Cell size of the grid, in W, of kerb stretches, and least length of a stretch
+# [m].
 _CELL, _SHORTEST = 6.5, 3.0
-# Distance of the places that are tried, away from the kerb [m].
+# Distance between the places that are tried, away from the kerb [m].
 _STEP = 0.4
 
 
 @dataclass(frozen=True)
 class _Row:
-    """Things of a row along kerbs, from `roadsides.yaml`."""
+    """A kind of objects in rows along kerbs, from `roadsides.yaml`."""
 
     kinds: list[str]
     share: float
@@ -418,9 +419,9 @@ _ROWS = {
 
 
 def fill_roadsides(around: Surroundings, share: float) -> None:
-    """Puts up a share of the things that have room beside kerbs near a drive.
+    """Adds a share of the objects that have room beside kerbs near a drive.
 
-    All but cars stand at the same places with every seed.
+    Except for cars, they stand at the same places with every seed.
     """
     stretches = _stretches(around, "roadsides", _CELL, _SHORTEST)
     standing = around.obstacles(ignored=GROUND_CLASSES)
@@ -445,7 +446,7 @@ def fill_roadsides(around: Surroundings, share: float) -> None:
                     shapely.intersects(areas, area).any()
                 ):
                     continue
-                # What a smaller share leaves out takes its room as well.
+                # Objects that a smaller share leaves out take up room as well.
                 areas.append(area)
                 if is_put_up:
                     kind = builder.semantic_class

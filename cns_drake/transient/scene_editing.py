@@ -1,4 +1,4 @@
-"""Edits a loaded world, and records the cause of each change."""
+"""Changes a loaded world, and records the cause of each change."""
 
 from collections import defaultdict
 from collections.abc import Collection, Iterable, Iterator, Mapping
@@ -31,7 +31,7 @@ from cns_drake.transient.world_structures import (
     draws,
 )
 
-# Snow farther from the drive would be hardly visible to a LiDAR [m].
+# Snow farther from the drive than this would hardly be visible to a LiDAR [m].
 _NEAR = 120.0
 
 
@@ -46,8 +46,8 @@ Named = TypeVar("Named", bound=_Named)
 class Look(NamedTuple):
     """The look of new surfaces.
 
-    The reflectivity, 0 to 1 near 900 nm, is None if it follows from class and
-    diffuse colour.
+    The reflectivity is from 0 to 1, near 900 nm; if it is None, it follows from
+    the class and the diffuse colour.
     """
 
     rgb: tuple[float, float, float]
@@ -55,34 +55,34 @@ class Look(NamedTuple):
 
 
 class SceneEditing:
-    """Removes things from a world and adds others.
+    """Removes structures from a world and adds others.
 
-    A cause is the scenario's switch that changed a structure.
+    The `cause` of a change is the name of the scenario's switch that made it.
     """
 
     def __init__(self, world: World):
-        """Begins with a world that is not yet a part of a diagram.
+        """Takes a world that is not yet part of a diagram.
 
-        Its SceneGraph is changed.
+        Its SceneGraph will be changed.
         """
         self._world = world
         self._source = world.plant.get_source_id()
-        # Name -> class and reflectivity.
+        # Name -> class and reflectivity of structures that were added.
         self._added: dict[str, tuple[str, float | None]] = {}
         self._causes: defaultdict[str, list[str]] = defaultdict(list)
         self._notes: list[str] = []
 
     def note(self, text: str) -> None:
-        """Stores a note for the user on the changes."""
+        """Stores a note for the user about the changes."""
         self._notes.append(f"transient: {text}")
 
     def blame(self, structure: str, cause: str) -> None:
-        """Notes what caused a change of a structure."""
+        """Records the cause of a structure's change."""
         if cause not in self._causes[structure]:
             self._causes[structure].append(cause)
 
     def remove(self, thing: Structure, cause: str) -> None:
-        """Removes a structure, and notes the cause."""
+        """Removes a structure, and records the cause."""
         for part in thing.parts:
             self._remove_part(part)
         self.blame(thing.name, cause)
@@ -90,7 +90,7 @@ class SceneEditing:
     def move(
         self, thing: Structure, X_new: RigidTransform, name: str, cause: str
     ) -> None:
-        """Moves a structure's points by X_new in the world, and renames it."""
+        """Transforms a structure's points by X_new in W, and renames it."""
         for part in thing.parts:
             self._register(
                 f"{name}/{part.name}",
@@ -106,7 +106,7 @@ class SceneEditing:
     def cover_part(
         self, part: StructurePart, p_W: np.ndarray, look: Look
     ) -> None:
-        """Moves a part of a structure by p_W (3,) [m], and paints it."""
+        """Moves a part of a structure by p_W (3,) [m], and changes its look."""
         self._register(
             f"{part.geometry.structure}/{part.name}_covered",
             RigidTransform(p_W) @ part.X_WG,
@@ -143,16 +143,17 @@ class SceneEditing:
         self.blame(name, cause)
 
     def keep_triangles(self, part: StructurePart, kept: np.ndarray) -> None:
-        """Removes all triangles of a part except those with given indices."""
+        """Removes the triangles of a part except those with indices `kept`."""
         surface = part.geometry.surface
         assert isinstance(surface, TriangleSurface)
         triangles = surface.triangles[kept]
-        # The mesh is unscaled, so that parts of one mesh share one again.
+        # The mesh is unscaled, so that parts that shared a mesh share one
+        # again.
         shape, scale = self._shape(part), np.ones(3)
-        # Boxes and cones are the only such shapes without triangles.
+        # Of the shapes with triangles, only boxes and cones have no scale.
         if isinstance(shape, geometry.Mesh | geometry.Convex):
             scale = np.array(shape.scale3())
-        # The old part goes first: the new one may have its very name.
+        # The old part is removed first, since the new one may have its name.
         properties = [type(one)(one) for one in self._properties(part)]
         self._remove_part(part)
         if len(triangles):
@@ -173,14 +174,14 @@ class SceneEditing:
         triangles: np.ndarray,
         look: Look,
     ) -> None:
-        """Adds a part of triangles to the structure of another part.
+        """Adds a part made of triangles to the structure of another part.
 
         Args:
             part: the other part.
             name: name of the new part.
             p_WVs: (N, 3) vertices [m].
             triangles: (M, 3) indices of vertices.
-            look: its colour and material.
+            look: its colour and reflectivity.
         """
         R, p = part.X_WG.rotation().matrix(), part.X_WG.translation()
         mesh = _memory_mesh(product(p_WVs - p, R), triangles)
@@ -196,14 +197,14 @@ class SceneEditing:
         look: Look,
         cause: str,
     ) -> None:
-        """Adds a structure of triangles.
+        """Adds a structure made of triangles.
 
         Args:
             name: unique in the world.
             semantic_class: its class.
             p_WVs: (N, 3) vertices [m].
             triangles: (M, 3) indices of vertices.
-            look: its colour and material.
+            look: its colour and reflectivity.
             cause: the switch that adds it.
         """
         middle = np.round(p_WVs.mean(axis=0))
@@ -217,7 +218,7 @@ class SceneEditing:
         self.blame(name, cause)
 
     def finish(self) -> World:
-        """Returns the world with its table and notes brought up to date.
+        """Returns the changed world, with updated structure table and notes.
 
         Raises:
             InputError: there are more structures than instance ids.
@@ -288,10 +289,11 @@ class SceneEditing:
 
 @dataclass
 class Surroundings:
-    """A drive's surroundings while they are changed.
+    """The surroundings of a drive, while they are changed.
 
-    The drive is the way of the vehicle, and `kept_free` the area that stays
-    free of new things, seen from above [m].
+    `things` are the structures before the changes, by name. `drive` is the path
+    of the vehicle, and `kept_free` the area that must stay free of new objects,
+    both seen from above [m].
     """
 
     editing: SceneEditing
@@ -317,7 +319,8 @@ class Surroundings:
     ) -> Obstacles:
         """Returns the footprints of structures, and the area to keep free.
 
-        Some classes are no obstacles, or only the given ones are.
+        Structures of the classes `ignored` do not count; with `classes`, only
+        those of these classes do.
         """
         feet = (
             (thing.name, thing.footprint)
@@ -333,7 +336,7 @@ class Surroundings:
     def chosen(
         self, cause: str, things: Iterable[Named], share: float
     ) -> Iterator[tuple[Named, np.random.Generator]]:
-        """Yields a random share of objects, with random numbers for each."""
+        """Yields a random share of objects, each with a random generator."""
         for thing in things:
             rng = draws(self.seed, cause, thing.name)
             if rng.uniform() < share:
@@ -345,12 +348,13 @@ def _memory_mesh(
     triangles: np.ndarray,
     scale: ArrayLike = (1.0, 1.0, 1.0),
 ) -> geometry.Mesh:
-    """Returns a mesh in memory; readers treat equal ones as the same.
+    """Returns a mesh in memory; equal meshes give the same text.
 
-    It has (N, 3) vertices, before they are scaled [m], and (M, 3) triangles.
+    Readers thus recognise them as the same mesh. It has vertices (N, 3), before
+    they are scaled [m], and triangles (M, 3).
     """
     used, corners = np.unique(triangles, return_inverse=True)
-    # Numbers of Python are formatted several times as fast as those of NumPy.
+    # Python's numbers are formatted several times faster than NumPy's.
     lines = [
         f"v {x:.7g} {y:.7g} {z:.7g}" for x, y, z in vertices[used].tolist()
     ]
@@ -374,7 +378,7 @@ def _properties(look: Look) -> tuple[geometry.GeometryProperties, ...]:
 
 
 def _model_shape(shape: structures.Shape) -> geometry.Shape:
-    """Returns a shape of the city generator's as one of Drake's."""
+    """Returns a Drake shape that equals a shape of the city generator."""
     if isinstance(shape, structures.BoxShape):
         return geometry.Box(*shape.size)
     if isinstance(shape, structures.CylinderShape):

@@ -30,14 +30,14 @@ from cns_drake.scene.perception_geometry import (
 )
 from cns_drake.scene.world import World
 
-# Classes of the ground below other things.
+# Classes of the ground on which other objects stand.
 GROUND_CLASSES = frozenset(
     {"road", "parking", "sidewalk", "other-ground", "terrain"}
 )
-# Cars and walkers can pass below parts higher than this above a thing's foot
-# [m].
+# Cars and people can pass below parts that are higher than this above a
+# structure's foot [m].
 _HEADROOM = 2.2
-# Corners of the box about a round shape of size one.
+# Corners of the box around a round shape of unit size.
 _BOX = np.array(
     [(x, y, z) for x in (-1, 1) for y in (-1, 1) for z in (-1, 1)], float
 )
@@ -45,7 +45,7 @@ _BOX = np.array(
 
 @dataclass(frozen=True)
 class StructurePart:
-    """One geometry of a structure, visible to a LiDAR, and its pose."""
+    """One geometry of a structure that a LiDAR can see, and its pose in W."""
 
     geometry: PerceptionGeometry
     X_WG: RigidTransform
@@ -57,7 +57,7 @@ class StructurePart:
 
     @cached_property
     def p_WPs(self) -> np.ndarray:
-        """(N, 3) points in the world whose hull holds the part [m]."""
+        """Points (N, 3) in W whose convex hull contains the part [m]."""
         surface = self.geometry.surface
         if isinstance(surface, surfaces.TriangleSurface):
             p_GPs = surface.p_GVset
@@ -79,7 +79,7 @@ class StructurePart:
 
 @dataclass(frozen=True)
 class Structure:
-    """A structure in the world, of a class of `CLASS_IDS`."""
+    """A structure in the world; its class is a key of `CLASS_IDS`."""
 
     name: str
     semantic_class: str
@@ -87,7 +87,7 @@ class Structure:
 
     @cached_property
     def p_WPs(self) -> np.ndarray:
-        """(N, 3) points in the world whose hull holds the structure [m]."""
+        """Points (N, 3) in W whose convex hull contains the structure [m]."""
         return np.concatenate([part.p_WPs for part in self.parts])
 
     @cached_property
@@ -120,9 +120,10 @@ def _hull(p_WPs: np.ndarray) -> BaseGeometry:
 def read_structures(
     world: World, wanted: Callable[[str], bool] = lambda name: True
 ) -> dict[str, Structure]:
-    """Returns the static structures of a world by name, in alphabetical order.
+    """Returns the static structures of a world by name, sorted by name.
 
-    The world is not yet a part of a diagram.
+    The world must not be part of a diagram yet. `wanted` selects structures by
+    name.
 
     Raises:
         InputError: a mesh cannot be read.
@@ -154,10 +155,10 @@ def read_structures(
 
 
 class Obstacles:
-    """Obstacles of new things, seen from above."""
+    """Areas, seen from above, where nothing new may stand."""
 
     def __init__(self, areas: Iterable[tuple[str, BaseGeometry]]):
-        """Takes names, and areas in the world [m]."""
+        """Takes names and areas in W [m]."""
         pairs = [(n, area) for n, area in areas if not area.is_empty]
         self._names = np.array([name for name, _ in pairs], object)
         self._areas = [area for _, area in pairs]
@@ -166,15 +167,16 @@ class Obstacles:
     def is_free(
         self, area: BaseGeometry, ignored: Collection[str] = ()
     ) -> bool:
-        """Returns whether an area meets no obstacle but those of some names."""
+        """Returns whether an area touches no obstacle, except ignored ones."""
         return not self._met(area, ignored)
 
     def distance(
         self, area: BaseGeometry, within: BaseGeometry, ignored: Collection[str]
     ) -> float:
-        """Returns the distance of an area from obstacles within another [m].
+        """Returns the distance from an area to the nearest obstacle [m].
 
-        It is inf for none. Obstacles of some names do not count.
+        Only the parts of obstacles `within` another area count. Obstacles with
+        ignored names do not count. The distance is inf if there is no obstacle.
         """
         return min(
             (
@@ -195,7 +197,7 @@ class Obstacles:
         ]
 
 
-# Steeper surfaces are not ground: sine of their slope against the vertical.
+# Steeper surfaces are not ground: least z of the unit normal.
 _LEAST_UP = 0.3
 # Slits between triangles are closed up to twice this width [m].
 _SEAM = 0.05
@@ -206,7 +208,8 @@ _LEAST_AREA = 4.0
 class Kerb(NamedTuple):
     """A stretch of the edge of the carriageway.
 
-    Points (N, 2) [m] lie along it; unit vectors (N, 2) are away from the road.
+    Points (N, 2) lie along it in W [m]; unit vectors (N, 2) point away from the
+    road.
     """
 
     points: np.ndarray
@@ -214,10 +217,10 @@ class Kerb(NamedTuple):
 
 
 class GroundSurface:
-    """The ground below things near a drive, within the area `near` [m]."""
+    """The ground near a drive, within an area `near` in W [m]."""
 
     def __init__(self, things: Mapping[str, Structure], near: BaseGeometry):
-        """Takes all structures, and the area [m]."""
+        """Takes all structures, and the area in which the ground is known."""
         shapely.prepare(near)
         self.near = near
         corners = {of_road: [np.zeros((0, 3, 3))] for of_road in (False, True)}
@@ -246,10 +249,11 @@ class GroundSurface:
     def heights(
         self, xy: np.ndarray, *, of_road: bool | None = None
     ) -> np.ndarray:
-        """Returns the heights of the ground at (N, 2) places; NaN without any.
+        """Returns the heights (N,) of the ground at places (N, 2) [m].
 
-        These are heights of carriageways, or of all other ground; with None,
-        the higher of both [m].
+        They are heights of carriageways if `of_road` is True, of all other
+        ground if it is False, and the higher ones of both if it is None. They
+        are NaN where there is no ground.
         """
         kinds = (False, True) if of_road is None else (of_road,)
         found = np.max([self._sides[k].heights(xy) for k in kinds], axis=0)
@@ -258,16 +262,16 @@ class GroundSurface:
     def lowest(self, area: BaseGeometry, default: float) -> float:
         """Returns the least height at the corners of an area [m].
 
-        Without ground there, it is `default`.
+        It is `default` if there is no ground.
         """
         z = self.heights(shapely.get_coordinates(area))
         z = z[np.isfinite(z)]
         return float(z.min()) if len(z) else default
 
     def rise(self, old: np.ndarray, new: np.ndarray) -> float:
-        """Returns how much higher the ground is at a new place (2,) [m].
+        """Returns how much higher the ground is at `new` than at `old` [m].
 
-        It is 0 where either place has no ground.
+        Both are places (2,). The result is 0 if either has no ground.
         """
         z = self.heights(np.array([old, new]))
         return float(z[1] - z[0]) if np.isfinite(z).all() else 0.0
@@ -275,9 +279,9 @@ class GroundSurface:
     def kerbs(self, spacing: float) -> Iterator[Kerb]:
         """Yields the edges of the carriageway within the area.
 
-        Their points are at most a spacing apart [m].
+        Their points are at most `spacing` apart [m].
         """
-        inner = self.near.buffer(-1.0)  # The edge of `near` is no kerb.
+        inner = self.near.buffer(-1.0)  # The edge of `near` is not a kerb.
         shapely.prepare(inner)
         for polygon in polygons_of(self.carriageway):
             turned = orient(polygon)
@@ -289,7 +293,10 @@ class GroundSurface:
 
 
 def _runs(xy: np.ndarray, inside: np.ndarray) -> Iterator[Kerb]:
-    """Yields rings of an area, with the area on their left."""
+    """Yields the stretches of a ring that are inside an area, as kerbs.
+
+    The carriageway is on the left of the ring.
+    """
     along = np.roll(xy, -1, axis=0) - np.roll(xy, 1, axis=0)
     along /= np.linalg.norm(along, axis=1, keepdims=True)
     outwards = np.column_stack([along[:, 1], -along[:, 0]])
@@ -300,14 +307,14 @@ def _runs(xy: np.ndarray, inside: np.ndarray) -> Iterator[Kerb]:
     first = int(np.argmin(inside))
     order = np.roll(np.arange(len(xy)), -first)
     cuts = np.flatnonzero(np.diff(inside[order])) + 1
-    # The first run is outside.
+    # The first run is outside the area.
     for run in np.split(order, cuts)[1::2]:
         if len(run) >= 2:
             yield Kerb(xy[run], outwards[run])
 
 
 def triangle_corners(part: StructurePart) -> np.ndarray:
-    """Returns the (M, 3, 3) corners of a part's triangles in the world [m]."""
+    """Returns the corners (M, 3, 3) of a part's triangles in W [m]."""
     surface = part.geometry.surface
     if not isinstance(surface, surfaces.TriangleSurface):
         return np.zeros((0, 3, 3))
@@ -315,9 +322,9 @@ def triangle_corners(part: StructurePart) -> np.ndarray:
 
 
 def draws(seed: int, cause: str, name: str) -> np.random.Generator:
-    """Returns the random numbers of one structure for one cause.
+    """Returns the random generator of one structure for one cause.
 
-    They do not depend on other structures or other causes.
+    Its numbers do not depend on other structures or other causes.
     """
     digest = hashlib.sha256(f"{seed}/{cause}/{name}".encode()).digest()
     return np.random.default_rng(int.from_bytes(digest[:16], "little"))

@@ -1,16 +1,17 @@
-"""Brings two drives of one place into one world.
+"""Aligns two drives of one place, so that both are in one world frame.
 
-As LT-SLAM does it (Kim and Kim, "LT-mapper", ICRA 2022), made robust:
+The method is that of LT-SLAM (Kim and Kim, "LT-mapper", ICRA 2022), made more
+robust:
 
 1. Each drive is checked against itself where it passes a place again, and
    straightened if it has drifted.
-2. A first guess: the same coordinates if both name the same datum or frame.
-   Otherwise, or if that fails, places that look alike.
-3. From where the guess holds, submaps are registered along the source's path,
-   each from its neighbour's result, so that drift does not add up.
-4. One rigid pose for the source if the loops agree on one, else a pose graph
-   that bends it. The target is held.
-5. Heights start at the target's ground, like the grid of the TCR.
+2. A first guess is made. It is the identity if both drives name the same datum
+or frame. Otherwise, or if that fails, it comes from places that look alike. 3.
+Submaps are registered along the source's path, outwards from where the guess
+holds. Each registration starts from its neighbour's result, so that drift does
+not add up. 4. The source gets one rigid pose if the loops agree on one;
+otherwise a pose graph bends it. The target stays fixed. 5. Heights are counted
+from the target's ground, as the grid of the TCR needs.
 """
 
 from dataclasses import asdict, dataclass
@@ -43,21 +44,22 @@ from evaluation.methods.method import yaw_pose
 
 When = Literal["auto", "always", "never"]
 
-# Keyframes that try a guess; a guess holds if half of them fit.
+# Number of keyframes that test a guess; a guess holds if half of them fit.
 _NUM_PROBES = 8
-# Loops that must agree: least number, and share of the tried keyframes. Under a
-# wrong guess in a city of equal blocks 15 % fitted.
+# Loops that must agree: least number, and least share of the tried keyframes.
+# In a city of equal blocks, 15 % of the keyframes fitted a wrong guess.
 _FEWEST_LOOPS = 4
 _LEAST_YIELD = 0.25
 # Number of times that keyframes without a loop are tried again.
 _ROUNDS = 3
-# A drive has drifted if a quarter of its loops with itself, or of those with
-# the target under the best rigid pose, have a greater error [m].
+# A drive has drifted if a quarter of its loops have a greater error [m]. The
+# loops are those with itself, or those with the target under the best rigid
+# pose.
 _DRIFT = 0.3
-# The ground of a world that is off zero by less is left there [m].
+# Heights are not changed if the ground is within this distance of zero [m].
 _GROUND_TOLERANCE = 0.25
-# Number of tried pairs; number that must fit, so that a chance fit bends no
-# drive; and number of rounds, if the drive has drifted.
+# Self-loops: number of pairs to try; number of pairs that must fit, so that no
+# chance fit bends a drive; and number of rounds if the drive has drifted.
 _MOST_SELF_LOOPS = 30
 _FEWEST_SELF_LOOPS = 3
 _STRAIGHTENINGS = 3
@@ -68,7 +70,7 @@ class AlignmentReport:
     """The alignment of two drives.
 
     Attributes:
-        held: name of the drive that gives the world.
+        held: name of the drive that stays fixed; its world is the common one.
         moved: name of the other drive.
         frames: names of the original world frames of both drives.
         guess: source of the first guess.
@@ -84,10 +86,11 @@ class AlignmentReport:
         turn_deg: turn of that frame about the vertical.
         bend: greatest difference between the move of a frame and that of the
             middle frame [m].
-        straightened: how much the drives disagreed with themselves before they
-            were straightened, as the upper quartile over their loops [m]; 0 if
-            they were not straightened.
-        ground: height that was subtracted from both [m].
+        straightened: upper quartile of the errors of the drives' loops with
+            themselves, before the drives were straightened [m]; 0 if they were
+            not straightened.
+        ground: height of the ground that was subtracted from both drives'
+            heights [m].
     """
 
     held: str
@@ -150,9 +153,6 @@ def in_one_world(
 ) -> Alignment | None:
     """Moves two drives into one world if needed; else returns None.
 
-    "auto" aligns drives whose world frames differ by name. With `across_maps`
-    they may be of maps of different names.
-
     Args:
         first, second: the drives.
         when: `auto` aligns drives whose world frames differ by name; `always`,
@@ -162,7 +162,7 @@ def in_one_world(
         across_maps: whether the drives may be of maps of different names.
 
     Raises:
-        InputError: if they should be aligned and cannot be.
+        InputError: the drives should be aligned, but that failed.
     """
     if not across_maps:
         check_same_map(first, second)
@@ -182,11 +182,12 @@ def align(
     """Moves one of two drives into the world of the other.
 
     Args:
-        first: a drive, which is held unless it has drifted more than the other.
+        first: a drive, which stays fixed unless it has drifted more than the
+            other.
         second: another drive.
         track: reports progress.
-        hold_first: whether to hold the first drive in any case, without any
-            change, because other drives are already aligned to it.
+        hold_first: whether the first drive must stay unchanged in any case,
+            because other drives are already aligned to it.
 
     Raises:
         InputError: if the two have too little in common, or a scan cannot
@@ -225,7 +226,7 @@ def align(
     X_TS = source.bend(X_TK)
     frame = target.drive.world_frame
     if ground != 0.0 or held > 0.0:
-        # The result is no longer in the world that the name stands for.
+        # The drive's world frame is no longer the one that its name stands for.
         frame = f"{frame}, corrected by {target.name}"
     held_drive = _lowered(target.drive, target.X_WS, ground, frame, target)
     moved_drive = _lowered(source.drive, X_TS, ground, frame, target)
@@ -255,10 +256,13 @@ def align(
 def _start(
     source: Submaps, target: Submaps, track: Track
 ) -> tuple[LoopSearch, str, int | None]:
-    """Finds first loops.
+    """Finds a guess that holds, and the first loops.
 
-    Returns the search with them, the source of the guess, and the number of
-    candidates if places had to be recognised. Refuses drives if no guess fits.
+    Returns the search with these loops, the source of the guess, and the number
+    of candidate pairs if places had to be recognised.
+
+    Raises:
+        InputError: no guess fits.
     """
     a, b = source.drive, target.drive
     known = None
@@ -290,7 +294,7 @@ def _start(
 
 
 def _same_coordinates(source: Submaps, target: Submaps) -> np.ndarray:
-    """Returns X_TS of worlds that differ, if at all, in their heights."""
+    """Returns X_TS (4, 4) for worlds that differ at most in height."""
     offsets = target.X_WK[:, None, :3, 3] - source.X_WK[None, :, :3, 3]
     away = np.linalg.norm(offsets[:, :, :2], axis=2)
     place = away.argmin(axis=0)
@@ -308,7 +312,7 @@ def _probe(
     X_TS: np.ndarray,
     keyframes: np.ndarray | None = None,
 ) -> tuple[LoopSearch, bool]:
-    """Tries a guess at some keyframes; returns loops and whether it holds."""
+    """Tests a guess at some keyframes; returns loops, and whether it holds."""
     search = LoopSearch(source, target)
     X_TK = X_TS @ source.X_WK
     if keyframes is None:
@@ -320,7 +324,7 @@ def _probe(
 
 
 def _fit(search: LoopSearch) -> tuple[np.ndarray, str]:
-    """Returns poses X_TK (K, 4, 4) by all loops, and the model's name."""
+    """Returns poses X_TK (K, 4, 4) that fit all loops, and the model's name."""
     loops = list(search.loops.values())
     X_TL, source = search.target.X_WK, search.source
     X_TS = fit_anchor(loops, X_TL, source.X_WK)
@@ -350,14 +354,14 @@ def _lowered(
     world_frame: str,
     target: Submaps,
 ) -> Drive:
-    """Returns a drive at poses whose heights start at the ground."""
+    """Returns a drive at given poses, moved so that its ground has height 0."""
     X = X_WS.copy()
     X[:, 2, 3] -= ground
     return MovedDrive(drive, X, world_frame, target.drive.datum)
 
 
 def _motion(X_WS: np.ndarray, X_TS: np.ndarray) -> dict:
-    """Returns the fields of the report on a drive's move."""
+    """Returns the report's fields `move`, `turn_deg` and `bend`."""
     moves = X_TS @ poses.inverse(X_WS)
     middle = moves[len(moves) // 2]
     rigid = middle @ X_WS
@@ -372,20 +376,22 @@ def _motion(X_WS: np.ndarray, X_TS: np.ndarray) -> dict:
 
 
 def make_consistent(drive: Drive, track: Track) -> tuple[Submaps, float]:
-    """Returns a drive's submaps, corrected where it passes a place again.
+    """Returns a drive's submaps, with poses that agree with its own loops.
 
-    The corrected poses agree at places that the drive passes more than once.
+    If the drive has drifted, its poses are corrected so that they agree at
+    places that it passes more than once.
 
     Returns:
-        The drive, with new poses if it had drifted; and how much it disagreed
-        with itself before, see `AlignmentReport`.
+        The submaps; and the error of the drive's loops with itself before the
+        correction, see `AlignmentReport.straightened`.
 
     Raises:
         InputError: if a scan cannot be read.
     """
     submaps = Submaps(drive)
     worst = 0.0
-    # Near places come first: their loops bring others within reach.
+    # Places that are near by come first: their loops bring the others within
+    # reach.
     for _ in range(_STRAIGHTENINGS):
         loops = find_self_loops(submaps, _MOST_SELF_LOOPS, track)
         if len(loops) < _FEWEST_SELF_LOOPS:

@@ -1,9 +1,10 @@
 """Guesses of the transformation between the worlds of two drives.
 
-Without common coordinates, places that look alike show it: Scan Context
-proposes pairs of keyframes with the turn between them, and a consensus of
-two pairs (RANSAC) fixes the four numbers that two upright worlds can differ
-by: a turn about the vertical and a move.
+Without common coordinates, the transformation is found from places that look
+alike. Scan Context proposes pairs of keyframes, with the heading between them.
+A consensus of pairs (RANSAC on two pairs at a time) fixes the four numbers by
+which two upright worlds can differ: a turn about the vertical and a
+translation.
 """
 
 from dataclasses import dataclass, replace
@@ -22,7 +23,7 @@ from evaluation.drives.sampling import gather
 from evaluation.methods.method import yaw_pose
 from evaluation.methods.scan_context import ScanContext
 
-# Factors on the width of the kernel, and steps at each.
+# Factors of the kernel's width, and number of iterations for each.
 _WIDTHS = (100.0, 30.0, 10.0, 3.0, 1.0)
 _STEPS = 8
 # Limit of the squared, normalised error: 95 % of the chi-squared distribution
@@ -30,11 +31,12 @@ _STEPS = 8
 _KERNEL = 12.6
 _STILL = 1e-6
 # Candidates for each query. LT-mapper takes 3 with a score of at least 0.7.
-# Here there is no limit: in a changed city right ones score 0.3 to 0.5, and
-# wrong ones are outvoted.
+# Here no score is required: in a changed city, right candidates score 0.3 to
+# 0.5, and wrong ones are outvoted.
 _CANDIDATES = 5
-# Greatest error of a pair under a guess: half a lane and the spacing of
-# keyframes, drift; sectors of six degrees [m, rad].
+# Greatest error of a pair under a guess [m, rad]. The distance allows for half
+# a lane, the spacing of keyframes and drift; the angle for sectors of six
+# degrees.
 _NEAR = 8.0
 _TURN = np.radians(12.0)
 # Two pairs determine a turn if they are this far apart [m].
@@ -44,12 +46,13 @@ _NUM_GUESSES = 5
 # Extent of the points of a scan along each axis [m].
 _MAX_RANGE = 100.0
 _SEED = 11
-# Loops that agree with an anchor [m, rad].
+# Greatest error of a loop that agrees with an anchor [m, rad].
 AGREEMENT = (1.0, np.radians(2.0))
-# Expected bend of a drive on a metre of its path, 0.15 degrees and 0.05 m; it
-# grows with the square root of the distance.
+# Covariance of the drift over a metre of path: 0.15 degrees and 0.05 m. The
+# drift grows with the square root of the distance.
 _BEND = np.diag([np.radians(0.15) ** 2] * 3 + [0.05**2] * 3)
-# Deviation of keyframes at one place; it keeps the ties regular [m].
+# Least distance that counts between keyframes; it keeps the covariance of
+# keyframes at one place regular [m].
 _LEAST_STEP = 0.1
 
 
@@ -61,8 +64,8 @@ class Ties:
         i: (M,) index of the first pose.
         j: (M,) index of the second pose.
         Z: (M, 4, 4).
-        covariance: (M, 6, 6) covariance of a small motion of Z from the left:
-            turn [rad], then move [m].
+        covariance: (M, 6, 6) covariance of a small motion applied to Z from the
+            left: rotation [rad], then translation [m].
         is_doubtful: whether the ties may be wrong.
     """
 
@@ -88,12 +91,12 @@ def optimise(
     "A tutorial on graph-based SLAM" (2010). Ties that may be wrong are weighted
     by Cauchy's kernel, whose width shrinks step by step to its final value
     (graduated non-convexity), so that a poor start does not decide which ties
-    are believed.
+    count as right.
 
     Args:
         V: (N, 4, 4) poses from which the optimisation starts.
         all_ties: the ties, which together must determine every pose.
-        num_held: how many poses stay as they are; these are the last ones.
+        num_held: number of fixed poses; these are the last ones.
     """
     information = [np.linalg.inv(ties.covariance) for ties in all_ties]
     V, free = V.copy(), slice(0, len(V) - num_held)
@@ -115,7 +118,7 @@ def _solve(
     information: list[np.ndarray],
     width: float,
 ) -> np.ndarray:
-    """Returns the steps (F, 6) of the free poses in one iteration."""
+    """Returns the steps (F, 6) of the free poses for one iteration."""
     size = 6 * free.stop
     H, b = sparse.csc_matrix((size, size)), np.zeros(size)
     for ties, omega in zip(all_ties, information, strict=True):
@@ -124,8 +127,9 @@ def _solve(
             squared = np.einsum("mi,mij,mj->m", errors, omega, errors)
             weights = 1.0 / (1.0 + squared / (_KERNEL * width**2))
             omega = omega * weights[:, None, None]
-        # To first order in the errors, a step of V_j, as V_j exp(step), acts
-        # through Z, and one of V_i directly, with the opposite sign.
+        # To first order in the errors, a step of V_j, as V_j exp(step), changes
+        # the error by the adjoint of Z times the step; a step of V_i changes it
+        # directly, with the opposite sign.
         opposite = np.broadcast_to(-np.eye(6), omega.shape)
         J = _blocks(_adjoint(ties.Z), ties.j, len(V)) + _blocks(
             opposite, ties.i, len(V)
@@ -140,14 +144,14 @@ def _solve(
 def _blocks(
     blocks: np.ndarray, columns: np.ndarray, number: int
 ) -> sparse.bsr_matrix:
-    """Returns a matrix with a block (6, 6) a row, in some of its columns."""
+    """Returns a sparse matrix with one block (6, 6) in each row of blocks."""
     starts = np.arange(len(blocks) + 1)
     shape = 6 * len(blocks), 6 * number
     return sparse.bsr_matrix((blocks, columns, starts), shape)
 
 
 def _adjoint(X: np.ndarray) -> np.ndarray:
-    """Returns the (M, 6, 6) that moves twists (turn, move) through X."""
+    """Returns the adjoints (M, 6, 6) of poses X, for twists (turn, move)."""
     R, p = X[:, :3, :3], X[:, :3, 3]
     result = np.zeros((len(X), 6, 6))
     result[:, :3, :3] = result[:, 3:, 3:] = R
@@ -164,8 +168,8 @@ class Candidates:
         target: (M,) keyframes of the target.
         p_S: (M, 3) position of the first keyframe in the source's world [m].
         p_T: (M, 3) position of the second keyframe in the target's world [m].
-        turn: (M,) angle about the vertical, from the source's world to the
-            target's, at which both look alike [rad].
+        turn: (M,) angle about the vertical from the source's world to the
+            target's at which the two keyframes look alike [rad].
     """
 
     source: np.ndarray
@@ -211,7 +215,7 @@ def find_candidates(
             if not np.isfinite(scores[place]):
                 break
             X_PQ = method.relative_pose(query, database, int(place))
-            assert X_PQ is not None  # It has a score.
+            assert X_PQ is not None  # NaN means no score.
             turn = (
                 _heading(target.X_WK[place])
                 + _heading(X_PQ)
@@ -233,7 +237,7 @@ def find_guesses(candidates: Candidates) -> list[Guess]:
     """Returns the guesses with the most agreeing candidates, best first.
 
     Each is the consensus of two pairs, refined with all agreeing pairs. A pair
-    that agreed with a better guess does not vote for the next one.
+    that agrees with one guess does not vote for the next.
     """
     trials = _trials(candidates)
     is_left = np.ones(len(candidates.turn), dtype=bool)
@@ -242,7 +246,7 @@ def find_guesses(candidates: Candidates) -> list[Guess]:
         agreement = np.stack(
             [_agrees(candidates, turn, move) for turn, move in trials]
         )
-        # A place that is proposed three times has one vote.
+        # A query for which several pairs agree has only one vote.
         votes = np.array(
             [
                 len(np.unique(candidates.source[row & is_left]))
@@ -267,7 +271,7 @@ def find_guesses(candidates: Candidates) -> list[Guess]:
 
 
 def _trials(candidates: Candidates) -> list[tuple[float, np.ndarray]]:
-    """Returns turns and moves that two pairs of candidates agree on."""
+    """Returns the turns and moves on which each two candidates agree."""
     p_S, p_T = candidates.p_S[:, :2], candidates.p_T[:, :2]
     one, two = np.triu_indices(len(p_S), k=1)
     from_S, from_T = p_S[two] - p_S[one], p_T[two] - p_T[one]
@@ -297,7 +301,7 @@ def _trials(candidates: Candidates) -> list[tuple[float, np.ndarray]]:
 def _agrees(
     candidates: Candidates, turn: float, move: np.ndarray
 ) -> np.ndarray:
-    """Returns (M,) bool, which pairs a guess brings together."""
+    """Returns which pairs agree with a guess, (M,) bool."""
     p_T = _turned(candidates.p_S, turn) + move
     distances = np.linalg.norm((p_T - candidates.p_T)[:, :2], axis=1)
     return (distances < _NEAR) & (
@@ -306,7 +310,7 @@ def _agrees(
 
 
 def _fit(candidates: Candidates, pairs: np.ndarray) -> tuple[float, np.ndarray]:
-    """Returns the turn and move of least squares (Umeyama 1991, in 2-D)."""
+    """Returns turn and move by least squares (Umeyama 1991, in 2-D)."""
     p_S, p_T = candidates.p_S[pairs, :2], candidates.p_T[pairs, :2]
     a, b = p_S - p_S.mean(axis=0), p_T - p_T.mean(axis=0)
     turn = float(
@@ -349,8 +353,8 @@ def fit_anchor(
         for anchor in anchors
     ]
     best = int(np.argmax(agreement))
-    # The variable is the pose of one keyframe amid the loops: the worlds'
-    # origins may be kilometres away.
+    # The unknown is the pose of a keyframe near the loops, because the origins
+    # of the worlds may be kilometres away.
     ties = _loop_ties(loops)
     X_MK = poses.inverse(X_SK[k[best]]) @ X_SK[k]
     ties = replace(
@@ -385,8 +389,8 @@ def fit_bent(
 def straighten(loops: list[Loop], drive: Submaps) -> np.ndarray:
     """Returns poses X_WK (K, 4, 4) of a drive that agree with its loops.
 
-    The last keyframe is held meanwhile. All poses are then moved so that the
-    first keyframe is where it was.
+    The last keyframe is fixed during the optimisation. All poses are then moved
+    so that the first keyframe is where it was.
     """
     X_WK = drive.X_WK
     V = optimise(X_WK, [_loop_ties(loops), _drive_ties(drive)], num_held=1)

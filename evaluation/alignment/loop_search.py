@@ -10,21 +10,22 @@ from cns_drake.base.progress import Track
 from evaluation.alignment.registration import register
 from evaluation.alignment.submaps import Submaps
 
-# Least share of two submaps with a counterpart, of all points and of upright
-# things. In a simulated city that lost three quarters of its buildings, trees
-# and poles, right pairs reach at least 0.71 and 0.69; 95 % of pairs that slid
-# along a street, or are of other places, stay below 0.64 and 0.45.
+# Least shares of a submap's points that have a counterpart in the other submap:
+# of all points, and of upright points only. In a simulated city that lost three
+# quarters of its buildings, trees and poles, right pairs reach at least 0.71
+# and 0.69. Of wrong pairs (other places, or shifted along a street), 95 % stay
+# below 0.64 and 0.45.
 _LEAST_FITNESS = 0.55
 _LEAST_STRUCTURE = 0.55
 # Greatest error of a guess that registration can correct [m].
 _BASIN = 12.0
-# Errors that ICP does not estimate: 0.2 degrees, 0.1 m.
+# Additional errors, which ICP does not estimate: 0.2 degrees, 0.1 m.
 _FLOOR = np.diag([np.radians(0.2) ** 2] * 3 + [0.1**2] * 3)
-# Greatest distance of keyframes with a common view, seen from above [m].
+# Greatest horizontal distance of keyframes that can be registered [m].
 SAME_PLACE = 10.0
-# Least path between two passes of a place [m].
+# Least length of the path between two passes of a place [m].
 _DETOUR = 50.0
-# A guess is new if it is this far from the last one [m].
+# A keyframe is tried again if its guess has moved by this distance [m].
 _ANOTHER_GUESS = 1.0
 
 
@@ -53,13 +54,13 @@ def close(
 
     Args:
         source: a drive.
-        target: another one, or the same.
+        target: another drive, or the same.
         k: keyframe of the source.
         place: keyframe of the target.
-        X_LK: (4, 4) guess of k's pose in the frame of the place.
+        X_LK: (4, 4) guess of the pose of keyframe k in the frame of `place`.
 
     Returns:
-        The loop; None if the two do not fit together.
+        The loop; None if the registration fails.
     """
     moving, held = source.surface(k), target.surface(place)
     if moving is None or held is None:
@@ -78,7 +79,7 @@ def close(
 def loop_errors(
     loops: list[Loop], X_WL: np.ndarray, X_WK: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Returns how much poses disagree with loops.
+    """Returns the errors of loops, given poses of the keyframes.
 
     Args:
         loops: the M loops.
@@ -95,7 +96,7 @@ def loop_errors(
 
 
 def implied_poses(loops: list[Loop], X_WL: np.ndarray) -> np.ndarray:
-    """Returns the poses (M, 4, 4) of keyframes that loops imply."""
+    """Returns poses X_WK (M, 4, 4) of the sources' keyframes, by loops."""
     X_LK = np.array([loop.X_LK for loop in loops]).reshape(-1, 4, 4)
     return X_WL[[loop.target for loop in loops]] @ X_LK
 
@@ -108,7 +109,7 @@ class LoopSearch:
         source: drive of the keyframes K to register.
         target: drive of the keyframes L.
         loops: keyframe of the source -> its loop.
-        tried: guess X_TK from which each keyframe was registered last.
+        tried: keyframe -> guess X_TK from which it was last registered.
         num_attempts: number of registrations that were tried.
     """
 
@@ -119,9 +120,9 @@ class LoopSearch:
     num_attempts: int = 0
 
     def near(self, X_TK: np.ndarray) -> np.ndarray:
-        """Returns keyframes (M,) that have a neighbour in the other drive.
+        """Returns the keyframes (M,) near the other drive.
 
-        Their guessed poses are (K, 4, 4).
+        `X_TK` has the guessed poses (K, 4, 4) of all keyframes.
         """
         return np.flatnonzero([self._place(X) is not None for X in X_TK])
 
@@ -146,7 +147,7 @@ class LoopSearch:
     def grow(self, track: Track) -> None:
         """Tries all keyframes, outwards along the path from known loops.
 
-        The guess for each is the move of the nearest one with a loop.
+        Each keyframe is first moved like the nearest keyframe that has a loop.
         """
         path = self.source.path
         away = np.full(len(path), np.inf)
@@ -173,7 +174,7 @@ class LoopSearch:
         """Registers keyframes again if their guesses have changed.
 
         Args:
-            keyframes: which.
+            keyframes: numbers of the keyframes.
             X_TK: (K, 4, 4) guesses for all.
 
         Returns:
@@ -190,7 +191,7 @@ class LoopSearch:
         return made
 
     def _moved_like(self, teacher: int, k: int) -> np.ndarray:
-        """Returns X_TK of a keyframe that is moved as one with a loop is."""
+        """Returns X_TK (4, 4) of k if it moves like keyframe `teacher`."""
         loop = self.loops[teacher]
         X_TJ = self.target.X_WK[loop.target] @ loop.X_LK
         X_WK = self.source.X_WK
@@ -207,7 +208,7 @@ class LoopSearch:
 def find_self_loops(drive: Submaps, most: int, track: Track) -> list[Loop]:
     """Registers a drive's keyframes to its earlier ones at the same place.
 
-    If there are too many, only some are tried, evenly along the drive.
+    At most `most` pairs are tried, evenly along the drive.
     """
     pairs = []
     for k in range(len(drive)):
@@ -227,7 +228,7 @@ def find_self_loops(drive: Submaps, most: int, track: Track) -> list[Loop]:
 
 
 def evenly(number: int, most: int) -> np.ndarray:
-    """Returns up to `most` evenly spread indices below `number`."""
+    """Returns up to `most` evenly spaced indices from 0 to `number` - 1."""
     if number <= most:
         return np.arange(number)
     return np.linspace(0, number - 1, most).astype(np.int64)

@@ -2,8 +2,8 @@
 
 Point-to-plane ICP (Chen and Medioni 1991) of small_gicp: each point is paired
 with the nearest one of the other cloud and drawn to its plane. The distance
-limit shrinks from stage to stage: far guesses are drawn in, and later pairs are
-not disturbed by changes.
+limit shrinks from stage to stage. At first it lets a poor guess converge; later
+it keeps changed parts from disturbing the pairs.
 """
 
 from dataclasses import dataclass
@@ -14,23 +14,23 @@ import small_gicp
 
 from cns_drake.base import poses
 
-# Neighbours, the point among them, that a normal is fitted to.
+# Number of points to which a normal is fitted, including the point itself.
 NUM_NEIGHBOURS = 10
-# A normal this close to the horizontal is that of an upright surface.
+# A surface is upright if the z component of its normal is below this.
 _UPRIGHT = 0.5
-# Farthest pairs of each stage [m], and the points that it uses: more add
-# time, not accuracy.
+# Greatest distance of a pair in each stage [m], and the number of points used:
+# more points add time, not accuracy.
 _STAGES = ((10.0, 1500), (5.0, 1500), (2.0, 4000), (1.0, 4000), (0.5, 4000))
 _LIMIT, _NUM_SAMPLES = 1.0, 4000
 _MAX_ITERATIONS = 15
-# A stage is over when a step moves or turns less than this [m, rad].
+# A stage ends when a step is shorter than this [m, rad].
 _STILL = (0.005, 2e-4)
-# The normals of a pair on one surface have at least this cosine.
+# Least cosine between the normals of a pair.
 _PARALLEL = 0.7
 _FEWEST_PAIRS = 20
 _SEED = 7
-# Error of a point off its plane [m]; number of neighbouring points with a
-# common error, of which only one counts.
+# Standard deviation of a point's distance from its plane [m]; number of
+# neighbouring points that have a common error and count as one.
 _SIGMA = 0.1
 _CORRELATED = 50.0
 
@@ -61,7 +61,7 @@ class Surface:
 
     @cached_property
     def covariances(self) -> np.ndarray:
-        """(N, 3, 3) covariances of points' neighbours, flattened for GICP."""
+        """(N, 3, 3) covariances around the points, made planar for GICP."""
         return covariances(self.cloud)
 
     @cached_property
@@ -76,11 +76,11 @@ class Registration:
 
     Attributes:
         X_TS: (4, 4).
-        fitness: part of the points of one cloud that have a counterpart in the
-            other: the greater part of both, since one cloud may show many
-            things that were built or torn down in between.
-        structure: the same part for upright points only, since flat ground fits
-            nearly everywhere.
+        fitness: share of a cloud's points that have a counterpart in the other
+            cloud. It is the greater share of the two clouds, because one of
+            them may show much that was built or torn down in between.
+        structure: the same share for upright points only, because flat ground
+            fits nearly everywhere.
         covariance: (6, 6) covariance of a small motion of S in T: turn [rad],
             move [m].
     """
@@ -101,7 +101,7 @@ def make_surface(
 ) -> Surface:
     """Returns a cloud with normals and covariances of its points.
 
-    They are computed from the nearest neighbours of each point.
+    Normals and covariances come from the nearest neighbours of each point.
 
     Args:
         points: (N, 3) points [m], N >= num_neighbours.
@@ -118,12 +118,12 @@ def make_surface(
 def register(
     source: Surface, target: Surface, guess: np.ndarray
 ) -> Registration:
-    """Returns the motion that registers a cloud to another, and its quality.
+    """Registers one cloud to another; returns pose and quality of the fit.
 
     Args:
         source: the cloud S.
         target: the cloud T.
-        guess: (4, 4) guess of X_TS, right within some metres and degrees.
+        guess: (4, 4) guess of X_TS, off by at most some metres and degrees.
     """
     X = np.array(guess, dtype=np.float64)
     for limit, number in _STAGES:
@@ -150,8 +150,8 @@ def _pair(
     """Pairs a sample of the points with the nearest ones of the target.
 
     Returns:
-        (M,) indices of the sample; (M,) bool, which of its points have a
-        partner; (M, 3) their places in T; (M,) indices of the partners.
+        (M,) indices of the sampled points; (M,) bool, which of them have a
+        partner; (M, 3) their positions in T; (M,) indices of the partners.
     """
     sample = source.sample()
     p_T = poses.transform(X_TS, source.points[sample])
@@ -182,7 +182,8 @@ def _judge(source: Surface, target: Surface, X_TS: np.ndarray) -> Registration:
             _part(is_paired, source.is_upright[sample]),
             _part(is_found, target.is_upright[reverse]),
         ),
-        # Without constraints, a metre and a few degrees remain uncertain.
+        # Directions without constraints get uncertainties of a metre and a few
+        # degrees.
         covariance=np.linalg.inv(H + np.eye(6)),
     )
 

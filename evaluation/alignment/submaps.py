@@ -10,29 +10,29 @@ from evaluation.alignment.registration import Surface, make_surface
 from evaluation.drives.sampling import sample_frames, travelled
 from evaluation.maps.voxel_maps import VoxelAccumulator
 
-# Between keyframes, along the path [m]; on very long drives more, on very
-# short ones less.
+# Distance between keyframes along the path [m]; longer on very long drives,
+# shorter on very short ones.
 _SPACING = 10.0
 _FEWEST_KEYFRAMES = 20
 _MOST_KEYFRAMES = 400
-# A submap holds the scans of this part of the path on either side of its
-# keyframe, at this spacing, out to this range [m].
+# A submap contains the scans within this distance along the path on either side
+# of its keyframe, at this spacing, with points out to this range [m].
 _HALF_LENGTH = 10.0
 _SCAN_SPACING = 2.5
 _RANGE = 60.0
 _VOXEL_SIZE = 0.7
 _FEWEST_POINTS = 500
-# The ground is searched within this distance [m] of this number of keyframes,
-# among normals this close to the vertical.
+# The ground is searched within this distance of a keyframe [m], at this number
+# of keyframes, among points whose normals are this close to the vertical.
 _GROUND_RANGE = 8.0
 _GROUND_KEYFRAMES = 20
 _LEVEL = 0.95
-# Number of surfaces kept in memory; neighbours are used in sequence.
+# Number of surfaces kept in memory; neighbouring ones are used in sequence.
 _NUM_KEPT = 48
 
 
 class Submaps:
-    """Keyframes K of a drive, and their surroundings.
+    """Keyframes of a drive, with a submap around each.
 
     Attributes:
         drive: the drive.
@@ -77,14 +77,14 @@ class Submaps:
         return self.travelled[self.frames]
 
     def bend(self, X_VK: np.ndarray) -> np.ndarray:
-        """Returns the poses of all frames after the keyframes have moved.
+        """Returns poses of all frames, given new poses of the keyframes.
 
         Args:
             X_VK: (K, 4, 4) new poses of the keyframes.
 
         Returns:
-            (N, 4, 4); between keyframes, the moves of both are blended along
-            the path.
+            (N, 4, 4) poses; between two keyframes, their motions are blended
+            along the path.
         """
         moves = X_VK @ poses.inverse(self.X_WK)
         frames = np.arange(len(self.X_WS))
@@ -97,7 +97,7 @@ class Submaps:
         )
 
     def ground_height(self) -> float:
-        """Returns the usual height of the ground under the drive in W [m]."""
+        """Returns the median height in W of the ground under the drive [m]."""
         heights = []
         number = min(_GROUND_KEYFRAMES, len(self))
         for index in np.linspace(0, len(self) - 1, number).astype(np.int64):
@@ -117,7 +117,7 @@ class Submaps:
     def _make_surface(self, index: int) -> Surface | None:
         """Returns the submap around a keyframe, in the frame of its LiDAR.
 
-        None if it has too few points.
+        Returns None if the submap has too few points.
         """
         frame = self.frames[index]
         apart = np.abs(self.travelled[self._scans] - self.travelled[frame])

@@ -1,19 +1,20 @@
 """Errors of an estimated trajectory, such as that of a LiDAR odometry.
 
-Two figures are usual. X_i are true poses, Y_i the estimated ones of the same
-times, p_i and q_i their positions:
+Two figures are in common use. X_i are true poses, Y_i the estimated poses at
+the same times, p_i and q_i their positions:
 
 - ATE, the absolute trajectory error: the root mean square of |p_i - R q_i - t|
-  over all i, where the rigid motion R, t is the one that makes it least. The
-  scale is kept. J. Sturm et al., A benchmark for the evaluation of RGB-D SLAM
+  over all i. The rigid motion R, t is the one that minimises it; there is no
+  change of scale. J. Sturm et al., A benchmark for the evaluation of RGB-D SLAM
   systems, IROS 2012; S. Umeyama, Least-squares estimation of transformation
   parameters between two point patterns, PAMI 13(4), 1991. `evo_ape --align`
   prints it as `rmse`.
 - Drift over 100 m: the length and the angle of
-  (Y_i^-1 Y_j)^-1 (X_i^-1 X_j), where i is every tenth pose and j the first one
-  more than 100 m of true path behind it. A. Geiger et al., Are we ready for
-  autonomous driving?, CVPR 2012, and the development kit of KITTI odometry,
-  which divides by the 100 m and calls the mean the translation error [%].
+  (Y_i^-1 Y_j)^-1 (X_i^-1 X_j), where i is every tenth pose, and j the first
+  pose that follows more than 100 m of true path later. A. Geiger et al., Are we
+  ready for autonomous driving?, CVPR 2012, and the development kit of KITTI
+  odometry, which divides by the 100 m and calls the mean the translation error
+  [%].
 """
 
 from collections.abc import Iterator
@@ -36,7 +37,7 @@ Frame = Literal["lidar", "base_link"]
 # Length of the parts over which an odometry drifts [m].
 SPAN = 100.0
 _STEP = 10
-# An alignment of fewer poses has hardly an error.
+# With fewer poses, an alignment would leave hardly any error.
 _LEAST_POSES = 3
 _LONGEST_GAP_NS = 1_000_000_000
 
@@ -69,7 +70,7 @@ class TrajectoryErrors:
         return float(np.sqrt(np.mean(self.offsets**2)))
 
     def to_json(self) -> dict:
-        """Returns the errors as a JSON object; without drift it is null."""
+        """Returns the errors as a JSON object; drift is null if unknown."""
         drift: dict[str, float | None] = dict.fromkeys(
             (
                 "drift_100m",
@@ -170,16 +171,16 @@ def trajectory_errors(
 
 
 def aligned_offsets(p: np.ndarray, q: np.ndarray) -> np.ndarray:
-    """Returns the distances (N,) of points from others, after alignment.
+    """Returns distances (N,) of true and estimated positions, aligned [m].
 
     Args:
         p: (N, 3) true positions [m].
-        q: (N, 3) estimated ones, in any frame [m].
+        q: (N, 3) estimated positions, in any frame [m].
     """
     p, q = p - p.mean(axis=0), q - q.mean(axis=0)
     with warnings.catch_warnings():
-        # Along a straight line the best rotation is not the only one, but its
-        # error is.
+        # For points on a straight line, several rotations are best; all have
+        # the same error.
         warnings.filterwarnings("ignore", "Optimal rotation is not uniquely")
         R, *_ = Rotation.align_vectors(p, q)
     return np.asarray(np.linalg.norm(p - R.apply(q), axis=1))
@@ -192,11 +193,12 @@ def segment_errors(
 
     Args:
         X: (N, 4, 4) true poses.
-        Y: (N, 4, 4) estimated ones, in any world.
+        Y: (N, 4, 4) estimated poses, in any world.
 
     Returns:
-        (K,) index of the first and (K,) of the last pose of each part of 100 m;
-        and (K, 4, 4) pose of its true end, seen from the estimated end.
+        For each segment of 100 m: (K,) index of its first pose, (K,) index of
+        its last pose, and (K, 4, 4) true end pose relative to the estimated end
+        pose.
     """
     along = travelled(X[:, :3, 3])
     starts = np.arange(0, len(X), _STEP)

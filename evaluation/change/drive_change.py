@@ -1,8 +1,8 @@
 """The structural change between two drives, with its context.
 
-A TCR_sym is published with two more values: one that comes from the two routes
-alone (the control), and one for the parts of the city that both routes saw (the
-coverage-masked one).
+TCR_sym is reported with two more values: the control, which is due to the two
+routes only, and the coverage-masked value, for the parts of the city that both
+routes saw.
 """
 
 from __future__ import annotations
@@ -41,7 +41,7 @@ if TYPE_CHECKING:
     from evaluation.alignment import AlignmentReport, When
 
 
-# Greatest distance of two drives on one route [m]; lanes are 3.5 m wide.
+# Greatest mean distance of two drives on one route [m]; lanes are 3.5 m wide.
 _SAME_ROUTE = 1.0
 
 
@@ -51,10 +51,11 @@ class Surveyed:
 
     Attributes:
         name: name of the drive or file.
-        voxels: the map in cells of `CELL_SIZE`, of which the voxels of the
-            TCR are made, on any grid.
+        voxels: the map in cells of `CELL_SIZE`, which are merged into the
+            voxels of the TCR on any grid.
         positions: (N, 3) positions of the sensor [m]; None for a map file.
-        drive: the drive, or its world frame and map; None for a map file.
+        drive: the drive, or only its names of world frame and map; None for a
+            map file.
         notes: notes on how the drive or the file was read.
     """
 
@@ -73,13 +74,13 @@ class ChangeReport:
         source: name of A.
         target: name of B.
         change: change over the whole maps.
-        spread: least and greatest TCR_sym on this grid and on `GRIDS`.
+        spread: least and greatest TCR_sym over the default grid and `GRIDS`.
         masked: change over the parts that both drives passed within the
             coverage radius; None if a map has no drive.
         control: change between two drives on the two routes in one stage; None
             if no control was given.
         control_names: names of the two drives that `control` compares.
-        alignment: alignment of A and B; None if they were in one world.
+        alignment: alignment of A and B; None if they were in one world already.
     """
 
     source: str
@@ -136,7 +137,7 @@ def survey(path: Path, track: Track = silent) -> Surveyed:
     """Returns the map of a drive, or of a map file.
 
     Raises:
-        InputError: if it can be read as neither.
+        InputError: if the path can be read neither as a drive nor as a map.
     """
     return _survey(open_source(path), track)
 
@@ -151,12 +152,13 @@ def survey_in_one_world(
     """Returns the maps of drives or map files, all in one world.
 
     Args:
-        paths: paths of drives or map files; map files must be in that world.
-        when: whether later drives are aligned with the first.
+        paths: paths of drives or map files; map files must be in the common
+            world.
+        when: whether later drives are aligned with the first one.
         track: reports progress.
         lidar: name of the LiDAR, for recordings with several.
-        columns: number of columns of `.bin` files; by default as their values
-            show.
+        columns: number of columns of `.bin` files; by default guessed from the
+            values.
 
     Returns:
         The maps, in the order of the paths, and reports on alignments.
@@ -192,7 +194,7 @@ def survey_in_one_world(
 
 
 def survey_drive(drive: Drive, voxels: VoxelMap) -> Surveyed:
-    """Returns a drive with its map in cells of the TCR."""
+    """Returns a drive with a map in cells of `CELL_SIZE`."""
     return Surveyed(
         drive.name, voxels, drive.X_WS[:, :3, 3], drive, drive.notes
     )
@@ -211,14 +213,15 @@ def compare(
         source: the map A.
         target: the map B.
         control: a drive on A's route in B's stage, or on B's route in A's
-            stage; its route shows which. It is compared with the drive of its
-            own stage, so that both routes are compared in one stage.
+            stage; which of the two follows from its route. The control is
+            compared with the drive of its own stage. That comparison contains
+            both routes but no change.
         alignment: alignment of A and B, for the report.
-        grids: shifts of the grid [m] whose values make the spread.
+        grids: shifts of the grid [m] over which `spread` is taken.
 
     Raises:
-        InputError: if the three are not of one world, or the control is on
-            neither route.
+        InputError: A, B and the control are not in one world, or the control is
+            on neither route.
     """
     if source.drive is not None and target.drive is not None:
         check_same_world(source.drive, target.drive)
@@ -251,7 +254,7 @@ def _change(
     target: Surveyed,
     shift: tuple[float, float, float] = (0.0, 0.0, 0.0),
 ) -> tuple[TemporalChange, list[np.ndarray]]:
-    """Returns the change on a shifted grid [m], and both maps' centroids."""
+    """Returns the change on a grid shifted by [m], and centroids of A and B."""
     clouds = [
         one.voxels.merged(shift=shift).centroids_W for one in (source, target)
     ]
@@ -288,7 +291,7 @@ def _survey(
 def _same_stage_partner(
     source: Surveyed, target: Surveyed, control: Surveyed
 ) -> Surveyed:
-    """Returns the drive whose route differs from the control's."""
+    """Returns the drive in the control's stage, which has the other route."""
     if (
         source.drive is None
         or control.drive is None
@@ -313,7 +316,7 @@ def _same_stage_partner(
 
 
 def _route_distance(first: np.ndarray, second: np.ndarray) -> float:
-    """Returns the mean distance between two routes, seen from either [m]."""
+    """Returns the mean distance between routes, the larger of both ways [m]."""
     there, _ = cKDTree(second).query(first)
     back, _ = cKDTree(first).query(second)
     return float(max(there.mean(), back.mean()))

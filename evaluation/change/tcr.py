@@ -5,14 +5,15 @@ are open in the paper.
 
 - X is the map of a whole drive in world coordinates, as the centroids of
   the voxels of a grid that is fixed in the world (see `evaluation.maps`).
-- The place of that grid alone moves TCR_sym. The least and the greatest
-  value on `GRIDS`, which are spread evenly over a voxel, show by how much.
-- The hull is wider by `HULL_MARGIN` to all sides. Flat ground is a face of
-  the hull, so that a millimetre would decide whether it counts.
+- Shifting that grid changes TCR_sym. By how much is shown by the least and the
+greatest value on `GRIDS`, shifts that are spread evenly over a voxel. - The
+hull is widened by `HULL_MARGIN` on all sides. Flat ground is a face of the
+hull; without a margin, a millimetre would decide whether the ground counts.
 - O, the unchanged points, is counted inside H, the points in the other map's
   convex hull; otherwise the ratio could become negative.
-- The two united sets are of different clouds. The union is a concatenation:
-  TCR_sym is the mean of the directed ratios, weighted by the sizes of H.
+- The two sets of a union are points of different clouds, so that the union is a
+concatenation. TCR_sym is therefore the mean of the directed ratios, weighted by
+the sizes of H.
 """
 
 from __future__ import annotations
@@ -28,10 +29,11 @@ from evaluation.maps.voxel_maps import VOXEL_SIZE
 # Tolerance of the boundary and of flatness, relative to the extent of the
 # cloud. Without it, rounding would put the hull's own corners outside.
 _TOLERANCE = 1e-9
-# Points so far outside of a hull count as in it [m]: a tenth of a voxel.
+# Points up to this far outside of a hull count as inside [m]: a tenth of a
+# voxel.
 HULL_MARGIN = 0.5
-# Shifts of the grid [m]: the points of a lattice of rank 1, each of whose
-# coordinates are evenly spaced.
+# Shifts of the grid [m]: points of a rank-1 lattice, evenly spaced along each
+# coordinate.
 _NUM_GRIDS = 16
 GRIDS = tuple(
     (
@@ -41,7 +43,8 @@ GRIDS = tuple(
     )
     for k in range(_NUM_GRIDS)
 )
-# The distances of so many points to all facets stay in the cache.
+# Number of points processed at a time: their distances to all facets fit into
+# the cache.
 _CHUNK = 1 << 8
 # Distance up to which a point has a counterpart in the other map [m].
 TAU = 4.5
@@ -54,13 +57,13 @@ def in_convex_hull(
 ) -> np.ndarray:
     """Returns which points lie in the convex hull, boundary included.
 
-    Clouds without volume have a hull as well: a polygon in its plane, a
-    segment, a point. Coordinates are centred first, so that large offsets (UTM)
-    do not cost precision.
+    A cloud without volume has a hull as well: a polygon in a plane, a line
+    segment or a point. Coordinates are centred first, so that large offsets
+    (UTM) do not cost precision.
 
     Args:
         points: (N, 3) float64.
-        vertices: (M, 3) float64, the points whose hull it is.
+        vertices: (M, 3) float64 points that span the hull.
         margin: distance by which each face of the hull is moved outwards [m].
 
     Returns:
@@ -82,7 +85,7 @@ def in_convex_hull(
         try:
             facets = ConvexHull(hull @ axes[:rank].T).equations
         except QhullError:
-            # Qhull takes the cloud as flat up to rounding.
+            # For Qhull the cloud is flat, up to rounding.
             rank -= 1
             continue
         return _in_half_spaces(inside @ axes[:rank].T, facets, tolerance) & (
@@ -114,7 +117,7 @@ def _is_flat(
     normals: np.ndarray,
     tolerance: float,
 ) -> np.ndarray:
-    """Returns the points in the plane or line that the hull spans."""
+    """Returns which points lie in the plane or line that the hull spans."""
     heights = hull @ normals.T
     out = points @ normals.T
     return (
@@ -153,7 +156,7 @@ class DirectedChange:
         return _ratio(self.num_unchanged, self.num_in_hull)
 
     def restricted(self, kept: np.ndarray) -> DirectedChange:
-        """Returns the change with only the points kept (N,) bool counted."""
+        """Returns the change, counted over the points of a mask (N,)."""
         return DirectedChange(
             self.in_hull & kept, self.unchanged & kept, self.distances
         )
@@ -237,15 +240,15 @@ def temporal_change(
     """Returns the temporal change ratios between two maps.
 
     Args:
-        source: (N, 3) float64 voxel centroids, in the frame of both [m].
-        target: (M, 3) float64.
+        source: (N, 3) float64 voxel centroids, in the common world frame [m].
+        target: (M, 3) float64 voxel centroids of the other map [m].
         tau: distance up to which a point is unchanged, inclusive [m].
         margin: margin of the hulls, see `in_convex_hull` [m].
         restrict_to_hull: whether O is counted inside H. False is the literal
             equation 2, under which values may be negative.
 
     Returns:
-        Labels of all points, and the ratios.
+        The labels of all points; the ratios follow from them.
 
     Raises:
         ValueError: if a coordinate is not finite.
@@ -271,8 +274,8 @@ def covered(
 ) -> np.ndarray:
     """Returns which points lie near each of several trajectories.
 
-    Even without a change, two routes see different parts of a city. Points near
-    both routes are free of most of that difference.
+    Even without a change, two routes see different parts of a city. This hardly
+    affects points near both routes.
 
     Args:
         points: (N, 3) points in the world [m].

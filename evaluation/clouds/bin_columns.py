@@ -2,9 +2,10 @@
 
 A `.bin` is a sequence of float32. KITTI has four for each point: x y z
 intensity; others leave out the intensity, or add a ring, a time or a colour.
-Read with a wrong number, a file is a cloud that was never measured. The values
-show the right one: the columns of a cloud are distributed differently, and read
-with a wrong number of columns they are mixed, hence alike.
+Reading a file with a wrong number of columns gives a cloud that was never
+measured. The right number can be found from the values: the columns of a cloud
+have different distributions, while with a wrong number the columns are mixed
+and have similar distributions.
 """
 
 from collections.abc import Sequence
@@ -18,25 +19,27 @@ from cns_drake.base.errors import InputError
 from cns_drake.base.files import check_regular, user_errors
 from cns_drake.base.poses import FARTHEST
 
-# KITTI's, which are taken where the values tell nothing else.
+# KITTI's number of columns, used if the values do not show another.
 _USUAL = 4
 FEWEST_COLUMNS = 3
 _CANDIDATES = range(FEWEST_COLUMNS, 13)
-# A multiple of all candidates: windows of so many values begin with a point.
+# A multiple of all candidates, so that each window of this many values begins
+# at the beginning of a point.
 _WINDOW = 27720
 _WINDOWS = 4
 _MOST_BINS = 16
-# Average number of values in a bin, and number of points that columns need.
+# Average number of values per bin; also the least number of points.
 _FILLED = 16
-# Information of the column about the value that counts: at least so much [nat],
-# and so many standard deviations above that of random columns.
+# Least information that the column must have about the value [nat], and least
+# excess over random columns, in standard deviations.
 _LEAST_INFORMATION = 0.05
 _SIGNIFICANCE = 5.0
-# Fewer columns that tell almost as much are right.
+# If fewer columns have at least this share of the information, they are right.
 _ALMOST = 0.9
-# Where beams alternate between low and high ones, two points look like one with
-# twice as many columns. Then half of them tell at least this share, and the
-# horizontal coordinates of both points differ by at most this total variation.
+# If low and high beams alternate, two points look like one point with twice as
+# many columns. Half of these columns then have at least this share of the
+# information, and the distributions of the two points' horizontal coordinates
+# differ by at most this total variation.
 _HALF = 0.5
 _NAMES = ("x", "y", "z", "intensity")
 
@@ -69,8 +72,8 @@ def find_layout(files: Sequence[Path], columns: int | None = None) -> BinLayout:
         columns: number of columns, if the user gives it.
 
     Raises:
-        InputError: if a file cannot be read, is no whole number of points, or
-            its values do not show how many columns there are.
+        InputError: a file cannot be read, does not contain a whole number of
+            points, or its values do not show the number of columns.
     """
     if columns is not None:
         return BinLayout(columns)
@@ -113,7 +116,7 @@ def find_layout(files: Sequence[Path], columns: int | None = None) -> BinLayout:
     ]
     with np.errstate(invalid="ignore"):
         if not others or (np.abs(values) >= FARTHEST).any():
-            # What cannot be coordinates is refused where points are read.
+            # Impossible coordinates are refused later, when points are read.
             return layout
         # No LiDAR measures a negative intensity.
         is_contrary = (values[places % _USUAL == 3] < 0.0).any()
@@ -130,11 +133,12 @@ def find_layout(files: Sequence[Path], columns: int | None = None) -> BinLayout:
 
 
 def _period(values: np.ndarray, places: np.ndarray) -> int | None:
-    """Returns the number of columns that values show, if they show one.
+    """Returns the number of columns found from the values, or None.
 
     Args:
         values: (N,) in the order of the file.
-        places: (N,) their places in it, modulo any number of columns.
+        places: (N,) positions of the values in the file, correct modulo any
+            number of columns.
     """
     num_bins = min(_MOST_BINS, len(values) // _FILLED)
     candidates = [k for k in _CANDIDATES if k * _FILLED <= len(values)]
@@ -156,7 +160,7 @@ def _period(values: np.ndarray, places: np.ndarray) -> int | None:
     found = min(k for k in told if told[k] >= _ALMOST * most)
     degrees = len(edges) * (found - 1)
     chance = _SIGNIFICANCE * math.sqrt(2.0 * degrees) / (2.0 * len(values))
-    # Twice as many must have been tried.
+    # The result is trusted only if twice as many columns were tried as well.
     too_few = min(2 * found, _CANDIDATES[-1]) not in candidates
     if too_few or told[found] <= chance:
         return None
@@ -170,10 +174,10 @@ def _period(values: np.ndarray, places: np.ndarray) -> int | None:
 
 
 def _information(table: np.ndarray) -> float:
-    """Returns how much columns tell about the bin of a value [nat].
+    """Returns the information of the column about the value's bin [nat].
 
-    It is the mutual information, less its expectation for columns that tell
-    nothing (Miller and Madow).
+    It is their mutual information, less its expectation for columns that are
+    independent of the values (Miller and Madow).
 
     Args:
         table: (K, M) number of values by column and bin.

@@ -20,15 +20,15 @@ from cns_drake.base.points import check_range, store
 from cns_drake.base.poses import FARTHEST
 from evaluation.clouds.bin_columns import find_layout
 
-# Enough for rows of some tens of numbers with some tens of characters.
+# Room for some tens of numbers with some tens of characters each.
 _LONGEST_LINE_BYTES = 1 << 16
 _PCD_TYPES = {"F": "f", "I": "i", "U": "u"}
 _PCD_SIZES = {"f": (2, 4, 8), "i": (1, 2, 4, 8), "u": (1, 2, 4, 8)}
 _UNMOVED = [0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0]
-# Steps of a coordinate that blur a surface [m].
+# Rounding steps of a coordinate from which on surfaces are blurred [m].
 _COARSE_STEP = 0.03
 _MARK = codecs.BOM_UTF8
-# A header takes some hundred bytes; the search for it ends here.
+# The end of a header is searched up to here; a header takes some hundred bytes.
 _HEADER_LIMIT_BYTES = 1 << 16
 # LZF expands three bytes to at most 264. Compressed files are unpacked in
 # memory; larger ones must not be compressed.
@@ -45,13 +45,14 @@ _PLY_ORDERS = {
     "binary_big_endian": ">",
     "ascii": "<",
 }
-# Takes a note for the user.
+# A function that takes a note for the user.
 OnNote = Callable[[str], None]
-# Reads a file; the second argument is the number of points in a block.
+# A function that reads a file; its second argument is the number of points per
+# block.
 _Reader = Callable[[Path, int, OnNote], Iterator[np.ndarray]]
 # Number of points of a map that are read at a time.
 _BLOCK = 1 << 18
-# More than a LiDAR's turn can fill [bytes].
+# Largest file of a scan [bytes]; a turn of a LiDAR cannot fill it.
 SCAN_LIMIT_BYTES = 1 << 27
 
 
@@ -60,8 +61,8 @@ def _records(
 ) -> Iterator[np.ndarray]:
     """Yields the records of a file in blocks; at least one, maybe empty.
 
-    They are read into memory of our own: a memory-mapped file would end the
-    process without a message (SIGBUS) if another program shortened it.
+    The file is not memory-mapped: if another program shortened it, the process
+    would end without a message (SIGBUS).
     """
     with open(path, "rb") as stream:
         stream.seek(offset)
@@ -109,7 +110,7 @@ def _text_records(
 
 
 def _check_size(path: Path, needed: int, exactly: bool) -> None:
-    """Refuses a file of another size [bytes], or, unless exactly, a less."""
+    """Refuses a file shorter or, if `exactly`, longer than `needed` [bytes]."""
     size = path.stat().st_size
     if size < needed:
         raise ValueError(f"cut off at {size} of {needed} bytes")
@@ -120,7 +121,7 @@ def _check_size(path: Path, needed: int, exactly: bool) -> None:
 
 
 def _lines(stream: BinaryIO) -> Iterator[bytes]:
-    """Yields the lines that are not blank."""
+    """Yields the lines that are neither blank nor comments."""
     while line := stream.readline(_LONGEST_LINE_BYTES):
         if len(line) == _LONGEST_LINE_BYTES:
             raise ValueError("a line is too long for a row of numbers")
@@ -147,8 +148,8 @@ def _to_records(values: np.ndarray, dtype: np.dtype, kind: str) -> np.ndarray:
 def _read_pcd(path: Path, block: int, on_note: OnNote) -> Iterator[np.ndarray]:
     """Reads an ascii, binary or binary_compressed PCD file (PCL, up to 0.7).
 
-    Padding (fields named `_`) gets names of its own. Programs disagree whether
-    VIEWPOINT moves the points, so it does not, and a note says so.
+    Padding (fields named `_`) gets names of its own. VIEWPOINT is not applied,
+    because programs disagree whether it moves the points; a note says so.
     """
     header, offset = _read_pcd_header(path)
     if _is_moved(header.get("VIEWPOINT", [])):
@@ -196,7 +197,7 @@ def _read_pcd_header(path: Path) -> tuple[dict[str, list[str]], int]:
 
 
 def _is_moved(viewpoint: list[str]) -> bool:
-    """Returns whether a viewpoint is another one than the origin's."""
+    """Returns whether a viewpoint differs from the origin's."""
     if not all(map(is_number, viewpoint)):
         return True
     return bool(viewpoint) and list(map(float, viewpoint)) != _UNMOVED
@@ -288,7 +289,7 @@ def _read_compressed(
 def _interleaved(
     plain: np.ndarray, dtype: np.dtype, count: int, part: slice
 ) -> np.ndarray:
-    """Returns some points of `count`, stored field by field."""
+    """Returns points of a file that stores its `count` points by fields."""
     points = np.empty(len(range(count)[part]), dtype=dtype)
     start = 0
     for name in dtype.names or ():
@@ -304,10 +305,11 @@ def _interleaved(
 def _decompress_lzf(packed: np.ndarray, plain: np.ndarray) -> bool:
     """Expands LZF data; returns whether it was sound and filled `plain`.
 
-    The format: a control byte below 32 announces that many literal bytes
-    plus one. Otherwise its upper three bits are the length of a copy less
-    two (7: one more byte adds to it), its lower five bits and the next byte
-    the distance back less one.
+    Format: each sequence begins with a control byte c. If c < 32, then c + 1
+    literal bytes follow. Otherwise the sequence copies earlier bytes. The upper
+    three bits of c are the length minus two; if they are 7, the next byte is
+    added to the length. The lower five bits and one more byte are the distance
+    back minus one.
     """
     source = 0
     target = 0
@@ -346,8 +348,9 @@ def _decompress_lzf(packed: np.ndarray, plain: np.ndarray) -> bool:
 def _read_ply(path: Path, block: int, on_note: OnNote) -> Iterator[np.ndarray]:
     """Reads the vertices of an ascii or binary PLY file.
 
-    Faces and other elements are ignored; before the vertices they may have no
-    lists in a binary file, which would hide where the vertices begin.
+    Faces and other elements are ignored. In a binary file, elements before the
+    vertices may have no lists, because lists would hide where the vertices
+    begin.
     """
     del on_note
     encoding, elements, offset = _read_ply_header(path)
@@ -376,7 +379,7 @@ def _read_ply(path: Path, block: int, on_note: OnNote) -> Iterator[np.ndarray]:
 
 
 def _behind_lines(path: Path, offset: int, count: int) -> int:
-    """Returns the offset behind so many rows of a text [bytes]."""
+    """Returns the offset after `count` rows of a text file [bytes]."""
     with open(path, "rb") as stream:
         stream.seek(offset)
         for _ in itertools.islice(_lines(stream), count):
@@ -392,7 +395,7 @@ class _Element(NamedTuple):
     properties: list[tuple[str, str]]
 
     def dtype(self, order: str) -> np.dtype:
-        """Returns the type of a record in an order of bytes."""
+        """Returns the type of a record with a given byte order."""
         for name, kind in self.properties:
             if kind not in _PLY_TYPES:
                 raise ValueError(
@@ -460,8 +463,9 @@ def read_cloud(
     is KITTI's sequence of float32 x y z intensity, or one of other columns.
 
     Args:
-        path: an existing file, of a scan rather than a map.
-        columns: number of columns of a `.bin`; by default as its values show.
+        path: an existing file of a scan; see `read_blocks` for maps.
+        columns: number of columns of a `.bin`; by default guessed from the
+            values.
         on_note: takes notes on how the file was read.
 
     Returns:
@@ -494,15 +498,15 @@ def read_blocks(
     Args:
         path: an existing file.
         columns: see `read_cloud`.
-        on_note: likewise.
+        on_note: see `read_cloud`.
         block: number of points in a part.
 
     Yields:
         At least one part, maybe empty.
 
     Raises:
-        InputError: as `read_cloud`; also later, e.g. if the file is cut off
-            meanwhile.
+        InputError: see `read_cloud`; raised also between parts, e.g. if the
+            file is cut off meanwhile.
     """
     path = Path(path)
     reader = _find_reader(path)
@@ -524,7 +528,7 @@ def read_blocks(
 
 
 def _coarse_step(points: np.ndarray) -> float:
-    """Returns the step of the farthest coordinate if it is coarse, or 0 [m]."""
+    """Returns the float32 step of the farthest point if coarse, else 0 [m]."""
     farthest = [
         np.abs(points[axis]).max(where=np.isfinite(points[axis]), initial=0)
         for axis in "xyz"
@@ -575,7 +579,7 @@ def _read_npy(path: Path, block: int, on_note: OnNote) -> Iterator[np.ndarray]:
 def _read_npy_header(
     path: Path,
 ) -> tuple[np.dtype, tuple[int, ...], bool, int]:
-    """Returns type, shape, whether stored by columns, and the offset."""
+    """Returns type, shape, whether in Fortran order, and offset of the data."""
     try:
         with warnings.catch_warnings():
             # A damaged header can overflow the size of the array.
@@ -600,7 +604,8 @@ def read_npy(path: Path) -> np.ndarray:
     """Returns the array of a .npy file, in C order.
 
     Raises:
-        InputError: it cannot be read, or holds no array of the size it names.
+        InputError: the file cannot be read, or its size does not fit its
+            header.
     """
     with user_errors(path), value_errors(path):
         check_regular(path)

@@ -30,7 +30,7 @@ if TYPE_CHECKING:
     from evaluation.recognition.metrics import Interval
     from evaluation.recognition.place_recognition import PlaceRecognition
 
-# Command of an earlier version -> what takes its place.
+# Command of an earlier version -> the command that replaces it.
 RENAMED = {
     "ranking": "compare --rankings",
     "trend": "cns-drake study FILE.yaml FOLDER",
@@ -68,15 +68,17 @@ def tcr(
     """Measure how much changed between two drives or maps.
 
     A and B are recorded drives (MCAP, MulRan, HeLiPR, NCLT, Boreas, KITTI
-    odometry, CNS) or maps (.pcd .ply .npy .bin). The directed ratios take A as
-    source and B as target. Drives in different world frames are aligned first.
+    odometry, CNS) or maps (.pcd .ply .npy .bin). The main result, TCR_sym, is 0
+    if nothing changed and 1 if everything did. The ratios with a direction go
+    from A, the source, to B, the target. Drives in different world frames are
+    aligned first.
 
     Args:
         source: Drive or map before the change.
         target: Drive or map after the change.
         control: Recording of A's route in B's stage, or of B's route in A's
-            stage. It measures how much TCR_sym the different routes alone
-            cause.
+            stage. It shows how much of TCR_sym is due to different routes
+            instead of change.
     """
     from evaluation.change import drive_change as change
 
@@ -144,30 +146,34 @@ def pr(
 ) -> None:
     """Measure place recognition between two drives.
 
-    Measures how well a method finds the places of QUERY's scans in DATABASE.
-    Both are recorded drives (MCAP, MulRan, HeLiPR, NCLT, Boreas, KITTI
-    odometry, CNS). Drives in different world frames are aligned first.
+    The command measures how well a method finds, among the places of DATABASE,
+    the place of each scan of QUERY. Both are recorded drives (MCAP, MulRan,
+    HeLiPR, NCLT, Boreas, KITTI odometry, CNS). Drives in different world frames
+    are aligned first.
 
     Args:
-        database: Drive whose places are known.
-        query: Drive whose scans are to be recognised.
-        mode: Which queries count: all, or only those that have a match
-            (filtered).
-        across_maps: Allow drives through maps with different names, such as
-            another city drawn along the same streets.
-        truth: What counts as a match: a place within the radius, or a place
-            whose scan shows at least this part of the query's scan.
-        overlaps: File to which to write the overlap of each query with each
-            place.
-        exact_overlaps: Table of exact overlaps to read, from cns-drake
-            export-pairs; by default overlaps are estimated from the scans.
-        turn_queries: Turn each query by a random yaw; by default as --protocol
-            says.
-        tilt_queries: Largest random roll and pitch by which each query is
-            tilted [deg]; by default as --protocol says.
-        hide_sector: Angle of a random sector that is hidden from each query
-            [deg], as by a truck beside the car.
-        seed: Seed of the random turns, tilts and hidden sectors.
+        database: Recorded drive that provides the known places.
+        query: Recorded drive that provides the scans to recognise.
+        mode: Which queries count: all of them, or only those that have a match
+            in the database (filtered).
+        across_maps: Allow two drives through maps of different names, such as
+            two cities drawn along the same streets.
+        truth: What makes a place a match of a query. With radius, the place
+            lies within --radius. With overlap:PART, such as overlap:0.5, its
+            scan shows at least this share of what the query's scan shows, at
+            any distance.
+        overlaps: File to write: the overlap of each query with each place.
+            Needs --truth overlap:PART.
+        exact_overlaps: File with exact overlaps, as cns-drake export-pairs
+            --format overlap-table writes it. Without it, overlaps are estimated
+            from the scans. Needs --truth overlap:PART.
+        turn_queries: Whether to turn each query by a random yaw, as if the car
+            had another heading. By default as --protocol says.
+        tilt_queries: Tilt each query by a random roll and pitch of up to this
+            angle [deg]. By default as --protocol says.
+        hide_sector: Hide a random sector of this angle from each query [deg],
+            as a truck beside the car would.
+        seed: Seed of the random turns, tilts and hidden sectors of the queries.
     """
     from cns_drake.base import files
     from cns_drake.base.errors import InputError
@@ -196,7 +202,7 @@ def pr(
             f"--exclude-recent: it is for a drive against itself, but {query} "
             f"is not {database}"
         )
-    # Before a long work.
+    # Checked before the long work.
     if overlaps is not None:
         files.check_writable(overlaps)
     if exact_overlaps is not None:
@@ -267,18 +273,20 @@ def scores(
 ) -> None:
     """Score every pair of scans from two folders.
 
-    Scans are .bin, .pcd, .npy or .ply files. Every query is compared with every
-    place: searches that only save time are skipped. An empty score means that
-    the method does not consider the place a candidate.
+    Use it for scans without poses. Scans are .bin, .pcd, .npy or .ply files.
+    Every query is compared with every place: searches that only save time are
+    skipped. An empty score means that the method does not consider the place a
+    candidate.
 
     Args:
-        database: Folder of the scans of places, one file each.
-        query: Folder of the scans of queries, one file each.
-        output: CSV file to write.
-        gate: Reject top-ranked places that lie beyond the radius according to
-            the method's own pose estimate. Only for methods that estimate
-            poses.
-        radius: Greatest distance between a query and its match [m].
+        database: Folder with the scans of the places, one file per scan.
+        query: Folder with the scans of the queries, one file per scan.
+        output: CSV file to write, with a score for each pair of a query and a
+            place.
+        gate: Reject top-ranked places that lie, by the method's own pose
+            estimate, beyond the radius. It has no effect on methods that
+            estimate no pose.
+        radius: Radius that --gate uses [m].
     """
     from evaluation.recognition import scan_folders
 
@@ -329,12 +337,13 @@ def report(
 ) -> None:
     """Evaluate all recordings in a folder and write a report.
 
-    Writes tables, figures and report.html. To resume after an interruption, run
-    the same command again.
+    The command compares the drives of each map in place recognition and
+    structural change. It writes tables, figures and report.html. To resume
+    after an interruption, run the same command again.
 
     Args:
-        recordings: Folder of the recordings.
-        output: Folder for the report.
+        recordings: Folder that contains the recordings.
+        output: Folder for the report; created if it does not exist.
     """
     from cns_drake.base.jobs.cluster import choose_cluster
     from evaluation.paper import reference_for
@@ -371,21 +380,25 @@ def compare(
 ) -> None:
     """Rank the methods in tables of results.
 
-    RESULTS are files like results.csv, or folders that hold one. Their methods
-    are ranked together with the shipped ones, by the mean over the conditions
-    that all tables share, with 95 % intervals. Differences between methods get
-    p-values if a queries.csv lies next to each table, corrected (Holm) for all
-    differences that are printed. Kendall's tau measures how similarly two
-    tables rank the methods.
+    RESULTS are files like results.csv, or folders that hold one. The command
+    ranks their methods together with the shipped ones, by the mean over the
+    conditions that all tables share, with 95 % intervals. For AUC it also
+    prints the differences between methods. They have p-values if a queries.csv
+    lies next to each table, corrected by Holm's method for all differences that
+    are printed. Kendall's tau says how similarly two tables rank the methods.
 
     Args:
-        tables: Tables of results, or folders with a results.csv.
-        metric: Name of the metric to rank by, as in the tables.
-        protocol: Protocol whose rows to compare; by default all protocols.
-        gate: Compare the results that were measured with the gate, instead of
+        tables: Tables of results to compare, or folders with a results.csv.
+        metric: Metric to rank by: auc, r1 or another one in the tables. An
+            unknown name prints those that there are.
+        protocol: Compare only the rows that were measured by this protocol; own
+            stands for a protocol with changed options. By default the rows of
+            all protocols are compared, each with rows of the same protocol.
+        gate: Compare the results that were measured with the gate. By default
             those without it.
-        rankings: Compare only the rankings, each over its own conditions, such
-            as those of simulated and of real drives.
+        rankings: Compare only the order of the methods. Each table is ranked
+            over its own conditions, so they need not be the same, as for
+            simulated and real drives.
     """
     from evaluation.results import comparing
 

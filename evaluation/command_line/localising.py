@@ -36,31 +36,34 @@ def localise(
 ) -> None:
     """Localise scans in a map.
 
+    Each scan of QUERY is aligned to MAP from a start near its true pose. The
+    start is moved away from this pose by --start in a random direction, and
+    turned by --start-turn about a random axis. The results are errors and rates
+    of success.
+
     MAP and QUERY are drives (MCAP, MulRan, HeLiPR, NCLT, Boreas, KITTI
-    odometry, CNS) or point clouds (.pcd .ply .npy .bin). A drive becomes a map
-    by placing its scans at their true poses. A cloud as QUERY is one scan at
-    the origin of the map. Each scan is aligned to the map from a start near its
-    true pose, moved by --start in a random direction and turned by --start-turn
-    about a random axis.
+    odometry, CNS) or point clouds (.pcd .ply .npy .bin). The scans of a drive
+    as MAP are put together at their true poses. A cloud as QUERY is one scan,
+    whose true pose is the origin of the map.
 
     Args:
-        place: Drive or cloud that makes the map.
-        query: Drive or cloud whose scans are localised.
+        place: Drive or point cloud to use as the map.
+        query: Drive or point cloud whose scans are localised in the map.
         method: Registration method: icp, plane-icp, gicp, vgicp,
             robust-plane-icp, robust-gicp or kiss-matcher; or a Python file with
             a function of your own.
-        start: Distance of each start from the true pose [m].
-        start_turn: Angle by which each start is turned from the true pose
-            [deg].
-        seed: Seed of the random starts.
-        query_spacing: Distance driven between two queries [m].
-        follow: Track the whole drive: each scan starts from the estimated pose
-            of the one before.
+        start: Distance between each start and the true pose [m]. A larger one
+            makes the task harder.
+        start_turn: Angle between each start and the true pose [deg].
+        seed: Seed of the random directions of the starts.
+        query_spacing: Distance that the car drives between two queries [m].
+        follow: Track the whole drive instead of single scans: each scan starts
+            from the estimated pose of the scan before, moved by the odometry.
         odometry_drift: Drift of the odometry that --track uses, as a share of
-            the distance driven; the heading drifts by as many degrees per
-            metre.
-        output: Folder for the result of each query, localisation.csv, and with
-            --track a picture.
+            the distance driven. With 0.01, lengths are wrong by about 1 %, and
+            the heading drifts by about 0.01 deg per metre.
+        output: Folder to write: localisation.csv, with the result of each
+            query, and with --track a picture.
     """
     import math
 

@@ -33,20 +33,22 @@ def map_update(
 ) -> None:
     """Score labels of what changed between two maps.
 
-    Scores the labels of --labels-a and --labels-b, or else those of a baseline.
-    DIR is a folder that cns-drake map-truth wrote, or one with the same files
-    for real drives: A/map.ply, A/truth.npy, B/map.ply and B/truth.npy. A
-    baseline also needs scans and poses. Points whose true label is 255 are
-    ignored.
+    The command scores your own labels (--labels-a and --labels-b), or else
+    those of a baseline, against the true labels. DIR is a folder that cns-drake
+    map-truth wrote, or a folder with the same files for real drives: A/map.ply,
+    A/truth.npy, B/map.ply and B/truth.npy. A baseline also needs the scans and
+    poses in it. Points whose true label is 255 are ignored.
 
     Args:
         folder: Folder with the maps and their true labels.
-        baseline: Change detector to score; by default free-space, if no labels
-            are given.
-        labels_a: File of labels of A's map: 0 unobserved, 1 kept, 2 gone (.npy,
-            or .ply with a property prediction).
-        labels_b: File of labels of B's map: 1 kept, 3 new, 4 newly seen.
-        output: Folder for the baseline's labels of A and B.
+        baseline: Shipped change detector to score, instead of labels of your
+            own. By default free-space, if you give no labels.
+        labels_a: File with your labels of A's map: 0 unobserved, 1 kept, 2
+            gone. It is a .npy file, or a .ply file with a property
+            `prediction`. Needs --labels-b.
+        labels_b: File with your labels of B's map, in the same formats: 1 kept,
+            3 new, 4 newly seen. Needs --labels-a.
+        output: Folder for the labels that were scored, A.npy and B.npy.
     """
     from cns_drake.base.errors import InputError
     from cns_drake.base.files import make_folder
@@ -93,14 +95,14 @@ def map_sessions(
 ) -> None:
     """Make unlabelled maps of two recorded drives.
 
-    Writes the maps, scans and poses that cns-drake map-truth writes, but no
-    labels. Use it for drives whose world is unknown, such as real ones. Both
-    drives must be in one world frame.
+    The command writes the maps, scans and poses that cns-drake map-truth
+    writes, but no labels. Use it for drives whose world is unknown, such as
+    real ones. Both drives must be in one world frame.
 
     Args:
-        a: Older drive.
-        b: Newer drive.
-        output: Folder for both maps.
+        a: Older drive A.
+        b: Newer drive B, through the same place.
+        output: Folder for both maps, with their scans and poses.
     """
     from cns_drake.base.drives.drive import check_same_world
     from cns_drake.base.files import draft_folder

@@ -1,4 +1,4 @@
-"""What commands share: options, drives that are opened, results."""
+"""Options and functions that several commands share."""
 
 from __future__ import annotations
 
@@ -16,13 +16,13 @@ if TYPE_CHECKING:
     from evaluation.drives import Drive
 
 
-# When drives are aligned to one world.
+# Option: when drives are aligned to one world.
 When = Literal["auto", "always", "never"]
 Align = Annotated[
     When,
     typer.Option(
-        help="Whether to align drives to one world: auto aligns those whose "
-        "world frames differ."
+        help="Whether to align the drives to each other before they are "
+        "compared. With auto, they are aligned if their world frames differ."
     ),
 ]
 Json = Annotated[
@@ -32,8 +32,8 @@ MethodName = Annotated[
     str,
     typer.Option(
         "--method",
-        help="Name of a place-recognition method, or a Python file that "
-        "registers one.",
+        help="Place-recognition method: the name of a shipped one, or a Python "
+        "file that registers your own.",
     ),
 ]
 Parameters = Annotated[
@@ -41,8 +41,8 @@ Parameters = Annotated[
     typer.Option(
         "--set",
         metavar="NAME=VALUE",
-        help="Setting of the method; may be repeated. Separate several numbers "
-        "by commas.",
+        help="Change a setting of the method. Separate the numbers of a list "
+        "by commas. May be repeated.",
     ),
 ]
 SensorHeight = Annotated[
@@ -53,8 +53,8 @@ LidarName = Annotated[
     typer.Option(
         "--lidar",
         metavar="NAME",
-        help="Name of the LiDAR to read, if a recording has several; its topic "
-        "is /NAME/points.",
+        help="LiDAR to read, if a recording has several. Its name is part of "
+        "its topic, /NAME/points.",
     ),
 ]
 Columns = Annotated[
@@ -63,16 +63,17 @@ Columns = Annotated[
         "--columns",
         metavar="N",
         min=3,  # x, y, z
-        help="Number of float32 values per point in .bin files, x y z first; "
-        "by default it is guessed from the values.",
+        help="Number of float32 values per point in .bin files, of which the "
+        "first three are x, y and z. By default it is guessed from the values; "
+        "give it if the guess is wrong.",
     ),
 ]
 OwnMethods = Annotated[
     list[Path] | None,
     typer.Option(
         help="Method to run in addition to the standard ones: map-closures, "
-        "probe, svt-net, dpa-net, or a Python file that registers one; may be "
-        "repeated."
+        "probe, svt-net or dpa-net, or a Python file that registers your own. "
+        "May be repeated."
     ),
 ]
 
@@ -117,10 +118,10 @@ def show(
 
 
 def overlap_of(truth: str) -> float | None:
-    """Returns the least overlap, of `overlap:PART`; None for `radius`.
+    """Returns PART of `overlap:PART`; None for `radius`.
 
     Raises:
-        InputError: if it is neither.
+        InputError: the text is neither.
     """
     if truth == "radius":
         return None

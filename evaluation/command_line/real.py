@@ -16,19 +16,22 @@ def real(
 ) -> None:
     """Measure place recognition and registration on real scans.
 
-    DIR holds excerpts of public data sets, each in a folder named as the
-    documentation lists them: KITTI 00 and its revisits, nuScenes 1072, Newer
-    College, NCLT and HeLiPR. Missing data sets are named and skipped. Writes
-    results.csv and queries.csv, which cns-eval compare reads.
+    DIR contains excerpts of public data sets, each in a folder with the name
+    that the page "Real drives" of the documentation lists: KITTI 00 and its
+    revisits, nuScenes 1072, Newer College, NCLT and HeLiPR. The command names
+    and skips missing data sets. It writes results.csv and queries.csv, which
+    cns-eval compare reads.
 
     Args:
         folder: Folder with the excerpts.
-        output: Folder for the results.
-        method: Method or estimator to run: the name of a shipped one, or the
-            Python file of your own; by default all; may be repeated.
-        simulated: Folder of simulated recordings. Those of the same LiDAR add
-            places to the database, and a classifier is trained to tell them
-            from the real scans.
+        output: Folder for the results; created if it does not exist.
+        method: Place-recognition method or registration method to run: the name
+            of a shipped one, or a Python file with your own. By default all
+            shipped ones. May be repeated.
+        simulated: Folder with simulated recordings. Those of a data set's LiDAR
+            are added to its database as further places. A classifier is also
+            trained to tell them from the real scans, which shows how realistic
+            they are.
     """
     from cns_drake.base.files import make_folder
     from evaluation.real.measuring import Measuring

@@ -26,13 +26,14 @@ def drives(
 ) -> None:
     """Compare the paths of two drives.
 
-    Takes a point of A every 5 m and measures how B passes it: offset, lane,
-    heading, height and stops. The same figures are shown for two pairs of real
-    drives along one route (Boreas, 28 days apart; KAIST 01 and 02 of MulRan).
+    Every 5 m along A, the command measures how B passes there: its offset,
+    lane, heading, height and stops. Next to these figures it shows those of two
+    pairs of real drives along one route (Boreas, 28 days apart; KAIST 01 and 02
+    of MulRan), so that you can see whether yours differ as real drives do.
 
     Args:
-        first: Recorded drive.
-        second: Recorded drive along the same streets.
+        first: Recorded drive A.
+        second: Recorded drive B along the same streets.
     """
     from evaluation.drives.comparison import compare_drives
 
@@ -54,16 +55,18 @@ def trajectory(
 ) -> None:
     """Measure the errors of an estimated trajectory.
 
-    The estimate is a TUM file: time [s], x y z and a quaternion x y z w. Prints
-    the errors as evo and KITTI define them: ATE, the root mean square of the
-    distances from DRIVE after rigid alignment, and drift, the error of the
-    motion over 100 m of path.
+    The estimate is a TUM file: time [s], x y z and a quaternion x y z w. The
+    command prints two errors, as evo and KITTI define them. ATE is the root
+    mean square of the distances from the true trajectory after rigid alignment.
+    Drift is the error of the motion over 100 m of path.
 
     Args:
         drive: Recorded drive with the true trajectory.
-        estimate: File of the estimated trajectory.
-        frame: Frame whose poses are estimated: the LiDAR's or the vehicle's.
-        time_offset: Time to add to the times of the estimate [s].
+        estimate: File with the estimated trajectory.
+        frame: Frame whose poses the file contains: the LiDAR's (lidar) or the
+            vehicle's (base_link).
+        time_offset: Time to add to the times of the estimate [s], if its clock
+            differs from that of the drive.
     """
     from evaluation.alignment.trajectory_errors import trajectory_errors
     from evaluation.drives.text_tables import read_tum

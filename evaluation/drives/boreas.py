@@ -4,10 +4,11 @@
     SEQ/applanix/lidar_poses.csv     us, x y z [m], velocity, roll pitch yaw
                                      [rad], angular velocity
 
-Times are those of the middle of a scan; a point's time is in seconds from it.
-Angles are those of the world in the LiDAR's frame S, as its development kit
-reads them: Rz(yaw) Ry(pitch) Rx(roll) is R_SW. All drives share W, with its
-axes east, north and up. In the first releases it was the UTM grid.
+The time of a scan is that of its middle; the time of a point is in seconds
+relative to it. Angles describe the rotation of the world in the LiDAR's frame
+S, as in the data set's development kit: Rz(yaw) Ry(pitch) Rx(roll) is R_SW. All
+drives share W, with its axes east, north and up. In the first releases W was
+the UTM grid.
 """
 
 from pathlib import Path
@@ -38,7 +39,7 @@ _POINT = np.dtype(
     ]
 )
 _LONGEST_GAP_NS = 1_000_000_000
-# Of W on the UTM grid, in Toronto, see `scan_files.ORIGIN` [m].
+# Origin of W on the UTM grid, in Toronto; see `scan_files.ORIGIN` [m].
 _ORIGIN = (620_000.0, 4_845_000.0, 0.0)
 
 
@@ -46,10 +47,10 @@ class BoreasDrive(FileDrive):
     """The scans of the Alpha Prime on a drive of Boreas."""
 
     def __init__(self, path: Path, columns: int | None = None):
-        """Opens a drive; its files have columns of their own.
+        """Opens a drive, whose scans have a fixed layout.
 
         Raises:
-            InputError: if there is none, or its poses cannot be used.
+            InputError: there is no such drive, or its poses cannot be used.
         """
         del columns
         files, stamps_ns = list_stamped(

@@ -37,11 +37,12 @@ _IMU = "imu.csv"
 # Names of the folder in the paper and in the download.
 _FOLDERS = ("pcd", "LiDAR")
 _MOUNT = "transformation_lidar.yaml"
-# Above the vehicle, by the data set's figure of its sensors [m].
+# Height of the LiDAR above the vehicle's origin, from the data set's drawing
+# [m].
 _LIDAR_HEIGHT = 1.6
 
-# Scans and poses have the same times. Only their notation may differ: a double
-# holds nanoseconds since 1970 with an error.
+# Scans and poses have the same times, but their notation can differ: a double
+# rounds nanoseconds since 1970.
 _TOLERANCE_NS = 1000
 
 
@@ -54,10 +55,10 @@ class CnsFolderDrive(FileDrive):
     """
 
     def __init__(self, path: Path, columns: int | None = None):
-        """Opens a drive; its clouds say themselves what columns they have.
+        """Opens a drive; PCD files themselves name their columns.
 
         Raises:
-            InputError: if there is none, or its poses cannot be used.
+            InputError: there is no such drive, or its poses cannot be used.
         """
         folders = [path / name for name in _FOLDERS if (path / name).is_dir()]
         if not folders:
@@ -127,7 +128,7 @@ def _read_mount(path: Path | None) -> np.ndarray:
     if path is None:
         return poses.make_pose(np.eye(3), np.array([0.0, 0.0, _LIDAR_HEIGHT]))
     with value_errors(path):
-        # OpenCV begins its files with a directive that is not YAML's.
+        # OpenCV's files begin with a directive that is not valid YAML.
         lines = [
             x for x in read_text(path).splitlines() if not x.startswith("%")
         ]
@@ -146,7 +147,7 @@ def _read_mount(path: Path | None) -> np.ndarray:
 
 
 class _Loader(yaml.SafeLoader):
-    """Reads values with tags of their own (OpenCV's matrices) as if without."""
+    """Loads YAML and ignores custom tags, such as OpenCV's for matrices."""
 
 
 _Loader.add_multi_constructor(
@@ -194,7 +195,7 @@ def _compose(p: np.ndarray, rotation: np.ndarray, path: Path) -> np.ndarray:
 
 
 def _numbers(node: Any) -> np.ndarray | None:
-    """Returns the numbers of a flat or nested list, or of x, y, z, w keys."""
+    """Returns the numbers of a list, flat or nested, or of keys x, y, z, w."""
     if isinstance(node, dict):
         keys = [key for key in "xyzw" if key in node]
         node = [node[key] for key in keys] if len(keys) >= 3 else None

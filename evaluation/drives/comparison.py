@@ -1,7 +1,7 @@
-"""How the ways of two drives differ: offsets, lanes, headings, stops.
+"""How the paths of two drives differ: offsets, lanes, headings, stops.
 
-Two drives along one route differ by their drivers. These are the quantities in
-which real drives are compared with simulated ones.
+Two drives along one route differ because of their drivers. The quantities here
+serve to compare real drives with simulated ones.
 """
 
 from dataclasses import asdict, dataclass
@@ -16,7 +16,8 @@ from cns_drake.base.errors import InputError
 from cns_drake.base.json_text import json_number
 from evaluation.drives.sampling import travelled
 
-# Distance between the stops at which two drives are compared [m].
+# Distance between the stations at which two drives are compared [m]; the code
+# calls the stations stops.
 STOP_SPACING = 5.0
 # Two drives meet at a stop if they pass within this distance [m].
 MEETING_RADIUS = 12.0
@@ -24,15 +25,15 @@ MEETING_RADIUS = 12.0
 LANE_OFFSET = 1.5
 # A vehicle stands below this speed [m/s].
 STANDING_SPEED = 0.5
-# The path is sampled this densely [m], from poses that are at least this far
-# apart, so that the jitter of a standing receiver makes no way.
+# The path is sampled at this spacing [m], from poses that are at least this far
+# apart, so that the jitter of a standing receiver does not lengthen the path.
 _PATH_SPACING = 0.25
 _LEAST_STEP = 0.2
 # Half of the length over which a path's direction is taken [m].
 _DIRECTION_REACH = 1.0
-# Pairs of stops that a correlation needs.
+# Least number of pairs of stations for a correlation.
 _LEAST_PAIRS = 20
-# Speeds are taken over this time [s].
+# Speeds are averaged over this time [s].
 _SPEED_TIME = 0.5
 
 
@@ -43,7 +44,7 @@ class Driving:
     Attributes:
         name: the drive's name.
         length: length of the way [m].
-        standing: part of the time below `STANDING_SPEED`.
+        standing: share of the time with a speed below `STANDING_SPEED`.
         speed_10, speed_50, speed_90: quantiles of the speed while it moves
             [m/s]; NaN if it never does.
         roll_spread_deg, pitch_spread_deg: standard deviations of the sensor's
@@ -62,23 +63,26 @@ class Driving:
 
 @dataclass(frozen=True)
 class DriveComparison:
-    """How the way of a drive B differs from that of a drive A.
+    """How the path of a drive B differs from that of a drive A.
 
-    A has a stop every `STOP_SPACING`. B meets it if its path passes within
-    `MEETING_RADIUS`, and it is compared at the nearest place that has A's
-    direction. Offsets are horizontal and square to A's path. Values that
-    nothing was measured for are NaN.
+    Stops are points of A's path, `STOP_SPACING` apart. B meets a stop if its
+    path passes within `MEETING_RADIUS` of it. The two drives are then compared
+    at the nearest point of B's path that has A's direction. Offsets are
+    horizontal and perpendicular to A's path. Values without a measurement are
+    NaN.
 
     Attributes:
         first, second: how A and B were driven.
         num_stops: number of stops of A.
-        num_met: number of them that B meets.
-        reverse: part of these that B meets in the opposite direction only.
+        num_met: number of these stops that B meets.
+        reverse: share of the met stops that B meets only in the opposite
+            direction.
         offset_50, offset_75, offset_90, offset_95, offset_99: quantiles of the
             absolute offset in the same direction [m].
-        other_lane: part of the stops in the same direction with an offset of
-            more than `LANE_OFFSET`.
-        episode_50, episode_90: quantiles of the length of such an episode [m].
+        other_lane: share of the stops met in the same direction at which the
+            offset exceeds `LANE_OFFSET`.
+        episode_50, episode_90: quantiles of the length of a stretch in another
+            lane [m].
         wander: standard deviation of the offset in the same lane [m].
         wander_length: distance along A at which the correlation of the offset
             in the same lane has fallen to 1/e [m].
@@ -130,7 +134,7 @@ class DriveComparison:
 
 @dataclass(frozen=True)
 class _Way:
-    """A path in steps of `_PATH_SPACING`.
+    """A drive's path, sampled in steps of `_PATH_SPACING`.
 
     Attributes:
         length: length of the path [m].
@@ -145,7 +149,7 @@ class _Way:
     tangent: np.ndarray
 
     def stops(self) -> np.ndarray:
-        """Returns the indices of the path's steps that are stops."""
+        """Returns the indices of those samples of the path that are stops."""
         return np.arange(0, len(self.p_WS), round(STOP_SPACING / _PATH_SPACING))
 
 
@@ -157,8 +161,7 @@ def compare_drives(first: Drive, second: Drive) -> DriveComparison:
         second: drive B, in the same world, with its LiDAR mounted as on A.
 
     Raises:
-        InputError: if the two are not of one world, or one of them never
-            moves.
+        InputError: the two drives are not in one world, or one never moves.
 
     Example:
         from evaluation import compare_drives, open_drive
@@ -236,9 +239,10 @@ def _way(drive: Drive) -> _Way:
 
 
 def _nearest(p_A: np.ndarray, direction: np.ndarray, way: _Way) -> np.ndarray:
-    """Returns the steps of a way nearest to stops (N, 3), in directions (N, 2).
+    """Returns the index of the path's sample nearest to each stop, (N,).
 
-    -1 where the way does not pass by in a direction less than 90 deg away.
+    Only samples within `MEETING_RADIUS` count whose direction is less than 90
+    deg from that of the stop (N, 2); the index is -1 if there are none.
     """
     xy = way.p_WS[:, :2]
     found = np.full(len(p_A), -1)
@@ -255,7 +259,7 @@ def _nearest(p_A: np.ndarray, direction: np.ndarray, way: _Way) -> np.ndarray:
 def _offsets(
     p_A: np.ndarray, tangent: np.ndarray, way: _Way, steps: np.ndarray
 ) -> np.ndarray:
-    """Returns the (N,) offsets to the left of A's path; NaN for step -1."""
+    """Returns offsets (N,) to the left of A's path [m]; NaN for index -1."""
     x, y = (way.p_WS[steps, :2] - p_A[:, :2]).T
     offset = tangent[:, 0] * y - tangent[:, 1] * x
     return np.where(steps >= 0, offset, np.nan)
@@ -264,7 +268,7 @@ def _offsets(
 def _correlation_length(offset: np.ndarray, within: np.ndarray) -> float:
     """Returns the distance at which the correlation has fallen to 1/e [m].
 
-    Between the stops that count it is interpolated. It is NaN if the
+    The correlation is interpolated between stops. The result is NaN if the
     correlation does not fall so far within a quarter of the stops.
     """
     if not within.any():
@@ -290,7 +294,7 @@ def _correlation_length(offset: np.ndarray, within: np.ndarray) -> float:
 def _driving(drive: Drive, way: _Way) -> Driving:
     time = (drive.stamps_ns - drive.stamps_ns[0]) * 1e-9
     p_WS = drive.X_WS[:, :3, 3]
-    # Each frame with the first one that is _SPEED_TIME later.
+    # Pair each frame with the first frame that is _SPEED_TIME later.
     later = np.searchsorted(time, time + _SPEED_TIME - 1e-6)
     now = np.flatnonzero(later < len(time))
     later = later[now]
@@ -300,7 +304,7 @@ def _driving(drive: Drive, way: _Way) -> Driving:
     R_WS = drive.X_WS[way.frame[way.stops()], :3, :3]
     roll = np.arctan2(R_WS[:, 2, 1], R_WS[:, 2, 2])
     pitch = -np.arcsin(np.clip(R_WS[:, 2, 0], -1.0, 1.0))
-    # About their means, so that a turned mount does not cut the circle.
+    # Relative to the mean, so that a tilted mount does not wrap around.
     roll = np.angle(np.exp(1j * roll) / np.exp(1j * roll).mean())
     return Driving(
         name=drive.name,
@@ -313,7 +317,7 @@ def _driving(drive: Drive, way: _Way) -> Driving:
 
 
 def _runs(flags: np.ndarray) -> np.ndarray:
-    """Returns the lengths of the runs of true values, in their order."""
+    """Returns the length of each run of consecutive true values."""
     edges = np.flatnonzero(np.diff(flags, prepend=False, append=False))
     return edges[1::2] - edges[::2]
 
@@ -321,7 +325,7 @@ def _runs(flags: np.ndarray) -> np.ndarray:
 def _quantiles(
     name: str, values: np.ndarray, *percentages: int
 ) -> dict[str, float]:
-    """Returns quantiles, named by their percentages; NaN of no values."""
+    """Returns name -> quantile; NaN if there are no values."""
     if len(values) == 0:
         return {name.format(one): math.nan for one in percentages}
     return {

@@ -1,4 +1,4 @@
-"""Drives that show another drive otherwise: moved, or with scans kept."""
+"""Views of another drive: at other poses, or with scans kept in memory."""
 
 from collections import OrderedDict
 from collections.abc import Mapping
@@ -11,10 +11,10 @@ from cns_drake.base.drives.lidar_fields import LidarField
 
 
 class DriveView(Drive):
-    """Has the length, times, poses and scenario of another drive."""
+    """A drive that takes length, times, poses and scenario from another one."""
 
     def __init__(self, drive: Drive):
-        """Begins with the other drive."""
+        """Wraps another drive."""
         self.name = drive.name
         self._drive = drive
 
@@ -48,7 +48,7 @@ class MovedDrive(DriveView):
         world_frame: str,
         datum: str | None,
     ):
-        """Gives a drive other poses.
+        """Wraps a drive and replaces its poses.
 
         Args:
             drive: drive of N scans.
@@ -82,7 +82,7 @@ class MovedDrive(DriveView):
 
 
 class CountedDrive(MovedDrive):
-    """Another drive, which counts the points that are not finite.
+    """Another drive, with a count of the points that are not finite.
 
     Attributes:
         num_ignored: number of such points in the scans that were read.
@@ -104,19 +104,19 @@ class CountedDrive(MovedDrive):
 
 
 class RecentScans(DriveView):
-    """A drive that reads each scan once.
+    """Another drive, whose last scans stay in memory.
 
-    This holds for a program that reads scans in increasing order, or goes back
-    by at most as many scans as are kept.
+    Each scan is read only once by a program that asks for scans in increasing
+    order, or goes back by fewer scans than are kept.
     """
 
     def __init__(self, drive: Drive, kept: int):
-        """Starts without a scan in memory.
+        """Wraps a drive, without a scan in memory.
 
         Args:
             drive: the drive.
-            kept: number of the last scans that stay in memory; older ones are
-                read again.
+            kept: number of scans that stay in memory; older scans are read
+                again if needed.
         """
         super().__init__(drive)
         self._kept = kept

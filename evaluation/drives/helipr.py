@@ -34,7 +34,7 @@ _AEVA_EARLY = [
     ("time_offset_ns", "<i4"),
     ("line_index", "u1"),
 ]
-# Records have no padding: 26, 22, 19, 29 and 25 bytes.
+# Sizes of the unpadded records: 26, 22, 19, 29 and 25 bytes.
 _RECORDS = {
     "Ouster": np.dtype(
         [
@@ -71,8 +71,8 @@ _LONGEST_GAP_NS = 1_000_000_000
 class HeliprDrive(FileDrive):
     """The scans of one LiDAR of HeLiPR on a drive.
 
-    With a `global_*_gt.txt`, W is the UTM grid with a nearer origin, see
-    `scan_files.to_world`; else W is the frame of the drive's own
+    If there is a `global_*_gt.txt`, W is the UTM grid with a nearer origin (see
+    `scan_files.to_world`). Otherwise W is the frame of the drive's own
     `*_gt.txt`. Points without a return are left out.
     """
 
@@ -85,7 +85,7 @@ class HeliprDrive(FileDrive):
                 the Ouster, or else the only one there.
 
         Raises:
-            InputError: if there is none, or its poses cannot be used.
+            InputError: there is no such drive, or its poses cannot be used.
         """
         drive, lidar = _choose(path, lidar)
         self._lidar = lidar
@@ -114,7 +114,9 @@ class HeliprDrive(FileDrive):
 
 
 def read_scan(lidar: str, path: Path, stamp_ns: int = 2**63) -> np.ndarray:
-    """Returns the points (N,) of a scan of a LiDAR, by its time [ns].
+    """Returns the points (N,) of a scan file of a LiDAR.
+
+    Aeva's format depends on the time of the scan [ns].
 
     Raises:
         ValueError: if the file is not of that LiDAR.

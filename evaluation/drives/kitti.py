@@ -7,15 +7,15 @@
 
 C is the left grey camera (x right, y down, z forward), C0 that at the first
 scan, S the LiDAR. Without a `calib.txt` the poses are those of the LiDAR,
-X_S0S. If scans are missing, the numbers in the names of the others select their
-rows. If scans were renumbered, `frames.txt` has their old numbers, one for each
-scan.
+X_S0S. If scans are missing, the numbers in the names of the remaining files
+select the rows of the tables. If scans were renumbered, `frames.txt` has their
+old numbers, one for each scan.
 
-Beside these there may be, in SemanticKITTI's form,
+There may also be labels, in SemanticKITTI's form,
 
     sequences/NN/labels/%06d.label   uint32 label | instance << 16, a point
 
-and, as cns-drake exports a drive,
+and, in drives exported by cns-drake,
 
     sequences/NN/first_pose.txt      upper 3 x 4 of X_WS at the first scan
     sequences/NN/scenario.yaml
@@ -50,8 +50,8 @@ _LABELS = "labels"
 _FRAMES = "frames.txt"
 _FIRST_POSE = "first_pose.txt"
 _STRUCTURES = "structures.json"
-# Below that of KITTI's cameras, 707 or more [pixels]; other projections in such
-# files are the identity.
+# Least focal length of a camera [pixels]. KITTI's cameras have 707 or more; in
+# other files the projection is the identity.
 _KITTIS_FOCAL_LENGTH = 100.0
 _LABEL = np.dtype([("label", "<u2"), ("instance", "<u2")])
 
@@ -59,10 +59,10 @@ _LABEL = np.dtype([("label", "<u2"), ("instance", "<u2")])
 class KittiDrive(BinDrive):
     """A drive of KITTI odometry.
 
-    Poses of the LiDAR are X_S0S = inverse(Tr) X_C0C Tr. W is S0, the frame
-    of the LiDAR at the first scan and not that of the camera, so that z is
-    up; with a `first_pose.txt` it is the world of the recording. With
-    `labels` points have the fields `label` and `instance`.
+    Poses of the LiDAR are X_S0S = inverse(Tr) X_C0C Tr. W is S0, the frame of
+    the LiDAR at the first scan. It is not that of the camera, so that z is up.
+    If there is a `first_pose.txt`, W is the world of the recording. If there
+    are `labels`, points have the fields `label` and `instance`.
     """
 
     def __init__(self, path: Path, columns: int | None = None):
@@ -71,12 +71,12 @@ class KittiDrive(BinDrive):
         Args:
             path: its folder; the poses lie in `../../poses/<name>.txt`, or
                 as `poses.txt` beside the scans.
-            columns: number of columns of a scan; by default as its values
-                show.
+            columns: number of columns of a scan; by default guessed from the
+                values.
 
         Raises:
-            InputError: if there is none, its files do not fit together, or
-                it has no poses (as 11 to 21).
+            InputError: there is no such drive, its files do not fit together,
+                or it has no poses, like KITTI's sequences 11 to 21.
         """
         files, numbers = _numbered_files(path)
         times_path = path / "times.txt"
@@ -90,8 +90,8 @@ class KittiDrive(BinDrive):
         notes: list[str] = []
         stamps_ns = _rows_of_scans(times_path, stamps_ns, numbers, notes)
         X_C0C = _rows_of_scans(poses_path, X_C0C, numbers, notes)
-        # If numbers are missing, one table may have a row for each number and
-        # the other a row for each scan.
+        # If scans are missing, one table may have a row for each number and the
+        # other table a row for each existing scan.
         gaps = numbers != list(range(len(files)))
         if counts[0] != counts[1] and not gaps:
             raise InputError(
@@ -201,7 +201,8 @@ def _rows_of_scans(
 ) -> np.ndarray:
     """Returns the rows of a table that belong to the scans.
 
-    A table has a row for each scan; or for each number, which gives a note.
+    The table must have a row for each scan, or a row for each number; in the
+    second case a note is returned as well.
     """
     if len(rows) == len(numbers):
         return rows
@@ -241,7 +242,7 @@ def _read_first_pose(path: Path) -> np.ndarray:
 
 
 def _read_calibration(path: Path) -> dict[str, np.ndarray]:
-    """Returns the rows P0 and Tr, if they are there, (1, 12) each.
+    """Returns the rows P0 and Tr of `calib.txt`, (1, 12) each, if present.
 
     Tr is the upper 3 x 4 of X_CS, the pose of the LiDAR in the camera's frame.
 

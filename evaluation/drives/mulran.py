@@ -27,7 +27,7 @@ from evaluation.drives.text_tables import read_matrices
 _POSES = "global_pose.csv"
 _FOLDERS = ("sensor_data/Ouster", "Ouster")
 
-# Fields that follow from the place of a point in a whole scan.
+# Fields that follow from the index of a point in a complete scan.
 _FOUND = [("ring", "<u2"), ("t", "<u4")]
 
 _NUM_RINGS = 64
@@ -40,13 +40,12 @@ _LONGEST_GAP_NS = 1_000_000_000
 class MulranDrive(BinDrive):
     """A drive of MulRan.
 
-    W is the UTM grid with a nearer origin, see `scan_files.to_world`; for poses
-    in local coordinates it is the drive's own frame.
-    The pose of a scan is interpolated at its stamp. Points without a return,
-    which are stored as (0, 0, 0), are left out. A complete scan has the fields
-    `ring` and `t` [ns since the stamp] beside the stored ones. A scan with too
-    few points lacks these two, because its file does not show which points are
-    missing.
+    W is the UTM grid with a nearer origin (see `scan_files.to_world`). If the
+    poses are in local coordinates, W is the drive's own frame. The pose of a
+    scan is interpolated at its stamp. Points without a return, which are stored
+    as (0, 0, 0), are left out. A complete scan has the fields `ring` and `t`
+    [ns since the stamp] beside the stored ones. A scan with too few points
+    lacks these two, because its file does not show which points are missing.
     """
 
     def __init__(self, path: Path, columns: int | None = None):
@@ -54,11 +53,11 @@ class MulranDrive(BinDrive):
 
         Args:
             path: its folder, with or without a `sensor_data`.
-            columns: number of columns of a scan; by default as its values
-                show.
+            columns: number of columns of a scan; by default guessed from the
+                values.
 
         Raises:
-            InputError: if there is none, or its poses cannot be used.
+            InputError: there is no such drive, or its poses cannot be used.
         """
         folder = _scan_folder(path)
         if folder is None:
@@ -78,7 +77,7 @@ class MulranDrive(BinDrive):
             )
         else:
             X_UB = to_world(X_UB, trajectory.path)
-        scenario = read_scenario(path)  # An export of cns-drake has one.
+        scenario = read_scenario(path)  # cns-drake exports one.
         super().__init__(
             columns,
             name=name,
@@ -96,7 +95,7 @@ class MulranDrive(BinDrive):
         stored = super()._read(path, stamp_ns)
         if len(stored) != _NUM_RINGS * _NUM_COLUMNS:
             return stored
-        # Points are stored column by column, each from ring to ring.
+        # Points are stored column by column, and within a column ring by ring.
         points = np.empty(len(stored), dtype=[*stored.dtype.descr, *_FOUND])
         for name in stored.dtype.names or ():
             points[name] = stored[name]

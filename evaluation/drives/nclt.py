@@ -3,10 +3,10 @@
     DATE/velodyne_sync/<us>.bin     uint16 x y z, uint8 intensity, uint8 laser
     groundtruth_DATE.csv            us, x y z [m], roll pitch yaw [rad] of X_NB
 
-The table lies in the drive's folder, beside it, or in a `ground_truth` there.
-N has its axes north, east and down. B is the vehicle's body, with x forward, y
-right and z down; points are in B, and stored in steps of 5 mm from -100 m on.
-All sessions share N.
+The table is in the drive's folder, beside that folder, or in a folder
+`ground_truth` there. The axes of N point north, east and down. B is the
+vehicle's body, with x forward, y right and z down. Points are expressed in B
+and stored as multiples of 5 mm, counted from -100 m. All sessions share N.
 """
 
 from pathlib import Path
@@ -43,8 +43,8 @@ _LONGEST_GAP_NS = 1_000_000_000
 _X_WN = poses.make_pose(
     np.array([[0.0, 1.0, 0.0], [1.0, 0.0, 0.0], [0.0, 0.0, -1.0]]), np.zeros(3)
 )
-# S is at the LiDAR, by the data set's x_body_velodyne, with x forward, y left
-# and z up.
+# The origin of S is the LiDAR's, from the data set's x_body_velodyne; its x is
+# forward, y left and z up.
 _X_BS = poses.make_pose(
     np.diag([1.0, -1.0, -1.0]), np.array([0.002, -0.004, -0.957])
 )
@@ -60,10 +60,10 @@ class NcltDrive(FileDrive):
     """
 
     def __init__(self, path: Path, columns: int | None = None):
-        """Opens a session; its files have columns of their own.
+        """Opens a session, whose scans have a fixed layout.
 
         Raises:
-            InputError: if there is none, or its poses cannot be used.
+            InputError: there is no such session, or its poses cannot be used.
         """
         del columns
         if not (path / _SCANS).is_dir():

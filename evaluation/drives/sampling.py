@@ -19,7 +19,7 @@ from cns_drake.base import poses
 from cns_drake.base.drives.drive import Drive
 from cns_drake.base.errors import InputError
 
-# Frames that lie closer stand at one place [m].
+# Frames closer than this are at the same place [m].
 _LEAST_SPACING = 1e-6
 
 
@@ -48,11 +48,12 @@ class QuerySensor:
         tilt_deg: float,
         hidden_deg: float,
     ) -> QuerySensor:
-        """Draws how a query is turned, tilted and hidden.
+        """Draws a query's random turn, tilt and hidden sector.
 
-        The draw at a frame is the same for all drives, so that a query of a
-        drive and the same query of its control are turned alike. The draw of
-        each effect does not depend on whether the other effects are used.
+        The draw depends on the frame's number but not on the drive, so that a
+        query of a drive and the same query of its control are turned alike. The
+        draw of each effect does not depend on whether the other effects are
+        used.
 
         Args:
             seed: seed of the draws.
@@ -72,12 +73,12 @@ class QuerySensor:
         return cls(X_SQ, float(hidden_from), math.radians(hidden_deg))
 
     def without_hidden(self, scan: np.ndarray) -> np.ndarray:
-        """Returns the points of a scan of S outside the hidden sector."""
+        """Returns those points of a scan in S that the hidden sector leaves."""
         if self.hidden == 0.0:
             return scan
         azimuth = np.arctan2(scan["y"], scan["x"]).astype(np.float64)
         turned = np.mod(azimuth - self.hidden_from, 2.0 * math.pi)
-        # A point that is not finite is in no sector.
+        # Points that are not finite are in no sector.
         return scan[~(turned < self.hidden)]
 
 
@@ -88,7 +89,7 @@ def travelled(positions: np.ndarray) -> np.ndarray:
 
 
 def sample_frames(positions: np.ndarray, spacing: float) -> np.ndarray:
-    """Returns frames at equal distances along a trajectory.
+    """Returns frames at a given spacing along a trajectory.
 
     Args:
         positions: (N, 3) positions of the sensor [m], at least one.
@@ -136,12 +137,12 @@ def gather(
         max_range: see `within_range`.
         fields: fields of the points, beside their coordinates.
         num_before: how many of the scans come before the frame.
-        sensor: turns the frame's sensor, and hides the same sector of each of
-            the scans; None for the cloud as recorded.
+        sensor: sensor by which the frame's sensor is turned and a sector of
+            each merged scan is hidden; None for the cloud as recorded.
 
     Returns:
-        (N, 3) float64, in the sensor frame of the frame's scan; with fields,
-        a structured array (N,) of float64 x, y, z and the fields.
+        (N, 3) float64 points in the sensor's frame at that frame. If fields are
+        requested, a structured array (N,) of float64 x, y, z and the fields.
 
     Raises:
         InputError: if the scans lack a field.
@@ -177,9 +178,8 @@ def cropped(
 ) -> np.ndarray:
     """Returns the points of a scan that are finite and within range.
 
-    Products and sums are computed one by one, since these are rounded in the
-    same way on every processor. The rounding of a matrix product depends on the
-    processor.
+    Products and sums are computed one by one, because they are then rounded in
+    the same way on every processor; a matrix product is not.
 
     Args:
         scan: structured array (N,) in the frame S of a sensor.

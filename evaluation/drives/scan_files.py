@@ -25,7 +25,7 @@ _LIMITS = ((100_000.0, 900_000.0), (0.0, 10_000_000.0))
 
 
 def is_local(X_WB: np.ndarray) -> bool:
-    """Returns whether poses (N, 4, 4) are too near the origin to be in UTM."""
+    """Returns whether poses (N, 4, 4) are too near the origin for UTM."""
     return bool((np.abs(X_WB[:, :2, 3]) < _LIMITS[0][0]).all())
 
 
@@ -33,9 +33,9 @@ def to_world(X_UB: np.ndarray, path: Path) -> np.ndarray:
     """Returns poses X_WB (N, 4, 4) from poses in the UTM grid U, zone 52N.
 
     W has its axes east, north and up, and its origin at a fixed point of that
-    grid near the drives of MulRan and HeLiPR. Coordinates are a few kilometres
-    instead of thousands: a float32 resolves them to under a millimetre, but
-    easting and northing to 0.25 m.
+    grid near the drives of MulRan and HeLiPR. Coordinates in W are at most a
+    few kilometres, which float32 resolves to under a millimetre. It would
+    resolve easting and northing, thousands of kilometres, only to 0.25 m.
 
     Raises:
         InputError: if a position cannot be in UTM metres.
@@ -174,7 +174,7 @@ def list_stamped(
     Args:
         folder: folder of the files.
         suffix: suffix of their names.
-        parse: returns times [ns] of texts.
+        parse: function that returns the times [ns] of texts.
 
     Returns:
         The files in order of time; (N,) int64 times [ns]; N >= 1.
@@ -200,10 +200,10 @@ def list_stamped(
 def keep_spanned(
     files: list[Path], spanned: np.ndarray, poses_path: Path
 ) -> tuple[list[Path], tuple[str, ...]]:
-    """Returns scan files without those before the first or after the last pose.
+    """Leaves out scan files before the first or after the last pose.
 
     Returns:
-        The other files; a note if scans were left out.
+        The remaining files; a note if scans were left out.
     """
     if spanned.all():
         return files, ()
@@ -216,7 +216,7 @@ def keep_spanned(
 
 
 def read_packed(path: Path, dtype: np.dtype) -> np.ndarray:
-    """Returns the records of a file that contains nothing else.
+    """Returns the records of a file without a header.
 
     Raises:
         ValueError: if the last record is incomplete.
@@ -234,7 +234,7 @@ def read_packed(path: Path, dtype: np.dtype) -> np.ndarray:
 def check_below(points: np.ndarray, name: str, limit: int) -> None:
     """Raises an error for points whose field exceeds a sensor's limit.
 
-    This check notices files of another sensor.
+    The error shows that a file is from another sensor.
 
     Raises:
         ValueError: if `points[name]` reaches `limit`.
@@ -247,7 +247,7 @@ def check_below(points: np.ndarray, name: str, limit: int) -> None:
 
 
 def _returns(points: np.ndarray) -> np.ndarray:
-    """Leaves out points without a return, which are stored at the origin.
+    """Returns the points without those at the origin: beams with no return.
 
     Raises:
         ValueError: if a coordinate is too large for a point.

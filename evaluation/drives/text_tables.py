@@ -16,10 +16,10 @@ from cns_drake.base.number_rows import is_number, parse_rows
 
 _NS_PER_S = 1_000_000_000
 _NS_PER_US = 1000
-# Enough for hours of an IMU [bytes].
+# Largest table [bytes]: enough for hours of an IMU.
 _TABLE_LIMIT_BYTES = 1 << 26
-# Greatest error of a rotation matrix or quaternion: that of texts with four
-# digits.
+# Greatest error of a rotation matrix or quaternion: that of numbers written
+# with four digits.
 _ROTATION_TOLERANCE = 1e-3
 
 
@@ -35,7 +35,7 @@ def read_stamped_rows(
         path: the file.
         width: number of values after the time.
         separator: text between columns; None for white space.
-        parse: reads times; `parse_stamps_ns` by default.
+        parse: function that reads times; by default `parse_stamps_ns`.
 
     Returns:
         (N,) int64 times [ns]; (N, width) float64.
@@ -77,7 +77,7 @@ def read_numbers(
         text = decode_text(read_bytes(path, _TABLE_LIMIT_BYTES))
     except UnicodeDecodeError as error:
         raise InputError(f"{path}: not a text file") from error
-    # Only the line ends of files end a line; str.splitlines splits at more.
+    # Only \n and \r\n end a line; str.splitlines splits at more characters.
     lines = [
         line
         for line in io.StringIO(text, newline=None)
@@ -210,10 +210,11 @@ class Trajectory:
 
         Returns:
             (K, 4, 4) poses at those times that the table spans; (M,) bool,
-            which these are.
+            which times these are.
 
         Raises:
-            InputError: if it spans none, or a time lies in a longer gap.
+            InputError: the table spans none of the times, or a time lies in a
+                longer gap.
         """
         own = self.stamps_ns
         spanned = (stamps_ns >= own[0]) & (stamps_ns <= own[-1])
@@ -252,7 +253,7 @@ class Trajectory:
             (M, 4, 4).
 
         Raises:
-            InputError: if there is none for one of the times.
+            InputError: there is no pose at one of the times.
         """
         own = self.stamps_ns
         after = np.clip(np.searchsorted(own, stamps_ns), 0, len(own) - 1)
@@ -303,7 +304,7 @@ def read_quaternions(
     Args:
         path: the file.
         separator: see `read_stamped_rows`.
-        parse: likewise.
+        parse: see `read_stamped_rows`.
 
     Raises:
         InputError: like `read_matrices`.
@@ -329,16 +330,16 @@ def read_angles(path: Path, width: int) -> tuple[Trajectory, tuple[str, ...]]:
 
     Args:
         path: a table with commas.
-        width: number of values after the time. Those between the position and
-            the angles, and behind them, are velocities. The angles are the
-            last three, or else begin with the seventh.
+        width: number of values after the time. The position comes first. The
+            angles are the last three values or, if there are more than nine,
+            the seventh to ninth. All other values are velocities.
 
     Returns:
         Poses with the rotation Rz(yaw) Ry(pitch) Rx(roll); a note if rows were
-        left out, since a number in them is NaN.
+        left out because a number in them is NaN.
 
     Raises:
-        InputError: like `read_matrices`, but for NaN.
+        InputError: like `read_matrices`, except for NaN.
     """
     columns = [("stamp", "U40"), ("values", "f8", width)]
     rows = read_numbers(path, columns, ",")
@@ -393,7 +394,7 @@ def pose_matrices(path: Path, values: np.ndarray) -> np.ndarray:
     check_finite(path, values)
     upper = values.reshape(-1, 3, 4)
     R = upper[:, :, :3]
-    # Numbers that overflow, and the NaN that they give, are no rotation either.
+    # Numbers that overflow, and the NaN that follow from them, are no rotation.
     with np.errstate(over="ignore", invalid="ignore"):
         error = np.abs(R @ np.swapaxes(R, 1, 2) - np.eye(3)).max(axis=(1, 2))
         bad = ~((error <= _ROTATION_TOLERANCE) & (np.linalg.det(R) > 0.0))
@@ -418,7 +419,7 @@ def _check_near(path: Path, positions: np.ndarray) -> None:
 def _in_order(
     path: Path, stamps_ns: np.ndarray, X_WB: np.ndarray
 ) -> Trajectory:
-    # Loggers repeat lines; a repeated row does no harm.
+    # Loggers may repeat lines; equal rows are harmless.
     news = np.ones(len(stamps_ns), dtype=bool)
     news[1:] = np.diff(stamps_ns) != 0
     news[1:] |= (np.diff(X_WB, axis=0) != 0.0).any(axis=(1, 2))

@@ -1,13 +1,14 @@
-"""Estimators: each moves a scan onto a map, from a start.
+"""Estimators: each registers a scan to a map, from a start pose.
 
-Shipped are those of small_gicp (K. Koide, "small_gicp: Efficient and parallel
-algorithms for point cloud registration", JOSS 2024), two with a robust kernel,
-and, as an optional extra, KISS-Matcher (H. Lim et al., ICRA 2025). An own one
-is a Python function.
+Shipped are the estimators of small_gicp (K. Koide, "small_gicp: Efficient and
+parallel algorithms for point cloud registration", JOSS 2024), two with a robust
+kernel, and, as an optional extra, KISS-Matcher (H. Lim et al., ICRA 2025). An
+estimator of your own is a Python function.
 
-small_gicp's point to plane multiplies the offset of a pair by the normal along
-each axis of the world. It is the usual error on surfaces that are parallel to
-two axes; on others it also resists a motion along the surface.
+small_gicp's point-to-plane error is the offset of a pair times the normal,
+component by component. On surfaces that are parallel to two axes of the world,
+this is the usual error; on other surfaces it also resists a motion along the
+surface.
 """
 
 from collections.abc import Callable, Iterable, Iterator
@@ -40,20 +41,21 @@ from evaluation.methods.method import run_module, with_named_faults
 
 # Distance between the scans of a drive that enter the map [m].
 _MAP_SPACING = 1.0
-# A normal is fitted to no fewer points.
+# Least number of points to which a normal is fitted.
 FEWEST_POINTS = 10
-# An alignment ends with a step below these [m, rad].
+# An alignment ends when a step is below these [m, rad].
 _STILL = (1e-4, 1e-5)
-# A point of a scan fits a surface of the map this near [m].
+# A point of a scan fits if a surface of the map is this near [m].
 _FIT = 0.15
-# Farthest pair that says something of the fit [m].
+# Pairs farther apart say nothing about the fit [m].
 _PAIR = 1.0
-# Shift of the voxels of VGICP, as a part of their side.
+# Shift of the voxels of VGICP, as a fraction of their side.
 _VOXEL_SHIFT = 0.37
-# Planes that a scan would measure exactly are rough by this [m].
+# Least standard deviation from a plane [m], even where a scan fits exactly.
 _ROUGHNESS = 0.01
-# Normals are known to 3 deg. That is the square of the part along a surface,
-# which would seem to hold a scan there.
+# Normals are exact to 3 deg. This is the square of the component along the
+# surface that such an error produces; uncorrected, it would seem to constrain a
+# scan along the surface.
 _NORMAL_NOISE = math.sin(math.radians(3.0)) ** 2
 
 
@@ -83,7 +85,7 @@ class Settings:
     iterations: int = 50
 
     def with_values(self, values: Iterable[tuple[str, Any]]) -> "Settings":
-        """Returns the settings with other values, as numbers or text.
+        """Returns the settings with some replaced; values are numbers or text.
 
         Raises:
             InputError: if a setting is unknown, or a value does not fit.
@@ -115,7 +117,7 @@ class Settings:
 
 @dataclass(frozen=True, eq=False)
 class LocalisationMap:
-    """A map to be localised in.
+    """A map in which scans are localised.
 
     Attributes:
         name: name of the drive or file from which it was made.
@@ -130,9 +132,9 @@ class LocalisationMap:
         return {}
 
     def voxels(self, resolution: float) -> small_gicp.GaussianVoxelMap:
-        """Returns a Gaussian for each voxel of the map.
+        """Returns the map as one Gaussian per voxel, in a shifted frame W.
 
-        The side of a voxel is `resolution` [m], the frame W shifted.
+        The side of a voxel is `resolution` [m]; see `_voxel_shift`.
         """
         if resolution not in self._voxels:
             voxels = small_gicp.GaussianVoxelMap(resolution)
@@ -154,8 +156,8 @@ class LocalisationMap:
 def _voxel_shift(resolution: float) -> np.ndarray:
     """Returns the pose of W in the frame of the voxels of VGICP.
 
-    The ground at height 0, and walls at round numbers, would lie on the sides
-    of voxels, where rounding chooses between two.
+    Without this shift, the ground at height 0 and walls at round coordinates
+    would lie on the sides of voxels, where rounding chooses between two voxels.
     """
     return poses.make_pose(np.eye(3), np.full(3, _VOXEL_SHIFT * resolution))
 
@@ -173,13 +175,13 @@ def make_map(
 
     Args:
         source: the drive, or the cloud's file.
-        settings: settings for thinning, and for the surface.
+        settings: settings for thinning and for normals.
         track: reports progress.
         columns: see `read_cloud`, for a cloud's file.
-        on_note: likewise.
+        on_note: see `read_cloud`.
 
     Raises:
-        InputError: if it cannot be read, or has hardly a point.
+        InputError: the source cannot be read, or has too few points.
     """
     if isinstance(source, Drive):
         blocks = _scans(source, track)
@@ -219,7 +221,7 @@ def map_of(
 
 @dataclass(frozen=True)
 class Estimate:
-    """The end of one alignment.
+    """The result of one alignment.
 
     Attributes:
         X_WS: (4, 4) pose; None if the estimator found none.
@@ -233,8 +235,8 @@ class Estimate:
     iterations: int = 0
 
 
-# Takes a map, the points (N, 3) of a scan in S, thinned and as measured, and
-# the start X_WS.
+# A function that takes a map, a thinned scan (N, 3) in S, the scan as measured,
+# and the start X_WS.
 Estimator = Callable[
     [LocalisationMap, np.ndarray, np.ndarray, np.ndarray], Estimate
 ]
@@ -246,12 +248,12 @@ class Fit:
 
     Attributes:
         share: share of the scan's points that lie on a surface of the map.
-        residual: root mean square distance of points from the planes with which
-            they are paired [m]; NaN without a pair.
+        residual: root mean square distance of points from the planes of their
+            pairs [m]; NaN without a pair.
         covariance: (6, 6) covariance of a small motion about the LiDAR, in axes
-            of W: turn [rad], move [m]. The Hessian of point to plane is reduced
-            by what the noise of normals adds to it; the covariance is the
-            inverse of this Hessian, times the square of the residual.
+            of W: turn [rad], move [m]. It is the inverse Hessian of the
+            point-to-plane error times the square of the residual. What the
+            noise of the normals adds to the Hessian is subtracted first.
     """
 
     share: float
@@ -260,7 +262,7 @@ class Fit:
 
 
 def judge(surface: Surface, scan: np.ndarray, X_WS: np.ndarray) -> Fit:
-    """Returns how well a scan (N, 3) in S fits a map at a pose."""
+    """Returns the `Fit` of a scan (N, 3) in S to a map at a pose."""
     p_W = poses.transform(X_WS, scan)
     found, squares = surface.tree.batch_nearest_neighbor_search(p_W)
     is_pair = np.asarray(squares) < _PAIR**2
@@ -281,14 +283,14 @@ def judge(surface: Surface, scan: np.ndarray, X_WS: np.ndarray) -> Fit:
 
 
 def _hessian(arms: np.ndarray, normals: np.ndarray) -> np.ndarray:
-    """Returns the Hessian (6, 6) of point to plane: of a turn, and a move."""
+    """Returns the point-to-plane Hessian (6, 6) over turn, then move."""
     J = np.concatenate([np.cross(arms, normals), normals], axis=1)
     return J.T @ J
 
 
 def _inverse(H: np.ndarray) -> np.ndarray:
     values, vectors = np.linalg.eigh(H)
-    # What nothing holds has a deviation of 100 m, or 100 rad.
+    # Directions without constraints get a standard deviation of 100 m or rad.
     return vectors / np.maximum(values, 1e-4) @ vectors.T
 
 
@@ -454,7 +456,7 @@ def make_estimator(method: str, settings: Settings) -> Estimator:
 
     Args:
         method: one of `METHODS`, or the name of a Python file.
-        settings: settings of a shipped method. The file of an own method
+        settings: settings of a shipped method. A file with a method of your own
             contains its settings.
 
     Raises:
@@ -502,7 +504,7 @@ def thinned(measured: np.ndarray, settings: Settings, where: str) -> np.ndarray:
     """Returns a scan (N, 3) with at most one point per voxel.
 
     Raises:
-        InputError: if hardly a point is left.
+        InputError: too few points are left.
     """
     points = thin(measured, settings.scan_voxel)
     if len(points) < FEWEST_POINTS:

@@ -1,7 +1,7 @@
-"""Single scans, each localised in a map from a start of its own.
+"""Single scans, each localised in a map from its own random start.
 
-Frames: world W, LiDAR S. An error has three parts in axes of the vehicle's way:
-along it, across (to the left) and up.
+Frames: world W, LiDAR S. An error has three components relative to the
+vehicle's path: along it, across it (to the left) and up.
 """
 
 from collections.abc import Iterator, Sequence
@@ -40,29 +40,30 @@ from evaluation.recognition.pose_errors import (
 )
 from evaluation.recognition.query_outcomes import auroc
 
-# Ends with errors of at most these are right [m, deg].
+# Results with errors of at most these are right [m, deg].
 RIGHT_TRANSLATION = 0.3
 RIGHT_ROTATION_DEG = 1.0
-# Farther starts are a matter of place recognition [m].
+# Greatest distance of a start [m]; beyond it lies place recognition.
 FARTHEST_START = 50.0
 # A query is localised if the map's drive, or a point of the map's file, is this
 # near to its LiDAR [m].
 NEAR = 7.5
-# Of the summary, in a table of results.
+# Numbers of the summary that go into a table of results.
 _SHOWN = (
     *("success_03m_1deg", "success_2m_5deg"),
     *("translation_median", "translation_95", "rotation_median_deg"),
     "auroc_own_score",
 )
-# Share of the right ends that a user believes, by the score.
+# Share of the right results whose scores pass the suggested threshold.
 _BELIEVED = 0.95
-# Queries that wait for a process, of each.
+# Number of queries that wait, per process.
 _WAITING = 4
 
-# One row for each query: its frame and time; the start's offset in W [m] and
-# turn, as a rotation vector in S; errors of the end; scores; deviations of the
-# end by the covariance [m]; the share of the scan that has no point of the map
-# within a voxel, at the true pose; steps, and seconds of processor time.
+# One row per query: its frame and time; the start's offset in W [m], and its
+# turn as a rotation vector in S; errors of the result; scores; standard
+# deviations of the result from its covariance [m]; the share of the scan that,
+# at the true pose, has no point of the map within a voxel; number of steps, and
+# CPU time [s].
 QUERY = np.dtype(
     [
         ("frame", "<i8"),
@@ -87,7 +88,7 @@ COLUMNS = tuple(QUERY.fields or ())
 
 @dataclass(frozen=True)
 class Starts:
-    """The draw of starts.
+    """How random starts are drawn.
 
     Attributes:
         radius: distance to the true position [m].
@@ -119,8 +120,8 @@ class Starts:
         """Returns the random start of a frame, the same for all methods.
 
         Returns:
-            (3,) its offset in W [m], on a sphere; (3,) its turn about a random
-            axis, a rotation vector in S [rad].
+            (3,) offset of the start in W, on a sphere [m]; (3,) turn about a
+            random axis, as a rotation vector in S [rad].
         """
         rng = np.random.default_rng([self.seed, frame])
         offset, axis = rng.normal(size=(2, 3))
@@ -170,7 +171,7 @@ def mapped_frames(
     """Returns which query frames lie within the map, (N,) bool.
 
     Raises:
-        InputError: if it holds none.
+        InputError: no frame lies within the map.
     """
     p_WQ = query.X_WS[:, :3, 3]
     if isinstance(place, Drive):
@@ -190,7 +191,7 @@ def mapped_frames(
 
 
 def way_axes(p_WS: np.ndarray, X_WS: np.ndarray) -> np.ndarray:
-    """Returns rotations R_WT (N, 3, 3) along the path.
+    """Returns rotations R_WT (N, 3, 3) to axes along, left of and above a path.
 
     Columns point along the path, to its left, and up.
 
@@ -206,7 +207,7 @@ def way_axes(p_WS: np.ndarray, X_WS: np.ndarray) -> np.ndarray:
     along[stands] = X_WS[stands, :3, 0]
     along /= np.linalg.norm(along, axis=1, keepdims=True)
     left = np.cross([0.0, 0.0, 1.0], along)
-    # A way straight up has no left of its own.
+    # A path straight up has no direction to the left.
     steep = np.linalg.norm(left, axis=1) < 1e-6
     left[steep] = X_WS[steep, :3, 1]
     left /= np.linalg.norm(left, axis=1, keepdims=True)
@@ -248,13 +249,14 @@ class Localiser:
             R_WT: see `way_axes`.
             offset: (3,) offset of the start in W [m].
             turn: (3,) turn of the start in S [rad].
-            X_WS0: the start, if `offset` and `turn` do not determine it.
+            X_WS0: the start pose; by default it follows from `offset` and
+                `turn`.
 
         Returns:
             A record of `QUERY`; the estimated X_WS, or None.
 
         Raises:
-            InputError: if the scan has hardly a point.
+            InputError: the scan has too few points.
         """
         if X_WS0 is None:
             R = Rotation.from_rotvec(turn).as_matrix()
@@ -290,7 +292,7 @@ class Localiser:
         return row, end
 
 
-# The localiser of a process that was forked.
+# The localiser in a forked process.
 _localiser: Localiser
 
 
@@ -312,7 +314,7 @@ def localise(
         localiser: the map and the estimator.
         query: the drive.
         frames: frames of the scans, in any order.
-        starts: the draw of starts.
+        starts: how starts are drawn.
         jobs: number of processes, where the system can fork.
         track: reports progress.
 
@@ -320,7 +322,7 @@ def localise(
         (K,) of `QUERY`, in the order of the frames.
 
     Raises:
-        InputError: if a scan cannot be read, or has hardly a point.
+        InputError: a scan cannot be read, or has too few points.
     """
     global _localiser
     X_WS, stamps = query.X_WS, query.stamps_ns
@@ -330,7 +332,8 @@ def localise(
     def arguments(frame: int) -> tuple:
         drawn = starts.draw(frame)
         scan = query.scan(frame)
-        # A table would be copied with all its columns.
+        # Only the coordinates are passed on: a scan would be copied to the
+        # process with all its fields.
         scan = clouds.from_xyz(clouds.xyz(scan))
         return frame, stamps[frame], scan, X_WS[frame], R_WT[frame], *drawn
 
@@ -360,7 +363,7 @@ def is_right(
     translation: float = RIGHT_TRANSLATION,
     rotation_deg: float = RIGHT_ROTATION_DEG,
 ) -> np.ndarray:
-    """Returns which results (K,) have at most these errors."""
+    """Returns which results have at most these errors, (K,) bool."""
     return (rows["translation_error"] <= translation) & (
         rows["rotation_error_deg"] <= rotation_deg
     )
@@ -385,10 +388,9 @@ class Localisation:
         return float(np.quantile(scores, 1.0 - _BELIEVED, method="lower"))
 
     def to_json(self) -> dict[str, float | int | None]:
-        """Returns the summary.
+        """Returns the summary for JSON.
 
-        Numbers of successes count all queries; quantiles count those with a
-        pose.
+        Success rates count all queries; quantiles count queries with a pose.
         """
         rows = self.rows
         right = is_right(rows)
@@ -475,8 +477,8 @@ def write_rows(rows: np.ndarray, path: Path) -> None:
 def query_frames(
     query: Drive, is_mapped: np.ndarray, spacing: float
 ) -> list[int]:
-    """Returns frames of queries, at equal distances where there is a map."""
+    """Returns query frames within the map, at a given spacing [m]."""
     frames = sample_frames(query.X_WS[:, :3, 3], spacing)
     chosen = frames[is_mapped[frames]]
-    # A short pass through the map may lie between two of them.
+    # A short pass through the map may lie between two sampled frames.
     return (chosen if len(chosen) else np.flatnonzero(is_mapped)[:1]).tolist()

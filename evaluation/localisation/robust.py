@@ -1,14 +1,16 @@
 """Point to plane and GICP with a robust kernel and a shrinking search.
 
-What has changed makes wrong pairs, which small_gicp's wheel weighs like all
-others. Here a pair at a distance d off its surface weighs (k / (k + d^2))^2
-(Geman and McClure), and k falls with the width of the search.
+Changed parts of a city lead to wrong pairs, to which the Python package of
+small_gicp gives the same weight as to others. Here a pair at a distance d from
+its surface has the weight (k / (k + d^2))^2 (Geman and McClure); k falls with
+the search width, the greatest distance of a pair.
 
-Width and kernel follow KISS-ICP (Vizzo et al., RA-L 2023): 3 s and s / 3 for a
-deviation s, that of the last alignment from its start, where a turn counts by
-what it moves a point at the greatest range. KISS-ICP takes it from the scans
-before; a scan that is localised by itself has none. It is aligned again and
-again from its own end, each time with at most half the width, until the least.
+Width and kernel follow KISS-ICP (Vizzo et al., RA-L 2023): they are 3 s and s /
+3 for a deviation s, by which the last alignment moved from its start. A
+rotation counts as the distance by which it moves a point at the greatest range.
+KISS-ICP takes s from the previous scans, but a scan that is localised by itself
+has none. It is therefore aligned repeatedly, each time from the last result and
+with at most half the width, until the least width is reached.
 """
 
 import math
@@ -19,12 +21,12 @@ from scipy.spatial.transform import Rotation
 from cns_drake.base import poses
 from evaluation.alignment.registration import Surface
 
-# Points of scans are used up to here, along each axis of the LiDAR [m].
+# Greatest coordinate of a point that is used, along each axis of the LiDAR [m].
 MAX_RANGE = 100.0
-# Variance of small_gicp's covariances across their planes, of two points; along
-# them it is a thousand times as large.
+# Sum of two points' variances across the plane in small_gicp's covariances;
+# along the plane the variance is a thousand times as large.
 _ACROSS = 2e-3
-# An alignment with fewer pairs ends: they do not determine a pose.
+# An alignment ends if there are fewer pairs, which do not determine a pose.
 _FEWEST_PAIRS = 6
 
 
@@ -43,9 +45,11 @@ def align_robustly(
         surface: the map.
         scan: (N, 3) in S [m].
         start: X_WS (4, 4).
-        widths: greatest distance of a pair at first, and in the end [m].
+        widths: greatest distance of a pair, at the beginning and at the end
+            [m].
         iterations: greatest number of steps of each alignment.
-        still: move and turn below which a step ends an alignment [m, rad].
+        still: translation and rotation below which a step ends an alignment [m,
+            rad].
         covariances: (N, 3, 3) covariances of the scan's points in S, for GICP;
             None for point to plane.
 

@@ -1,4 +1,4 @@
-"""Tracking: a drive followed through a map, each scan from the last pose."""
+"""Tracking: each scan of a drive is registered from the last estimate."""
 
 from dataclasses import dataclass
 
@@ -19,13 +19,14 @@ from evaluation.localisation.localise import (
     way_axes,
 )
 
-# Distance between two aligned scans [m].
+# Distance driven between two aligned scans [m].
 SPACING = 2.0
 # A vehicle with a greater error is lost [m].
 LOST = 2.0
-# The drift of an odometry changes after this way [m].
+# The drift of the odometry changes after this length of path [m].
 _DRIFT_LENGTH = 100.0
-# A drift of 1 % in length goes with .01 deg/m in heading.
+# Drift of the heading in deg/m, relative to the drift as a share: a drift of 1
+# % in length goes with 0.01 deg/m.
 _TURN_OF_DRIFT_DEG = 1.0
 _DRIFT_SEED = 5
 
@@ -45,18 +46,18 @@ def drifting_steps(
 ) -> np.ndarray:
     """Returns the motion between poses as a drifting odometry measures it.
 
-    In each 100 m of way, all lengths are wrong by one factor, and the heading
-    drifts at one rate. The errors of both are drawn from normal distributions,
-    with standard deviations of `drift` and of `drift` deg per metre.
+    For each 100 m of path, one scale error applies to all lengths and one drift
+    rate to the heading. Both are drawn from normal distributions, with standard
+    deviations of `drift` and of `drift` deg per metre.
 
     Args:
         X_WS: (N, 4, 4) true poses.
-        way: (N,) length of the way up to each [m].
-        drift: drift as a share of the way; 0 for none.
+        way: (N,) length of the path up to each pose [m].
+        drift: drift as a share of the path; 0 for none.
         seed: seed of the draw.
 
     Returns:
-        (N - 1, 4, 4) poses of each LiDAR in the one before.
+        (N - 1, 4, 4) poses of the LiDAR relative to its previous pose.
     """
     steps = poses.inverse(X_WS[:-1]) @ X_WS[1:]
     part = (way[1:] // _DRIFT_LENGTH).astype(np.int64)
@@ -84,24 +85,24 @@ def track_drive(
 ) -> np.ndarray:
     """Tracks a drive along the parts of its path that the map covers.
 
-    On each part the first start is drawn, and each later one is the last
-    estimate moved by the odometry.
+    On each part, the first start is random. Each later start is the last
+    estimate, moved by the odometry.
 
     Args:
         localiser: the map and the estimator.
         query: the drive.
         is_mapped: (N,) see `mapped_frames`.
-        starts: the draw of starts.
+        starts: how starts are drawn.
         drift: see `drifting_steps`.
         track: reports progress.
 
     Returns:
         (K,) records of `TRACKED`. Before the fields of `QUERY`, each contains
-        the number of the stretch, the way from the drive's first scan, and the
-        way from the scan before [m].
+        the number of the part, the length of the path from the drive's first
+        scan, and that from the scan before [m].
 
     Raises:
-        InputError: if a scan cannot be read, or has hardly a point.
+        InputError: a scan cannot be read, or has too few points.
     """
     X_WS = query.X_WS
     way = travelled(X_WS[:, :3, 3])
@@ -113,7 +114,7 @@ def track_drive(
             f"{query.name}: {len(frames)} scans, {SPACING:g} m apart, in the"
             " map; a track has two and more"
         )
-    # Between two stretches the drive left the map.
+    # Between two parts the drive left the map.
     gaps = np.add.reduceat(~is_mapped, frames)[:-1] > 0
     stretches = np.concatenate([[0], np.cumsum(gaps)])
     steps = drifting_steps(X_WS[frames], way[frames], drift, starts.seed)
@@ -141,7 +142,7 @@ def track_drive(
             turn,
             start,
         )
-        # Without a pose the vehicle goes on by its odometry.
+        # Without a pose, the estimate continues by odometry.
         last = end
         if end is None:
             R = Rotation.from_rotvec(turn).as_matrix()
@@ -168,7 +169,11 @@ class TrackSummary:
     rows: np.ndarray
 
     def losses(self) -> list[tuple[float, bool]]:
-        """Returns the path length to each loss [m], and whether it occurred."""
+        """Returns, for each loss, its length [m] and whether it ended.
+
+        The length is the path from the loss until the error is at most `LOST`
+        again, or else to the end of the part.
+        """
         found = []
         for stretch in np.unique(self.rows["stretch"]):
             rows = self.rows[self.rows["stretch"] == stretch]

@@ -1,1 +1,1 @@
-"""What of an old map is gone, what is new, and what was not looked at."""
+"""Labels of old maps: what is gone, what is new, what was not observed."""

@@ -1,18 +1,20 @@
-"""Baselines that label two maps, without the truth.
+"""Baselines that label the points of two maps without knowing the truth.
 
-- `distance`: a point is kept if the other map has a point within 0.5 m, else
-  gone or new. Nothing is unobserved.
+- `distance`: a point is kept if the other map has a point within 0.5 m;
+otherwise it is gone or new. No point is unobserved.
 - `m3c2` (the extra `map-update`; Lague et al., ISPRS J. 82, 2013, in py4dgeo):
-  distance of both maps along the surface's normal. A point is kept if it is
-  less than the level of detection and 0.1 m, gone or new if it is more, and
-  unobserved where a map has no points to measure.
-- `free-space`: cells of 0.2 m are compared with each scan of the other drive. A
-  scan sees past a cell if the surface through the three returns nearest to its
-  direction lies behind it, or if there is no return though the LiDAR looks
-  there. It shows the cell if that surface passes through it. A cell is kept if
-  the other map has a point near it; else gone or new if a scan sees past it;
-  else kept if enough scans show it; else unobserved. Where a fifth of a cube of
-  1 m is gone or new, so is what has only a point near to it, not at it.
+  the distance between the two maps along the normal of the surface. A point is
+  gone or new if this distance exceeds both the level of detection and 0.1 m,
+  otherwise kept. It is unobserved if a map lacks the points to measure.
+- `free-space`: cells of 0.2 m are compared with each scan of the other drive.
+The three returns nearest to the direction of a cell define a surface. A scan
+sees past the cell if this surface lies behind it, or if there is no return
+although the LiDAR looks there. A scan shows the cell if the surface passes
+through it. The first rule that applies gives the label: kept if the other map
+has a point near the cell; gone or new if a scan sees past it; kept if enough
+scans show it; otherwise unobserved. Where more than a fifth of the labelled
+points in a cube of 1 m are gone or new, the kept points there are relabelled as
+well, except points with a point of the other map within 0.12 m.
 """
 
 from collections.abc import Callable
@@ -31,38 +33,40 @@ from evaluation.map_update.scores import Labels, nearest
 from evaluation.map_update.sessions import SIDES, Pair, Session
 from evaluation.recognition.seen_surfaces import SeenSurfaces
 
-# Distance of the baseline of that name [m].
+# Threshold of the baseline `distance` [m].
 _APART = 0.5
-# M3C2: radii of the normal's and of the cylinder's neighbourhood, greatest
-# distance, and the smallest one that counts [m].
+# M3C2: radius of the normal's neighbourhood, radius of the cylinder, greatest
+# distance, and least distance that counts as a change [m].
 _NORMAL, _CYLINDER, _FARTHEST, _LEAST = 1.0, 0.5, 3.0, 0.1
-# Points that are measured between two steps of progress.
+# Number of points per step of progress.
 _CHUNK = 50_000
 
 
 # Settings of `free-space`, fitted on two pairs of drives: Metropolis 01 and 04,
-# whose ways hardly meet, and Suburbia after five years.
-# Side of a cell, and distance of a point of the other map that keeps it [m].
+# whose paths hardly meet, and Suburbia after five years. First the side of a
+# cell, and the distance of a point of the other map at which a cell is kept
+# [m].
 _CELL, _NEAR = 0.2, 0.2
-# Distance of the surface behind a cell that a scan sees past, and from a cell
-# that it shows [m].
+# A scan sees past a cell if the surface lies at least the first distance behind
+# it, and shows the cell if the surface is within the second [m].
 _BEHIND, _ON = 0.5, 0.2
-# Way between two scans [m].
+# Distance driven between two scans [m].
 _SPACING = 2.0
-# Scans that must show a kept cell: a share of those for which it is hidden, but
-# no more than a number.
+# Number of scans that must show a kept cell: this share of the scans from which
+# the cell is hidden, but at most this number.
 _SHOWN, _ENOUGH = 0.05, 2
-# Side of a cube in which changes are counted [m], and the part of it from which
-# on all is changed but what has a point of the other map so near [m].
+# Side of a cube in which changes are counted [m]; the share of changed points
+# above which the whole cube counts as changed; and the distance of a point of
+# the other map within which a point of such a cube is still kept [m].
 _BLOCK, _PART, _AT = 1.0, 0.2, 0.12
 
 
 def run_baseline(name: str, pair: Pair, track: Track = silent) -> Labels:
-    """Returns the labels that a change detector gives both maps.
+    """Returns a change detector's labels of both maps.
 
     Raises:
-        InputError: the sessions lack what it needs, or its package is not
-            installed.
+        InputError: the sessions lack data that the detector needs, or its
+            package is not installed.
     """
     label = BASELINES[name]
     return Labels(
@@ -86,7 +90,7 @@ def by_distance(
 def by_free_space(
     mine: Session, theirs: Session, track: Track = silent
 ) -> np.ndarray:
-    """Returns labels (N,) of a map by what the other drive's scans see."""
+    """Returns labels (N,) of a map by the baseline `free-space`."""
     unobserved, kept, changed = SIDES[mine.side]
     _check_scans(theirs)
     labels = np.full(len(mine.points), kept, np.uint8)
@@ -103,7 +107,7 @@ def by_free_space(
     found = np.where(is_shown, kept, unobserved)
     found = np.where(past > 0, changed, found)
     labels[far] = found[cell_of.ravel()]
-    # What stands there now passes near to what stood there.
+    # A new object may pass near to one that is gone.
     is_changed = labels == changed
     known = is_changed | (labels == kept)
     blocks = np.floor(mine.points[known] / _BLOCK).astype(np.int64)
@@ -121,15 +125,15 @@ def by_free_space(
 def _count_views(
     points: np.ndarray, other: Session, track: Track
 ) -> np.ndarray:
-    """Returns how many scans see past points (N, 3), show and hide them.
+    """Returns how many scans see past each point, show it and hide it.
 
     Returns:
-        (3, N).
+        (3, N) counts for the points (N, 3).
     """
     counts = np.zeros((3, len(points)), np.int32)
     chosen = sample_frames(other.X_WS[:, :3, 3], _SPACING).tolist()
-    # The LiDAR looks between its lowest and its highest return, as far as its
-    # farthest.
+    # The field of view reaches from the lowest to the highest return, and as
+    # far as the farthest.
     some = chosen[:: max(len(chosen) // 20, 1)]
     scans = [other.scan(number) for number in some]
     returns = np.concatenate([np.zeros((0, 3)), *scans])
@@ -217,6 +221,7 @@ def _py4dgeo() -> Any:
             f"--baseline: m3c2 needs py4dgeo ({error}); pip install "
             "'cns-drake[map-update]'"
         ) from None
-    # It would write to stdout, and to a file in the current folder.
+    # Without this, py4dgeo would write to stdout and to a file in the current
+    # folder.
     logging.getLogger("py4dgeo").handlers.clear()
     return py4dgeo

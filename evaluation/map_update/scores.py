@@ -1,17 +1,19 @@
-"""Scores of labels of two maps against the truth. Points count, not voxels.
+"""Scores of labels of two maps against the truth.
 
-IoU of a class is that of the points that have it by truth and by prediction,
-in both maps together: `unobserved` includes what B sees newly. A class that
-the truth lacks is left out of the mean, `miou`.
+All scores count points, not voxels. The IoU of a class compares the points that
+have this class by truth with those that have it by prediction, over both maps
+together. The class `unobserved` includes points that B is the first to see. A
+class that does not occur in the truth is left out of the mean, `miou`.
 
-Precision and recall of gone (in A) and new (in B) are those of points; within
-0.2 m and 0.5 m, a point is right if a point of the other set lies that near;
-by structure, those of structures, see `structures.verdicts`.
+Precision and recall of gone (in A) and new (in B) exist in three forms: by
+points; within 0.2 m and 0.5 m, where a point is right if a point of the other
+set lies within this distance; and by structure, see `structures.verdicts`.
 
-The updated map is A without what is predicted gone, with what is predicted new
-or newly seen in B. Its completeness is the share of B's map within 0.2 m of it,
-its accuracy the share of its own points that B's drive observed (by truth)
-within 0.2 m of B's map, its Chamfer distance the mean of both mean distances.
+The updated map is A without the points that are predicted gone, plus the points
+of B that are predicted new or newly seen. Its completeness is the share of B's
+map within 0.2 m of the updated map. Its accuracy is the share of the updated
+map within 0.2 m of B's map, over points that B's drive observed by truth. Its
+Chamfer distance is the mean of the mean distances in both directions.
 """
 
 from __future__ import annotations
@@ -37,12 +39,12 @@ _CLASSES = {
 }
 _CHANGES = {"gone": ("A", Label.GONE), "new": ("B", Label.NEW)}
 _TOLERANCES = {"within_02m": 0.2, "within_05m": 0.5}
-# Limits of distances from the other drive [m].
+# Limits of the classes of distance from the other drive [m].
 _DISTANCES = (0.0, 10.0, 20.0, 40.0, math.inf)
 
 
 class Labels(NamedTuple):
-    """Labels of both maps, (N,) and (M,)."""
+    """Labels of the points of both maps, A (N,) and B (M,)."""
 
     A: np.ndarray
     B: np.ndarray
@@ -83,7 +85,7 @@ def score(
 
 
 class _Labelled(NamedTuple):
-    """Both maps with their labels, and (N,) and (M,) bool, what counts."""
+    """Both maps with their labels, and masks of the points that count."""
 
     pair: Pair
     truth: Labels
@@ -96,7 +98,10 @@ class _Labelled(NamedTuple):
 
 
 def _of_points(both: _Labelled) -> dict[str, float]:
-    """Returns IoUs, NaN of a class that is nowhere; precisions and recalls."""
+    """Returns IoUs, precisions and recalls by points.
+
+    The IoU is NaN for a class that occurs neither by truth nor by prediction.
+    """
     code = np.zeros(256, np.int64)
     for k, labels in enumerate(_CLASSES.values()):
         code[list(labels)] = k
@@ -106,7 +111,7 @@ def _of_points(both: _Labelled) -> dict[str, float]:
         cells += np.bincount(
             size * code[true[rows]] + code[found[rows]], minlength=size * size
         )
-    # By truth and by prediction.
+    # Rows: truth; columns: prediction.
     table = cells.reshape(size, size)
     right, true, found = np.diag(table), table.sum(axis=1), table.sum(axis=0)
     known = true > 0
@@ -125,7 +130,7 @@ def _of_points(both: _Labelled) -> dict[str, float]:
 
 
 def _within(both: _Labelled, distance: float) -> dict[str, float]:
-    """Returns precision and recall of changed points up to a distance [m]."""
+    """Returns precision and recall of changed points within a distance [m]."""
     pair, truth, predicted, counted = both
     found = {}
     for k, (name, (_, label)) in enumerate(_CHANGES.items()):
@@ -140,7 +145,7 @@ def _within(both: _Labelled, distance: float) -> dict[str, float]:
 def _share_near(
     points: np.ndarray, others: np.ndarray, distance: float
 ) -> float:
-    """Returns the share of points (N, 3) with one of others this near."""
+    """Returns the share of points (N, 3) with another point this near."""
     if len(points) == 0:
         return math.nan
     if len(others) == 0:
@@ -152,9 +157,9 @@ def _share_near(
 def nearest(
     points: np.ndarray, others: np.ndarray, most: float = math.inf
 ) -> np.ndarray:
-    """Returns the distance (N,) to the nearest other point.
+    """Returns the distance (N,) to the nearest other point [m].
 
-    It is infinite beyond `most`.
+    Distances beyond `most` are infinite.
 
     Args:
         points: (N, 3) points [m].
@@ -185,9 +190,9 @@ def _by_structure(both: _Labelled) -> dict[str, float]:
 
 
 def _called(both: _Labelled) -> dict[str, float]:
-    """Returns what is called gone or new: shares of points and structures.
+    """Returns shares of points and structures predicted gone or new.
 
-    And how many structures have the true verdict, of the observed ones.
+    A third share is that of the observed structures with the right verdict.
     """
     points, structures, right = [], [], []
     for session, true, found, rows in zip(*both, strict=True):
@@ -216,7 +221,7 @@ def _updated_map(both: _Labelled) -> dict[str, float]:
     observed = stays & (truth.A != Label.UNOBSERVED)
     target = pair.B.points[counted[1]]
     updated = np.concatenate([pair.A.points[stays], pair.B.points[comes]])
-    # What B adds lies on B's map.
+    # Points that B adds lie on B's map: their distance is 0.
     own = np.concatenate(
         [nearest(pair.A.points[observed], target), np.zeros(comes.sum())]
     )
@@ -233,7 +238,7 @@ def _updated_map(both: _Labelled) -> dict[str, float]:
 
 
 def _by_distance(both: _Labelled) -> dict:
-    """Returns scores by the distance from the other drive."""
+    """Returns class of distance from the other drive -> scores by points."""
     pair = both.pair
     if not (len(pair.A.X_WS) and len(pair.B.X_WS)):
         return {}

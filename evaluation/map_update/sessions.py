@@ -32,9 +32,9 @@ from evaluation.clouds.cloud_files import read_blocks, read_cloud, read_npy
 from evaluation.drives.sampling import sample_frames
 from evaluation.drives.text_tables import read_poses
 
-# Side of the cells that keep a point each [m].
+# Side of the cells of which each keeps one point [m].
 THINNED = 0.1
-# Length of the way between two scans [m].
+# Distance driven between two scans [m].
 SPACING = 1.0
 _MAP_DTYPE = np.dtype(
     [
@@ -46,11 +46,11 @@ _MAP_DTYPE = np.dtype(
     ]
 )
 _PLY_TYPES = {"f8": "double", "u2": "ushort"}
-# Greatest number of arrays of cells that are searched one by one.
+# Greatest number of arrays of cells to search; more are merged.
 _MOST_PARTS = 8
 # Cells are numbered by 21 bits for each axis.
 _BITS = 21
-# Moving things, as SemanticKITTI numbers them, what can drive away, and people.
+# SemanticKITTI's classes of moving objects, vehicles and people.
 MOVES = (*range(252, 260), 10, 11, 13, 15, 18, 20, 30, 31, 32)
 
 
@@ -58,7 +58,7 @@ class Label(IntEnum):
     """What became of a point.
 
     Points of A have the labels 0, 1 and 2; points of B have 1, 3 and 4. IGNORED
-    occurs only in labels from a user: such a point is left out of scores.
+    occurs only in labels of a user; scores leave out such points.
     """
 
     UNOBSERVED = 0
@@ -116,12 +116,12 @@ class Session:
 class MapBuilder:
     """Merges scans into a map with one point in each cell of 0.1 m.
 
-    The first point of a cell stays as it is: a mean would lie beside the
+    The first point of a cell represents it: a mean might lie beside the
     surface.
     """
 
     def __init__(self, origin: np.ndarray):
-        """Starts an empty map; the origin (3,) is near to all points [m]."""
+        """Starts an empty map; its origin (3,) must be near all points [m]."""
         self._origin = np.floor(origin / THINNED) - (1 << (_BITS - 1))
         self._parts: list[np.ndarray] = []
         self._points: list[np.ndarray] = []
@@ -152,7 +152,7 @@ class MapBuilder:
             is_new &= part[places] != keys
         if not is_new.any():
             return
-        # The scans' order decides on that of the points.
+        # The order of the points follows the order of the scans.
         self._points.append(points[inside][np.sort(first[is_new])])
         self._parts.append(keys[is_new])
         while len(self._parts) > _MOST_PARTS or (
@@ -341,7 +341,7 @@ def _write_ply(path: Path, points: np.ndarray) -> None:
 
 
 def _g2o(X_WS: np.ndarray) -> str:
-    """Returns poses (K, 4, 4) as a graph of steps, for LT-mapper."""
+    """Returns poses (K, 4, 4) as a g2o pose graph of steps, for LT-mapper."""
     steps = poses.inverse(X_WS[:-1]) @ X_WS[1:]
     information = " ".join(
         "1" if i == j else "0" for i in range(6) for j in range(i, 6)

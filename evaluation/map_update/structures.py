@@ -1,4 +1,4 @@
-"""How much of each structure changed, and a verdict for the whole."""
+"""How much of each structure changed, and a verdict on each structure."""
 
 from collections.abc import Collection, Mapping, Sequence
 from dataclasses import astuple, dataclass, fields
@@ -13,7 +13,7 @@ from evaluation.map_update.sessions import MOVES, SIDES, Label, Pair
 
 @dataclass(frozen=True)
 class StructureChange:
-    """A structure in one of both maps, or in one world alone.
+    """A structure in map A or B, or in the world of one session only.
 
     Attributes:
         side: map in which the structure is, A or B.
@@ -22,10 +22,10 @@ class StructureChange:
         semantic_class: class of the structure; empty if unknown.
         label: the class as a number.
         points: number of the structure's points in the map.
-        observed: how many of these points the other drive observed.
-        changed: how many of the observed points are gone, or new.
+        observed: number of these points that the other drive observed.
+        changed: number of the observed points that are gone (A) or new (B).
         verdict: gone (A) or new (B) if most of the observed points are, else
-            kept; unobserved or newly_seen without an observed point.
+            kept. Without an observed point: unobserved (A) or newly_seen (B).
         alone: whether the other drive's world has no structure of this name.
     """
 
@@ -57,8 +57,9 @@ def verdicts(
         side: A or B.
 
     Returns:
-        (S,) numbers of the structures; (S, 3) their points in all, observed
-        and changed; (S,) a verdict each, as a `Label`.
+        (S,) numbers of the structures; (S, 3) number of their points, of
+        observed points and of changed points; (S,) verdict of each, as a
+        `Label`.
     """
     unobserved, kept, changed = SIDES[side]
     rows = np.flatnonzero(instances)
@@ -143,7 +144,7 @@ def write_structures(
 
 
 def class_names(folder: Path) -> dict[int, str]:
-    """Returns the names of classes by number, of a table in a folder, if any.
+    """Returns class number -> name from the table in a folder, if any.
 
     Raises:
         InputError: the table cannot be read.

@@ -2,10 +2,10 @@
 
 import numpy as np
 
-# Side of a cell [m]; 256 of them across, so that a byte counts them.
+# Side of a cell [m]; there are 256 cells across, so that a byte counts them.
 CELL = 0.5
 _HALF_CELLS = 128
-# Least height above the ground of kept points [m]; lower ones are road.
+# Least height above the ground of kept points [m]; lower points are road.
 _LOWEST = 0.4
 # Step of the stored heights above the ground [m].
 HEIGHT_STEP = 0.1
@@ -25,10 +25,10 @@ def thumbnail(
             are too many.
 
     Returns:
-        (M, 3) uint8, M <= 2000: cells along x and along y, of which 128 is
-        the first one forward or left of the sensor, and height above the
-        ground in steps of 0.1 m, at most 25.5 m. The order is random, so that
-        the first points show the whole scan thinned.
+        (M, 3) uint8, M <= 2000: cell along x, cell along y, and height above
+        the ground in steps of 0.1 m, at most 25.5 m. Cell 128 is the first in
+        front, or left, of the sensor. The order is random, so that the first
+        points alone show the whole scan, thinned.
     """
     x, y = np.floor(points[:, :2].T / CELL).astype(np.int64) + _HALF_CELLS
     heights = points[:, 2] + sensor_height

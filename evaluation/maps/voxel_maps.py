@@ -1,9 +1,9 @@
 """Maps of whole drives: the points of all scans, thinned to voxels.
 
-Voxels are on a grid that is fixed in the world, since its place influences a
-coarse voxel map. The grid has multiples of the voxel size in x and y, and
-starts at z = -2.5 m, so that ground at z = 0 is in the middle of a 5 m voxel. A
-voxel is represented by the centroid of its points.
+The grid of the voxels is fixed in the world, because its position influences a
+coarse voxel map. In x and y, the borders of voxels are multiples of the voxel
+size. In z they start at -2.5 m, so that ground at z = 0 is in the middle of a 5
+m voxel. Each voxel is represented by the centroid of its points.
 """
 
 from __future__ import annotations
@@ -33,12 +33,12 @@ SLOT = np.dtype(
     ],
     align=True,
 )
-# Voxels are numbered up to here, either way.
+# Greatest number of a voxel along an axis, positive or negative.
 FARTHEST = 2.0**31
 VOXEL_SIZE = 5.0
 Z_ORIGIN = -2.5
 _ORIGIN = (0.0, 0.0, Z_ORIGIN)
-# Length of the cells of which larger voxels, on any grid, are made [m].
+# Side of the cells that are merged into larger voxels, on any grid [m].
 CELL_SIZE = 1.0
 
 # Number of points in a batch; the table grows between batches.
@@ -51,9 +51,9 @@ _LOAD = (3, 5)
 def _find(
     table: np.ndarray, ix: np.int32, iy: np.int32, iz: np.int32
 ) -> np.uint64:
-    """Returns the slot of a voxel, or its free slot.
+    """Returns the slot of a voxel, or the free slot for it.
 
-    It has no sign: for a signed index, numba looks at each use whether it
+    The index is unsigned: for a signed one, numba tests at each use whether it
     counts from the end.
     """
     mask = len(table) - 1
@@ -91,7 +91,7 @@ def move(
 def _locate(
     p: tuple[float, float, float], X: np.ndarray, voxel_size: float
 ) -> tuple[float, float, float]:
-    """Returns a place along an axis, its voxel, and its offset in it [m]."""
+    """Returns a coordinate, its voxel, and its offset in the voxel [m]."""
     place = X[0] * p[0] + X[1] * p[1] + X[2] * p[2] + X[3]
     cell = np.floor(place / voxel_size)
     return place, cell, place - cell * voxel_size
@@ -115,20 +115,21 @@ def enter(
     Args:
         points: (3, N) points in the frame of a sensor [m].
         number: how many of the points to enter, beginning with the first.
-        X: (4, 4) pose of the sensor in the world, which is lifted so that
-            voxels begin at height 0.
+        X: (4, 4) pose of the sensor in the lifted world, whose voxels begin at
+            height 0.
         voxel_size: length of a voxel's side [m].
-        divisions: parts of a voxel's side; 0 for no samples.
+        divisions: number of parts of a voxel's side; 0 for no samples.
         table: (S,) slots of type `SLOT`, with room for all voxels.
         size: number of voxels in the table up to now.
-        sampled: (S, B) uint8, a bit for each part of a slot's voxel: whether it
-            has a sample.
+        sampled: (S, B) uint8, one bit for each part of a slot's voxel: whether
+            the part has a sample.
         samples: (K, 3) array to which samples are added, with room for all, in
             the lifted world [m].
         num_samples: number of samples up to now.
 
     Returns:
-        New size and number of samples, and how many points were skipped.
+        New number of voxels, new number of samples, and number of skipped
+        points.
     """
     scale = divisions / voxel_size
     last = np.float64(divisions - 1)
@@ -157,7 +158,8 @@ def enter(
         voxel.sy += sy
         voxel.sz += sz
         if divisions > 0:
-            # Rounding may put a point on an end just outside; -0.1 becomes 0.
+            # Rounding may put a point just outside the voxel: clip the index to
+            # the last part; -0.1 is truncated to 0.
             parts = min(np.trunc(sx * scale), last)
             parts = parts * divisions + min(np.trunc(sy * scale), last)
             parts = parts * divisions + min(np.trunc(sz * scale), last)
@@ -246,7 +248,7 @@ class VoxelMap:
         )
 
     def find(self, points_W: np.ndarray) -> np.ndarray:
-        """Returns the voxel in which each of N points lies.
+        """Returns the voxel that contains each point.
 
         The points (N, 3) are in the world [m].
 
@@ -257,7 +259,7 @@ class VoxelMap:
             return np.full(len(points_W), -1)
         lifted = points_W - np.array(self.origin_W)
         wanted = np.floor(lifted / self.voxel_size).astype(np.int64)
-        # Both become numbers with the order of rows of indices.
+        # Both are encoded as numbers that sort like rows of indices.
         low, high = self.indices.min(axis=0), self.indices.max(axis=0)
         spans = (high - low).astype(np.int64) + 1
         weights = np.array([spans[1] * spans[2], spans[2], 1])
@@ -275,8 +277,9 @@ class VoxelAccumulator:
     from the origin (UTM) lose nothing. The result depends only on the points
     and their order.
 
-    For pictures, samples of the points can be kept on a finer grid. Centroids
-    there would take twice as long: their table would not fit into the cache.
+    For pictures, one sample per cell of a finer grid can be kept. Centroids on
+    that grid would take twice as long, because their table would not fit into
+    the cache.
     """
 
     def __init__(self, voxel_size: float = VOXEL_SIZE, divisions: int = 0):
@@ -284,8 +287,8 @@ class VoxelAccumulator:
 
         Args:
             voxel_size: length of a voxel's side [m].
-            divisions: divisions of a voxel's side into parts that have a sample
-                each; 0 for no samples.
+            divisions: number of parts of a voxel's side, of which each keeps a
+                sample; 0 for no samples.
         """
         self._voxel_size = voxel_size
         self._divisions = divisions
@@ -308,8 +311,8 @@ class VoxelAccumulator:
                 identity if left out.
 
         Returns:
-            How many points were left out because they are not finite, or
-            farther away than voxels can be numbered.
+            Number of points left out because they are not finite, or too far
+            away for the numbers of voxels.
         """
         X = np.array(np.eye(4) if X_WS is None else X_WS, dtype=np.float64)
         X[2, 3] -= Z_ORIGIN
@@ -388,7 +391,7 @@ def voxelise(
     """Returns the voxel map of a cloud (N, 3) in the world frame [m].
 
     Returns:
-        The map, and how many points were left out as not finite.
+        The map, and the number of points left out because they are not finite.
 
     Example:
         from evaluation import voxelise

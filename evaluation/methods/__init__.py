@@ -1,4 +1,4 @@
-"""Place-recognition methods, one a file, all behind one interface."""
+"""Place-recognition methods: one per file, all with the same interface."""
 
 from evaluation.methods import (  # noqa: F401  (register themselves)
     btc,

@@ -8,15 +8,16 @@ A candidate counts if its triangles agree on a motion; its score is the fit of
 both clouds' planes under that motion.
 
 The clouds are several consecutive scans, in the frame of one of them. (The
-method's authors describe them in a common world frame, which favours it:
-the grids on which planes and keypoints are found then coincide.)
+method's authors describe all clouds in one world frame. This favours the
+method, because the grids on which planes and keypoints are found then
+coincide.)
 
-Scores are those of the public program (equal for 243 single scans of two
-LiDARs and 163 submaps, each against 308 places). Two details that the method
-leaves open follow the program. One is the order in which planes are compared
-(`btc_planes`), by which the order of a cloud's points matters. The other
-is a lean of keypoints on ground that leans sideways, which lowers scores there;
-`image_axes: orthogonal` corrects it.
+Scores are those of the public program (equal for 243 single scans of two LiDARs
+and 163 submaps, each against 308 places). Two details that the method leaves
+open follow the program. One is the order in which planes are compared
+(`btc_planes`); because of it, scores depend on the order of a cloud's points.
+The other is an error in the positions of keypoints where the ground slopes
+sideways, which lowers scores there; `image_axes: orthogonal` corrects it.
 
 Planes are found by `btc_planes`, keypoints and triangles by `btc_triangles`.
 """
@@ -50,14 +51,14 @@ from evaluation.methods.btc_triangles import (
 )
 from evaluation.methods.method import Method, MethodConfig, register
 
-# Fixed in the public program: how many pairs are tried at most (about), how
-# far from its partner a vertex may come to lie [m], and how many pairs must
-# agree on a motion.
+# Fixed in the public program: approximate greatest number of pairs to try,
+# greatest distance of an aligned vertex from its partner [m], and number of
+# pairs that must agree on a motion.
 _TRIALS = 50
 _VERTEX_LIMIT = 3.0
 _MIN_AGREEING = 4
 
-# A bit of an int64 for each layer, and one for the sign.
+# Greatest number of layers: the bits of an int64 without its sign.
 _MAX_LAYERS = 62
 
 
@@ -70,53 +71,57 @@ def _increasing(limits: tuple[float, float]) -> tuple[float, float]:
 class BtcConfig(MethodConfig):
     """Settings of BTC.
 
-    Sources of the values: [O] the outdoor settings of the public program, [P]
-    constants in its code. The height of the sensor is not used: the method
-    finds the ground in the cloud.
+    Letters in brackets name the source of a value: [O] stands for the outdoor
+    settings of the authors' program, [P] for constants in its code.
+    `sensor_height` has no effect, because the method finds the ground in the
+    cloud.
 
     Attributes:
-        voxel_size: side of the voxels in which planes are sought [m]; [O] 2.
-        max_sparse_points: number of points above which a voxel can be a plane;
-            [O] 10.
-        flatness: largest variance of a plane's points along its normal [m^2];
-            [O] 0.01.
-        merge_normal_limit: largest difference of the normals of two planes that
-            are merged; [O] 0.1.
-        merge_distance_limit: largest distance of the centre of one plane from
-            the other, for merging [m]; [O] 0.3.
-        image_axes: axes in which keypoints are placed. `public` copies the
-            public program, whose second axis leaves the plane by a wrong term
-            (see `btc_triangles.image_axes`); `orthogonal` corrects it. [P]
-            public.
-        resolution: side of a cell of the image [m]; [O] 0.5.
+        voxel_size: side of the voxels in which the method looks for planes [m];
+            [O] 2.
+        max_sparse_points: number of points that a voxel must exceed to be
+            checked for a plane; [O] 10.
+        flatness: largest variance along the normal at which points count as a
+            plane [m^2]; [O] 0.01.
+        merge_normal_limit: largest difference between the normals of two planes
+            that are merged; [O] 0.1.
+        merge_distance_limit: largest distance from the centre of a plane to
+            another plane with which it is merged [m]; [O] 0.3.
+        image_axes: axes of the image on a plane, in which keypoints are found.
+            `public` copies the authors' program, in which a wrong term tilts
+            the second axis out of the plane (see `btc_triangles.image_axes`).
+            `orthogonal` corrects it. [P] public.
+        resolution: side of a cell of the image on a plane [m]; [O] 0.5.
         height_range: lowest and highest height above the ground of the points
-            in the image [m]; [O] -1, 4.
-        height_step: height of each layer of the image [m]; [O] 0.1.
-        num_layers: number of layers; [P] 49. The public program divides the
-            range by the step in single precision, which gives one layer less
-            than meant, and writes higher points beyond the end of its array;
-            here these points are ignored.
-        min_heights: number of layers that a keypoint needs; [O] 10.
-        suppression_radius: distance within which only the keypoint with the
-            most layers is kept [m]; [O] 2.
-        max_keypoints: largest number of keypoints of a place; [O] 500.
-        num_neighbours: number of neighbouring keypoints with which triangles
-            are made, including the keypoint itself; [O] 10.
-        side_range: least and greatest length of the triangles' sides [m]; [O]
+            that are used [m]; [O] -1, 4.
+        height_step: thickness of each layer of the image [m]; [O] 0.1.
+        num_layers: number of layers of the image; [P] 49. The authors' program
+            divides the range of heights by the step in single precision, which
+            gives one layer less than intended. It then writes points of the
+            missing layer beyond the end of an array; here these points are
+            ignored.
+        min_heights: number of occupied layers that a keypoint needs; [O] 10.
+        suppression_radius: radius within which only the keypoint with the most
+            layers is used [m]; [O] 2.
+        max_keypoints: largest number of keypoints per place; [O] 500.
+        num_neighbours: number of nearest keypoints that form triangles with
+            each keypoint, including itself; [O] 10.
+        side_range: smallest and largest length of a triangle's sides [m]; [O]
             2, 50.
-        side_resolution: step by which side lengths are rounded in the table of
-            triangles [m]; [O] 0.2.
-        side_tolerance: largest relative difference between the sides of
-            matching triangles; [O] 0.01.
-        min_similarity: least similarity of the descriptors of matching
-            triangles; [O] 0.7.
-        min_votes: number of matches that a candidate needs; [P] 5.
-        candidates: number of places with the most votes that are verified; [O]
-            50.
-        normal_limit: largest difference between the normals of matching planes;
-            [O] 0.2.
-        distance_limit: largest distance of the centre of one plane from a
-            matching one [m]; [O] 0.5.
+        side_resolution: step to which side lengths are rounded in the hash
+            table of triangles [m]; [O] 0.2.
+        side_tolerance: largest relative difference between the sides of two
+            triangles that match; [O] 0.01.
+        min_similarity: smallest similarity of the descriptors of two triangles
+            that match; [O] 0.7.
+        min_votes: number of matching triangles that a place needs to be a
+            candidate; [P] 5.
+        candidates: number of candidates, those with the most matching
+            triangles, whose planes are then compared; [O] 50.
+        normal_limit: largest difference between the normals of two planes that
+            match; [O] 0.2.
+        distance_limit: largest distance from the centre of a plane to a plane
+            that it matches [m]; [O] 0.5.
     """
 
     voxel_size: PositiveFloat = 2.0
@@ -177,7 +182,7 @@ class BtcDatabase:
 class Btc(Method[BtcDescription, BtcDatabase]):
     """BTC; the score of a pair is the share of the planes that match.
 
-    A place has no score if too few triangles match, or too few of these
+    A place has no score if too few triangles match, too few of the matches
     agree on a motion, or no plane fits. The public program's limit on the score
     of a loop is not applied.
     """
@@ -189,7 +194,7 @@ class Btc(Method[BtcDescription, BtcDatabase]):
 
     def describe(self, points: np.ndarray) -> BtcDescription:
         config = self.config
-        # Arrays in another memory order would be compiled for anew.
+        # For arrays in another memory order, numba would compile again.
         points = np.ascontiguousarray(points)
         planes = voxel_planes(
             points, config.voxel_size, config.max_sparse_points, config.flatness
@@ -198,7 +203,8 @@ class Btc(Method[BtcDescription, BtcDatabase]):
             planes, config.merge_normal_limit, config.merge_distance_limit
         )
         if base is None:
-            # As in the public program: level, through the first point.
+            # As in the public program: a horizontal plane through the first
+            # point.
             first = points[0] if len(points) > 0 else np.zeros(3)
             base = first, np.array([0.0, 0.0, 1.0])
         center, normal = base
@@ -262,7 +268,7 @@ class Btc(Method[BtcDescription, BtcDatabase]):
     ) -> list[np.ndarray | None]:
         """Returns the poses on which most matching triangles agree.
 
-        None if too few match or agree.
+        A pose is None if too few triangles match or agree.
         """
         some = self.build_database([database.places[place] for place in places])
         found = dict(self._motions(query, some, None))
@@ -274,10 +280,11 @@ class Btc(Method[BtcDescription, BtcDatabase]):
         database: BtcDatabase,
         max_candidates: int | None,
     ) -> Iterator[tuple[int, np.ndarray]]:
-        """Yields candidates with the motion X_PQ of their triangles.
+        """Yields candidate places, each with the motion X_PQ of its triangles.
 
         Args:
-            max_candidates: only so many with most matches; all if None.
+            max_candidates: number of candidates, those with most matches; None
+                for all.
         """
         table = database.table
         of_query, of_table = match(
@@ -287,7 +294,8 @@ class Btc(Method[BtcDescription, BtcDatabase]):
             self.config.min_similarity,
         )
         clouds = table.clouds[of_table]
-        # By place, those of each in the order in which they were found.
+        # Sort by place; matches of a place stay in the order in which they were
+        # found.
         order = np.argsort(clouds, kind="stable")
         votes = np.bincount(clouds, minlength=len(database.places))
         ends = np.cumsum(votes)
@@ -342,7 +350,7 @@ def find_motion(query: np.ndarray, place: np.ndarray) -> np.ndarray | None:
         pairs agree.
     """
     stride = len(query) // _TRIALS + 1
-    # As many as there are whole strides.
+    # One proposal for each whole stride.
     tried = np.arange(len(query) // stride) * stride
     motions = align(query[tried], place[tried])
     turned = query.reshape(-1, 3) @ np.swapaxes(motions[:, :3, :3], 1, 2)
@@ -362,15 +370,15 @@ def plane_overlap(
 ) -> float:
     """Returns the share of a query's patches that match one of a place.
 
-    Each patch is compared with the one whose center is nearest to its own.
+    Each patch is compared with the patch whose center is nearest to its own.
 
     Args:
         query: patches of the query, at least one.
         place: patches of the place, at least one.
         X_PQ: (4, 4) the query's frame in that of the place.
         normal_limit: upper limit of the difference of the two normals.
-        distance_limit: upper limit of a center's distance from the other's
-            plane [m].
+        distance_limit: upper limit of a center's distance from the plane of the
+            other patch [m].
     """
     centers = poses.transform(X_PQ, query.centers)
     normals = query.normals @ X_PQ[:3, :3].T

@@ -1,10 +1,10 @@
-"""Planes in a cloud: one a voxel, and the ground plane.
+"""Planes in a cloud: one per voxel, and the ground plane.
 
-Part of BTC (see `evaluation.methods.btc`). Which patches of the ground come
-together to its largest plane depends on the order in which they are compared,
-and on that plane all keypoints depend. The public program takes the voxels as
-the hash table of its C++ library (libstdc++) holds them. That order is no
-part of the method, but it is a definite one, and only with it scores agree.
+Part of BTC (see `evaluation.methods.btc`). The order in which patches are
+compared decides which of them are merged into the largest plane, the ground, on
+which all keypoints depend. The public program takes the voxels in the order of
+the hash table of its C++ library (libstdc++). This order is not part of the
+method, but it is reproducible, and scores agree only with it.
 """
 
 from __future__ import annotations
@@ -19,9 +19,9 @@ from cns_drake.base.compiled import compiled
 _FACTOR = 116101
 _MODULUS = 10_000_000_000
 
-# How many buckets a std::unordered_map of libstdc++ has when it grows by one
-# element at a time: the primes of its table that follow each other by its
-# rule (at least twice as many, once there are as many elements as buckets).
+# Numbers of buckets of a std::unordered_map of libstdc++ that grows by one
+# element at a time. When there are as many elements as buckets, it takes the
+# next prime of its table that is at least twice as large.
 _NUM_BUCKETS = (
     13, 29, 59, 127, 257, 541, 1109, 2357, 5087, 10273, 20753, 42043, 85229,
     172933, 351061, 712697, 1447153, 2938679, 5967347, 12117689, 24607243,
@@ -35,7 +35,7 @@ class Planes:
 
     Attributes:
         centers: (P, 3) mean of each patch's points [m].
-        normals: (P, 3) unit vectors; their sign means nothing.
+        normals: (P, 3) unit vectors of either sign.
         covariances: (P, 3, 3) of the points, divided by their number [m^2].
         counts: (P,) int64 number of points.
     """
@@ -63,8 +63,8 @@ def voxel_planes(
 ) -> Planes:
     """Returns the voxels whose points lie on a plane.
 
-    They have the order of the public program, which depends on the order of the
-    points.
+    The voxels are in the order of the public program, which depends on the
+    order of the points.
 
     Args:
         points: (N, 3) points [m].
@@ -114,7 +114,7 @@ def merge(
     distance_limit: float,
     keep_single: bool,
 ) -> Planes:
-    """Returns the planes that similar patches form together.
+    """Merges similar patches; returns the merged planes.
 
     Args:
         planes: patches to merge. The groups depend on their order.
@@ -154,8 +154,9 @@ def group_alike(
     """Returns the group (P,) of each patch; -1 if no other is similar.
 
     From the last patch to the first, each is compared with all patches before
-    it, in their order. If two are similar and one has a group, the other joins
-    it. If neither has one, both found a new group. Two groups never become one.
+    it, in their order. If two patches are similar and one has a group, the
+    other joins this group. If neither has a group, they form a new one. Two
+    groups are never merged.
 
     Args:
         centers: (P, 3) centres of the patches [m].
@@ -169,13 +170,14 @@ def group_alike(
     labels = np.full(num_planes, -1)
     num_groups = 0
     excesses = np.empty(num_planes)
-    # One more than needed, for a write that is not kept.
+    # One element more than needed, for writes without effect.
     alike = np.empty(num_planes + 1, dtype=np.int64)
     p, n = np.ascontiguousarray(centers.T), np.ascontiguousarray(normals.T)
     for i in range(num_planes - 1, 0, -1):
         x, y, z = p[0, i], p[1, i], p[2, i]
         a, b, c = n[0, i], n[1, i], n[2, i]
-        # Without a branch, so that several patches are compared at a time.
+        # There is no branch, so that the processor compares several patches at
+        # a time.
         for j in range(i):
             u, v, w = n[0, j], n[1, j], n[2, j]
             dx, dy, dz = p[0, j] - x, p[1, j] - y, p[2, j] - z
@@ -204,7 +206,7 @@ def group_alike(
 def _moments(
     points: np.ndarray, voxel_size: float
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
-    """Returns the voxels of a cloud, in the order in which it meets them.
+    """Returns the voxels of a cloud, in the order of their first points.
 
     Returns:
         (V, 3) int64 indices along x, y and z; (V,) number of points; (V, 3)
@@ -271,7 +273,7 @@ def _moments(
 def _fit(
     centers: np.ndarray, covariances: np.ndarray, counts: np.ndarray
 ) -> tuple[Planes, np.ndarray]:
-    """Returns the planes of least squares, and the variances (P,) off them."""
+    """Returns the least-squares planes, and the variances (P,) across them."""
     variances, axes = np.linalg.eigh(covariances)
     return Planes(centers, axes[:, :, 0], covariances, counts), variances[:, 0]
 
@@ -296,7 +298,7 @@ def hash_table_order(codes: np.ndarray) -> np.ndarray:
     All elements form one list, in which the elements of a bucket follow each
     other. A new element goes to the front of its bucket, and a new bucket to
     the front of the list. When the number of buckets grows, all elements are
-    inserted anew, in the order of the list.
+    inserted again, in the order of the list.
 
     Args:
         codes: (N,) uint64 hashes of the elements, in the order in which they
@@ -312,11 +314,11 @@ def hash_table_order(codes: np.ndarray) -> np.ndarray:
         added = np.arange(len(order), min(num_buckets, len(codes)))
         order = np.concatenate([order, added])
         buckets = codes[order] % np.uint64(num_buckets)
-        # Where each bucket is first met: the first of equal indices is
-        # assigned last.
+        # Index of each bucket's first element: among equal indices, the first
+        # is assigned last.
         first = np.empty(num_buckets, dtype=np.int64)
         first[buckets[::-1]] = np.arange(len(order))[::-1]
-        # The last bucket leads, and in each its last element.
+        # The newest bucket comes first, and in each bucket the newest element.
         ranks = first[buckets] * len(order) + np.arange(len(order))
         order = order[np.argsort(ranks)[::-1]]
         if len(order) == len(codes):

@@ -3,7 +3,7 @@
 Part of BTC (see `evaluation.methods.btc`). Seen along the normal of a plane,
 the cloud is an image; each of its cells has bits for the heights above the
 plane that have points. Cells with many heights (walls, trunks, posts) are the
-keypoints, if they are not part of a line of such.
+keypoints, unless they are part of a line of such cells.
 """
 
 from __future__ import annotations
@@ -19,28 +19,28 @@ from scipy.spatial import cKDTree
 
 from cns_drake.base.compiled import compiled
 
-# Cells along the side of a square in which one keypoint may lie, the least
-# number of points of an image, and by how many heights a cell may have less
-# than its neighbour and still continue a line: fixed in the public program.
+# Fixed in the public program: side, in cells, of a square that may contain one
+# keypoint; least number of points of an image; and by how many heights a cell
+# may have fewer than its neighbour and still continue a line.
 _SEGMENT = 5
 _MIN_POINTS = 6
 _LINE_MARGIN = 3
 
 _NEIGHBOURS = ((0, 1), (1, 0), (1, 1), (1, -1))
 
-# Fixed in the public program: how much longer the two short sides must be than
-# the long one [m], the sides' difference at which two triangles of one cloud
-# are the same [m], and the greatest distance of a query from the center of a
-# cell that is searched [cells].
+# Fixed in the public program: least excess of the sum of the two short sides
+# over the long one [m]; greatest difference of the sides of two triangles of a
+# cloud that count as the same [m]; and greatest distance of a query from the
+# center of a cell that is searched [cells].
 _MIN_DETOUR = 0.2
 _SAME = 0.001
 _REACH = 1.5
 
-# The search reaches this much farther, against rounding.
+# The search reaches this much farther, to allow for rounding.
 _MARGIN = 1.0 + 1e-9
 
-# A similarity of exactly the limit counts, with either rounding: the public
-# program holds the limit in single precision, where 0.7 is 1e-8 less.
+# A similarity equal to the limit counts, whatever the rounding: in the public
+# program's single precision, the limit 0.7 is 1e-8 less.
 _ROUNDING = 1e-8
 
 
@@ -78,15 +78,15 @@ class HeightImage(NamedTuple):
 def image_axes(normal: np.ndarray, orthogonal: bool) -> np.ndarray:
     """Returns the directions of an image on a plane, (3, 3) of length 1.
 
-    The rows of the result are: the direction of increasing row numbers; that of
-    increasing column numbers, which follows the x axis as far as the plane
-    allows; and the normal.
+    The rows of the result are: the direction in which row numbers increase; the
+    direction in which column numbers increase, which is the x axis projected
+    onto the plane; and the normal.
 
-    By a wrong term, the second direction of the public program has a
-    component along the normal that is the normal's y component. Keypoints
-    then lie on a plane through the same center that is tilted by as much:
-    on level ground, about as much as the ground itself. This function copies
-    the wrong term unless `orthogonal` is true.
+    In the public program, a wrong term gives the second direction a component
+    along the normal, equal to the normal's y component. Keypoints then lie on a
+    plane through the same center that is tilted by that much: on nearly level
+    ground, by about the slope of the ground itself. This function copies the
+    wrong term unless `orthogonal` is true.
 
     Args:
         normal: (3,) unit normal of the plane, z >= 0.
@@ -116,8 +116,8 @@ def height_image(
 ) -> HeightImage:
     """Returns an image of the heights at which each cell has points.
 
-    The cells are those of a grid that starts at the first. Its memory grows
-    with the area that the points cover.
+    The grid of the cells starts at the first occupied row and column. Memory
+    grows with the area that the points cover.
 
     Args:
         points: (N, 3) points [m].
@@ -126,7 +126,7 @@ def height_image(
         resolution: length of a cell [m].
         height_range: limits of the heights above the plane [m].
         height_step: thickness of the layers of height [m].
-        num_layers: how many layers; points above them only count for the
+        num_layers: number of layers; points above them count only for the
             means.
     """
     # Rows, columns and heights of the points between the limits.
@@ -139,7 +139,8 @@ def height_image(
         z = points[i, 2] - center[2]
         height = axes[2, 0] * x + axes[2, 1] * y + axes[2, 2] * z
         if height_range[0] <= height <= height_range[1]:
-            # On the plane: the other axes need not be orthogonal to it.
+            # Project onto the plane first, because the other axes need not be
+            # orthogonal to the normal.
             x -= height * axes[2, 0]
             y -= height * axes[2, 1]
             z -= height * axes[2, 2]
@@ -205,7 +206,8 @@ def peaks(
     segment = np.flatnonzero(most >= min_heights)
     row = segment // columns * _SEGMENT + highest[segment] // _SEGMENT
     column = segment % columns * _SEGMENT + highest[segment] % _SEGMENT
-    # At the other two sides, the image ends in empty cells.
+    # No padding is needed at the other two sides, where the image ends in empty
+    # cells.
     inside = (row > 0) & (column > 0)
     row, column = row[inside], column[inside]
     peak = num_heights[row, column]
@@ -239,7 +241,7 @@ def find_keypoints(
 
 
 def suppress(keypoints: Keypoints, radius: float, max_number: int) -> Keypoints:
-    """Returns the keypoints with more heights than any other nearby.
+    """Returns the keypoints with more heights than any other keypoint nearby.
 
     If two neighbours have equally many heights, both are dropped.
 
@@ -267,8 +269,8 @@ def suppress(keypoints: Keypoints, radius: float, max_number: int) -> Keypoints:
 def count_bits(words: np.ndarray) -> np.ndarray:
     """Returns the number of set bits in int64 numbers from 0 to 2^62 - 1.
 
-    These are sums of neighbouring bits, pairs, nibbles, then of all bytes at
-    once.
+    It sums neighbouring bits, then pairs, then nibbles, and finally all bytes
+    at once.
     """
     words = words - ((words >> 1) & 0x5555555555555555)
     words = (words & 0x3333333333333333) + ((words >> 2) & 0x3333333333333333)
@@ -280,8 +282,8 @@ def count_bits(words: np.ndarray) -> np.ndarray:
 class Triangles:
     """Triangles of keypoints.
 
-    The vertices have this order: where the two shortest sides meet, where the
-    shortest and the longest side meet, where the two longest sides meet.
+    The vertices are ordered by the sides that meet there: the two shortest
+    sides; the shortest and the longest side; the two longest sides.
 
     Attributes:
         sides: (T, 3) lengths, shortest first [m].
@@ -331,8 +333,8 @@ def make_triangles(
     Args:
         keypoints: K of them.
         num_neighbours: nearest keypoints that are looked at, the keypoint
-            itself included. (Where a cloud has fewer, the public program
-            reads beyond them.)
+            itself included. (If a cloud has fewer keypoints, the public program
+            reads beyond its array.)
         side_range: limits of the sides [m].
     """
     num_neighbours = min(num_neighbours, len(keypoints))
@@ -344,7 +346,7 @@ def make_triangles(
         )
     positions = keypoints.positions
     _, nearest = cKDTree(positions).query(positions, k=num_neighbours)
-    # Itself, then two different neighbours, all in order of distance.
+    # The keypoint itself, then two of its neighbours, in order of distance.
     one, other = np.triu_indices(num_neighbours - 1, k=1)
     corners = np.stack(
         [
@@ -387,7 +389,7 @@ def make_triangles(
 def make_table(clouds: Sequence[Triangles], resolution: float) -> TriangleTable:
     """Returns the triangles of several clouds, sorted by cell.
 
-    Triangles of one cell keep their order.
+    Triangles within a cell keep their order.
 
     Args:
         clouds: triangles of each cloud; at least one.
@@ -419,11 +421,11 @@ def match(
 ) -> tuple[np.ndarray, np.ndarray]:
     """Returns the triangles that are similar to those of a query.
 
-    Two triangles are similar if their sides differ little in relation to their
-    length (by the Euclidean norms over the three sides), and if their vertices
-    have about the same heights (by the mean Dice similarity of the three). Only
-    cells near those of the query are searched. Large triangles must therefore
-    be more similar than the tolerance requires.
+    Two triangles are similar in two respects: the difference of their sides is
+    small relative to the sides (as Euclidean norms of three numbers), and their
+    vertices have about the same heights (by the mean Dice similarity of the
+    three). Only cells near those of the query are searched, so that large
+    triangles must be more similar than the tolerance requires.
 
     Args:
         query: triangles of one cloud.
@@ -432,11 +434,13 @@ def match(
         min_similarity: lower limit of the similarity.
 
     Returns:
-        (M,) triangles of the query, non-decreasing, and (M,) of the table;
-        those of one triangle of the query in the order of the table.
+        (M,) indices of triangles of the query, non-decreasing, and (M,) indices
+        of triangles of the table. Matches of one query triangle are in the
+        order of the table.
     """
     limits = side_tolerance * np.sqrt((query.sides**2).sum(axis=1))
-    # Farther ones are in other cells, whose corners are sqrt(3) from a center.
+    # Triangles farther away are in cells that are not searched; the corners of
+    # a cell are sqrt(3) from its center.
     farthest = (_REACH + math.sqrt(3.0)) * table.resolution
     reach = np.minimum(limits, farthest) * _MARGIN
     near = table.tree.query_ball_point(query.sides, reach, return_sorted=True)

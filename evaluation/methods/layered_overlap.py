@@ -1,13 +1,13 @@
 """Layered overlap: a matched filter on maps of bits, made to survive change.
 
-A scan becomes maps from above: one for each layer of height, one for poles
-and one for kerbs. Two scans are compared at the pose at which most of their
-filled cells coincide. Things that are gone or new only lower this number;
-unchanged things add up at one pose.
+A scan becomes maps from above: one for each layer of height, one for poles and
+one for kerbs. Two scans are compared at the pose at which most of their filled
+cells coincide. Objects that are gone or new only lower this number, while
+unchanged objects all coincide at the same pose.
 
-The idea of a matched filter for places is that of Joseph, Fischer and
-Milford (arXiv 2409.03998), which uses one map of occupied cells; layers, poles
-and kerbs, and bits instead of a Fourier transform, are our ideas.
+Matched filters for place recognition come from Joseph, Fischer and Milford
+(arXiv 2409.03998), who use one map of occupied cells. The layers, poles and
+kerbs, and bits instead of a Fourier transform, are our additions.
 """
 
 from collections.abc import Sequence
@@ -35,10 +35,11 @@ def _moves(turn: int, shift: int) -> np.ndarray:
     return np.array([*itertools.product(range(-turn, turn + 1), near, near)])
 
 
-# Coarse maps are those of low with middle, high, poles and kerbs.
+# Coarse map of each layer: low and middle points share one; high points, poles
+# and kerbs have one each.
 _MAPS = np.array([0, 0, 1, 2, 3])
 # The first search: cells of 4 m and steps of 15 deg. All shifts within reach
-# are tried, except corners, which are too far for a match.
+# are tried, except in the corners, which are too far away for a match.
 _FIRST_HALVINGS = 3
 _FIRST_WEIGHTS = np.array([1, 1, 2, 2])
 _FIRST_TURNS = turns(24)
@@ -52,9 +53,10 @@ _SECOND_TURNS = turns(144)
 _SECOND_MOVES = _moves(1, 1) * [2, 1, 1]
 _THIRD_MOVES = _moves(3, 2)
 _SECOND_MARGIN = 2 * _FIRST_REACH + 3
-# From a pose of the first search to one of the second: place, heading, shifts.
+# Factors from a pose of the first search (place, heading, shifts) to one of the
+# second.
 _TO_SECOND = np.array([1, 6, 2, 2])
-# The last: whole cells; steps of 2.5 deg and 1 m, then of half of that.
+# The last search: all cells; steps of 2.5 deg and 1 m, then half of these.
 _LAST_TURNS = turns(288)
 _LAST_STEPS = np.array([[2, 4], [1, 2]])
 _TO_LAST = np.array([1, 2, 8, 8])
@@ -63,20 +65,21 @@ _TO_LAST = np.array([1, 2, 8, 8])
 class LayeredOverlapConfig(MethodConfig):
     """Settings of layered overlap.
 
-    All values come from trials on development worlds, which are not the worlds
-    of the reported results.
+    All values were chosen by trials on development worlds. The reported results
+    come from other worlds.
 
     Attributes:
-        cell: side of a cell of the finest maps, which have 256 x 256 cells [m].
-        min_points: number of points that make a cell occupied.
-        poses: number of pairs of a place and a heading that the second search
-            compares.
-        refined: number of these pairs that the third search compares.
-        candidates: number of places that are compared cell by cell.
-        weights: weights of common cells with low, middle and high points, poles
-            and kerbs.
-        least_cells: number of weighted cells that is added to both scans, so
-            that two nearly empty scans do not look alike.
+        cell: side of a cell of the finest maps [m]. These maps have 256 x 256
+            cells.
+        min_points: number of points from which on a cell is occupied.
+        poses: number of candidate poses (a place and a heading) that the second
+            search compares.
+        refined: number of candidate poses that the third search compares.
+        candidates: number of places that the last search compares cell by cell.
+        weights: weights of a common cell in the score, by layer: low, middle
+            and high points, poles, kerbs.
+        least_cells: weighted number of cells that is added to that of each scan
+            in the score, so that two nearly empty scans do not look alike.
     """
 
     cell: PositiveFloat = 0.5
@@ -99,8 +102,8 @@ class LayeredScan:
     """Descriptor of one cloud.
 
     Attributes:
-        cells: (M,) uint16, filled cells of one layer after the other.
-        starts: (6,) int64, where in `cells` each layer begins, and where the
+        cells: (M,) uint16, filled cells, layer by layer.
+        starts: (6,) int64, index in `cells` at which each layer begins and the
             last one ends.
     """
 
@@ -113,8 +116,8 @@ class CoarseMaps:
     """Coarse maps of places, or of a query at some headings.
 
     Attributes:
-        bits: (N, R, 4) uint64, R rows of four maps. Maps of places have
-            additional rows without bits on either side.
+        bits: (N, R, 4) uint64, R rows of four maps, one word per row. Maps of
+            places have additional empty rows on either side.
         counts: (N, 4) int64 number of bits set in each map.
     """
 
@@ -145,12 +148,12 @@ class LayeredOverlap(Method[LayeredScan, LayeredDatabase]):
     rank places by how many standard deviations this number of bits lies above
     chance. The last search improves that pose by hill climbing, cell by cell.
 
-    The score counts the query's cells that meet a cell of the place or a
-    neighbour of one. This weighted number is divided by the geometric mean of
-    the numbers of cells of both scans.
+    The score is a weighted count of the query's cells that coincide with a cell
+    of the place or its neighbour. It is divided by the geometric mean of the
+    two scans' weighted numbers of cells.
 
-    Of equal counts, the first wins. All counts are integers, so that scores are
-    the same on every processor.
+    Among equal counts, the first wins. All counts are integers, so that scores
+    are the same on every processor.
     """
 
     Config = LayeredOverlapConfig
@@ -201,15 +204,15 @@ class LayeredOverlap(Method[LayeredScan, LayeredDatabase]):
         database: LayeredDatabase,
         places: Sequence[int],
     ) -> list[np.ndarray | None]:
-        """Returns the query's headings and horizontal translations.
+        """Returns poses with the query's heading and horizontal translation.
 
-        None if one of the two scans shows nothing.
+        A pose is None if one of the two scans shows nothing.
         """
         scans = [database.places[place] for place in places]
         poses: list[np.ndarray | None] = [None] * len(scans)
         if len(query.cells) == 0 or len(scans) == 0:
             return poses
-        # Every place with every heading is refined.
+        # An exhaustive search refines every place at every heading.
         every = len(scans) * len(_FIRST_TURNS)
         some = self.build_database(scans)
         for start in _search(query, some, every, every):
@@ -220,7 +223,7 @@ class LayeredOverlap(Method[LayeredScan, LayeredDatabase]):
         return poses
 
     def _to_pose(self, found: np.ndarray) -> np.ndarray:
-        """Returns X_PQ (4, 4) of the pose in a result of `climb`."""
+        """Returns X_PQ (4, 4) for the pose in a result of `climb`."""
         c, s = _LAST_TURNS[found[0]] / _LAST_TURNS[0, 0]
         R_PQ = np.array([[c, -s, 0.0], [s, c, 0.0], [0.0, 0.0, 1.0]])
         half_cell = 0.5 * self.config.cell
@@ -231,7 +234,7 @@ class LayeredOverlap(Method[LayeredScan, LayeredDatabase]):
     def _climb(
         self, query: LayeredScan, place: LayeredScan, start: np.ndarray
     ) -> np.ndarray:
-        """Returns pose and common cells of two scans, see `climb`."""
+        """Returns the best pose of two scans and common cells; see `climb`."""
         return climb(
             query.cells,
             query.starts,
@@ -246,7 +249,7 @@ class LayeredOverlap(Method[LayeredScan, LayeredDatabase]):
     def _rate(
         self, query: LayeredScan, place: LayeredScan, found: np.ndarray
     ) -> float:
-        """Returns the score of two scans at the pose that was found."""
+        """Returns the score of two scans, from a result of `climb`."""
         config = self.config
         weights = np.array(config.weights)
         common = int(weights @ found[3:])
@@ -266,12 +269,13 @@ def _search(
 ) -> np.ndarray:
     """Searches for the places and poses at which coarse maps overlap most.
 
-    The second search takes `number` places with a heading, the third `refined`
-    of them; an exhaustive one keeps each place with its best heading.
+    The second search compares `number` pairs of a place and a heading, and the
+    third search `refined` of them. An exhaustive search keeps each place at its
+    best heading.
 
     Returns:
-        (N, 4) int64 places, each with heading and shifts to climb from;
-        decreasing by how much the overlap is more than chance would have.
+        (N, 4) int64: place, heading and shifts from which `climb` starts. The
+        pairs with the greatest overlap, compared with chance, come first.
     """
     # The first search: every place at every heading.
     shape = len(database.places), len(_FIRST_TURNS)
@@ -284,8 +288,9 @@ def _search(
         starts,
         _FIRST_MOVES,
     )
-    # Overlap at all headings is no sign of a place, since both scans are full
-    # near their sensors. Half of it is subtracted, by trials.
+    # A large overlap at all headings is no sign of a match, because all scans
+    # have many points near their sensors. Half of the mean over headings is
+    # subtracted; trials led to this factor.
     surprise = surprise.reshape(shape)
     surprise -= 0.5 * surprise.mean(axis=1, keepdims=True)
     if exhaustive:
@@ -312,10 +317,13 @@ def _overlaps(
     starts: np.ndarray,
     moves: np.ndarray,
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Returns by how much overlaps near some poses exceed those by chance.
+    """Returns the best overlaps near some poses, compared with chance.
 
-    Poses, starts among them, are (N, 4): place, heading and shifts. The first
-    result is (N,) standard deviations, the second the best poses.
+    `starts` are (N, 4) poses: place, heading and shifts.
+
+    Returns:
+        (N,) by how many standard deviations the overlap exceeds that expected
+        by chance; (N, 4) the best poses.
     """
     counts, found = best_overlaps(
         query.bits, places.bits, weights, starts, moves
@@ -332,7 +340,7 @@ def _overlaps(
 def _maps_of_places(
     places: Sequence[LayeredScan], halvings: int, margin: int
 ) -> CoarseMaps:
-    """Returns maps of places at their own heading, with rows added."""
+    """Returns maps of places at their own heading, with a margin of rows."""
     maps = [_draw(place, turns(1), halvings) for place in places]
     bits = np.concatenate([one.bits for one in maps])
     return CoarseMaps(
@@ -342,7 +350,7 @@ def _maps_of_places(
 
 
 def _draw(scan: LayeredScan, at: np.ndarray, halvings: int) -> CoarseMaps:
-    """Returns coarse maps of a scan, at some turns."""
+    """Returns coarse maps of a scan at some headings."""
     return CoarseMaps(
         *coarse_maps(scan.cells, scan.starts, at, halvings, _MAPS)
     )
@@ -351,7 +359,8 @@ def _draw(scan: LayeredScan, at: np.ndarray, halvings: int) -> CoarseMaps:
 def _greatest(values: np.ndarray, number: int) -> np.ndarray:
     """Returns the indices of the greatest values (N,), decreasing.
 
-    The first of equal ones counts: a partial sort leaves that to the processor.
+    Equal values are in order of their indices. A partial sort alone would leave
+    their order to the processor.
     """
     some = np.arange(len(values))
     if number < len(values):

@@ -5,8 +5,8 @@ map of features, 8 rings x 48 sectors x 16. Two scans are compared by the
 correlation of their maps at the best turn, which is also the heading. The
 network has never seen a recorded scan: `cns-drake train` makes its weights.
 
-Its kin: correlations over turns are those of OverlapNet (Chen et al., RSS
-2020) and DiSCO (Xu et al., RA-L 2021).
+Related methods: OverlapNet (Chen et al., RSS 2020) and DiSCO (Xu et al., RA-L
+2021) also correlate over headings.
 """
 
 from collections.abc import Mapping, Sequence
@@ -28,31 +28,34 @@ from evaluation.methods.method import Method, MethodConfig, register, yaw_pose
 
 RINGS = 64
 SECTORS = 192
-# Occupied bands of height, then greatest height, thickness, and lowest height.
+# Channels: occupied bands of height, then greatest height, thickness and lowest
+# height.
 CHANNELS = 8
 # Range of the outermost ring [m].
 REACH = 64.0
 # Lower ends of the bands, above the ground below the sensor [m].
 _BANDS = np.array([0.35, 1.0, 2.0, 4.0, 8.0])
-# Heights at which the channels end [m].
+# Heights at which the last three channels saturate [m].
 _HIGHEST = 16.0
 _THICKEST = 0.5
 _LOWEST = 3.0
 WEIGHTS_VERSION = 1
-# Each layer of 3 x 3 cells has channels in and out, steps over rings and
-# sectors.
+# For each 3 x 3 convolution: channels in, channels out, stride over rings,
+# stride over sectors.
 LAYERS = ((CHANNELS, 16, 2, 2), (16, 32, 2, 2), (32, 64, 2, 1), (64, 16, 1, 1))
-# Rings x channels, and sectors, of the map of features.
+# Numbers of the map of features: rings x channels, and sectors.
 FEATURES = 8 * 16
 TURNS = 48
-# Frequencies of a map along its sectors; the highest one has no phase.
+# Number of frequencies of a map along its sectors; the highest frequency has no
+# phase and is left out.
 FREQUENCIES = TURNS // 2
 # Headings at which two maps are compared.
 HEADINGS = 2 * TURNS
-# Parts of the sectors with a return, least and greatest in training.
+# Name of an array: least and greatest share of sectors with a return in
+# training.
 SEEN = "seen"
-# The weights of the package: trained by the radius of a match on streets of the
-# shipped cities, and graded by exact overlap on streets of no map.
+# The shipped weights: trained with matches by radius, on streets of the shipped
+# cities; and trained with exact overlaps, on streets of no map.
 SHIPPED = Path(__file__).with_name("learned_weights.npz")
 GRADED = SHIPPED.with_name("learned_graded_weights.npz")
 _MOST_BYTES = 5_000_000
@@ -71,9 +74,10 @@ def polar_image(points: np.ndarray, sensor_height: float) -> np.ndarray:
 
     Returns:
         (RINGS, SECTORS, CHANNELS) uint8, 0 where there is no point. The first
-        five channels say which bands of height have points: from 0.35, 1, 2, 4
-        and 8 m on. The others are the greatest height (0 to 16 m), the greatest
-        less the lowest (0 to 0.5 m), and the lowest (-3 to 3 m).
+        five channels say which bands of height have points; the bands begin at
+        0.35, 1, 2, 4 and 8 m. The other three are the greatest height (0 to 16
+        m), the difference between greatest and lowest height (0 to 0.5 m), and
+        the lowest height (-3 to 3 m).
     """
     x, y, z = points.T
     ring = np.hypot(x, y) * (RINGS / REACH)
@@ -101,7 +105,7 @@ def polar_image(points: np.ndarray, sensor_height: float) -> np.ndarray:
         (least + _LOWEST) / (2.0 * _LOWEST),
     )
     for channel, share in enumerate(shares, start=5):
-        # Zero is kept for empty cells.
+        # Zero is reserved for empty cells.
         image[filled, channel] = 1.0 + 254.0 * np.clip(share, 0.0, 1.0)
     return image.reshape(RINGS, SECTORS, CHANNELS)
 
@@ -110,11 +114,12 @@ class LearnedConfig(MethodConfig):
     """Settings of the learned descriptor.
 
     Attributes:
-        weights: file of weights from `cns-drake train`; by default the shipped
-            weights of the variant.
-        variant: `radius`, whose training called places within 7.5 m right, on
-            streets of the shipped cities; or `graded`, whose training ranked
-            places by exact overlap, on streets of no map.
+        weights: file with weights from `cns-drake train`. By default the
+            shipped weights of the variant.
+        variant: which shipped weights to use. `radius` was trained on streets
+            of the shipped cities, and every place within 7.5 m counted as
+            right. `graded` was trained on streets of no shipped map, and places
+            were ranked by their exact overlap.
     """
 
     weights: Path | None = None
@@ -130,7 +135,7 @@ class LearnedConfig(MethodConfig):
     @computed_field  # type: ignore[prop-decorator]
     @property
     def digest(self) -> str:
-        """Digest of the weights, since two files can have the same name."""
+        """Digest of the weights' file; its name alone would not identify it."""
         load_weights(self.path)
         return hashlib.sha256(self.path.read_bytes()).hexdigest()[:16]
 
@@ -203,7 +208,7 @@ class Learned(Method[LearnedScan, LearnedDatabase]):
         *,
         exhaustive: bool = False,
     ) -> np.ndarray:
-        del exhaustive  # It always is.
+        del exhaustive  # Always true here.
         if not query.features.any():
             return np.full(len(database.filled), np.nan)
         found = _correlations(query, database.spectra).max(axis=0)
@@ -212,9 +217,9 @@ class Learned(Method[LearnedScan, LearnedDatabase]):
     def relative_pose(
         self, query: LearnedScan, database: LearnedDatabase, place: int
     ) -> np.ndarray | None:
-        """Returns the query's heading at a place, in steps of 3.75 deg.
+        """Returns a pose with the query's heading, in steps of 3.75 deg.
 
-        None if one of the two has no points within reach.
+        Returns None if one of the two scans has no points within reach.
         """
         if not (query.features.any() and database.filled[place]):
             return None
@@ -225,7 +230,7 @@ class Learned(Method[LearnedScan, LearnedDatabase]):
         return yaw_pose(yaw)
 
     def _check_seen(self, image: np.ndarray) -> None:
-        """Notes once that the sensor sees less than any in training."""
+        """Warns once if the sensor sees less than any did in training."""
         if self._warned:
             return
         seen = seen_part(image)
@@ -251,7 +256,7 @@ def load_weights(path: Path) -> Mapping[str, np.ndarray]:
         `seen` (2,).
 
     Raises:
-        InputError: it cannot be read, or has another version or size.
+        InputError: the file cannot be read, or has another version or size.
     """
     check_regular(path)
     with user_errors(path):
@@ -325,7 +330,7 @@ def _infer(weights: Mapping[str, np.ndarray], image: np.ndarray) -> np.ndarray:
 
 
 def _spectrum(scan: LearnedScan) -> np.ndarray:
-    """Returns a map's spectrum along its turns, (FREQUENCIES, FEATURES)."""
+    """Returns a map's spectrum over its sectors, (FREQUENCIES, FEATURES)."""
     return np.fft.rfft(scan.features, axis=0)[:FREQUENCIES]
 
 

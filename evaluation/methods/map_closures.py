@@ -1,15 +1,15 @@
 """MapClosures (Gupta et al., ICRA 2024), from its own package.
 
-Local maps are seen from above as images of density; ORB keypoints of two
-images that agree on a motion in the plane are inliers, and their number is
-the score. The package `map-closures` does all of that. It is an optional
-extra, since it needs an older NumPy.
+A local map becomes an image of density from above. ORB keypoints of two images
+that agree on a motion in the plane are inliers; their number is the score. The
+package `map-closures` does all of this. It is an optional extra, because it
+needs an older NumPy.
 
-The package offers one step only, which keeps a local map and aligns it with all
-that have lower numbers. Queries therefore join the database, as in the
-package's own program. Numbers fall here, each below the one before, and places
-have lower ones than queries: a place is then aligned with none when it is kept,
-and a query with all places but with no other query.
+The package offers a single operation: it stores a local map under a number, and
+aligns it with all stored maps of lower numbers. Queries are therefore stored as
+well, as in the package's own program. Here numbers descend, and all places have
+lower numbers than queries. A new place is then aligned with no map, and a query
+with all places but no other query.
 """
 
 from collections.abc import Callable, Sequence
@@ -24,9 +24,9 @@ from cns_drake.base.errors import InputError
 from evaluation.maps.voxel_maps import thin
 from evaluation.methods.method import Method, MethodConfig, PlaceScan, register
 
-# Larger than any number of local maps, and the number of the first query. The
-# numbers of later queries fall, and stay far above those of places, since the
-# package leaves out the maps numbered just below.
+# Number of the first query, larger than any count of local maps. Numbers of
+# later queries descend, but stay far above those of places, because the package
+# skips the maps numbered just below.
 _ALL = 1 << 17
 
 
@@ -40,10 +40,10 @@ class MapClosuresConfig(MethodConfig):
             `first`.
         density_map_resolution: length of a pixel, and of the voxels to which
             local maps are thinned [m].
-        density_threshold: density below which a pixel is empty, as a part of
-            the greatest.
-        hamming_distance_threshold: bits by which keypoints that match may
-            differ.
+        density_threshold: density below which a pixel is empty, as a fraction
+            of the greatest density.
+        hamming_distance_threshold: number of bits by which matching keypoints
+            may differ.
     """
 
     place: PlaceScan | None = "middle"
@@ -75,8 +75,8 @@ class MapClosuresDatabase:
 class MapClosures(Method[np.ndarray, MapClosuresDatabase]):
     """MapClosures, by its own package.
 
-    Descriptors are local maps (N, 3), thinned. Two hundred scans are about
-    50 m of a drive either way, at 10 m/s and 20 scans a second.
+    Descriptors are thinned local maps (N, 3). A local map of 200 scans covers
+    about 50 m of path in front and behind, at 10 m/s and 20 scans per second.
     """
 
     Config = MapClosuresConfig
@@ -88,7 +88,7 @@ class MapClosures(Method[np.ndarray, MapClosuresDatabase]):
         """Prepares the package.
 
         Raises:
-            InputError: it is not installed.
+            InputError: the package is not installed.
         """
         super().__init__(config)
         try:
@@ -137,7 +137,7 @@ class MapClosures(Method[np.ndarray, MapClosuresDatabase]):
         return None if found is None else found[1]
 
     def _find(self, query: np.ndarray, database: MapClosuresDatabase) -> None:
-        """Aligns a query with all places, unless that was the last thing."""
+        """Aligns a query with all places, unless it was just done."""
         if database.query is query:
             return
         number = _ALL - database.num_queries

@@ -25,7 +25,7 @@ from cns_drake.base.poses import make_pose
 Descriptor = TypeVar("Descriptor")
 Database = TypeVar("Database")
 
-# The scan of a merged place that stands for it: its pose is that of the place.
+# Which of a place's merged scans stands for the place and gives its pose.
 PlaceScan = Literal["middle", "first"]
 
 
@@ -35,14 +35,15 @@ class MethodConfig(BaseModel):
     A method with further parameters derives its own class from this one.
 
     Attributes:
-        sensor_height: height of the LiDAR above the ground [m]; by default as
-            on the CNS vehicle.
-        place: which of the merged scans stands for a place, `middle` or
-            `first`; by default the protocol decides. Methods of single scans do
-            not use it.
-        sequence: length of the path before a query [m] along which earlier
-            queries also vote for its place, as in SeqSLAM; 0 uses only the
-            query. See `sequences.along_the_way`.
+        sensor_height: height of the LiDAR above the ground [m]. The default is
+            that of the CNS vehicle.
+        place: which of the merged scans gives a place its pose: the one in the
+            `middle`, or the `first`. By default the protocol decides. Methods
+            that describe single scans do not use it.
+        sequence: length of the path before a query [m]. Earlier queries on this
+            path also vote for the place of the query, as in SeqSLAM (see
+            `sequences.along_the_way`). With 0, each query is recognised by
+            itself.
 
     Example:
         from evaluation import MethodConfig
@@ -74,8 +75,8 @@ class Method(abc.ABC, Generic[Descriptor, Database]):
         point_fields: additional fields of points that it needs, such as
             intensity, ring, t or label.
         batch_size: number of clouds for one call of `describe_batch`.
-        skips_places: whether its score may be NaN, even when `exhaustive`, for
-            places that are no candidates; otherwise NaN is an error.
+        skips_places: whether scores may be NaN even when `exhaustive`, for
+            places that are no candidates; if not, NaN is an error.
         rerank_best: number of best places that `rerank`, a second stage,
             compares by their points; 0 without one.
         config: the parameters in use.
@@ -104,7 +105,7 @@ class Method(abc.ABC, Generic[Descriptor, Database]):
         """Returns the description of a query's cloud."""
 
     def describe_place(self, points: np.ndarray) -> Descriptor:
-        """Returns the description of a place; by default as of a query."""
+        """Returns the description of a place; by default like a query's."""
         return self.describe(points)
 
     def describe_batch(
@@ -124,7 +125,7 @@ class Method(abc.ABC, Generic[Descriptor, Database]):
     def for_lidar(self, field: LidarField | None) -> "Method":
         """Returns the method adapted to a LiDAR; None is an unknown LiDAR.
 
-        By default it is the method itself.
+        By default, the method itself is returned.
         """
         del field
         return self
@@ -136,7 +137,7 @@ class Method(abc.ABC, Generic[Descriptor, Database]):
 
     @property
     def describes_alike(self) -> bool:
-        """Whether places and queries have the same descriptions."""
+        """Whether places and queries are described in the same way."""
         return type(self).describe_place is Method.describe_place
 
     @abc.abstractmethod
@@ -190,7 +191,7 @@ class Method(abc.ABC, Generic[Descriptor, Database]):
     ) -> np.ndarray:
         """Returns new scores for the best places, from a second stage.
 
-        The second stage compares points. All other places are then no
+        The second stage compares points. Only the best places remain
         candidates.
 
         Args:
@@ -209,7 +210,7 @@ class Method(abc.ABC, Generic[Descriptor, Database]):
     ) -> np.ndarray | None:
         """Returns the pose (4, 4) of a query's LiDAR in the frame of a place's.
 
-        It is X_PQ; None if the method does not estimate poses.
+        The pose is X_PQ; None if the method does not estimate poses.
         """
         if type(self).relative_poses is Method.relative_poses:
             return None
@@ -235,8 +236,8 @@ def yaw_pose(
 
 
 _METHODS: dict[str, type[Method]] = {}
-# Methods that run only if they are named: name -> module. Some need another
-# package, or weights.
+# Methods that run only on request: name -> module. Some need another package or
+# weights.
 _OPTIONAL = {
     "map-closures": "evaluation.methods.map_closures",
     "probe": "evaluation.methods.probe",
@@ -244,7 +245,7 @@ _OPTIONAL = {
     "dpa-net": "evaluation.methods.published_networks",
 }
 
-# The methods of the interface, which the author may have written.
+# Functions of the interface that a method's author may have written.
 _CALLED = (
     *("__init__", "describe", "describe_place", "describe_batch"),
     *("build_database", "score", "score_in_drive", "rerank"),
@@ -286,7 +287,7 @@ def register(name: str) -> Callable[[_MethodClass], _MethodClass]:
 def known_methods() -> tuple[str, ...]:
     """Returns the names of all registered methods.
 
-    Methods that run only on request are registered once they were made.
+    Methods that run only on request are registered when they are first made.
 
     Example:
         from evaluation import known_methods
@@ -353,14 +354,14 @@ def make_method(name: str, parameters: Mapping[str, Any]) -> Method:
 def load_method(path: Path) -> type[Method]:
     """Returns the method that a Python file defines.
 
-    Exceptions in it, then and later, become one line for its author.
+    Exceptions in the file's code, now or later, become one line for its author.
 
     Args:
         path: a file with one subclass of Method of its own, registered.
 
     Raises:
-        InputError: if there is no such file, it fails, or it registers no
-            method, several or one that is not whole.
+        InputError: there is no such file, it fails, or it does not register
+            exactly one complete method.
     """
     module = run_module(path)
     found = [
@@ -401,8 +402,8 @@ def run_module(path: Path) -> ModuleType:
     """
     if not path.is_file():
         raise InputError(f"--method: {path}: no such file")
-    # Entered like any import, since dataclasses look their module up; under
-    # a name that no other module has.
+    # The module is entered in `sys.modules`, because dataclasses look up their
+    # module there, under a unique name.
     name = f"own_method_{path.stem}"
     spec = importlib.util.spec_from_file_location(name, path)
     if spec is None or spec.loader is None:
@@ -431,7 +432,8 @@ def _faults(path: Path) -> Iterator[None]:
         yield
     except InputError:
         raise
-    # A SystemExit in the file would end the program without an error.
+    # Without this, a SystemExit in the file would end the program without an
+    # error.
     except (Exception, SystemExit) as error:
         # Python makes the name of a module's file absolute.
         lines = [

@@ -1,6 +1,6 @@
 """Maps of layered overlap: drawn from scans, and compared.
 
-All is integer arithmetic once cells are known: turns are by sines and cosines
+Once the cells are known, all arithmetic is in integers: sines and cosines are
 in units of 2^-14, positions in half cells. Counts are therefore the same on
 every processor.
 """
@@ -18,29 +18,33 @@ GRID = 256
 NUM_LAYERS = 5
 _POLES = 3
 
-# Heights above the ground: limit of the ground, and ends of the low and of the
-# middle layer [m].
+# Heights above the ground [m]: the top of the ground, of the low layer and of
+# the middle layer.
 _HEIGHTS = np.array([0.35, 1.5, 4.0])
 # Least height of a pole [m].
 _POLE_TOP = 2.0
-# Greatest number of cells of a pole, of 3 x 3; around them, 7 x 7 are free.
+# Greatest number of cells of a pole among 3 x 3 cells; the 7 x 7 cells around
+# must otherwise be free.
 _POLE_CELLS = 4
 # Range of the ground's rise within a cell with a kerb [m].
 _KERB_STEP = (0.08, 0.30)
 
-# The ground is followed outwards in so many sectors, in steps of [m].
+# The ground is followed outwards in this number of sectors, in steps of this
+# length [m].
 _SECTORS = 90
 _RING = 2.0
-# Greatest rise or fall from one step to the next [m, 1].
+# Greatest change of the ground's height from one step to the next [m], and
+# greatest slope.
 _GROUND_STEP = 0.15
 _GROUND_SLOPE = 0.2
 
-# Rows and columns around the cells of a place: twice the greatest step of a
-# climb, which is 6 cells, and one.
+# Rows and columns added around the cells of a place: twice the greatest step of
+# a climb, which is 6 cells, plus one.
 _MARGIN = 13
 # The unit of sines and cosines is 2 to minus this power.
 _UNIT_BITS = 14
-# Every second bit, pair of bits and nibble, and the first bit of every byte.
+# Masks: every second bit, every second pair of bits, every second nibble, and
+# the first bit of every byte.
 _EVERY_2ND = np.uint64(0x5555555555555555)
 _PAIRS = np.uint64(0x3333333333333333)
 _NIBBLES = np.uint64(0x0F0F0F0F0F0F0F0F)
@@ -52,9 +56,9 @@ def layer_cells(
 ) -> tuple[np.ndarray, np.ndarray]:
     """Returns the occupied cells of each layer of a scan.
 
-    Layers are low, middle, high, poles and kerbs. The cell of a point follows
-    from sums, products, quotients and square roots only. IEEE 754 defines these
-    to the last bit, so that cells are the same on every processor.
+    Layers are low, middle, high, poles and kerbs. Cells are computed by sums,
+    products, quotients and square roots only. IEEE 754 defines these to the
+    last bit, so that cells are the same on every processor.
 
     Args:
         points: (N, 3) in the frame of the LiDAR [m].
@@ -64,8 +68,9 @@ def layer_cells(
 
     Returns:
         (M,) uint16 numbers of the occupied cells, layer by layer, increasing in
-        each layer; and (6,) int64, where each layer begins and the last one
-        ends. Rows are along x, columns along y, with the sensor in the middle.
+        each layer; and (6,) int64, the index at which each layer begins and the
+        last one ends. Rows are along x, columns along y; the sensor is in the
+        middle.
     """
     half = 0.5 * GRID * cell
     x, y, z = points.T
@@ -101,11 +106,12 @@ def _ground_below(
 ) -> np.ndarray:
     """Returns the height of the ground below each point (N,) [m].
 
-    In each sector it is followed by the lowest points, from ring to ring up to
-    `half` of x and y [m], from its height `start` below the sensor [m].
+    In each sector, the lowest points of successive rings give the height of the
+    ground. It begins at the height `start` below the sensor and is followed up
+    to `half` in x and y [m].
     """
-    # Sectors are equal along a square: its angles need no arc tangent, whose
-    # last bits differ between processors.
+    # Sectors divide the sides of a square evenly. Angles would need an arc
+    # tangent, whose last bits differ between processors.
     length = np.abs(x) + np.abs(y)
     turn = y / np.where(length > 0.0, length, 1.0)
     turn = np.where(x < 0.0, 2.0 - turn, np.where(turn < 0.0, turn + 4.0, turn))
@@ -130,7 +136,7 @@ def _extremes(
 ) -> tuple[np.ndarray, np.ndarray]:
     """Returns the least and the greatest of values (N,) in each cell, (size,).
 
-    They are infinite, and minus infinite, for a cell without values.
+    For a cell without values they are inf and -inf.
     """
     least, greatest = np.full(size, np.inf), np.full(size, -np.inf)
     np.minimum.at(least, cells, values)
@@ -139,7 +145,7 @@ def _extremes(
 
 
 def _poles(is_tall: np.ndarray) -> np.ndarray:
-    """Returns the numbers of tall cells that stand alone.
+    """Returns the numbers of isolated tall cells: poles.
 
     Args:
         is_tall: (GRID, GRID) bool.
@@ -153,7 +159,7 @@ def _poles(is_tall: np.ndarray) -> np.ndarray:
 
 
 def turns(number: int) -> np.ndarray:
-    """Returns (H, 2) int64 cosines and sines of H equal steps of a turn."""
+    """Returns (H, 2) int64 cosines and sines of a full turn in H steps."""
     unit = 1 << _UNIT_BITS
     angles = [2.0 * math.pi * step / number for step in range(number)]
     return np.array(
@@ -173,15 +179,16 @@ def coarse_maps(
 
     Args:
         cells: (M,) uint16, see `layer_cells`.
-        starts: (layers + 1,) where layers begin.
+        starts: (layers + 1,) index at which each layer begins and the last
+            ends.
         turns: (H, 2) int64 by which the cells are turned about the sensor.
         halvings: how often the number of rows and columns is halved; at
             least 2.
-        maps: (layers,) int64, in which map each layer is drawn.
+        maps: (layers,) int64, number of the map into which each layer is drawn.
 
     Returns:
-        (H, R, S) uint64, R rows of S maps, whose bits are columns; and (H, S)
-        int64, how many bits are set in each map.
+        (H, R, S) uint64, R rows of S maps, in which bits are columns; and (H,
+        S) int64, number of bits set in each map.
     """
     rows, num_maps = GRID >> halvings, maps.max() + 1
     bits = np.zeros((len(turns), rows, num_maps), np.uint64)
@@ -217,16 +224,16 @@ def best_overlaps(
     Args:
         queries: (H, R, S) uint64: maps of the query, at headings of equal
             steps of a full turn.
-        places: (D, R + 2 m, S) uint64: maps of the places, with m rows without
-            bits on either side.
-        weights: (S,) int64, how much a common bit of each map counts.
-        starts: (N, 4) int64: which place, heading, and shift of the query along
-            rows and along columns.
-        moves: (K, 3) int64: what is added to heading and shifts.
+        places: (D, R + 2 m, S) uint64: maps of the places, with m empty rows on
+            either side.
+        weights: (S,) int64 weight of a common bit in each map.
+        starts: (N, 4) int64: place, heading, and shifts of the query along rows
+            and columns.
+        moves: (K, 3) int64: changes of heading and shifts to try.
 
     Returns:
-        (N,) int64 weighted counts of common bits, and (N, 3) where they are
-        found first: heading and shifts.
+        (N,) int64 greatest weighted counts of common bits, and (N, 3) the first
+        heading and shifts that have them.
     """
     num_headings, num_rows, num_maps = queries.shape
     margin = (places.shape[1] - num_rows) // 2
@@ -286,8 +293,9 @@ def climb(
         cells: (M,) uint16 of the query, see `layer_cells`.
         starts: (layers + 1,) where its layers begin.
         place_cells: (N,) uint16 of the place.
-        place_starts: (layers + 1,) likewise.
-        weights: (layers,) int64.
+        place_starts: (layers + 1,) starts of the place's layers in
+            `place_cells`.
+        weights: (layers,) int64 weight of a common cell in each layer.
         turns: (H, 2) int64 cosines and sines of equal steps of a full turn.
         start: (3,) int64: the turn, and the shifts along rows and along columns
             in half cells, from which the search starts.
@@ -298,7 +306,7 @@ def climb(
         (3 + layers,) int64: the pose, and how many of the query's cells overlap
         the place in each layer.
     """
-    # The place's filled cells and their neighbours, with a margin.
+    # A grid of the place's filled cells and their neighbours, with a margin.
     size = GRID + 2 * _MARGIN
     place = np.zeros((NUM_LAYERS, size, size), np.uint8)
     for layer in range(NUM_LAYERS):
@@ -315,13 +323,15 @@ def climb(
     move = (0, 0, 0)
     for level in range(len(steps)):
         step = steps[level, 1]
-        # How the centre moved last, in steps; at first, from out of reach.
+        # The last move of the centre, in steps; at first a move from out of
+        # reach.
         last = (3, 3, 3)
         while True:
             centre = best.copy()
             before = most
             for dt in range(-1, 2):
-                # Those around the centre before are no better.
+                # Poses that were neighbours of the previous centre are no
+                # better.
                 if abs(last[0] + dt) <= 1 and last[1] == 0 and last[2] == 0:
                     continue
                 pose[0] = (centre[0] + dt * steps[level, 0]) % len(turns)
@@ -360,22 +370,22 @@ def _count_common(
     step: int,
     common: np.ndarray,
 ) -> None:
-    """Counts the cells of each layer that meet the place's, near a pose.
+    """Counts each layer's cells that coincide with the place's, near a pose.
 
-    Shifts by whole cells move all cells alike: each is turned once.
+    The shifts are whole cells, so that each cell needs to be rotated only once.
 
     Args:
         cells, starts, turns: see `climb`.
         place: (layers, rows, columns) uint8, 1 where the place has a cell or a
             neighbour of one; `_MARGIN` more rows and columns on every side.
         pose: (3,) int64.
-        step: k, of the shifts in whole cells, from 1 to 6.
+        step: shift k in whole cells, from 1 to 6.
         common: (3, 3, layers) int64 to fill: for shifts by -k, 0 and k
             along rows and along columns.
     """
     c, s = turns[pose[0], 0], turns[pose[0], 1]
     right, up = (pose[1] + GRID) << _UNIT_BITS, (pose[2] + GRID) << _UNIT_BITS
-    # Beside the map are no cells.
+    # There are no cells outside the map.
     last = GRID + step
     common[:] = 0
     for layer in range(NUM_LAYERS):

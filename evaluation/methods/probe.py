@@ -1,21 +1,24 @@
 """PROBE (Lee, Lee, Yoo: RA-L 2026, arXiv 2603.05965), without learning.
 
-A scan becomes a polar image of greatest heights and another one of occupancy.
-A move of the sensor by a normal distribution would shift the cells; in polar
-coordinates that is a blur along the rings, narrower farther away, and one
-across them. The blurred occupancy is the probability of a point in a cell.
+A scan becomes two polar images: one of the greatest heights and one of
+occupancy. The sensor's displacement between query and place is modelled by a
+normal distribution. In polar coordinates it blurs the occupancy along the
+rings, less so at larger range, and across them. The blurred occupancy is the
+probability that a cell has a point.
 
-Heights give the turn between two scans, and their cosine at it. Probabilities
-are drawn to 1/2 where they are uncertain, and compared by the symmetric
-Kullback-Leibler divergence. The score is the product of both likenesses.
+The heights give the rotation between two scans, and a first similarity: their
+cosine at this rotation. The probabilities are moved towards 1/2 where they are
+uncertain; their symmetric Kullback-Leibler divergence gives a second
+similarity. The score is the product of the two.
 
-It follows the authors' program (github.com/shawrby/PROBE-descriptor, BSD-3);
-on the same scans scores are equal to 1e-6. Deliberate differences:
+The code follows the authors' program (github.com/shawrby/PROBE-descriptor,
+BSD-3); on the same scans, scores agree to 1e-6. Deliberate differences:
 
 - All places are compared. The program first takes the 50 nearest ones by the
   means of the rings, which saves time.
-- A scan without points within range is no candidate and finds none.
-- Scans of a narrow field of view are not treated apart.
+- A place without points within range is never a candidate, and a query without
+such points has no candidates. - Scans with a narrow field of view get no
+special treatment.
 """
 
 from collections.abc import Sequence
@@ -31,27 +34,26 @@ from evaluation.methods.sparse_convolution import PACKED
 
 # Probabilities stay this far from 0 and 1.
 _EPSILON = 1e-6
-# A cell counts if the probabilities of both scans add up to more.
+# A cell counts if the two scans' probabilities add up to more than this.
 _SEEN = 1e-3
-# The least blur along a ring [cells], and the least part of a ring that counts
-# as occupied.
+# Least blur along a ring [cells], and least fraction of a ring that counts as
+# occupied.
 _LEAST_BLUR, _LEAST_DENSITY = 0.1, 0.01
 
 
 class ProbeConfig(MethodConfig):
-    """Settings of PROBE; the defaults are those of the paper's Table I.
+    """Settings of PROBE. The defaults are those of Table I of its paper.
 
-    The height of the sensor is not used: heights are measured in the LiDAR's
-    frame.
+    `sensor_height` has no effect: heights are measured in the LiDAR's frame.
 
     Attributes:
-        voxel_size: side of the voxels to which clouds are thinned first [m];
-            the first point of each voxel is kept.
-        rings: number of equal cells up to `max_range`.
-        sectors: number of equal cells of azimuth.
-        max_range: greatest range of a point that counts [m].
-        sigma_t: standard deviation of the expected displacement between query
-            and place [m].
+        voxel_size: side of the voxels to which each cloud is first thinned [m].
+            The first point of each voxel stays.
+        rings: number of equal cells of range, up to `max_range`.
+        sectors: number of equal cells of azimuth in a turn.
+        max_range: largest range of a point that is used [m].
+        sigma_t: standard deviation of the displacement that is expected between
+            a query and its place [m].
     """
 
     voxel_size: PositiveFloat = 0.5
@@ -66,11 +68,11 @@ class Probe:
     """Descriptor of one scan.
 
     Attributes:
-        heights: (rings, sectors) greatest height in a cell, of unit length
-            over all of them; all NaN without a point within range.
-        mu: (rings, sectors) probability that a cell has a point, in single
-            precision: near 1 its rounding decides on the uncertainty, and with
-            it on scores by up to 0.002.
+        heights: (rings, sectors) greatest height in each cell, scaled to unit
+            length over all cells; all NaN without a point within range.
+        mu: (rings, sectors) probability that a cell has a point. It is in
+            single precision, like the authors', because its rounding near 1
+            changes the uncertainty, and thereby scores by up to 0.002.
     """
 
     heights: np.ndarray
@@ -92,7 +94,7 @@ class ProbeDatabase:
     Attributes:
         spectra: (D, rings, frequencies) of the heights.
         mu: (D, rings, sectors), see `Probe`.
-        evidence: both (D, rings, sectors), see `Probe.evidence`.
+        evidence: two arrays (D, rings, sectors), see `Probe.evidence`.
     """
 
     spectra: np.ndarray
@@ -160,7 +162,7 @@ class ProbeMethod(Method[Probe, ProbeDatabase]):
     def score(
         self, query: Probe, database: ProbeDatabase, *, exhaustive: bool = False
     ) -> np.ndarray:
-        del exhaustive  # It always is.
+        del exhaustive  # Always true here.
         cosines = self._cosines(query, database.spectra)
         scores = np.clip(cosines.max(axis=1), 0.0, 1.0)
         for place, shift in enumerate(cosines.argmax(axis=1)):
@@ -177,9 +179,9 @@ class ProbeMethod(Method[Probe, ProbeDatabase]):
     def relative_pose(
         self, query: Probe, database: ProbeDatabase, place: int
     ) -> np.ndarray | None:
-        """Returns the query's heading at a place, in steps of one sector.
+        """Returns a pose with the query's heading, in steps of one sector.
 
-        None if one of the two has no points within range.
+        Returns None if one of the two scans has no points within range.
         """
         cosines = self._cosines(query, database.spectra[place, None])[0]
         if np.isnan(cosines).any():
@@ -189,7 +191,7 @@ class ProbeMethod(Method[Probe, ProbeDatabase]):
         return yaw_pose(2.0 * math.pi * shift / self.config.sectors)
 
     def _cosines(self, query: Probe, spectra: np.ndarray) -> np.ndarray:
-        """Returns the cosines with D places at all turns, (D, sectors)."""
+        """Returns the cosines with D places at all headings, (D, sectors)."""
         own = np.conj(np.fft.rfft(query.heights))
         products = np.einsum("drf,rf->df", spectra, own)
         return np.fft.irfft(products, n=self.config.sectors)

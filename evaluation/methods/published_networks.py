@@ -1,19 +1,20 @@
 """SVT-Net and DPA-Net, with the weights that their authors published.
 
-SVT-Net: Fan, Song, Liu, Lu, He, Du (AAAI 2022). DPA-Net: Park, Kim, Jeon,
-Kwon, Lee, Lee (RA-L 2026). Both turn a cloud into 256 numbers, whose distance
-compares two places, and neither estimates a pose. The architectures are
-written anew after the papers and the authors' programs; no weights ship.
+SVT-Net: Fan, Song, Liu, Lu, He, Du (AAAI 2022). DPA-Net: Park, Kim, Jeon, Kwon,
+Lee, Lee (RA-L 2026). Both turn a cloud into a descriptor of 256 numbers; the
+distance of two descriptors is the dissimilarity of two places. Neither
+estimates a pose. The architectures are reimplemented from the papers and the
+authors' programs; no weights are shipped.
 
-A cloud is prepared as by PointNetVLAD's program (Uy and Lee, CVPR 2018), by
-which the networks' data were made: without the points near the greatest plane,
-thinned to 4096 points, centred, and scaled so that their mean distance from
-the centre is 1/2; points outside of [-1, 1] give way to others. Like there, x
-points backwards. Deliberate differences:
+Clouds are prepared as in PointNetVLAD's program (Uy and Lee, CVPR 2018), which
+made the networks' training data. Points near the greatest plane are removed.
+The rest is thinned to 4096 points, centred, and scaled so that the mean
+distance from the centre is 1/2. Points outside of [-1, 1] are replaced by other
+points. As in that program, x points backwards. Deliberate differences:
 
-- A place is one scan of a turning LiDAR, not 20 m of a planar scanner.
-- Draws have a fixed seed.
-- A cloud with fewer points than 4096 repeats some.
+- A place is one scan of a spinning LiDAR, not 20 m of a planar scanner. -
+Random draws have a fixed seed. - A cloud with fewer points than 4096 repeats
+some.
 """
 
 import abc
@@ -39,12 +40,12 @@ Weights = Mapping[str, np.ndarray]
 NUM_POINTS = 4096
 # Side of a cell of the networks, in clouds from -1 to 1.
 _CELL = 0.01
-# Points this near to the greatest plane count as ground [m]; its trials, and
-# the points that vote.
+# Points this near to the greatest plane count as ground [m]; number of trials
+# for this plane, and number of points that vote.
 _GROUND, _TRIALS, _VOTERS = 0.5, 200, 2000
-# Sides of the voxels of the thinning: this, and more by multiples [m].
+# Side of the voxels for thinning, and step by which it grows [m].
 _FINEST, _STEP, _SIZES = 0.001, 0.025, 400
-# Points that DPA-Net attends to, its heads, and samples of each.
+# DPA-Net's attention: numbers of points, of heads, and of samples per head.
 _CENTRES, _HEADS, _SAMPLES = 1024, 8, 8
 _TINY = 1e-6
 
@@ -56,7 +57,7 @@ def prepare(points: np.ndarray) -> np.ndarray:
         points: (N, 3) points, x ahead, y left, z up [m].
 
     Returns:
-        (4096, 3) float32, or (0, 3) if nothing stands on the ground.
+        (4096, 3) float32, or (0, 3) if there are no points above the ground.
     """
     rng = np.random.default_rng(0)
     points = _without_ground(points, rng)
@@ -96,14 +97,14 @@ def _without_ground(points: np.ndarray, rng: np.random.Generator) -> np.ndarray:
 def _drawn(
     points: np.ndarray, chosen: np.ndarray, rng: np.random.Generator
 ) -> np.ndarray:
-    """Returns what the chosen points lack, drawn of all."""
+    """Returns random points, as many as `chosen` lacks of the full number."""
     lacking = NUM_POINTS - len(chosen)
     repeats = lacking > len(points)
     return points[rng.choice(len(points), lacking, replace=repeats)]
 
 
 def _occupied(cloud: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Returns the cells (N, 3) of a cloud, and their features (N, 1): 1."""
+    """Returns the cells (N, 3) of a cloud, and their features (N, 1), all 1."""
     cells = np.floor(cloud / np.float32(_CELL)).astype(np.int64)
     cells = coarser(cells, 1)
     return cells, np.ones((len(cells), 1), np.float32)
@@ -141,14 +142,14 @@ def _linear(weights: Weights, name: str, x: np.ndarray) -> np.ndarray:
 
 
 def _generalised_mean(x: np.ndarray, p: np.ndarray) -> np.ndarray:
-    """Returns the mean (channels,) of rows by GeM (Radenovic et al. 2018)."""
+    """Returns the generalised mean (channels,) of rows (GeM, 2018)."""
     return (np.maximum(x, _TINY) ** p).mean(axis=0) ** (1.0 / p)
 
 
 def _nearest_three(
     known: np.ndarray, wanted: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Returns the indices of three neighbours, and inverse distances (M, 3)."""
+    """Returns indices and weights (M, 3) of the three nearest neighbours."""
     distances, found = cKDTree(known).query(wanted, min(3, len(known)))
     distances, found = (
         one.reshape(len(wanted), -1) for one in (distances, found)
@@ -165,7 +166,7 @@ def _interpolated(
 
 
 def _norms(names: str, channels: int) -> dict[str, tuple[int, ...]]:
-    """Returns the shapes of batch normalisations."""
+    """Returns name -> shape of the weights of batch normalisations."""
     return {
         f"{name}.{part}": (channels,)
         for name in names.split()
@@ -319,7 +320,7 @@ def dpa_net(weights: Weights, cloud: np.ndarray) -> np.ndarray:
     name = "sample_inter0.get_interpolate"
     x = x @ weights[f"{name}.conv1x1.kernel"]
     centres = cloud[farthest_points(cloud, _CENTRES)]
-    # The program takes the lower corner of a cell for its place.
+    # The authors' program uses the lower corner of a cell as its position.
     x = _interpolated(cells * _CELL, centres, x)
     x = _gelu(_layer_norm(weights, f"{name}.ln", x, 1e-6))
     x = _deformable_attention(weights, x, centres)
@@ -352,7 +353,7 @@ def farthest_points(points: np.ndarray, number: int) -> np.ndarray:
 def _deformable_attention(
     weights: Weights, x: np.ndarray, xyz: np.ndarray
 ) -> np.ndarray:
-    """Each point attends to samples at learned offsets from it."""
+    """Attention of each point to samples at learned offsets from it."""
     y = np.concatenate([x, xyz], axis=1)
     y = _linear(weights, "dpa0.offset_net.0", y)
     y = _gelu(_layer_norm(weights, "dpa0.offset_net.1", y))
@@ -390,11 +391,11 @@ def _deformable_attention(
 class NetworkConfig(MethodConfig):
     """Settings of a published neural network.
 
-    The height of the sensor is not used: the method finds the ground in the
-    cloud.
+    `sensor_height` has no effect: the method finds the ground in the cloud.
 
     Attributes:
-        weights: file of the weights that the authors published.
+        weights: file with the weights that the authors of the network
+            published.
     """
 
     weights: Path
@@ -402,13 +403,16 @@ class NetworkConfig(MethodConfig):
     @computed_field  # type: ignore[prop-decorator]
     @property
     def digest(self) -> str:
-        """Digest of the weights, since two files can have the same name."""
+        """Digest of the weights' file; its name alone would not identify it."""
         content = read_bytes(self.weights, MOST_BYTES)
         return hashlib.sha256(content).hexdigest()[:16]
 
 
 class _Network(Method[np.ndarray, np.ndarray]):
-    """Descriptors (256,), NaN without points; scores are less distances."""
+    """A network; descriptors (256,) are NaN without points.
+
+    Scores are negative distances.
+    """
 
     Config = NetworkConfig
     skips_places = True
@@ -440,7 +444,7 @@ class _Network(Method[np.ndarray, np.ndarray]):
         *,
         exhaustive: bool = False,
     ) -> np.ndarray:
-        del exhaustive  # It always is.
+        del exhaustive  # Always true here.
         return -np.linalg.norm(database - query, axis=1)
 
 

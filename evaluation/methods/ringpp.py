@@ -1,11 +1,11 @@
 """RING++ (Xu, Lu, Wu, Lu, Zhu, Liang, Xiong, Wang: T-RO 2023).
 
-A scan becomes a map from above with six channels that describe the shape of
-the cloud. Its Radon transform turns a rotation into a shift of its rows; the
-magnitude of each row's spectrum does not change if the scan is moved. Two
-scans are alike if these spectra correlate well for some shift, which is also
-their difference in heading. With the heading known, the maps from above give
-the translation.
+A scan becomes a map from above with six channels that describe the shape of the
+cloud. Its Radon transform turns a rotation into a shift of its rows; the
+magnitude of each row's spectrum does not change if the scan is moved. Two scans
+are similar if these spectra correlate well at some shift of the rows. This
+shift is also the difference in heading. Once the heading is known, the
+correlation of the maps from above gives the translation.
 """
 
 from __future__ import annotations
@@ -28,39 +28,41 @@ from evaluation.methods.method import Method, MethodConfig, register, yaw_pose
 
 # See `local_features`.
 _NUM_FEATURES = 6
-# Bounds the normalised spectrum of a channel that hardly varies. It is the
-# default of PyTorch's InstanceNorm2d, which the authors' program uses. It
-# removes a third of the power of the variance of z, and is therefore part of
-# the method.
+# Added to the variance, so that the normalised spectrum of a nearly constant
+# channel stays bounded: the default of PyTorch's InstanceNorm2d, which the
+# authors' program uses. It removes a third of the power of the channel with the
+# variance of z, and is therefore part of the method.
 _NORM_EPSILON = 1e-5
-# Spectra of places that are kept, of a third of a megabyte each.
+# Number of spectra of places kept in memory, a third of a megabyte each.
 _REFERENCES_KEPT = 64
-# The authors' scale of the correlation, chosen to make distances of 0 to 1.
+# The authors' scale of the correlation, chosen so that distances are from 0 to
+# 1.
 _CORRELATION_SCALE = 0.15
 
 
 class RingPlusPlusConfig(MethodConfig):
     """Settings of RING++.
 
-    All values are from the authors' program, with its settings for KITTI.
+    All defaults are the values of the authors' program for KITTI.
 
     Attributes:
-        half_width: half the side of the square map from above [m]; 70. The
-            protocol's limit of 100 m is wider.
-        crop: which points of the map count: `square` uses all of them, `round`
-            those within half a side of its middle. When the LiDAR is turned, a
-            square contains other points.
-        min_height: least height above the ground of a point that counts [m];
-            0.73 (z > -1.0 m from a LiDAR at 1.73 m).
-        max_height: greatest height above the ground of a point that counts [m];
-            11.73 (z < 10 m).
-        height_unit: divisor of heights when the shape around a point is
-            described [m]; 10. Horizontal coordinates are divided by
+        half_width: half the side of the square map from above [m]. The protocol
+            uses points up to 100 m away; RING++ leaves out those beyond this
+            square.
+        crop: which points of the map are used: `square` uses all of them,
+            `round` only those within `half_width` of its centre. A square
+            contains other points if the LiDAR is turned; a circle does not.
+        min_height: smallest height above the ground of a point that is used
+            [m]; the authors have z > -1.0 m for a LiDAR at 1.73 m.
+        max_height: largest height above the ground of a point that is used [m];
+            the authors have z < 10 m for a LiDAR at 1.73 m.
+        height_unit: number by which heights are divided where the shape around
+            a point is described [m]. Horizontal coordinates are divided by
             `half_width`.
-        neighbours: number of points that describe the shape around a point,
-            including the point itself; 30.
-        cells: number of rows and columns of the map from above, and of angles
-            and rays of its Radon transform; 120.
+        neighbours: number of nearest points that describe the shape around a
+            point, including itself.
+        cells: number of rows and of columns of the map from above, and also of
+            angles and of rays of its Radon transform.
     """
 
     half_width: PositiveFloat = 70.0
@@ -86,9 +88,10 @@ class Ring:
         filled: (M,) cells of the map that are not zero, row times n plus
             column; rows along x, columns along y.
         features: (M, 6) float32 values of these cells.
-        spectrum: (6 F, F) complex64. Rows: channels and frequencies along
-            the rays of the Radon transform, whose normalised magnitudes are
-            again transformed along the angles, the columns.
+        spectrum: (6 F, F) complex64. Rows are channels and frequencies along
+            the rays of the Radon transform. The normalised magnitudes of these
+            frequencies are transformed again, along the angles; the columns are
+            the frequencies of this second transform.
     """
 
     filled: np.ndarray
@@ -108,8 +111,9 @@ class RingDatabase:
 
     Attributes:
         places: the D descriptors.
-        is_empty: (D,) bool, whether a place shows nothing.
-        reference: returns the conjugate spectrum of a place's map from above.
+        is_empty: (D,) bool, whether a place's map has no points.
+        reference: function that returns the conjugate spectrum of a place's map
+            from above.
     """
 
     places: Sequence[Ring]
@@ -123,14 +127,13 @@ class RingPlusPlus(Method[Ring, RingDatabase]):
 
     Where it differs from the authors' program:
 
-    - Neighbours that lie in a plane have the omnivariance and entropy that
-      the formulas have in the limit. In the program, which computes in
-      single precision, rounding makes about one in ten of them NaN, and
-      these points are passed over.
-    - Rays sample the map from above up to where it is zero. The program's
-      end at its edge, and rounding adds or drops a sample there.
-    - Fewer points than neighbours asked for are all neighbours.
-    - A scan that shows nothing is no candidate and finds none.
+    - For neighbours that lie in a plane, omnivariance and entropy are the
+    limits of their formulas. In the program's single precision, rounding makes
+    about one in ten of these values NaN, and it skips such points. - Rays
+    sample the map from above until it is zero. The program's rays end at the
+    edge of the map, where rounding adds or drops a sample. - If there are fewer
+    points than `neighbours`, all points are neighbours. - A place with an empty
+    map is never a candidate, and a query with an empty map has no candidates.
     """
 
     Config = RingPlusPlusConfig
@@ -140,14 +143,14 @@ class RingPlusPlus(Method[Ring, RingDatabase]):
     def describe(self, points: np.ndarray) -> Ring:
         num_cells = self.config.cells
         image = self._bev(points)
-        # From 0 to a full turn, both included, as the program has it.
+        # From 0 to a full turn, both included, as in the program.
         angles = np.linspace(0.0, 2.0 * math.pi, num_cells)
         sinogram = radon(image, angles)
         magnitudes = np.abs(np.fft.rfft(sinogram, axis=1, norm="ortho"))
         normalised = _normalise(magnitudes.transpose(2, 1, 0), num_cells)
         spectrum = np.fft.rfft(normalised, axis=2)
         flat = image.reshape(-1, _NUM_FEATURES)
-        # No feature is negative: they only add up to 0 where all are 0.
+        # No feature is negative, so their sum is 0 only where all are 0.
         filled = np.flatnonzero(flat @ np.ones(_NUM_FEATURES))
         return Ring(
             filled=filled,
@@ -164,14 +167,14 @@ class RingPlusPlus(Method[Ring, RingDatabase]):
         return RingDatabase(
             places=places,
             is_empty=np.array([len(place.filled) == 0 for place in places]),
-            # Queries that follow each other have many best places in common.
+            # Successive queries have many of their best places in common.
             reference=functools.lru_cache(_REFERENCES_KEPT)(reference),
         )
 
     def score(
         self, query: Ring, database: RingDatabase, *, exhaustive: bool = False
     ) -> np.ndarray:
-        del exhaustive  # It always is.
+        del exhaustive  # Always true here.
         if len(query.filled) == 0:
             return np.full(len(database.places), np.nan)
         weighted = self._weigh(query)
@@ -184,16 +187,16 @@ class RingPlusPlus(Method[Ring, RingDatabase]):
     def relative_poses(
         self, query: Ring, database: RingDatabase, places: Sequence[int]
     ) -> list[np.ndarray | None]:
-        """Returns the query's headings and horizontal translations.
+        """Returns poses with the query's heading and horizontal translation.
 
-        None if one of the two scans shows nothing.
+        A pose is None if the map of one of the two scans is empty.
         """
         if len(query.filled) == 0:
             return [None] * len(places)
         num_cells = self.config.cells
         weighted = self._weigh(query)
         query_bev = query.bev(num_cells)
-        # Places along one street are seen at few headings.
+        # Places along one street have few different headings.
         turned = functools.cache(
             lambda heading: _spectrum(_rotate(query_bev, heading))
         )
@@ -211,14 +214,14 @@ class RingPlusPlus(Method[Ring, RingDatabase]):
         database: RingDatabase,
         place: int,
     ) -> np.ndarray:
-        """Returns X_PQ (4, 4) of a weighed query in a place with features."""
+        """Returns X_PQ (4, 4) for a query's `_weigh` spectrum and a place."""
         num_cells = self.config.cells
         correlation = self._correlate(weighted, database.places[place].spectrum)
         shift = -_signed(int(correlation.argmax()), num_cells)
         reference = database.reference(place)
-        # Rows lie 360 / (n - 1) deg apart, but since the last one repeats the
-        # first, a shift stands on average for 360 / n. Spectra of opposite
-        # rays are equal, which leaves two headings.
+        # Rows are 360 / (n - 1) deg apart. The last row repeats the first, so
+        # that a shift by one stands for 360 / n deg on average. Spectra of
+        # opposite rays are equal, which leaves two possible headings.
         yaw = 2.0 * math.pi * shift / num_cells
         headings = (yaw, yaw - math.pi)
         fits = [
@@ -278,10 +281,10 @@ class RingPlusPlus(Method[Ring, RingDatabase]):
         return image
 
     def _weigh(self, query: Ring) -> np.ndarray:
-        """Returns the spectrum (6 F, F) whose product is correlated.
+        """Returns a query's spectrum (6 F, F), weighted for the correlation.
 
-        Only half of a sum over all frequencies is stored. The scale is that of
-        the program, whose transforms are unitary.
+        The weights account for the frequencies that are not stored, about half
+        of them. The scale is that of the program, whose transforms are unitary.
         """
         n = self.config.cells
         scale = _CORRELATION_SCALE * _NUM_FEATURES * n * n * math.sqrt(n)
@@ -291,11 +294,12 @@ class RingPlusPlus(Method[Ring, RingDatabase]):
     def _correlate(
         self, weighted: np.ndarray, spectrum: np.ndarray
     ) -> np.ndarray:
-        """Correlates a query, see `_weigh`, with the spectrum of one place.
+        """Returns the (n,) correlation of a query with a place, by shift.
 
-        The circular correlation over the angles is taken for each channel and
-        frequency, and the magnitudes are summed, as in the program: (n,), for
-        each shift of the place's rows by 0, ..., n - 1.
+        The query is a result of `_weigh`. The place's rows are shifted by 0,
+        ..., n - 1. As in the program, the circular correlation over the angles
+        is computed for each channel and frequency, and the magnitudes are
+        summed.
         """
         correlations = scipy.fft.irfft(
             weighted * spectrum.conj(), n=self.config.cells, axis=1
@@ -304,13 +308,13 @@ class RingPlusPlus(Method[Ring, RingDatabase]):
 
 
 def _without_duplicates(points: np.ndarray) -> np.ndarray:
-    """Returns the different ones of points (N, 3), sorted by z, y and x."""
+    """Returns the distinct points of (N, 3), sorted by z, then y, then x."""
     points = points[np.lexsort(points.T)]
     return points[np.diff(points, axis=0, prepend=np.nan).any(axis=1)]
 
 
 def _frequency_weights(n: int) -> np.ndarray:
-    """Returns how many of n frequencies each of the n // 2 + 1 stands for."""
+    """Returns how many of n frequencies each of n // 2 + 1 represents."""
     weights = np.full(n // 2 + 1, 2.0)
     weights[0] = 1.0
     if n % 2 == 0:
@@ -333,9 +337,10 @@ def _normalise(magnitudes: np.ndarray, n: int) -> np.ndarray:
 
 
 def _rotate(image: np.ndarray, angle: float) -> np.ndarray:
-    """Returns an image (C, n, n), rotated from its rows' axis to its columns'.
+    """Returns an image (C, n, n) rotated from the row axis to the column axis.
 
-    Each pixel takes the value of the nearest one, or 0 from outside.
+    Each pixel takes the value of the nearest source pixel, or 0 outside the
+    image.
     """
     n = image.shape[1]
     centred = np.arange(n) - 0.5 * (n - 1)
@@ -355,11 +360,12 @@ def _spectrum(image: np.ndarray) -> np.ndarray:
 
 
 def _best_offset(product: np.ndarray, n: int) -> tuple[float, tuple[int, int]]:
-    """Returns how far an image with sides n is shifted against a reference.
+    """Returns the greatest correlation of two images, and its shift.
 
-    The product (C, n, F) is that of the image's spectrum with the conjugate of
-    the reference's. The correlation, summed over the magnitudes of its
-    channels, comes before the shift (rows, columns) at which it is greatest.
+    `product` (C, n, F) is the spectrum of the image times the conjugate
+    spectrum of the reference; n is the side of the images. The correlation is
+    the sum of its magnitudes over the channels; the shift is in rows and
+    columns.
     """
     correlations = scipy.fft.irfft2(product, s=(n, n))
     correlation = np.abs(correlations, out=correlations).sum(axis=0)
@@ -380,7 +386,7 @@ def nearest_neighbours(points: np.ndarray, k: int) -> np.ndarray:
 
     Args:
         points: (N, 3) finite float64.
-        k: how many, from 1 to N.
+        k: number of neighbours, from 1 to N.
 
     Returns:
         (N, k) indices in no particular order. The choice among equally far
@@ -394,14 +400,15 @@ def local_features(points: np.ndarray, neighbours: np.ndarray) -> np.ndarray:
     """Returns six numbers that describe the shape of a cloud at each point.
 
     They are a selection of the hand-made features of LPD-Net (Liu et al., ICCV
-    2019). With the covariance of a point's neighbours, its eigenvalues l1 >= l2
-    >= l3, their sum s, and the eigenvalues m1 >= m2 of its horizontal part:
-    change of curvature l3 / s; omnivariance (l1 l2 l3)^(1/3) / s; entropy of
-    the eigenvalues, -sum (li / s) ln (li / s); horizontal roundness m2 / m1
-    (there called linearity); range and variance of z.
+    2019). Let l1 >= l2 >= l3 be the eigenvalues of the covariance of a point's
+    neighbours, s their sum, and m1 >= m2 the eigenvalues of its horizontal
+    part. The features are change of curvature l3 / s; omnivariance (l1 l2
+    l3)^(1/3) / s; entropy of the eigenvalues, -sum (li / s) ln (li / s);
+    horizontal roundness m2 / m1 (there called linearity); range and variance of
+    z.
 
-    Where the neighbours lie in a plane or on a line, the limits of the formulas
-    count (0 ln 0 = 0, and 0 / 0 = 0 for a vertical line).
+    If the neighbours lie in a plane or on a line, the limits of the formulas
+    are used (0 ln 0 = 0, and 0 / 0 = 0 for a vertical line).
 
     Args:
         points: (N, 3) float64 points.
@@ -436,7 +443,7 @@ def local_features(points: np.ndarray, neighbours: np.ndarray) -> np.ndarray:
     angle = np.arccos(np.clip(cosine, -1.0, 1.0)) / 3.0
     l1 = mean + 2.0 * scale * np.cos(angle)
     least = mean + 2.0 * scale * np.cos(angle + 2.0 * math.pi / 3.0)
-    # What rounding makes negative is 0.
+    # Values that rounding makes negative are set to 0.
     l2, l3 = np.maximum(3.0 * mean - l1 - least, 0.0), np.maximum(least, 0.0)
     entropy = sum(scipy.special.entr(one) for one in (l1, l2, l3))
     return np.stack(
@@ -449,8 +456,8 @@ def local_features(points: np.ndarray, neighbours: np.ndarray) -> np.ndarray:
 def _moments(points: np.ndarray, neighbours: np.ndarray) -> np.ndarray:
     """Returns the second moments of each point's K neighbours about their mean.
 
-    They are (7, N): sums of products xx, yy, zz, xy, xz and yz, and the range
-    of z.
+    The result is (7, N): sums of the products xx, yy, zz, xy, xz and yz, and
+    the range of z.
     """
     num_points, num_neighbours = neighbours.shape
     result = np.empty((7, num_points))
@@ -486,13 +493,13 @@ def _moments(points: np.ndarray, neighbours: np.ndarray) -> np.ndarray:
 def radon(image: np.ndarray, angles: np.ndarray) -> np.ndarray:
     """Returns the integrals of an image along parallel rays.
 
-    With u the column and v the row of a pixel, counted from the centre of
-    the image, the ray s of angle t is u cos t - v sin t = s, where s counts
-    pixels from the centre, too. Image and value follow torch-radon (Ronchetti
-    2020): a ray samples the image once in each row (or each column, if it
-    is closer to those), interpolates between the two nearest pixels, and its
-    sum counts times the distance between samples; outside of the image
-    everything is zero.
+    With u the column and v the row of a pixel, counted from the centre of the
+    image, the ray s of angle t is u cos t - v sin t = s, where s counts pixels
+    from the centre, too. Image and value follow torch-radon (Ronchetti 2020): a
+    ray that is nearer to vertical samples the image once in each row, any other
+    ray once in each column. It interpolates between the two nearest pixels. The
+    sum of the samples is multiplied by the distance between samples. Outside
+    the image all is zero.
 
     A pixel at distance d from a ray contributes hat(d / w) / w with w =
     max(|cos t|, |sin t|) and hat(x) = max(1 - |x|, 0).

@@ -1,26 +1,25 @@
 """Scan Context++ (Kim, Choi, Kim: T-RO 2022).
 
 A scan becomes a small image of heights around the sensor: over range and
-azimuth (polar context) or along and across the road (cart context). Two
-means of the image index it: one is invariant to turning (or lane offset) and
-finds candidates in a KD-tree; the other gives the shift of the columns before
-two images are compared.
+azimuth (polar context) or along and across the road (cart context). Two keys
+are means of this image. The retrieval key, which does not change with heading
+(or lane offset), finds candidates in a KD-tree. The aligning key gives the
+shift of the columns at which two images are compared.
 
-The polar context looks different from the next lane. Its augmented form
-stores each place of the database three times: as seen, and from 2 m to
-either side.
+The polar context looks different from the next lane. The augmented variant
+therefore stores each place of the database three times: as seen, and as if seen
+from 2 m to either side.
 
-By default this is the authors' T-RO program. On the same thinned scans its
-scores are equal (to 1e-15; all variants but `augmented-cart`, which it has no
-code for), and so are those of their C++ program with `variant: polar`,
-`min_points: 1` and `far_points: dropped` (to 3e-4, the precision of its
-heights). Deliberate differences:
+The defaults are those of the authors' T-RO program. On the same thinned scans,
+scores agree with it to 1e-15 for all variants except `augmented-cart`, for
+which it has no code. With `variant: polar`, `min_points: 1` and `far_points:
+dropped`, scores agree with the authors' C++ program to 3e-4, the precision of
+its heights. Deliberate differences:
 
-- Voxels of the thinning are counted from the sensor. The T-RO program leaves
-  that to MATLAB, the C++ program to its caller.
-- The sensor's height is a parameter, 1.6 m for CNS, instead of 1.9 or 2 m.
-- One T-RO function adds up the shifts that it tries; its corrected twin is
-  followed.
+- The voxels for thinning start at the sensor. The T-RO program leaves this to
+MATLAB, the C++ program to its caller. - The sensor's height is a parameter, 1.6
+m for CNS, instead of 1.9 or 2 m. - A function of the T-RO program accumulates
+the shifts that it tries; the code here follows its corrected copy.
 - A cell may hold more than 500 points.
 - Two scans without a column in common have no score.
 """
@@ -37,7 +36,8 @@ from scipy.spatial import cKDTree
 from evaluation.maps.voxel_maps import thin
 from evaluation.methods.method import Method, MethodConfig, register, yaw_pose
 
-# Bounds the memory of an exhaustive comparison.
+# Number of contexts compared at a time; it limits the memory of an exhaustive
+# comparison.
 _CONTEXTS_AT_ONCE = 512
 
 Variant = Literal["polar", "augmented-polar", "cart", "augmented-cart"]
@@ -46,32 +46,36 @@ Variant = Literal["polar", "augmented-polar", "cart", "augmented-cart"]
 class ScanContextConfig(MethodConfig):
     """Settings of Scan Context++.
 
-    Sources of the values: [T] the T-RO program, [C] the C++ program, [E] the
-    evaluation program, all by the method's authors.
+    Letters in brackets name the source of a value: [T] stands for the authors'
+    program of their T-RO paper, [C] for their C++ program, [E] for their
+    evaluation program.
 
     Attributes:
-        variant: kind of context: polar or Cartesian (cart). The augmented kinds
-            also add shifted copies of each place to the database. The default
-            is what [T] calls A-PC.
-        voxel_size: side of the voxels to which clouds are thinned first [m];
+        variant: kind of context (descriptor): polar or Cartesian (cart). The
+            augmented kinds also add shifted copies of each place to the
+            database. The default is the one that [T] calls A-PC.
+        voxel_size: side of the voxels to which each cloud is first thinned [m];
             [T] 0.5.
         rings: number of rings of the polar context; [T], [C] 20.
         sectors: number of sectors of the polar context; [T], [C] 60.
-        max_range: farthest range of the polar context [m]; [T], [C] 80.
-        far_points: what happens to points beyond `max_range`: they count in the
-            last ring, as in [T], or are dropped, as in [C].
-        min_points: number of points that a cell of the polar context needs; [T]
-            5, [C] 1.
-        cart_cell: length and width of a cell of the cart context [m];
-            [T] 5 and 2.
-        cart_range: half length and half width of the cart context [m];
-            [T] 100 and 40.
-        lateral_shift: distance by which augmenting copies are shifted sideways
+        max_range: range up to which the polar context has rings [m]; [T], [C]
+            80.
+        far_points: what happens to points beyond `max_range`. With `last-ring`
+            they count in the last ring, as in [T]; with `dropped` they are left
+            out, as in [C].
+        min_points: number of points from which on a cell of the polar context
+            is filled; [T] 5, [C] 1.
+        cart_cell: length and width of a cell of the Cartesian context [m]; [T]
+            5 and 2.
+        cart_range: half the length and half the width of the Cartesian context
+            [m]; [T] 100 and 40.
+        lateral_shift: sideways shift of the copies that an augmented kind adds
             [m]; [T] 2.
         candidates: number of places that the search in the KD-tree returns; [E]
-            50. With augmented places it returns as many times more contexts.
-        search_ratio: share of all shifts that are tried, around the one that
-            the aligning key finds best; [C] 0.1.
+            50. With augmented places, it returns as many more contexts as each
+            place has copies.
+        search_ratio: share of all shifts of the context that are compared,
+            around the shift that fits the aligning key best; [C] 0.1.
     """
 
     variant: Variant = "augmented-polar"
@@ -93,15 +97,15 @@ class Contexts:
     """One or more contexts of one scan.
 
     Attributes:
-        images: (K, rows, columns) heights above the ground [m], 0 where
-            empty; K is 1 but for augmented places.
+        images: (K, rows, columns) heights above the ground [m], 0 where empty;
+            K is 1 except for augmented places.
     """
 
     images: np.ndarray
 
     @property
     def retrieval_keys(self) -> np.ndarray:
-        """(K, rows) row means, which a shift of the columns does not change."""
+        """(K, rows) row means; a shift of the columns does not change them."""
         return self.images.mean(axis=2)
 
     @property
@@ -189,16 +193,17 @@ class ScanContext(Method[Contexts, ContextDatabase]):
         for start in range(0, len(chosen), _CONTEXTS_AT_ONCE):
             some = chosen[start : start + _CONTEXTS_AT_ONCE]
             similarities, _ = self._compare(query, database, some)
-            # fmax: the best context of a place; NaN only where all are.
+            # fmax takes the best context of a place, and NaN only if all are
+            # NaN.
             np.fmax.at(scores, database.places[some], similarities)
         return scores
 
     def relative_pose(
         self, query: Contexts, database: ContextDatabase, place: int
     ) -> np.ndarray | None:
-        """Returns the query's heading (polar) or lateral offset (cart).
+        """Returns a pose with the query's heading (polar) or offset (cart).
 
-        None if the two have no filled column in common.
+        Returns None if the two scans have no filled column in common.
         """
         chosen = np.flatnonzero(database.places == place)
         similarities, shifts = self._compare(query, database, chosen)
@@ -208,14 +213,14 @@ class ScanContext(Method[Contexts, ContextDatabase]):
         num_columns = query.images.shape[2]
         shift = int(shifts[best])
         if self.config.variant in ("polar", "augmented-polar"):
-            # Shift s turns the place's context to the query's: what the
-            # place sees at azimuth a, the query sees at a + s cells.
+            # Shift s maps the place's context to the query's: what the place
+            # sees at azimuth a, the query sees at a + s cells.
             side = (0.0, -1.0, 1.0)[best]
             return yaw_pose(
                 -2.0 * math.pi * shift / num_columns,
                 y=side * self.config.lateral_shift,
             )
-        # Half of the shifts are to the right: 0, 1, ..., -2, -1.
+        # Half of the shifts are negative: 0, 1, ..., -2, -1.
         signed = (shift + num_columns // 2) % num_columns - num_columns // 2
         # The second context is the view of a car in the opposite direction.
         sign = 1.0 if best > 0 else -1.0
@@ -238,17 +243,17 @@ class ScanContext(Method[Contexts, ContextDatabase]):
     ) -> tuple[np.ndarray, np.ndarray]:
         """Compares a query with some contexts of a database.
 
-        For each shift s of a context's columns, the similarity is the mean
-        cosine between columns j of the query and j - s of the context, over
-        the columns that are filled in both. Only shifts near that of the
-        aligning keys count.
+        For a shift s of a context's columns, the similarity is the mean cosine
+        between column j of the query and column j - s of the context, over
+        columns that are filled in both. Only shifts near the best one by the
+        aligning keys are tried.
 
         Args:
             chosen: (C,) indices of contexts.
 
         Returns:
-            (C,) best similarity, NaN without a common column; (C,) its
-            shift, by which the context's columns are rolled.
+            (C,) best similarity, NaN without a common column; (C,) the shift at
+            which it occurs.
         """
         num_columns = query.images.shape[2]
         columns, filled = _unit_columns(query.images)
@@ -288,7 +293,7 @@ def _polar_context(points: np.ndarray, config: ScanContextConfig) -> np.ndarray:
         (r * (config.rings / config.max_range)).astype(np.int64),
         config.rings - 1,
     )
-    # Sectors are open below and closed above.
+    # A sector includes its upper limit but not its lower one.
     sector = np.ceil(azimuth * (config.sectors / (2.0 * math.pi))) - 1
     sector = np.clip(sector, 0, config.sectors - 1).astype(np.int64)
     return _highest(
@@ -301,11 +306,11 @@ def _polar_context(points: np.ndarray, config: ScanContextConfig) -> np.ndarray:
 
 
 def _cart_context(points: np.ndarray, config: ScanContextConfig) -> np.ndarray:
-    """Returns the highest point of each cell along (row) and across.
+    """Returns the greatest height per cell: rows along x, columns across.
 
-    Cells are counted from the axes outwards, so that the ones around the
-    axes are twice as large, and the first row and column stay empty; points
-    below the ground count as ground. Both as in the T-RO program.
+    As in the T-RO program, cells are counted outwards from the axes, so that
+    the cells around the axes are twice as large, and the first row and column
+    stay empty. Also as there, points below the ground count as ground.
     """
     rows, columns = (
         2 * int(half / cell)
@@ -333,9 +338,9 @@ def _highest(
     min_points: int,
     floor: float,
 ) -> np.ndarray:
-    """Returns the greatest of heights (N,) in each cell, 0 with too few [m].
+    """Returns the greatest of heights (N,) in each cell [m].
 
-    A filled cell holds `floor` at least.
+    It is 0 in cells with too few points, and at least `floor` in others.
     """
     size = shape[0] * shape[1]
     highest = np.full(size, floor)
@@ -345,7 +350,7 @@ def _highest(
 
 
 def _unit_columns(images: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Returns images with columns of length 1 or 0, and which are filled."""
+    """Returns images with columns of length 1 or 0, and filled columns."""
     norms = np.linalg.norm(images, axis=1)
     filled = norms > 0.0
     return (
@@ -355,10 +360,10 @@ def _unit_columns(images: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
 
 
 def _key_shift(key: np.ndarray, others: np.ndarray) -> np.ndarray:
-    """Returns the shift (C,) of each row of others that fits a key best.
+    """Returns the shift (C,) at which each other key fits a key best.
 
-    It is the s that minimises |key - roll(other, s)|, which is the one that
-    maximises their product; the lowest of equal ones.
+    It is the s that minimises |key - roll(other, s)|, and equally the s that
+    maximises the product of the two; the lowest of several equal ones.
     """
     column = np.arange(len(key))
     rolled = key[(column + column[:, None]) % len(key)]

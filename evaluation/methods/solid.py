@@ -1,8 +1,9 @@
 """SOLiD (Kim, Choi, Sim, Kim, Park: RA-L 2024), for narrow fields of view.
 
 Points are counted over range and elevation, and over azimuth and elevation.
-An elevation's weight grows with its number of points. The weighted counts over
-range distinguish places at any heading; those over azimuth give the heading.
+Each elevation has a weight that grows with its number of points. The weighted
+counts over range identify a place at any heading; the weighted counts over
+azimuth give the heading.
 """
 
 from __future__ import annotations
@@ -19,32 +20,33 @@ from cns_drake.base.drives.lidar_fields import LidarField
 from evaluation.maps.voxel_maps import Z_ORIGIN, thin
 from evaluation.methods.method import Method, MethodConfig, register, yaw_pose
 
-# The LiDAR of the `cns` preset [S].
+# Field of view of the `cns` preset's LiDAR [S].
 _CNS = LidarField(32, -22.5, 22.5)
 
 
 class SolidConfig(MethodConfig):
     """Settings of SOLiD.
 
-    Sources of the values: [P] the Python program and [C] the C++ program, both
-    by the method's authors; [S] the data sheet of the `cns` LiDAR.
+    Letters in brackets name the source of a value: [P] stands for the authors'
+    Python program, [C] for their C++ program, [S] for the data sheet of the
+    `cns` LiDAR.
 
     Attributes:
-        voxel_size: side of the voxels to which clouds are thinned first [m];
-            [P] 1.0. ([C] has 0.4, but only [P] lists LiDARs of this field of
+        voxel_size: side of the voxels to which each cloud is first thinned [m];
+            [P] 1.0. ([C] has 0.4, but only [P] is for LiDARs with this field of
             view.)
-        min_range: least range of a point that counts [m]; [P] 3.
-        max_range: greatest range of a point that counts [m]; [P] 80, for a
-            LiDAR of this field of view.
-        ranges: number of equal cells up to `max_range`; [P], [C] 40.
-        azimuths: number of equal cells of azimuth; [P], [C] 60.
+        min_range: smallest range of a point that is used [m]; [P] 3.
+        max_range: largest range of a point that is used [m]; [P] 80, for a
+            LiDAR with this field of view.
+        ranges: number of equal cells of range, up to `max_range`; [P], [C] 40.
+        azimuths: number of equal cells of azimuth in a turn; [P], [C] 60.
         elevations: number of equal cells of elevation over the field of view;
-            [P], [C] the beams of the LiDAR. By default those of the drive's
-            LiDAR, or 32 if its unit is unknown [S].
-        lowest_deg: lower limit of the field of view [deg]; by default that of
-            the drive's LiDAR, or -22.5 if its unit is unknown [S].
-        highest_deg: upper limit of the field of view [deg]; by default that of
-            the drive's LiDAR, or 22.5 if its unit is unknown [S].
+            [P], [C] the number of beams of the LiDAR. By default the number of
+            beams of the drive's LiDAR, or 32 if its model is unknown [S].
+        lowest_deg: lower limit of the field of view [deg]. By default that of
+            the drive's LiDAR, or -22.5 if its model is unknown [S].
+        highest_deg: upper limit of the field of view [deg]. By default that of
+            the drive's LiDAR, or 22.5 if its model is unknown [S].
     """
 
     voxel_size: PositiveFloat = 1.0
@@ -110,13 +112,13 @@ class SolidMethod(Method[Solid, SolidDatabase]):
     Where it differs from the authors' programs:
 
     - An elevation outside the field of view counts in the outermost cell.
-      [P] lets those below wrap around to the top; [C] reads outside its
+      In [P], elevations below it wrap around to the top; [C] reads outside its
       table if they are more than one cell too low.
     - Coordinates that are exactly zero stay zero; the programs replace them
       by 1 mm.
-    - If all elevations have equally many points, all weigh 1 (the programs
-      divide by zero).
-    - A scan without points within range is no candidate and finds none.
+    - If all elevations have the same number of points, all weights are 1 (the
+    programs divide by zero). - A place without points within range is never a
+    candidate, and a query without such points has no candidates.
     """
 
     Config = SolidConfig
@@ -183,15 +185,15 @@ class SolidMethod(Method[Solid, SolidDatabase]):
     def score(
         self, query: Solid, database: SolidDatabase, *, exhaustive: bool = False
     ) -> np.ndarray:
-        del exhaustive  # It always is.
+        del exhaustive  # Always true here.
         return (database.ranges * _unit(query.ranges)).sum(axis=1)
 
     def relative_pose(
         self, query: Solid, database: SolidDatabase, place: int
     ) -> np.ndarray | None:
-        """Returns the query's heading at a place, in steps of one azimuth cell.
+        """Returns a pose with the query's heading, in steps of one cell.
 
-        None if one of the two has no points within range.
+        Returns None if one of the two scans has no points within range.
         """
         azimuths = database.azimuths[place]
         if not (query.azimuths.any() and azimuths.any()):
@@ -220,7 +222,7 @@ class SolidMethod(Method[Solid, SolidDatabase]):
             return within
         least = np.array([column.min() for column in within.T])
         first = least - 0.5 * config.voxel_size
-        # `thin` has a grid through the origin, but for z.
+        # The grid of `thin` goes through the origin in x and y, but not in z.
         offset = first - [0.0, 0.0, Z_ORIGIN]
         return thin(within - offset, config.voxel_size) + offset
 
@@ -235,7 +237,7 @@ def _count(
 
 
 def _elevation_weights(counts: np.ndarray) -> np.ndarray:
-    """Returns the counts, scaled so that the least is 0 and the most is 1."""
+    """Returns weights: counts scaled so that the least is 0, the greatest 1."""
     least, most = counts.min(), counts.max()
     if least == most:
         return np.ones(len(counts))

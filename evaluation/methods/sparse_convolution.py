@@ -1,14 +1,14 @@
-"""Convolutions of features in some of the cells of a grid, for inference.
+"""Sparse convolutions, for inference: only occupied cells have features.
 
 They follow MinkowskiEngine 0.5 (Choy, Gwak, Savarese: CVPR 2019), so that its
-weights can be used: only cells with a feature have a result, and the offsets
-of a kernel run along x first, then y, then z. An odd kernel lies around its
-cell, an even one begins there.
+weights can be used. Only cells with a feature have a result. The offsets of a
+kernel vary along x first, then y, then z. A kernel of odd size is centred at
+its cell; a kernel of even size begins there.
 """
 
 import numpy as np
 
-# Makes one number of the three of a cell.
+# Base for encoding the three indices of a cell in one number.
 PACKED = np.array([1 << 42, 1 << 21, 1])
 
 
@@ -22,11 +22,11 @@ def convolve(
     """Returns the features of a convolution, (M, channels out).
 
     Args:
-        cells: (N, 3) int64, different ones, each below 2^20.
+        cells: (N, 3) int64 distinct cells, each index below 2^20.
         features: (N, channels in) features of the cells.
         kernel: (offsets, channels in, channels out) weights.
         step: distance of neighbouring cells.
-        at: (M, 3) cells of the result; None for the same ones.
+        at: (M, 3) cells of the result; None for `cells`.
     """
     at = cells if at is None else at
     size = round(len(kernel) ** (1 / 3))
@@ -47,6 +47,6 @@ def convolve(
 def coarser(cells: np.ndarray, step: int) -> np.ndarray:
     """Returns the occupied cells (M, 3) of a coarser grid.
 
-    They are named by their lower corners, as the finer cells are.
+    Like the finer cells, they are identified by their lower corners.
     """
     return np.unique(cells // step * step, axis=0)

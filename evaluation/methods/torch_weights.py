@@ -1,8 +1,8 @@
 """Weights that PyTorch has saved, read without PyTorch.
 
-A file of `torch.save` is an archive of a pickle and of the numbers of each
-tensor. Pickles run code; this reader knows tensors alone, and makes inert
-objects of all else.
+A file of `torch.save` is an archive with a pickle and the numbers of each
+tensor. Unpickling can run any code; this reader recognises tensors only, and
+replaces everything else with inert objects.
 """
 
 from collections import OrderedDict
@@ -18,7 +18,7 @@ import numpy as np
 from cns_drake.base.errors import InputError
 from cns_drake.base.files import read_bytes
 
-# Greatest size of a file, and of what it unpacks to.
+# Greatest size of a file, and of its unpacked content [bytes].
 MOST_BYTES = 200_000_000
 _TYPES = {"FloatStorage": np.float32, "LongStorage": np.int64}
 
@@ -51,7 +51,7 @@ class _Unpickler(pickle.Unpickler):
 def _tensor(
     storage: np.ndarray, offset: int, shape: tuple, steps: tuple, *_: Any
 ) -> np.ndarray:
-    # NumPy refuses what would reach outside of the storage.
+    # NumPy refuses a view that would reach outside of the storage.
     size = storage.itemsize
     strides = [size * step for step in steps]
     return np.ndarray(shape, storage.dtype, storage, size * offset, strides)
@@ -60,15 +60,15 @@ def _tensor(
 def read_weights(
     path: Path, shapes: Mapping[str, tuple[int, ...]]
 ) -> dict[str, np.ndarray]:
-    """Returns the tensors of a network, float32.
+    """Returns name -> tensor (float32) of a network's weights.
 
     Args:
         path: file that `torch.save` wrote (PyTorch 1.6 or later), with a state
-            or a dict that holds one.
-        shapes: name -> shape of the wanted ones.
+            dict or a dict that contains one.
+        shapes: name -> shape of the wanted tensors.
 
     Raises:
-        InputError: if it cannot be read, or a tensor is missing, of another
+        InputError: the file cannot be read, or a tensor is missing, of another
             shape or not finite.
     """
     content = read_bytes(path, MOST_BYTES)

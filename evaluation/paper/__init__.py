@@ -1,8 +1,8 @@
-"""The paper "The City that Never Settles" beside the cities made after it.
+"""The paper "The City that Never Settles", as reference for the cities.
 
-It has the paper's values, pairs of drives and claims, and judges the shipped
-cities by them. Commands pass their maps to `reference_for`; the rest of the
-evaluation does not need this package.
+This package contains the paper's values, pairs of drives and claims, and
+compares the shipped cities with them. Commands pass their maps to
+`reference_for`; the rest of the evaluation does not need this package.
 """
 
 from evaluation.paper.paper_reference import reference_for

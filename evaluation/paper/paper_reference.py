@@ -1,8 +1,9 @@
 """The paper as the reference of a report: its values, findings and aims.
 
-The findings are the paper's own. By the aims the shipped cities were fitted and
-judged: TCR_sym and SOLiD's AUC were fitted to the paper; the other methods were
-not, but later freezes followed looks at them.
+The findings are claims of the paper. The aims are targets by which the shipped
+cities were made: TCR_sym and SOLiD's AUC were fitted to the paper. Other
+methods' results were not fitted, but had been seen before later versions of the
+cities were frozen.
 """
 
 from collections import Counter
@@ -30,7 +31,7 @@ from evaluation.report.result_tables import recognition_table
 from evaluation.results.table_forms import Cell, in_table_order, title
 
 _TITLE = "the paper “The City that Never Settles”"
-# The drives through a real city, in the tables of the paper.
+# Drives through a real city in the paper's tables.
 _KAIST = ("kaist", "01", "06")
 # Least number of pairs from which a trend is judged.
 _FEWEST_PAIRS = 5
@@ -47,7 +48,7 @@ MISSED = "is missed"
 _BOTH = "Tables I and II"
 
 _TCR_TOLERANCE = 0.015
-# Method, greatest difference of AUC, part of the pairs.
+# Aim: method, greatest difference of AUC, and share of pairs that meet it.
 _AUC_AIMS = (
     ("ring++", 0.12, 0.8),
     ("scan-context++", 0.20, 0.7),
@@ -70,7 +71,7 @@ def paper() -> Reference:
     Downtown 01-04 the value of 02-04, and one R@1 of RING++ on Riverside 02->01
     contradicts the F1 beside it. The paper does not state the mode of
     `recognition.metrics` of a method. The mode is inferred from the relation
-    between R@1, F1 and AUC in all its rows.
+    between R@1, F1 and AUC in all rows of a method.
     """
     changes = {
         (row["map"], row["sequence_a"], row["sequence_b"]): float(
@@ -132,10 +133,10 @@ def _judge(
 class Trend:
     """The trend of AUC over TCR_sym of some pairs.
 
-    It consists of Spearman's rank correlation, which is NaN if one of the two
-    does not vary, and of the two-sided p-value under the hypothesis of no
-    correlation. The slope is that of the least-squares line: the change of AUC
-    for 0.1 of TCR_sym.
+    It consists of Spearman's rank correlation, its two-sided p-value under the
+    hypothesis of no correlation, and a slope. The correlation is NaN if AUC or
+    TCR_sym is constant. The slope is that of the least-squares line: the change
+    of AUC per 0.1 of TCR_sym.
     """
 
     rho: float
@@ -154,9 +155,9 @@ def findings(
 ) -> list[Finding]:
     """Returns which of the paper's findings hold, if there are data for them.
 
-    Only the paper's maps and methods are judged, and only by its protocol. If a
-    method has several results on a pair, the report's own tables contain the
-    first one.
+    Only results on the paper's maps, with its methods and its protocol, count.
+    If a method has several results on a pair, the first one counts, as in the
+    report's tables.
     """
     shown = {
         (*r.pair, r.method): r
@@ -187,7 +188,7 @@ def findings(
 
 
 def trend(change: Sequence[float], auc: Sequence[float]) -> Trend:
-    """Returns the trend of AUC over TCR_sym, given three pairs or more."""
+    """Returns the trend of AUC over TCR_sym over three or more pairs."""
     x, y = np.asarray(change), np.asarray(auc)
     spread = float(np.ptp(y))
     if np.ptp(x) == 0.0 or spread == 0.0:
@@ -215,7 +216,7 @@ def _trends(
     tcr: Mapping[tuple[str, str, str], float],
     methods: Sequence[str],
 ) -> dict[str, Trend]:
-    """Returns method -> its trend in mode all, where pairs suffice."""
+    """Returns method -> its trend in mode all, if it has enough pairs."""
     trends = {}
     for method in methods:
         points = [
@@ -282,7 +283,7 @@ def _counted_alike(
     results: Sequence[PlaceRecognition],
     words: str = "When all methods are counted alike",
 ) -> str:
-    """Returns a sentence on the best methods if all count all queries."""
+    """Returns a sentence on which methods are best if all are in mode all."""
     best = _best_methods(results, "all")
     number = sum(_RING in methods for methods in best)
     return (
@@ -294,14 +295,14 @@ def _counted_alike(
 def _best_methods(
     results: Sequence[PlaceRecognition], mode: Mode | None = None
 ) -> list[list[str]]:
-    """Returns the methods of the greatest AUC on each pair.
+    """Returns the methods with the greatest AUC on each pair.
 
-    They are those that Table II prints in bold: two or more if its digits are
-    the same. Without a mode, each is counted in the paper's.
+    Table II prints these in bold; there are several if their printed digits are
+    equal. If no mode is given, each method has the paper's mode.
     """
     table = recognition_table(results, (), mode, paper())
     methods = [name for name, _ in table.groups[1:]]
-    step = table.groups[1][1]  # AUC is the first column of a method.
+    step = table.groups[1][1]  # AUC is the first of a method's columns.
     return [
         [
             method
@@ -315,7 +316,7 @@ def _best_methods(
 
 
 def _listed(best: Iterable[Iterable[str]]) -> str:
-    """Returns on how many pairs each method is best, the greatest first."""
+    """Returns "<method> on <number>, ...": the pairs on which each is best."""
     counts = Counter(itertools.chain.from_iterable(best)).most_common()
     return ", ".join(f"{method} on {number}" for method, number in counts)
 
@@ -325,7 +326,8 @@ def _falls(trends: Mapping[str, Trend], too_few: str) -> Finding:
         "Place recognition gets worse as TCR_sym grows (for BTC the paper"
         " says it does not)."
     )
-    # One wording for all; the paper itself makes an exception of BTC.
+    # The wording is the same for all methods; the paper itself makes an
+    # exception for BTC.
     falls = [one.falls for name, one in trends.items() if name != "btc"]
     if not falls:
         return Finding(claim, UNDECIDED, too_few)
@@ -379,10 +381,10 @@ def _part(number: int, total: int) -> str:
 def aims(
     results: Sequence[PlaceRecognition], changes: Sequence[ChangeResult]
 ) -> list[Finding]:
-    """Returns whether each aim is met, if all pairs of the paper are there.
+    """Returns whether each aim is met; empty unless all pairs are present.
 
-    RING++ is counted on queries with a match, the others on all, as the paper
-    seems to have done.
+    RING++ is evaluated on queries with a match and all other methods on all
+    queries, as the paper seems to have done.
     """
     differences = _differences(results)
     if differences.keys() != {
@@ -443,7 +445,7 @@ def aims(
 def _differences(
     results: Sequence[PlaceRecognition],
 ) -> dict[tuple[str, str, str, str], float]:
-    """Returns (map, database, query, method) -> AUC here less the paper's."""
+    """Returns (map, database, query, method) -> our AUC minus the paper's."""
     found = {}
     for result in results:
         mode = paper().mode(result.method)

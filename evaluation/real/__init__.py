@@ -1,5 +1,5 @@
-"""Real scans that anyone can get, measured as a study measures simulated ones.
+"""Public real scans, measured as a study measures simulated ones.
 
-`data_sets` knows them, `measuring` measures, and `judge` tells them from
-simulated scans.
+`data_sets` opens the scans, `measuring` measures methods on them, and `judge`
+trains a classifier that tells them from simulated scans.
 """

@@ -1,8 +1,8 @@
 """Public data sets of few scans: where each file is from, and how it is read.
 
 Nothing is shipped. A folder holds a folder for each data set, as `docs/real.md`
-lays them out. A data set is known by its folder's name; the digest of its scans
-says whether they are the ones that were measured before.
+lays them out. A data set is recognised by its folder's name. The digest of its
+scans tells whether they are the same scans as in earlier measurements.
 """
 
 from collections.abc import Callable, Sequence
@@ -21,7 +21,7 @@ from evaluation.drives import Drive, helipr, nclt, open_drive
 from evaluation.drives.scan_files import FileDrive
 from evaluation.drives.text_tables import read_poses, read_quaternions
 
-# Between scans without poses [m]. No scan reaches so far.
+# Distance put between scans without poses [m]; no scan reaches so far.
 _APART = 1000.0
 
 
@@ -37,11 +37,12 @@ class DataSet(NamedTuple):
         origin: repository of the data set, and the path in it.
         licence: terms of use.
         digest: SHA-256 of all scans, concatenated in the order of their names.
-        poses: `drive` for a folder of `open_drive`; `matrices` for rows of the
-            upper 3 x 4 of X_WS, and `named` for rows of a scan's name, x y z
-            and quat_xyzw, both in `poses.txt`; "" for none.
-        read: reads a scan.
-        whole: whether the scans have all points that the unit measured.
+        poses: where poses come from: `drive` for a folder that `open_drive`
+            reads; `matrices` for a `poses.txt` whose rows are the upper 3 x 4
+            of X_WS; `named` for a `poses.txt` whose rows are a scan's name, x y
+            z and quat_xyzw; "" for none.
+        read: function that reads a scan.
+        whole: whether the scans contain all points that the unit measured.
     """
 
     folder: str
@@ -146,7 +147,7 @@ DATA_SETS = (
 
 
 class RealScans(NamedTuple):
-    """The scans of a data set that are there, as a drive."""
+    """The existing scans of a data set, as a drive."""
 
     data_set: DataSet
     drive: Drive
@@ -174,7 +175,7 @@ def open_data_sets(folder: Path, on_note: OnNote) -> list[RealScans]:
     unknown folders.
 
     Raises:
-        InputError: none is there, or one cannot be read.
+        InputError: there is no data set, or one cannot be read.
     """
     if not folder.is_dir():
         raise InputError(f"{folder}: no such folder")

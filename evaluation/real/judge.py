@@ -1,15 +1,16 @@
 """Can a classifier tell real scans from simulated ones?
 
-Sixteen patches of 8 m of each scan, within 30 m, are described by features.
-Boosted trees then tell the patches of both sets apart; none of a place is ever
-both learned from and asked for. Scans less than 30 m from the first one of a
-place belong to it, as those of one folder of scans do. The AUC is 1 if all
-patches are told apart, and 0.5 for a guess. The control tells the first half of
-the simulated places from the second one. All AUCs are means over draws of
-patches, of which one differs by up to 0.04.
+Of each scan, sixteen patches of 8 m within 30 m of the LiDAR are described by
+features. Boosted trees then learn to tell the patches of the two sets apart; a
+place is never in both training and test data. Scans less than 30 m from the
+first scan of a place belong to that place; so do all scans of one folder. The
+AUC of the classifier is 1 if it tells all patches apart, and 0.5 for guessing.
+As a control, the classifier tells the first half of the simulated places from
+the second half. All AUCs are means over random draws of patches; single draws
+differ by up to 0.04.
 
 Rings come from recordings, or from files with one ring after the other, as
-KITTI's. Features that need them are left out if either set has none.
+KITTI's. Features that need rings are left out if one of the sets has none.
 
 Needs the extra `judge`.
 """
@@ -33,19 +34,19 @@ _PATCHES = 16
 _HALF_WIDTH = 4.0
 _NEAREST, _FARTHEST = 5.0, 30.0
 _FEWEST_POINTS = 150
-# Neighbourhoods: that many of a patch, of this radius [m].
+# Neighbourhoods: number per patch, and radius [m].
 _NEIGHBOURHOODS, _RADIUS = 160, 0.75
 _APART = 30.0
-# Most scans of a drive; most folds.
+# Greatest number of scans per drive, and of folds of the cross-validation.
 _MOST_SCANS, _MOST_FOLDS = 40, 3
 _TREES = 120
 _QUANTILES = (0.1, 0.5, 0.9)
-# As KITTI's, which never reaches 1.
+# Greatest intensity after scaling, like KITTI's, which never reaches 1.
 _FULL = 99.0
 
 
 def scan_table(scan: np.ndarray) -> np.ndarray:
-    """Returns (N, 5) x, y, z [m], intensity from 0 to 99 and ring.
+    """Returns a scan as (N, 5): x, y, z [m], intensity from 0 to 99, ring.
 
     Args:
         scan: (N, 4) x, y, z and intensity, or records of a drive.
@@ -117,7 +118,7 @@ def patches(scan: np.ndarray, rng: np.random.Generator) -> Iterator[np.ndarray]:
 
 
 def describe(patch: np.ndarray, rng: np.random.Generator) -> dict[str, float]:
-    """Returns the features of a patch; their names begin with their group."""
+    """Returns name -> feature of a patch; a name begins with its group."""
     p, bright, ring = patch[:, :3], patch[:, 3], patch[:, 4]
     tree = cKDTree(p)
     result = _intensity(bright, tree) | _density(p, ring, tree)
@@ -214,7 +215,7 @@ def _density(
 
 
 def _ground_steps(p: np.ndarray) -> dict[str, float]:
-    """Returns by how much neighbouring cells of the ground differ."""
+    """Returns the differences in height of neighbouring cells of the ground."""
     cell = np.floor(p[:, :2] / 0.5).astype(int)
     places, which = np.unique(cell, axis=0, return_inverse=True)
     which = which.reshape(-1)
@@ -237,8 +238,8 @@ def _shape(p: np.ndarray, ring: np.ndarray) -> tuple[float, ...]:
     """Returns the shape of a neighbourhood: shares, normal and residuals.
 
     The shares of lines, planes and scatter are those of Demantke et al. (2011).
-    Residuals are logarithms of mm: of all points, within rings, and of the
-    means of rings.
+    Residuals from the plane are logarithms of mm, in three kinds: of all
+    points, within rings, and of the rings' means.
     """
     spread = p - p.mean(axis=0)
     values, vectors = np.linalg.eigh(spread.T @ spread / len(p))
@@ -275,7 +276,7 @@ class Features:
 
     Attributes:
         rows: a dictionary for each patch.
-        place: (N,) number of the place of each.
+        place: (N,) number of the place of each patch.
     """
 
     def __init__(self, places: list[list[np.ndarray]], seed: int = 0):
@@ -306,7 +307,7 @@ class Features:
 
 
 def common_names(sets: list[Features]) -> list[str]:
-    """Returns the features that a tenth of the patches in both sets have."""
+    """Returns the features that at least a tenth of each set's patches have."""
     names = list(dict.fromkeys(n for s in sets for row in s.rows for n in row))
     shares = [np.isfinite(one.of(names)).mean(axis=0) for one in sets]
     kept = np.min(shares, axis=0) >= 0.1
@@ -316,7 +317,8 @@ def common_names(sets: list[Features]) -> list[str]:
 def tell_apart(real: Features, simulated: Features, names: list[str]) -> float:
     """Returns how well a classifier tells real from simulated patches.
 
-    It is the mean AUC over folds of places; NaN if a set has one place.
+    The result is the mean AUC over folds of places; NaN if a set has only one
+    place.
     """
     sets = [_in_folds(one) for one in (real, simulated)]
     folds = min(_MOST_FOLDS, *(fold.max() + 1 for fold in sets))
@@ -362,7 +364,7 @@ def judge(real: Features, simulated: Features) -> dict:
     place = _in_folds(simulated)
     half = place > place.max() // 2
     halves = simulated.part(half), simulated.part(~half)
-    # The trees are small: threads take longer.
+    # The trees are small: several threads would take longer than one.
     with threadpool_limits(1):
         return {
             "patches": [len(real.rows), len(simulated.rows)],

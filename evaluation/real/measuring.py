@@ -1,10 +1,11 @@
 """The tasks of a study, measured on public data sets of few scans.
 
-Each scan of a data set with poses is asked. It may find all other scans of its
-LiDAR's unit: those of its data set, of others, and simulated ones. A place is a
-single scan, and queries are turned and tilted as by the protocol `fair`. Each
-scan is also localised, from a drawn start, in the map of the scans around it.
-The judge tells each data set from the simulated scans of its unit.
+Each scan of a data set with poses is a query. Its candidates are all other
+scans of the same LiDAR unit: from its data set, other data sets and simulated
+recordings. A place is a single scan; queries are turned and tilted as in the
+protocol `fair`. Each scan is also localised, from a random start, in a map of
+the scans around it. The judge, a classifier, tells each data set from simulated
+scans of the same unit.
 """
 
 from collections.abc import Sequence
@@ -47,19 +48,20 @@ from evaluation.results.table import Answers, Key, QueryRows, Results, Row
 _SIMULATED = replace(FAIR_PROTOCOL, scans_per_place=1)
 # Every real scan is a query and a place.
 _REAL = replace(_SIMULATED, query_spacing=1e-6, place_spacing=1e-6)
-# A study's default start [m, deg].
+# The default starts of a study [m, deg].
 _STARTS = localise.Starts(2.0, 10.0)
-# Scans this near make the map of a query [m].
+# Scans within this distance make the map of a query [m].
 _AROUND = 30.0
 _ESTIMATORS = tuple(
     one for one in estimators.METHODS if one != estimators.KISS_MATCHER
 )
-# Draws of patches for the judge, which differ by up to 0.04.
+# Number of random draws of patches for the judge; their AUCs differ by up to
+# 0.04.
 _DRAWS = 1
 
 
 class _Part(NamedTuple):
-    """Described scans that are places: a data set's, or a recording's."""
+    """Places, with descriptions, from one data set or one recording."""
 
     name: str
     world: str
@@ -76,11 +78,11 @@ class Measuring:
     """
 
     def __init__(self, names: Sequence[str], track: Track, on_note: OnNote):
-        """Chooses what is measured.
+        """Chooses the methods and estimators to measure.
 
         Args:
-            names: methods and estimators, or Python files with one's own
-                methods; all that ship if there is none.
+            names: names of methods and estimators, or Python files with your
+                own methods; if empty, all shipped ones.
             track: reports progress.
             on_note: takes notes.
 
@@ -115,8 +117,8 @@ class Measuring:
 
         Args:
             folder: see `open_data_sets`.
-            simulated: folder of recordings. They add places, and the judge
-                tells real scans from theirs.
+            simulated: folder of simulated recordings. They add places, and the
+                judge tells real scans from theirs.
 
         Raises:
             InputError: no data set is there, or one cannot be read.
@@ -215,7 +217,7 @@ class Measuring:
     ) -> None:
         """Adds the rows of `place` and `pose` of a data set."""
         world, drive = one.data_set.world, one.drive
-        # The data set itself comes first, then what is of its world.
+        # The data set itself comes first, then other sets of the same world.
         parts = sorted(
             parts, key=lambda part: (part.name != one.name, part.world != world)
         )
@@ -284,7 +286,7 @@ class Measuring:
                 )
 
     def _localise(self, one: RealScans) -> None:
-        """Adds the rows of `localise`: each scan, in a map of the others."""
+        """Adds the rows of `localise`: each scan in a map of the rest."""
         drive, X_WS = one.drive, one.drive.X_WS
         R_WT = localise.way_axes(X_WS[:, :3, 3], X_WS)
         found: dict[str, list[np.ndarray]] = {n: [] for n in self._estimators}

@@ -1,4 +1,4 @@
-"""Costs of a method: time to describe and to query, and memory for a place."""
+"""Costs of a method: time to describe and query, and memory per place."""
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
@@ -23,7 +23,7 @@ class Cost:
         method: name of the method.
         scans_per_place: number of scans merged into a cloud.
         points: mean number of points in a cloud.
-        describe_ms: time to describe a cloud, as a query [ms].
+        describe_ms: time to describe a query's cloud [ms].
         query_ms: time to compare a query with all places, including a second
             stage, the gate and the pose of the best place [ms].
         places: number of places.
@@ -55,7 +55,7 @@ def measure_cost(
             counted, since it includes loading and compiling.
         scans_per_place: number of merged scans.
         database: described drive with places.
-        query: described drive with queries; as many are used as there are
+        query: described drive with queries; the number used is that of the
             clouds.
         gate_radius: see `score_places`.
     """
@@ -92,7 +92,7 @@ def query_ms(
         method: method to measure.
         places: described places, all of them candidates.
         queries: described queries.
-        number: how many queries are asked, two or more.
+        number: number of queries to measure, two or more.
         gate_radius: see `score_places`.
         with_pose: whether the pose of the best place is estimated, too.
     """

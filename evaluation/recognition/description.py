@@ -14,16 +14,16 @@ from evaluation.methods.method import Method
 from evaluation.recognition.metrics import route_blocks
 from evaluation.recognition.protocol import DEFAULT_PROTOCOL, RetrievalProtocol
 
-# The role of a drive.
+# What a drive's scans are used for: places of the database, or queries.
 Role = Literal["places", "queries"]
-# A frame, with its cloud in each role that it has.
+# A frame that waits to be described, with its cloud in each of its roles.
 _Waiting: TypeAlias = "tuple[int, Mapping[Role, np.ndarray]]"
-# A method, the roles that it describes, and the protocol of these.
+# A method, the roles in which it describes a drive, and the protocol.
 Request: TypeAlias = "tuple[Method, Set[Role], RetrievalProtocol]"
-# Number of merged scans of a cloud, of those before its frame, and fields of
-# its points.
+# How a cloud is made: number of merged scans, how many of these come before its
+# frame, and fields of the points.
 _Kind: TypeAlias = "tuple[int, int, tuple[str, ...]]"
-# Distance between two worlds of joined scans [m].
+# Distance put between the worlds of joined scans [m].
 _APART = 1e5
 
 
@@ -35,9 +35,9 @@ class DescribedScans:
         frames: (K,) frame numbers in the drive.
         stamps_ns: (K,) int64 time stamps.
         X_WS: (K, 4, 4) poses of the sensor.
-        descriptors: K descriptors; none if the drive does not have this role.
+        descriptors: K descriptors; empty if the drive does not have this role.
         clouds: the K described clouds if the method has a second stage;
-            otherwise none.
+            otherwise empty.
         blocks: (K,) block of the route in which each lies, see `route_blocks`;
             None if the route is unknown.
     """
@@ -62,7 +62,7 @@ def joined_scans(
 ) -> DescribedScans:
     """Returns the scans of several drives, by default all of them.
 
-    Scans of different worlds are moved so far apart that none reaches another.
+    Worlds are moved so far apart that scans of different worlds never match.
     """
     poses = []
     for one, world in zip(every, worlds, strict=True):
@@ -104,8 +104,8 @@ def describe_drive(
 ) -> list[DescribedDrive]:
     """Describes the places and queries of a drive, each cloud once.
 
-    If a frame is both a place and a query, a method that describes both alike
-    describes it once. Clouds are shared between methods.
+    If a frame is both a place and a query, and the method describes both in the
+    same way, it is described only once. Clouds are shared between methods.
 
     Args:
         drive: the drive.
@@ -114,10 +114,10 @@ def describe_drive(
         protocol: protocol by which frames of places and queries are chosen, and
             their clouds made.
         track: reports progress.
-        visit: also receives each described frame and its single scan (N, 3),
-            cropped, in the frame of the sensor: as recorded if the drive has
-            places, else as its queries see it.
-        further: descriptions by other protocols.
+        visit: function that is called with each described frame and its single
+            scan (N, 3), cropped, in the sensor's frame. The scan is as recorded
+            if the drive has places, otherwise as its queries see it.
+        further: requests for descriptions by other protocols.
 
     Returns:
         The descriptions by each method, then the further ones.
@@ -161,7 +161,7 @@ class _Seen:
         self._clouds: dict[tuple, np.ndarray] = {}
 
     def sensor(self, protocol: RetrievalProtocol) -> QuerySensor | None:
-        """Returns the sensor of the frame's query; None for the recorded."""
+        """Returns the sensor of the frame's query; None if as recorded."""
         if protocol not in self._sensors:
             self._sensors[protocol] = protocol.query_sensor(self.frame)
         return self._sensors[protocol]
@@ -240,7 +240,7 @@ class _Describing:
         return set().union(*self._members.values())
 
     def add(self, seen: _Seen) -> None:
-        """Describes a frame, now or later, in the roles that it has."""
+        """Adds a frame in its roles; it is described when a batch is full."""
         clouds = {
             role: seen.cloud(
                 seen.sensor(self._protocol) if role == "queries" else None,
@@ -274,7 +274,7 @@ class _Describing:
     def _describe(
         self, role: Role, known: Mapping[int, object]
     ) -> dict[int, object]:
-        """Describes the waiting frames of a role, but for those known.
+        """Describes the waiting frames of a role, except frames in `known`.
 
         Returns:
             Frame -> descriptor.

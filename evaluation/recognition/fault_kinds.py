@@ -8,7 +8,7 @@ import numpy as np
 
 from evaluation.recognition.place_recognition import PlaceRecognition
 
-# The kinds in order of precedence: a wrong answer gets the first one that fits.
+# The reasons in order of precedence: a wrong answer gets the first that fits.
 FAULT_KINDS = (
     "no_place",
     "no_candidate",
@@ -19,12 +19,12 @@ FAULT_KINDS = (
     "twin",
     "elsewhere",
 )
-# Within this number of radii a place counts as too far away and not as
-# elsewhere.
+# Up to this multiple of the radius, a wrong place is `too_far`; beyond it,
+# `elsewhere`.
 NEARLY = 2.0
-# Least overlap of two scans, as in truth by overlap.
+# Overlap below which two scans show different surroundings.
 _ENOUGH = 0.5
-# Least part of the surroundings that has come or gone.
+# Share of the surroundings that must have changed for the reason `changed`.
 MUCH_CHANGED = 0.25
 
 
@@ -32,24 +32,26 @@ MUCH_CHANGED = 0.25
 class PairEvidence:
     """Comparisons of the scans of Q queries and of places.
 
-    The right place of a query is the match that shows most of its scan.
+    The right place of a query is the match whose scan shows most of the query's
+    scan.
 
     Attributes:
-        overlaps: (Q,) part of the query's scan that the right place shows;
-            NaN without a match.
-        hidden: (Q,) part of the query's scan that is hidden from the right
+        overlaps: (Q,) share of the query's scan that the right place's scan
+            shows; NaN without a match.
+        hidden: (Q,) share of the query's scan that is hidden from the right
             place's sensor; NaN without a match.
-        changed: (Q,) part of the standing points of both scans on a structure
-            that the other scan lacks without being hidden; NaN also if a
-            recording does not name its structures.
-        changed_classes: Q names of the class with most of these points; ""
-            without any.
-        right_fits: (Q,) part of the standing points of the query and its right
+        changed: (Q,) share of both scans' upright points that lie on a
+            structure that is absent from the other scan although it is not
+            hidden there. NaN without a match, or if a recording does not name
+            its structures.
+        changed_classes: Q names of the class with most of these points; "" if
+            there are none.
+        right_fits: (Q,) share of the upright points of the query and its right
             place that coincide at the best alignment of the two scans; NaN if
             no method is wrong.
-        fits: method -> (Q,) the same part for the query and its wrong best
-            place; NaN where the best place is right or only too far.
-        unchanged: (Q,) `overlaps` in the control; None without one.
+        fits: method -> (Q,) the same share for the query and its wrong best
+            place; NaN if the best place is right or only too far.
+        unchanged: (Q,) `overlaps` of the control; None without a control.
     """
 
     overlaps: np.ndarray
@@ -62,7 +64,7 @@ class PairEvidence:
 
     @property
     def visible_changes(self) -> np.ndarray:
-        """(Q,) share of each query's scan that its match does not show."""
+        """(Q,) share of each query's scan that the right place lacks."""
         return 1.0 - self.overlaps
 
     @property
@@ -72,22 +74,22 @@ class PairEvidence:
 
     @property
     def visible_change_added(self) -> float:
-        """Mean visible change less the control's; NaN without a control."""
+        """Mean visible change minus the control's; NaN without a control."""
         return visible_change_added(self.overlaps, self.unchanged)
 
 
 def visible_change_added(now: np.ndarray, before: np.ndarray | None) -> float:
-    """Returns the mean visible change less that of a baseline.
+    """Returns the mean visible change minus that of a baseline.
 
-    The difference cancels what two viewpoints hide from each other, their
-    parallax, which both values contain.
+    Both values contain what is not visible only because of the different
+    viewpoints (parallax); the difference cancels this part.
 
     Args:
         now: (Q,) overlaps, see `PairEvidence`.
         before: (Q,) overlaps of the same queries in the baseline.
 
     Returns:
-        NaN if no query has both, or the queries are not the same.
+        The difference; NaN if no query has both values, or the queries differ.
     """
     if before is None or len(before) != len(now):
         return math.nan
@@ -99,7 +101,7 @@ def visible_change_added(now: np.ndarray, before: np.ndarray | None) -> float:
 def mean_visible_change(overlaps: np.ndarray) -> tuple[float, int]:
     """Returns the mean visible change, and the number of queries.
 
-    The visible change of a query is the part of its scan that the best of its
+    The visible change of a query is the share of its scan that the best of its
     matches does not show.
 
     Args:
@@ -120,13 +122,14 @@ def fault_kinds(result: PlaceRecognition, evidence: PairEvidence) -> list[str]:
     """Returns the reason for each query's wrong best place.
 
     Returns:
-        Q of: "" if it is right; `no_place` if the query has no match;
-        `no_candidate` if the method has no place, or rejects all; `too_far`
-        if it is within two radii; `hidden` if less than half of the query's
-        scan is visible from the right place, and most of the rest is hidden
-        there; `no_overlap` if it is less than half for another reason;
-        `changed` if a quarter of the surroundings has come or gone; `twin` if
-        it fits the query as well as the right place does; else `elsewhere`.
+        Q reasons, the first that applies: "" if the best place is right;
+        `no_place` if the query has no match; `no_candidate` if the method finds
+        no place or rejects all; `too_far` if the best place is within two
+        radii; `hidden` if the right place shows less than half of the query's
+        scan, and most of the rest is hidden there; `no_overlap` if it shows
+        less than half for another reason; `changed` if at least a quarter of
+        the surroundings has come or gone; `twin` if the best place fits the
+        query as well as the right place does; otherwise `elsewhere`.
     """
     retrieval = result.retrieval
     little = evidence.overlaps < _ENOUGH

@@ -1,21 +1,22 @@
 """Recall, precision-recall curve, AUC and F1 of place recognition.
 
-The definitions were derived from the paper's numbers. Each query counts with
-its best place only:
+The definitions were derived from the paper's numbers. Only the best place of
+each query counts:
 
-- TP: accepted, and the best place is a true match,
-- FP: accepted, and it is not, whether or not the query has a match at all,
-- FN: rejected, although the query has a match.
+- TP: accepted, and the best place is a true match, - FP: accepted, and the best
+place is not a true match, whether or not the query has a match, - FN: rejected,
+although the query has a match.
 
-A rejected query without a match counts nowhere. A query without a candidate
-is never accepted. In mode `all` every query counts; in mode `filtered` only
-those that have a match (then F1max carries no more than recall at 1).
+A rejected query without a match is in none of these. A query without a
+candidate is never accepted. In mode `all` every query counts; in mode
+`filtered` only queries that have a match (F1max then follows from recall at 1).
 
-A wrong accepted answer to a query with a match thus leaves FN, so that recall =
-TP / (TP + FN) reaches 1 for every method that answers all queries. `auc_strict`
-is the area with recall = TP / N, of N queries with a match.
+A query with a match that gets a wrong answer is FP once it is accepted, and no
+longer FN. Recall = TP / (TP + FN) therefore reaches 1 for every method that
+answers all queries. `auc_strict` is the area with recall = TP / N, of N queries
+with a match.
 
-In both modes R@N is the part of the queries with a match that have a match
+In both modes, R@N is the share of the queries with a match that have a match
 among their N best places.
 """
 
@@ -44,11 +45,10 @@ MAX_RANK = 25
 
 @dataclass(frozen=True)
 class PrCurve:
-    """Precision over recall at every distinct score, best scores first.
+    """Precision and recall at every distinct score, from the best score down.
 
     Attributes:
-        thresholds: (K,) scores from which on a place is accepted,
-            decreasing.
+        thresholds: (K,) least accepted scores, decreasing.
         true_positives: (K,) TP at each threshold.
         false_positives: (K,) FP at each threshold.
         false_negatives: (K,) FN at each threshold.
@@ -85,16 +85,16 @@ class PrCurve:
     def auc(self) -> float:
         """Area under the curve, by trapezoids over the recalls it reaches.
 
-        From recall 0 to its first point the curve keeps that point's
-        precision. 0 if nothing is ever accepted.
+        From recall 0 to its first point, the curve has that point's precision.
+        The area is 0 if nothing is ever accepted.
         """
         return float(areas_under(self.precision[None], self.recall[None])[0])
 
     def strict_auc(self, num_with_match: int) -> float:
         """Returns the area under the curve with recall = TP / N.
 
-        N, the number of queries with a match, includes those whose accepted
-        place is wrong; TP / (TP + FN) reaches 1 whatever they are.
+        N, the number of queries with a match, includes queries with a wrong
+        accepted answer, which TP / (TP + FN) ignores.
         """
         recall = recall_of(
             self.true_positives, num_with_match - self.true_positives
@@ -124,7 +124,8 @@ def weighted_counts(
 
     Args:
         outcomes: outcomes of Q queries.
-        weights: (B, Q) how often each query counts, in each of B samples.
+        weights: (B, Q) number of times that each query counts in each of B
+            samples.
 
     Returns:
         (K,) thresholds, decreasing; (B, K) TP; (B, K) FP; (B, K) FN.
@@ -132,8 +133,7 @@ def weighted_counts(
     answered = np.flatnonzero(~np.isnan(outcomes.best_scores))
     order = answered[np.argsort(-outcomes.best_scores[answered], kind="stable")]
     scores = outcomes.best_scores[order]
-    # The last query of each group of equal scores: all of them are accepted
-    # together.
+    # The last query of each group of equal scores, which are accepted together.
     is_last = np.ones(len(scores), dtype=bool)
     is_last[:-1] = scores[1:] != scores[:-1]
     ends = np.flatnonzero(is_last)
@@ -192,7 +192,7 @@ def route_blocks(positions: np.ndarray, frames: np.ndarray) -> np.ndarray:
 def resampled_weights(
     num_queries: int, seed: int = 0, blocks: np.ndarray | None = None
 ) -> np.ndarray:
-    """Returns how often each query counts in each sample of a bootstrap.
+    """Returns the number of times each query is in each bootstrap sample.
 
     Neighbouring queries along a drive tend to be right or wrong together.
     Therefore whole blocks of queries are drawn with replacement (Kuensch,
@@ -201,9 +201,9 @@ def resampled_weights(
     Args:
         num_queries: Q, one or more.
         seed: seed of the draws; equal seeds draw the same queries.
-        blocks: (Q,) the block of each query. A sample draws as many blocks as
-            there are. By default, and on a route that is shorter than two
-            blocks, each query is a block of its own.
+        blocks: (Q,) the block of each query. Each sample draws as many blocks
+            as exist. By default, and on routes shorter than two blocks, each
+            query is a block of its own.
 
     Returns:
         (B, Q) float64 counts. Without blocks, each row sums to Q.
@@ -231,8 +231,8 @@ def resampled_metrics(
         weights: (B, Q) how often each query counts in each sample.
     """
     _, tp, fp, fn = weighted_counts(outcomes, weights)
-    # Nothing is accepted before a sample's first query; there the curve keeps
-    # the precision of its first point.
+    # Before a sample's first query nothing is accepted; the curve there has the
+    # precision of its first point.
     with np.errstate(invalid="ignore"):
         precision = tp / (tp + fp)
     precision = _filled_from_right(precision)
@@ -248,7 +248,7 @@ def resampled_metrics(
 def own_samples(
     outcomes: QueryOutcomes, seed: int = 0
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Returns `resampled_metrics` of queries, resampled in their own blocks.
+    """Returns `resampled_metrics` of queries by their own blocks.
 
     The samples are cached, so that several comparisons use the same ones.
     """
@@ -259,10 +259,11 @@ def own_samples(
 def paired_samples(
     outcomes: QueryOutcomes, other: QueryOutcomes
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Returns `resampled_metrics` of queries, in the blocks of other queries.
+    """Returns `resampled_metrics` of queries by the blocks of others.
 
-    There must be as many other queries. `own_samples` of these draws the same
-    blocks, so that both sets of samples can be compared pair by pair.
+    The number of other queries must be equal. `own_samples` of the other
+    queries draws the same blocks, so that the two sets of samples can be
+    compared pair by pair.
     """
     if np.array_equal(outcomes.own_blocks, other.own_blocks):
         return own_samples(outcomes)
@@ -271,7 +272,7 @@ def paired_samples(
 
 
 def percentile_interval(samples: np.ndarray) -> Interval:
-    """Returns the interval that holds 95 % of the samples, without NaN."""
+    """Returns the interval of the middle 95 % of samples, without NaN."""
     known = samples[~np.isnan(samples)]
     if len(known) == 0:
         return UNKNOWN
@@ -309,7 +310,7 @@ class Difference:
     """The difference of two areas under precision-recall curves.
 
     Attributes:
-        value: the first less the second.
+        value: the first area minus the second.
         interval: 95 % interval.
         p_value: two-sided p-value under the hypothesis that there is no
             difference; NaN with a single block.
@@ -339,10 +340,11 @@ def mean_auc_difference(
 
     The mean is over one or more sets of queries (mode all). The bootstrap draws
     the same blocks for both methods. The p-value is that of a t test with n - 1
-    degrees of freedom, which uses the standard deviation of the bootstrap,
-    corrected for the number n of blocks. Unlike a share of the samples, such a
-    p-value can be smaller than one over their number. Sets of queries are
-    independent: their variances and degrees of freedom add up.
+    degrees of freedom for n blocks; its standard error is the bootstrap's
+    standard deviation, corrected for n. Unlike the share of bootstrap samples
+    beyond zero, such a p-value can be smaller than 1 over the number of
+    samples. Sets of queries are independent, so that their variances and
+    degrees of freedom add up.
 
     Args:
         pairs: outcomes of both methods on each set.
@@ -371,7 +373,7 @@ def mean_auc_difference(
 def holm(p_values: np.ndarray) -> np.ndarray:
     """Returns p-values (N,) corrected for multiple tests, by Holm's method.
 
-    A NaN stays, and does not count as a test.
+    NaN stays NaN and does not count as a test.
     """
     known = np.flatnonzero(~np.isnan(p_values))
     order = known[np.argsort(p_values[known], kind="stable")]
@@ -395,14 +397,15 @@ class PlaceRecognitionMetrics:
         f1_max_index: index of that point on the curve; None if the curve is
             empty.
         recall_at_n: (25,) R@1 to R@25.
-        recall_at_1_percent: recall R@N with N a hundredth of the places.
+        recall_at_1_percent: R@N, where N is a hundredth of the number of
+            places.
         num_queries: number of queries.
         num_with_match: N, the number of queries with a match.
         num_right: TP with every candidate accepted: the queries whose best
             place is right. R@1 = num_right / N.
         auc_interval: 95 % interval of `auc`, by bootstrap over blocks of the
             route.
-        recall_at_1_interval: 95 % interval of R@1, likewise.
+        recall_at_1_interval: 95 % interval of R@1, by the same bootstrap.
 
     Example:
         from evaluation import evaluate, judge

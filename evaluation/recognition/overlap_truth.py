@@ -1,9 +1,9 @@
-"""Truth by overlap: the part of a query's scan that a place's scan shows.
+"""Truth by overlap: the share of a query's scan that a place's scan shows.
 
-Poses are exact. The place's scan shows a point of the query's scan if the point
-lies on a surface that the place's scan shows, see `seen_surfaces`. The overlap
-is the part of the query's points that are shown. Parts that are hidden from the
-place's sensor, or absent when it passes, are not shown.
+Poses are exact. A point of the query's scan counts as shown if it lies on a
+surface of the place's scan, see `seen_surfaces`. The overlap is the share of
+the query's points that are shown. Points that were hidden from the place's
+sensor, or absent when it passed, are not shown.
 
 The idea is that of OverlapNet (Chen et al., RSS 2020), which compares range
 images pixel by pixel.
@@ -25,7 +25,7 @@ from evaluation.drives.sampling import gather, sample_frames
 from evaluation.recognition.protocol import RetrievalProtocol
 from evaluation.recognition.seen_surfaces import TOLERANCE, SeenSurfaces
 
-# Number of points of a query's scan that are compared.
+# Greatest number of points of a query's scan that are compared.
 _NUM_POINTS = 8192
 _COLUMNS = ("query_frame", "database_frame", "overlap")
 
@@ -57,17 +57,17 @@ def overlap_matrix(
 ) -> np.ndarray:
     """Returns the overlap of every query with every place, (Q, D) float64.
 
-    Single scans are compared, even if methods merge several. NaN for a query
-    without a point.
+    Single scans are compared, even if methods merge several. The overlap is NaN
+    for a query without a point.
 
     Args:
         database: the drive of the places.
         query: the drive of the queries, in the same world frame.
         protocol: protocol by which frames of queries and places are chosen.
         track: reports progress.
-        see: frame of the database -> the surfaces that its sensor sees there.
-            By default these are the surfaces of its scan, and at most 8192
-            points of a query are compared with them.
+        see: function that returns the surfaces seen at a frame of the database.
+            By default these are the surfaces of the frame's scan, and at most
+            8192 points of a query are compared.
 
     Raises:
         InputError: if a drive cannot be read.
@@ -128,7 +128,7 @@ def best_overlaps(
     X_WQs: np.ndarray,
     matches: np.ndarray,
 ) -> np.ndarray:
-    """Returns how much of each query's scan its best match shows, (Q,).
+    """Returns the share of each query's scan that its best match shows, (Q,).
 
     Args:
         place_scans: D scans (N, 3), each in the frame of its sensor.
@@ -138,7 +138,8 @@ def best_overlaps(
         matches: (Q, D) bool, the truth.
 
     Returns:
-        NaN for a query without a point or without a match.
+        (Q,) greatest overlap with a match; NaN for a query without a point or
+        without a match.
     """
     matched = np.flatnonzero(matches.any(axis=0)).tolist()
     seen = {k: SeenSurfaces.of(place_scans[k].astype(float)) for k in matched}
@@ -171,8 +172,8 @@ def write_overlaps(
 ) -> None:
     """Writes the overlap of each query with each place as CSV.
 
-    Columns `query_frame`, `database_frame` and `overlap`, which is empty for a
-    query without a point.
+    The columns are `query_frame`, `database_frame` and `overlap`. The overlap
+    is empty for a query without a point.
 
     Args:
         path: CSV file to write.
@@ -203,7 +204,7 @@ def read_overlaps(
 
     Raises:
         InputError: the file cannot be read, a number is impossible, or the
-            frames are others.
+            frames differ.
     """
     expected = [
         (int(frame), int(place))

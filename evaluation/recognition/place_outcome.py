@@ -22,7 +22,7 @@ from evaluation.recognition.pose_errors import PoseErrors, pose_success
 from evaluation.recognition.query_outcomes import QueryOutcomes, judge
 from evaluation.recognition.retrieval import Retrieval
 
-# Kinds of wrong best places, in order of precedence.
+# Reasons for wrong best places, in order of precedence.
 FAULTS = ("no_place", "no_candidate", "other_city", "too_far", "elsewhere")
 _HALF = 0.5
 
@@ -113,7 +113,7 @@ class PlaceOutcome:
         interval: Interval = UNKNOWN,
         n: int | None = None,
     ) -> Number:
-        """Returns one result of the outcome, by default over all queries."""
+        """Returns a metric of the outcome, by default over all queries."""
         count = len(self.outcomes) if n is None else n
         return Number(
             self.method, self.is_gated, metric, value, interval, count
@@ -175,14 +175,14 @@ class PlaceOutcome:
 
 
 class Number(NamedTuple):
-    """A number that a task found.
+    """A result of a task.
 
     Attributes:
         method: method, estimator or baseline; "" if there is none. For a place
-            recognition method it is the `key` of its choice.
+            recognition method, it is the method's name with its settings.
         gate: whether the gate was used.
-        metric: name of the number.
-        value: the number itself.
+        metric: name of the metric.
+        value: its value.
         interval: its 95 % interval.
         n: number of queries, or other things, that count.
     """
@@ -198,15 +198,15 @@ class Number(NamedTuple):
 def place_numbers(
     now: PlaceOutcome, before: PlaceOutcome | None
 ) -> Iterator[Number]:
-    """Yields the results of a method in a condition, for the table.
+    """Yields a method's place recognition results in a condition.
 
     Intervals are by bootstrap over blocks of the route. Each bootstrap sample
     draws the same blocks in the condition and in the baseline.
 
     Args:
         now: outcome of the method in the condition.
-        before: outcome of the method in the baseline, from which `kept`, `lost`
-            and `found` follow; None to leave these out.
+        before: outcome of the method in the baseline, with which `kept`, `lost`
+            and `found` are computed; None to leave these out.
     """
     outcomes = now.outcomes
     values = _areas(outcomes)
@@ -251,12 +251,12 @@ def place_numbers(
 def pose_numbers(
     now: PlaceOutcome, before: PlaceOutcome | None
 ) -> Iterator[Number]:
-    """Yields the results of a method's poses; none without poses.
+    """Yields a method's pose results; nothing if it estimates no poses.
 
     Args:
         now: outcome of the method in a condition.
-        before: outcome of the method in the baseline, from which the kept share
-            follows.
+        before: outcome of the method in the baseline, with which the kept share
+            is computed.
     """
     errors = now.pose_errors
     value = pose_success(errors, now.outcomes)
@@ -279,14 +279,14 @@ def pose_numbers(
 def kept_share(
     changed: np.ndarray | float, unchanged: np.ndarray | float
 ) -> np.ndarray:
-    """Returns changed / unchanged; NaN if the latter is 0 or NaN."""
+    """Returns changed / unchanged; NaN where `unchanged` is 0 or NaN."""
     with np.errstate(invalid="ignore", divide="ignore"):
         share = np.divide(changed, unchanged)
     return np.where(np.asarray(unchanged) > 0.0, share, math.nan)
 
 
 def _areas(outcomes: QueryOutcomes) -> dict[str, float]:
-    """Returns the numbers of which `own_samples` has samples."""
+    """Returns the metrics of which `own_samples` returns samples."""
     curve = pr_curve(outcomes)
     return {
         "auc": curve.auc,

@@ -25,7 +25,7 @@ from evaluation.recognition.protocol import DEFAULT_PROTOCOL, RetrievalProtocol
 from evaluation.recognition.query_outcomes import QueryOutcomes, judge
 from evaluation.recognition.retrieval import Retrieval, retrieve
 
-# Radii of a match for which AUC is computed as well [m].
+# Further radii of a match for which AUC is computed [m].
 RADII = (2.5, 5.0, 7.5, 10.0, 15.0, 20.0, 25.0)
 
 
@@ -40,10 +40,10 @@ class PlaceRecognition:
         query: name of the drive of the queries.
         retrieval: scores and truth of all pairs.
         outcomes: outcomes of the queries.
-        by_mode: the numbers in each mode.
+        by_mode: mode -> metrics.
         pose: errors of the estimated poses.
-        protocol: protocol of the run, without open choices.
-        mode: mode of the numbers in `metrics`.
+        protocol: protocol of the run, with every choice made.
+        mode: mode of `metrics`.
         pair: names of the map and of the stages of database and query, if the
             result is for a report.
     """
@@ -62,13 +62,13 @@ class PlaceRecognition:
 
     @property
     def metrics(self) -> PlaceRecognitionMetrics:
-        """The numbers."""
+        """The metrics in mode `mode`."""
         return self.by_mode[self.mode]
 
     def auc_over_radius(self) -> dict[float, float]:
-        """Returns radius [m] -> AUC if matches have that radius (mode all).
+        """Returns radius of a match [m] -> AUC in mode all.
 
-        NaN where no query has a match.
+        The AUC is NaN if no query has a match within the radius.
         """
         found = {}
         for radius in RADII:
@@ -143,8 +143,9 @@ def run(
         protocol: protocol of the comparison.
         track: reports progress.
         across_maps: whether the drives may be of maps of different names.
-        overlaps: (Q, D) part of each query's scan that each place's scan shows;
-            by default computed from the scans. Only for matches by overlap.
+        overlaps: (Q, D) share of each query's scan that each place's scan
+            shows; by default computed from the scans. Used only for matches by
+            overlap.
 
     Raises:
         InputError: as `retrieve` does, or if no query has a match.
@@ -172,7 +173,7 @@ def judge_retrieval(
     mode: Mode = "all",
     pair: tuple[str, str, str] = ("", "", ""),
 ) -> PlaceRecognition:
-    """Returns the scores of a method, given what it retrieved.
+    """Returns the outcome of a method, given its retrieval.
 
     Args:
         method: the method.

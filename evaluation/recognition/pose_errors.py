@@ -25,7 +25,8 @@ class PoseErrors:
     Attributes:
         translation: (Q,) distance to the true position [m]; NaN without a
             candidate or a pose.
-        rotation_deg: (Q,) angle to the true orientation [deg]; likewise.
+        rotation_deg: (Q,) angle to the true orientation [deg]; NaN without a
+            candidate or a pose.
     """
 
     translation: np.ndarray
@@ -47,12 +48,14 @@ class PoseMetrics:
 
     Attributes:
         num_accepted: number of accepted matches.
-        translation_median, translation_90: median and 90 % quantile [m]; NaN
-            without an accepted match that has a pose.
-        rotation_median_deg, rotation_90_deg: likewise [deg].
-        success: part of the queries with a match whose pose in the world has
-            errors of at most 2 m and 5 deg, at any score; NaN if the method
-            estimates no pose or no query has a match.
+        translation_median, translation_90: median and 90 % quantile of the
+            translation error [m]; NaN without an accepted match that has a
+            pose.
+        rotation_median_deg, rotation_90_deg: the same for the rotation error
+            [deg].
+        success: share of the queries with a match whose pose in the world has
+            errors of at most 2 m and 5 deg, whatever the score; NaN if the
+            method estimates no pose or no query has a match.
     """
 
     num_accepted: int
@@ -85,7 +88,7 @@ def checked_pose(method: Method, X_PQ: object) -> np.ndarray | None:
     """Returns the result of `relative_pose` if it is a pose or None.
 
     Raises:
-        InputError: if it is not.
+        InputError: the result is something else.
     """
     if X_PQ is None:
         return None
@@ -109,7 +112,7 @@ def pose_metrics(
 ) -> PoseMetrics:
     """Returns a summary of pose errors.
 
-    The metrics of the queries must be those of the mode `all`.
+    `metrics` must be those of the mode `all`.
     """
     accepted = np.zeros(len(outcomes), dtype=bool)
     if metrics.f1_max_index is not None:
@@ -130,7 +133,7 @@ def pose_metrics(
 
 
 def pose_success(errors: PoseErrors, outcomes: QueryOutcomes) -> float:
-    """Returns the share of right poses, `PoseMetrics.success`."""
+    """Returns the share of right poses; see `PoseMetrics.success`."""
     # A method that finds no place localises no query.
     known = ~np.isnan(errors.translation)
     estimates = known.any() or np.isnan(outcomes.best_scores).all()

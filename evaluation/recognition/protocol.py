@@ -28,8 +28,8 @@ _QUERY_CHANGES = ("turn_queries", "tilt_queries", "hide_sector")
 class RetrievalProtocol:
     """How two drives are compared: scans, truth, and changes of queries.
 
-    By default, queries are as recorded. All other options are those of the
-    paper, except the choice of the merged scan that stands for a place.
+    The defaults are those of the paper, with queries as recorded, except for
+    the choice of the merged scan that stands for a place.
 
     Attributes:
         radius: greatest distance between a query and its match [m].
@@ -43,8 +43,8 @@ class RetrievalProtocol:
             `first`, as in the paper. The pose of this scan is that of the
             place. A method's own parameter `place` overrides it. With one scan
             per place it becomes None.
-        exclude_recent: for a drive compared with itself: least time since it
-            passed a place [s]. None for two drives.
+        exclude_recent: least time since the drive passed a place [s], if a
+            drive is compared with itself. None for two drives.
         overlap: least part of a query's scan, up to 1, that a match must show,
             at any distance (see `overlap_truth`); None for matches by the
             radius.
@@ -56,11 +56,12 @@ class RetrievalProtocol:
             tilted, from 0 to 90 [deg].
         hide_sector: angle of a random sector that is hidden from each query,
             from 0 to below 360 [deg].
-        seed: seed of these random numbers, see `QuerySensor.draw`.
+        seed: seed of the turns, tilts and hidden sectors, see
+            `QuerySensor.draw`.
 
     Raises:
-        InputError: if a value is out of range, with the option that it has on
-            the command line.
+        InputError: a value is out of range; the message names the command-line
+            option.
 
     Example:
         from evaluation import RetrievalProtocol
@@ -109,14 +110,14 @@ class RetrievalProtocol:
         return method.scans_per_place
 
     def scans_before(self, method: Method) -> int:
-        """Returns how many scans of a place precede the scan at its pose."""
+        """Returns how many of a place's scans precede the one at its pose."""
         is_middle = self.of(method).place == "middle"
         return self.scans(method) // 2 if is_middle else 0
 
     def query_sensor(self, frame: int) -> QuerySensor | None:
-        """Returns the changed sensor of a query; None if it is as recorded.
+        """Returns the sensor of a query; None if queries are as recorded.
 
-        It can be turned, tilted and partly hidden.
+        The sensor can be turned, tilted and partly hidden.
         """
         if not self._changes_queries:
             return None
@@ -182,7 +183,7 @@ class RetrievalProtocol:
         return self.radius if self.gate else None
 
     def of(self, method: Method) -> RetrievalProtocol:
-        """Returns the protocol with the choices that it leaves to a method."""
+        """Returns the protocol with the method's choices filled in."""
         return replace(
             self,
             scans_per_place=self.scans(method),
@@ -192,7 +193,8 @@ class RetrievalProtocol:
     def asked_like(self, other: RetrievalProtocol) -> RetrievalProtocol:
         """Returns the protocol with the queries of another protocol.
 
-        The choice of the scan that stands for a place is taken over, too.
+        The choice of the scan that stands for a place is also taken from the
+        other.
         """
         return replace(self, place=other.place, **other._asked)
 
@@ -263,12 +265,13 @@ GATE_TEXT = (
 
 DEFAULT_PROTOCOL = RetrievalProtocol()
 
-# The paper's: queries as recorded, and the first of merged scans gives the
-# pose. It serves the comparison with the paper's tables only.
+# The paper's protocol: queries are as recorded, and the first of the merged
+# scans gives the pose. It serves only to compare with the paper's tables.
 PAPER_PROTOCOL = RetrievalProtocol(place="first")
 
-# That of all studies. Neither crops along the sensor's axes, nor voxel grids,
-# nor streets at right angles help a method then. The draws are frozen.
+# The protocol of all studies. Turned queries deprive methods of help from crops
+# along the sensor's axes, voxel grids and streets at right angles. The random
+# draws must not change any more.
 FAIR_PROTOCOL = RetrievalProtocol(turn_queries=True, tilt_queries=1.5, seed=0)
 
 PROTOCOLS = {
@@ -284,7 +287,7 @@ def check_one_protocol(protocols: Iterable[RetrievalProtocol]) -> None:
     """Checks that all protocols make queries in the same way.
 
     Raises:
-        InputError: otherwise.
+        InputError: the protocols make queries in different ways.
     """
     first = None
     for one in protocols:
@@ -295,8 +298,8 @@ def check_one_protocol(protocols: Iterable[RetrievalProtocol]) -> None:
             )
 
 
-# Columns of a table of results: the options of the protocol. Tables are made
-# without matches by overlap; a column `protocol` names what else differs.
+# Columns of a table of results: options of the protocol. Tables contain no
+# matches by overlap; a column `protocol` covers the other options.
 PROTOCOL_COLUMNS = tuple(
     one.name
     for one in fields(RetrievalProtocol)

@@ -18,9 +18,10 @@ _NAMED: Options = {
             Literal["fair", "paper", "recorded"],
             typer.Option(
                 "--protocol",
-                help="How queries are made: fair turns and tilts them at "
-                "random, paper follows the protocol of the CNS paper, recorded "
-                "leaves the scans as recorded.",
+                help="How the scans of the query drive become queries. fair "
+                "turns and tilts them at random, so that no method profits "
+                "from equal headings. paper follows the CNS paper. recorded "
+                "leaves the scans as they are.",
             ),
         ],
         "fair",
@@ -33,46 +34,49 @@ _FIELDS: Options = {
             "radius",
             float,
             DEFAULT_PROTOCOL.radius,
-            "Greatest distance between a query and its match [m].",
+            "Greatest distance at which a place counts as a match of a query "
+            "[m].",
             None,
         ),
         (
             "query_spacing",
             float,
             DEFAULT_PROTOCOL.query_spacing,
-            "Distance driven between two queries [m].",
+            "Distance that the car drives between two queries [m].",
             None,
         ),
         (
             "place_spacing",
             float,
             DEFAULT_PROTOCOL.place_spacing,
-            "Distance driven between two places of the database [m].",
+            "Distance that the car drives between two places of the database "
+            "[m].",
             None,
         ),
         (
             "max_range",
             float,
             DEFAULT_PROTOCOL.max_range,
-            "Largest x, y or z of a point in the LiDAR's frame [m]; farther "
-            "points are left out.",
+            "Leave out points that are farther than this along x, y or z in "
+            "the LiDAR's frame [m].",
             None,
         ),
         (
             "scans_per_place",
             int | None,
             None,
-            "Number of consecutive scans that are merged into one, for every "
-            "method; by default each method's own number.",
+            "Number of consecutive scans that are merged for each place and "
+            "each query, with every method. By default each method's own "
+            "number.",
             "N",
         ),
         (
             "exclude_recent",
             float | None,
             None,
-            "Least time between a query and an earlier place of the same drive "
-            "[s]. Turns on loop closure: each drive is also compared with "
-            "itself.",
+            "Turn on loop closure, which compares each drive also with itself. "
+            "A query is then compared only with places that the car passed at "
+            "least this time before [s], such as 30.",
             "S",
         ),
     )
@@ -83,9 +87,9 @@ _GATE: Options = {
             bool,
             typer.Option(
                 "--gate",
-                help="Reject top-ranked places that lie beyond the radius "
-                "according to the method's own pose estimate. Only for methods "
-                "that estimate poses.",
+                help="Reject top-ranked places that lie, by the method's own "
+                "pose estimate, beyond the radius. It has no effect on methods "
+                "that estimate no pose.",
             ),
         ],
         False,
@@ -97,6 +101,6 @@ def _named(named_protocol: str, **fields: Any) -> RetrievalProtocol:
     return replace(PROTOCOLS[named_protocol], **fields)
 
 
-# Gives a command the options of the protocol, which replace its keyword
+# Decorator: the command gets the protocol's options in place of its keyword
 # `protocol`.
 with_protocol = with_options("protocol", {**_NAMED, **_FIELDS, **_GATE}, _named)

@@ -16,8 +16,8 @@ class QueryOutcomes:
         best_scores: (Q,) score of the best place; NaN without a candidate.
         is_right: (Q,) bool, whether the best place is a true match.
         has_match: (Q,) bool, whether the database holds a true match.
-        first_right_ranks: (Q,) rank of the best true match, from 1 on;
-            infinite if no candidate is one.
+        first_right_ranks: (Q,) rank of the best true match, 1 or greater;
+            infinite if no candidate is a true match.
         num_places: size of the database.
         blocks: (Q,) block of the route in which each query lies, see
             `route_blocks`; None if each is a block of its own.
@@ -51,7 +51,7 @@ class QueryOutcomes:
 
     @property
     def own_blocks(self) -> np.ndarray:
-        """(Q,) block of each query; its number if there are no blocks."""
+        """(Q,) block of each query; each is its own block if there are none."""
         return np.arange(len(self)) if self.blocks is None else self.blocks
 
     @property
@@ -76,12 +76,12 @@ class QueryOutcomes:
 
     @property
     def match_auroc(self) -> float:
-        """How well the best score separates queries with a match from others.
+        """AUROC of the best score as a sign that a query has a match.
 
-        It is the area under the receiver operating characteristic: the chance
-        that a query with a match has a higher best score than one without.
-        Equal scores count half, and a query without a candidate has the lowest
-        score. NaN if all or none of the queries have a match.
+        It is the area under the receiver operating characteristic: the
+        probability that a query with a match has a higher best score than a
+        query without. Equal scores count half, and a query without a candidate
+        has the lowest score. NaN if all or none of the queries have a match.
         """
         return auroc(self.best_scores, self.has_match)
 
@@ -98,10 +98,11 @@ def judge(
 ) -> QueryOutcomes:
     """Returns the outcome of each query from the scores of all pairs.
 
-    Of places with equal scores, the first in the database counts as better.
+    Among places with equal scores, the first in the database ranks higher.
 
     Args:
-        scores: (Q, D) scores, higher is more similar; NaN is no candidate.
+        scores: (Q, D) scores, higher is more similar; NaN for places that are
+            no candidates.
         matches: (Q, D) bool, true matches.
         blocks: (Q,) block of the route in which each query lies; None if each
             is a block of its own.
@@ -157,8 +158,8 @@ def judge(
 def auroc(scores: np.ndarray, is_positive: np.ndarray) -> float:
     """Returns the area under the receiver operating characteristic.
 
-    It is the chance that a positive has a higher score than a negative; equal
-    scores count half. NaN if all or none are positive.
+    It is the probability that a positive has a higher score than a negative;
+    equal scores count half. It is NaN if all or none are positive.
 
     Args:
         scores: (N,) scores; NaN is the lowest.

@@ -31,13 +31,14 @@ class Retrieval:
     Attributes:
         query_frames: (Q,) frame of each query in its drive.
         database_frames: (D,) frame of each place.
-        scores: (Q, D) float64, higher is more similar, NaN for a place that
-            the method does not consider.
+        scores: (Q, D) float64, higher is more similar; NaN for places that are
+            no candidates.
         distances: (Q, D) float64 distances between query and place [m].
         matches: (Q, D) bool, whether a place is a true match of a query.
         pose_errors: errors of the estimated pose at each query's best place.
-        is_known: (Q, D) bool, whether a place may be an answer to a query.
-        overlaps: (Q, D) float64 part of a query's scan that a place's scan
+        is_known: (Q, D) bool, whether a place is allowed as an answer to a
+            query.
+        overlaps: (Q, D) float64 share of a query's scan that a place's scan
             shows (see `overlap_truth`); None if matches are by the radius.
         query_blocks: (Q,) block of the route in which each query lies.
 
@@ -60,7 +61,7 @@ class Retrieval:
 
     @property
     def best_places(self) -> np.ndarray:
-        """(Q,) best place of each query, the first of equals; -1 for none."""
+        """(Q,) best place of each query; of equals, the first; -1 for none."""
         candidate = ~np.isnan(self.scores)
         best = ranking(self.scores)[:, 0] if self.scores.size else -1
         return np.where(candidate.any(axis=1), best, -1)
@@ -98,8 +99,9 @@ def retrieve(
         protocol: protocol of the comparison.
         track: called with the progress.
         across_maps: whether the drives may be of maps with different names.
-        overlaps: (Q, D) part of each query's scan that each place's scan shows;
-            by default computed from the scans. Only for matches by overlap.
+        overlaps: (Q, D) share of each query's scan that each place's scan
+            shows; by default computed from the scans. Used only for matches by
+            overlap.
 
     Raises:
         InputError: if a drive cannot be read, the two are not of the same
@@ -158,14 +160,14 @@ def compare_with_gates(
     overlaps: np.ndarray | None = None,
     is_known: np.ndarray | None = None,
 ) -> list[Retrieval]:
-    """Returns what is retrieved with each gate, scoring queries only once.
+    """Returns one retrieval per gate; queries are scored only once.
 
     Args:
         method, database, query, track, overlaps: see `compare`.
         protocol: protocol of the comparison; its own gate does not matter.
-        gate_radii: radius of each gate [m]; None is no gate.
-        is_known: (Q, D) bool, which places each query may find; by default as
-            the protocol says.
+        gate_radii: radius of each gate [m]; None stands for no gate.
+        is_known: (Q, D) bool, which places are allowed for each query; by
+            default as the protocol says.
 
     Raises:
         InputError: if the method returns an invalid result.
@@ -244,7 +246,7 @@ def _known_places(
     query: DescribedDrive,
     protocol: RetrievalProtocol,
 ) -> np.ndarray:
-    """Returns which places each query may find, (Q, D) bool."""
+    """Returns which places are allowed for each query, (Q, D) bool."""
     query_ns, place_ns = query.queries.stamps_ns, database.places.stamps_ns
     if protocol.exclude_recent is None or database.name != query.name:
         return np.ones((len(query_ns), len(place_ns)), dtype=bool)

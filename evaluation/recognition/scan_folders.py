@@ -46,10 +46,11 @@ def write_scores(
         query: folder of the scans of queries, one file each.
         output: the file to write.
         track: reports progress.
-        gate_radius: reject places by the gate, see `gate.gated` [m].
-        columns: number of columns of `.bin` files; by default as the values
-            of each folder's show.
-        on_note: takes notes on how the scans were read, one of each kind.
+        gate_radius: radius of the gate, see `scoring.gated` [m]; None for no
+            gate.
+        columns: number of columns of `.bin` files; by default guessed for each
+            folder from the values.
+        on_note: takes notes on how scans were read, one note of each kind.
 
     Returns:
         The number of points left out because they are not finite.
@@ -111,7 +112,7 @@ def write_scores(
 def _columns(
     files: list[Path], columns: int | None, on_note: OnNote
 ) -> int | None:
-    """Returns the number of columns of a folder's `.bin` files, if any."""
+    """Returns the number of columns of `.bin` files; None if there are none."""
     bins = [path for path in files if path.suffix.lower() == ".bin"]
     if not bins:
         return None
@@ -122,7 +123,7 @@ def _columns(
 
 
 def _first_of_each_kind(on_note: OnNote) -> OnNote:
-    """Returns what passes on the first of notes that differ by file alone."""
+    """Returns a function that drops notes like earlier ones on other files."""
     seen: set[str] = set()
 
     def pass_on(note: str) -> None:
@@ -137,7 +138,7 @@ def _first_of_each_kind(on_note: OnNote) -> OnNote:
 def _read(
     path: Path, method: Method, columns: int | None, on_note: OnNote
 ) -> tuple[np.ndarray, int]:
-    """Returns a cropped cloud, N > 0, and the number of points not finite."""
+    """Returns a cropped cloud, N > 0, and its number of non-finite points."""
     scan = read_cloud(path, columns, on_note)
     points = point_arrays.xyz(scan)
     num_finite = int(np.isfinite(points).all(axis=1).sum())

@@ -19,7 +19,7 @@ def ranking(scores: np.ndarray) -> np.ndarray:
     """Returns places from the best to the worst.
 
     If places have equal scores, the first one in the database is better. Places
-    that are no candidates come last, after those with a score of minus
+    that are no candidates (NaN) come last, even after a score of minus
     infinity.
 
     Args:
@@ -40,10 +40,10 @@ def gate_weight(
     It depends on the distance of the place.
 
     Args:
-        distance: distances from query to place by the method's own pose [m], an
-            array of any shape.
+        distance: distances from query to place according to the method's own
+            pose [m], an array of any shape.
         radius: radius of a match [m].
-        softness: half the width of the ramp, as a part of the radius.
+        softness: half the width of the transition, as a fraction of the radius.
     """
     far = np.asarray(distance, dtype=np.float64) / radius
     return np.clip((1.0 + softness - far) / (2.0 * softness), 0.0, 1.0)
@@ -56,16 +56,16 @@ def gated(
     scores: np.ndarray,
     radii: Sequence[float],
 ) -> list[np.ndarray]:
-    """Returns scores (D,) after the gate of each radius.
+    """Returns the scores (D,) after the gate, for each radius.
 
-    They are NaN for rejected places.
+    The gate rejects places that lie too far from the query according to the
+    method's own pose; their scores are NaN. Places after the best `NUM_GATED`
+    are no candidates either. A place for which the method estimates no pose
+    keeps its score. If it estimates no pose at all, all scores are unchanged.
 
-    Places after the best `NUM_GATED` are no candidates. A place whose pose the
-    method does not estimate keeps its score. If the method estimates no pose at
-    all, every score stays.
-
-    A score s with weight w becomes s - (1 - w) |s|. This is the part w of a
-    positive score; a negative score falls by the same amount.
+    Near the radius, the gate has a weight w from 1 to 0: a score s becomes s -
+    (1 - w) |s|. This is w times a positive score; a negative score falls by (1
+    - w) |s|.
 
     Args:
         method: method that made the scores.
@@ -118,8 +118,8 @@ def score_places(
 ) -> np.ndarray:
     """Returns a method's scores for the last of several queries, (D,).
 
-    They are float64. Its second stage, if it has one, and the gate are
-    included.
+    The scores are float64, and include the method's second stage, if it has
+    one, and the gate.
 
     Args:
         method: method that described queries and places.
@@ -127,15 +127,15 @@ def score_places(
         query_cloud: cloud of the current query, for a second stage.
         database: the result of `build_database` for the places.
         place_clouds: clouds of the D places, for a second stage.
-        is_known: (D,) bool, which places may be candidates. Unless all are,
+        is_known: (D,) bool, which places may be candidates. If some may not,
             every place is compared, because a search for the best few of all
-            places would also find places that may not be candidates.
+            places could find places that are not allowed.
         gate_radius: radius of a match for `gated` [m]; None without a gate.
         exhaustive: see `Method.score`.
         where: the name of the current query, for errors.
 
     Raises:
-        InputError: if the method returns anything else.
+        InputError: the method returns something other than scores.
     """
 
     def ask(exhaustive: bool) -> np.ndarray:
@@ -183,7 +183,8 @@ def _checked(
 ) -> np.ndarray:
     """Returns scores (number,) as float64; refuses anything else.
 
-    A conversion would drop an imaginary part, or a mask.
+    Complex and masked arrays are refused, because a conversion would drop the
+    imaginary part or the mask.
     """
     fault = ""
     try:

@@ -1,12 +1,12 @@
-"""Surfaces that a scan shows, between its returns.
+"""Surfaces that a scan shows, interpolated between its returns.
 
 A scan samples the surfaces around its sensor. The four returns around a
-direction, one in each quadrant, say where the surface lies there: in the plane
-of the three nearest ones, or, at edges and where the beams graze it, between
-the nearest and the farthest of them.
+direction, one in each quadrant, tell where the surface lies in that direction:
+in the plane of the three nearest returns or, at edges and at grazing incidence,
+between the ranges of the nearest and the farthest return.
 
-Rays cast in the sensor's world show the error: it is some hundredths for points
-of scans that were taken up to 30 m away, and more beyond
+Compared with rays cast in the simulated world, shares of shown points are wrong
+by some hundredths for scans taken up to 30 m apart, and by more beyond
 (docs/notes/fitting.md).
 """
 
@@ -23,8 +23,8 @@ from cns_drake.base.compiled import compiled
 
 # Greatest distance of a shown point from a surface [m].
 TOLERANCE = 0.2
-# One return this near to a direction is enough [deg], because edges of roofs
-# and of the field of view have returns on one side only.
+# A single return within this angle of a direction is enough [deg], because the
+# edges of roofs and of the field of view have returns on one side only.
 _NEAR_DEG = 0.75
 # If one return around a direction is this many times as far as another, they
 # are on two surfaces.
@@ -32,17 +32,17 @@ _FARTHEST = 3.0
 # Numbers of cells in elevation and in azimuth; a cell has a width of 1 deg.
 _UP, _SIDE = 2, 1
 _ROWS, _COLUMNS = 180, 360
-# Squares are compared with this margin, against rounding.
+# Factor by which squares may exceed a limit because of rounding.
 _MARGIN = 1.0 + 1e-9
 _UNKNOWN, _SHOWN, _BEHIND = range(3)
 
 
 class Shares(NamedTuple):
-    """Parts of the points of another scan; NaN without points.
+    """Shares of the points of another scan; NaN without points.
 
     Attributes:
-        shown: lies on the seen surfaces.
-        hidden: lies behind all returns around its direction.
+        shown: share of points on surfaces that this scan shows.
+        hidden: share of points behind all returns around their directions.
     """
 
     shown: float
@@ -55,9 +55,9 @@ class SeenSurfaces:
 
     Attributes:
         points: (N, 3) in the frame of the sensor [m], sorted by cell.
-        angles_deg: (N, 2) elevation from -90 deg on, and azimuth from the
-            back on.
-        starts: starts of each cell in the points, row by row; the last is N.
+        angles_deg: (N, 2) elevation plus 90 deg, and azimuth counted from the
+            back.
+        starts: index of each cell's first point, row by row; at the end N.
     """
 
     points: np.ndarray
@@ -102,7 +102,7 @@ class SeenSurfaces:
         return self.shares_of(points).shown
 
     def shares_of(self, points: np.ndarray) -> Shares:
-        """Returns the shares of points (N, 3) that are shown, and hidden.
+        """Returns the shares of points (N, 3) that are shown and hidden.
 
         Args:
             points: (N, 3) points in this sensor's frame [m].
@@ -117,10 +117,10 @@ class SeenSurfaces:
     def clearances(self, points: np.ndarray) -> np.ndarray:
         """Returns how far points (N, 3) lie in front of a surface, (N,) [m].
 
-        The distance is across the plane of the three nearest returns, or, at
-        edges and with fewer returns, along the line of sight to the nearest of
-        them. It is negative behind the surface, infinite where no return is
-        near, and NaN for a point between two surfaces.
+        The distance is perpendicular to the plane of the three nearest returns
+        or, at edges and with fewer returns, along the line of sight to the
+        nearest of these returns. It is negative behind the surface, infinite
+        where no return is near, and NaN for a point between two surfaces.
 
         Args:
             points: (N, 3) points in this sensor's frame [m].
@@ -146,8 +146,8 @@ def _find_corners(
 ) -> None:
     """Finds the nearest return in each quadrant around a point's direction.
 
-    Fills (4,) indices of returns, -1 without one, and (4,) their angular
-    distances [deg].
+    Fills in (4,) indices of returns, -1 if there is none, and (4,) their
+    angular distances [deg].
     """
     corners[:] = -1
     away[:] = math.inf
@@ -172,7 +172,8 @@ def _find_corners(
                 side -= 180.0
                 quadrant = 2 * int(up >= 0.0) + int(side >= 0.0)
                 across = side * shrink
-                # Square roots are slow, and squares show which are too far.
+                # Squares suffice to exclude returns that are too far; square
+                # roots are slow.
                 square = up * up + across * across
                 if square > away[quadrant] * away[quadrant] * _MARGIN:
                     continue
@@ -186,7 +187,9 @@ def _find_corners(
 def _fit_plane(
     seen: np.ndarray, corners: np.ndarray, away: np.ndarray
 ) -> tuple[float, float, float, float]:
-    """Returns the plane n p = h of the nearest three returns; n of any length.
+    """Returns the plane n p = h through the three nearest returns.
+
+    The normal n has any length.
 
     Returns:
         The three components of n, and h.
@@ -217,9 +220,10 @@ def _length(p: np.ndarray) -> float:
 def _look(
     others: np.ndarray, seen: np.ndarray, angles: np.ndarray, starts: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Returns whether M points are shown, hidden, or neither, and clearances.
+    """Returns whether M points are shown, hidden or neither; and clearances.
 
-    The latter are how far they lie before what is seen [m].
+    A clearance is the distance of a point in front of the surface [m], see
+    `SeenSurfaces.clearances`.
     """
     kinds = np.full(len(others), _UNKNOWN, np.int8)
     clearances = np.empty(len(others))

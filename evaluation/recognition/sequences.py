@@ -1,8 +1,9 @@
-"""Matching of sequences: the queries along a way vote together.
+"""Sequence matching: successive queries along a path vote together.
 
 As in SeqSLAM (Milford and Wyeth, ICRA 2012), scores are summed along straight
-lines in the matrix of queries and places. There the speeds of both drives are
-unknown; here distances along both ways are known, so each line has one slope.
+lines in the matrix of queries and places. SeqSLAM does not know the speeds of
+the drives and tries several slopes. Here the distances along both paths are
+known, so that there is only one slope.
 """
 
 import numpy as np
@@ -19,19 +20,22 @@ def along_the_way(
 ) -> np.ndarray:
     """Returns scores (Q, D) that are averaged along the path.
 
-    It is the mean of the query's own score and those of the queries before it,
-    each for the place that lies as far from the place as that query lies from
-    the last one: before it along the database's way, or behind it if the drive
-    goes the other way. The better direction counts. What lies beyond the ends
-    of the way has no vote, nor has a query without a candidate; a missing score
-    counts as the least of its query.
+    The score of a query q and a place p becomes a mean over q and the queries
+    up to `length` before it. An earlier query at distance d from q along its
+    path contributes its score for the place at distance d from p along the
+    database's path: before p, or after p if the query drives in the opposite
+    direction. The better direction counts. A place beyond the ends of the path
+    has no vote, and neither has a query without a candidate. A missing score
+    counts as the least score of its query.
 
     Args:
-        scores: (Q, D) of single queries, NaN for no candidate.
-        is_known: (Q, D) bool, places that may be found.
+        scores: (Q, D) scores of single queries; NaN for places that are no
+            candidates.
+        is_known: (Q, D) bool, places that are allowed as answers.
         p_WQs: (Q, 3) positions of the queries, in the order of the drive [m].
         p_WPs: (D, 3) positions of the places in the world [m].
-        length: greatest distance of a voting query, along its way [m].
+        length: greatest distance of an earlier query that votes, along its path
+            [m].
     """
     of_query, of_place = travelled(p_WQs), travelled(p_WPs)
     between = (of_place[1:] + of_place[:-1]) / 2.0

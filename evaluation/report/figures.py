@@ -122,9 +122,12 @@ def judge_points(
 ) -> tuple[np.ndarray, np.ndarray]:
     """Applies the two tests of the TCR to points (N, 3) of a finer map [m].
 
-    `other` holds M > 0 voxel centroids (M, 3) of the other map. Returns, each
-    (N,) bool, whether there is no counterpart in it up to the distance tau [m],
-    and whether the point lies in its hull, so that this counts.
+    `other` has the voxel centroids (M, 3) of the other map, M > 0.
+
+    Returns:
+        (N,) bool, whether a point lacks a counterpart within the distance tau
+        [m]; and (N,) bool, whether the point is in the other map's hull and
+        therefore counts.
     """
     # A distance beyond the bound only counts as far away, so the search stops
     # there.
@@ -208,8 +211,8 @@ def draw_change(
 def voxel_of_each(points: np.ndarray, coarse: VoxelMap) -> np.ndarray:
     """Returns the voxel of their map in which each point (N, 3) [m] lies.
 
-    By a rounding error a point on a border may have been counted on its other
-    side. The occupied voxel with the nearest centre is taken therefore.
+    Rounding can put a point on the other side of a border. The result is
+    therefore the occupied voxel with the nearest centre.
     """
     owners = coarse.find(points)
     elsewhere = np.flatnonzero(owners < 0)
@@ -387,14 +390,15 @@ def colour_by_height(
     lowest: tuple[int, int, int],
     highest: tuple[int, int, int],
 ) -> np.ndarray:
-    """Returns colours (N, 3) uint8 that go from one to another by height."""
+    """Returns colours (N, 3) uint8, blended between two colours by height."""
     part = _height_parts(heights)[:, None]
     return ((1.0 - part) * lowest + part * highest).astype(np.uint8)
 
 
 def _height_parts(heights: np.ndarray) -> np.ndarray:
-    """Returns 0 for low points to 1 for high ones; stray ones do not count."""
-    # A river's bed is up to 5 %, and must be no brighter than streets.
+    """Returns heights scaled from 0 (low) to 1 (high), ignoring outliers."""
+    # Up to 5 % of the points are a river's bed, which must not be brighter than
+    # streets.
     low, high = np.quantile(heights, [0.05, 0.99])
     part = np.clip((heights - low) / max(high - low, 1e-9), 0.0, 1.0)
     # The square root spreads low heights, because most of a city is near the

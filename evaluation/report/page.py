@@ -326,7 +326,7 @@ def _shown_tables(report: Report) -> dict[str, list[Table]]:
 def _content(
     report: Report, tables: Mapping[str, Sequence[Table]]
 ) -> dict[str, object]:
-    """Returns what both the text and the page show."""
+    """Returns the values for the templates of the text and of the page."""
     ranked, headline = rows.ranked_methods(report.results)
     return {
         "report": report,

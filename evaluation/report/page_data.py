@@ -61,7 +61,7 @@ class Illustration:
 
 @dataclass(frozen=True)
 class CameraImages:
-    """What a camera saw at K frames of a drive.
+    """Images of a camera at K frames of a drive.
 
     Attributes:
         stamps_ns: (K,) stamps of the frames.
@@ -99,7 +99,7 @@ class PageDrive:
         thumbnails: K reduced scans (see `evaluation.maps.thumbnails`).
         view: the map from above, as a WebP file.
         extent: left, right, bottom and top of the view [m].
-        images: what the drive's camera saw at the frames, if it has one.
+        images: images of the drive's camera at the frames, if it has one.
     """
 
     name: str
@@ -128,7 +128,7 @@ def make_drive(
         X_WS: (N, 4, 4) poses of the LiDAR at all frames.
         frames: numbers of the K frames that are places or queries.
         thumbnails: K reduced scans, one for each of these frames.
-        images: what the drive's camera saw at these frames, if it has one.
+        images: images of the drive's camera at these frames, if it has one.
     """
     positions = X_WS[:, :3, 3]
     stream = io.BytesIO()
@@ -187,14 +187,14 @@ def browser_data(
     pages: Mapping[str, str],
     evidence: Mapping[tuple[str, str], PairEvidence],
 ) -> dict:
-    """Returns what the query browser reads, ready for JSON.
+    """Returns the data of the query browser, ready for JSON.
 
     The maps from above are not included; the browser takes them from the
     pictures that `evaluation.report.page.route_picture` makes.
 
     Args:
         recognitions: results of methods on pairs of drives.
-        drives: name of a drive -> what the page shows of it.
+        drives: name of a drive -> its data for the page.
         changes: map, database and query -> change between the drives.
         pages: name of a drive -> its web page; some may be absent.
         evidence: names of database and query -> why queries went wrong; some

@@ -1,4 +1,4 @@
-"""The reference of a report: published numbers, and claims to judge."""
+"""The reference of a report: published numbers and claims to check."""
 
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
@@ -32,7 +32,7 @@ class Finding:
 
 @dataclass(frozen=True)
 class Judgement:
-    """Findings under a heading that says whose claims they judge."""
+    """Findings under a heading that says whose claims they test."""
 
     heading: str
     findings: Sequence[Finding]
@@ -52,9 +52,9 @@ class Reference:
             method has one mode.
         protocols: method -> how the source ran it, its number of scans
             included.
-        judge: function that returns verdicts on all claims that our numbers can
-            judge. It takes the results of a report, the results that the report
-            repeated by the source's protocol, and the changes.
+        judge: function that returns verdicts on all claims that our numbers
+            allow to check. It takes the results of a report, the results that
+            the report repeated by the source's protocol, and the changes.
     """
 
     title: str = ""
@@ -117,7 +117,7 @@ class Reference:
     def values(self, result: PlaceRecognition, mode: Mode) -> Published | None:
         """Returns the published numbers, if they were counted in this mode.
 
-        None for numbers that were found by another protocol.
+        Returns None for numbers that were measured by another protocol.
         """
         if not self._ran(result):
             return None

@@ -1,6 +1,7 @@
 """The tables of a report: change, recognition, faults, poses, costs, queries.
 
-Those for print are called `..._table`; `..._numbers` have all digits for files.
+Functions named `..._table` return tables for print; those named `..._numbers`
+return tables with all digits, for files.
 """
 
 from __future__ import annotations
@@ -62,7 +63,7 @@ Evidence = Mapping[tuple[str, str], PairEvidence]
 
 
 def _inner(columns: Columns[PlaceRecognition]) -> Columns[Any]:
-    """Returns the columns for items that hold a `result`."""
+    """Returns columns of results as columns of items with a field `result`."""
     return keyed(columns, lambda item, value: value(item.result))
 
 
@@ -128,9 +129,10 @@ def change_table(
 def _visible_change(
     evidence: Evidence, database: str, query: str
 ) -> tuple[float | None, ...]:
-    """Returns the mean visible change of a pair, and of how many queries.
+    """Returns four values on a pair's visible change; None if unknown.
 
-    And what is left of it less that of the control, also as a share.
+    They are the mean, the number of queries, the mean minus the control's, and
+    this difference as a share of the mean.
     """
     known = evidence.get((database, query))
     if known is None:
@@ -141,7 +143,7 @@ def _visible_change(
 
 
 class _Counted(NamedTuple):
-    """A result in a mode, with what is published of it."""
+    """A result in a mode, with the published numbers, if any."""
 
     result: PlaceRecognition
     metrics: PlaceRecognitionMetrics
@@ -429,7 +431,7 @@ def pose_numbers(results: Sequence[PlaceRecognition]) -> Table:
 
 
 class _Faults(NamedTuple):
-    """The wrong best places of a result: their kinds, and what changed."""
+    """The wrong best places of a result: reasons, and changed classes."""
 
     result: PlaceRecognition
     kinds: Counter[str]
@@ -437,7 +439,7 @@ class _Faults(NamedTuple):
 
     @property
     def wrong(self) -> int:
-        """The number of these of queries that have a place."""
+        """Number of wrong best places of queries that have a match."""
         return self.kinds.total() - self.kinds["no_place"]
 
 

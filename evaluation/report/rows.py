@@ -1,9 +1,10 @@
-"""The numbers of a report as rows of the table of results, and what they say.
+"""The numbers of a report as rows of a table of results, and conclusions.
 
-How the methods rank, and what of each survives structural change. A control
-drive takes the place of one drive of a pair: it follows the same route, but in
-the stage of the other drive. What a method loses from the control to the pair
-is due to the change alone, and not to the routes.
+The conclusions are the ranking of the methods, and the share of its result that
+each method keeps under structural change. A control drive takes the place of
+one drive of a pair: it follows the same route, but in the stage of the other
+drive. What a method loses from the control to the pair is due to the change
+alone, and not to the routes.
 """
 
 from collections import Counter
@@ -186,7 +187,7 @@ def _headline(
 
 
 class Survival(NamedTuple):
-    """A method on a pair of drives: metric -> row.
+    """Results of a method on a pair, with and without the change.
 
     Attributes:
         pair: map, stage of the database, and of the query.
@@ -210,7 +211,7 @@ class Survival(NamedTuple):
 
 
 def survivals(rows: Iterable[Row], stages: Mapping[str, str]) -> list[Survival]:
-    """Returns what each method keeps on each pair, in the order of tables.
+    """Returns a `Survival` per method and pair, in the order of tables.
 
     The stages are those of drives.
     """
@@ -241,7 +242,7 @@ def interval_text(kept: Row) -> str:
 
 
 def survival_numbers(survivals: Sequence[Survival]) -> tables.Table:
-    """Returns what methods keep, for `survival.csv`."""
+    """Returns the shares that methods keep, for `survival.csv`."""
     numbers: dict[str | tuple[str, str], tuple[str, ...]] = {
         "auc_unchanged": ("before", "auc"),
         "auc_changed": ("after", "auc"),
@@ -271,7 +272,7 @@ def survival_numbers(survivals: Sequence[Survival]) -> tables.Table:
 
 
 def survival_table(survivals: Sequence[Survival]) -> tables.Table:
-    """Returns what methods keep, for print: a row per pair and method."""
+    """Returns the shares that methods keep, for print."""
     return tables.Table.of(
         survivals,
         {

@@ -1,6 +1,6 @@
-"""One table of everything that is measured, and what is made of it.
+"""The common tables of all results, with summaries, charts and rankings.
 
-`table` reads and writes `results.csv` and `queries.csv`, `summaries` has the
-numbers that are functions of them, `charts` and `page` show them, and
-`comparing` ranks methods beside the tables in `baselines`.
+`table` reads and writes `results.csv` and `queries.csv`, `summaries` computes
+numbers from them, `charts` and `page` show them, and `comparing` ranks methods
+together with the shipped tables in `baselines`.
 """

@@ -8,10 +8,10 @@
 - `scatter` (`x`, `y`): a metric over a metric or a numeric factor, with a
   smooth line and its 95 % band.
 
-All other keys are columns of the table with the values that are shown. By
-default the task is `place`, or else the only one with the metric, and the gate
-is 0. Methods keep their colours, and the
-title is what the chart shows, in words.
+All other keys select rows: each is a column of the table with the values to
+show. By default, the task is `place`, or else the only task with the metric,
+and the gate is 0. Each method has the same colour in all charts. The title says
+in words what the chart shows.
 """
 
 from __future__ import annotations
@@ -85,7 +85,7 @@ class Drawn:
     """A chart.
 
     Attributes:
-        message: what it shows, in words.
+        message: sentence that says what the chart shows.
         figure: the drawing.
         legend: name -> colour, line style and marker; empty where the drawing
             has the names.
@@ -98,7 +98,7 @@ class Drawn:
 
 @dataclass(frozen=True)
 class _Chart:
-    """What a chart is made of."""
+    """The inputs of a chart."""
 
     keys: Mapping[str, str]
     results: Results
@@ -112,7 +112,7 @@ class _Chart:
 
     @property
     def panes(self) -> dict[str, list[Row]]:
-        """Title of a panel -> its rows: of one map, unless maps are lines."""
+        """Title of a panel -> its rows; one panel per map, unless over maps."""
         found: dict[str, list[Row]] = {}
         for row in self.rows:
             name = "" if self.keys.get("over") == "map" else row.map
@@ -294,10 +294,10 @@ def _dumbbell(chart: _Chart) -> tuple[str, Figure]:
 
 
 def _ends(found: Mapping[str, tuple[float, str]]) -> list[tuple[str, str]]:
-    """Returns the methods with the most and the least, and what they have.
+    """Returns name and text of the methods with the most and the least.
 
     Args:
-        found: method -> its number, and that in words.
+        found: method -> its number, and the number as text.
     """
     order = sorted(
         found.items(), key=lambda one: (math.isnan(one[1][0]), -one[1][0])

@@ -1,4 +1,4 @@
-"""Anybody's tables of results beside the shipped ones, on what all have."""
+"""Compares users' tables of results with the shipped ones."""
 
 from __future__ import annotations
 
@@ -43,12 +43,12 @@ from evaluation.results.table import (
 
 _BASELINES = Path(__file__).with_name("baselines")
 _SHIPPED = "shipped"
-# Metrics of which less is better.
+# Metrics for which less is better.
 _LESS = re.compile(
     r"translation_\w+|rotation_\w+|\w+_ms|no_\w+|other_city|too_far|elsewhere"
     r"|lost"
 )
-# Metric -> its place among those of `resampled_metrics`.
+# Metric -> its index in the result of `resampled_metrics`.
 _RESAMPLED = {"auc": 0, "r1": 1}
 
 # A method, and what identifies a condition.
@@ -57,7 +57,7 @@ _Place = tuple[str, tuple[object, ...]]
 
 @dataclass(frozen=True)
 class _Table:
-    """The rows of one metric, and the answers that are there."""
+    """The rows of one metric, and the answers that are available."""
 
     name: str
     rows: Mapping[_Place, Row]
@@ -73,7 +73,7 @@ class _Table:
 
 
 class Compared(NamedTuple):
-    """Two methods by name, and the mean AUC of the first less the second.
+    """The mean AUC of one method minus that of another.
 
     The p-value is corrected, by Holm's method, for all differences of the
     comparison.
@@ -102,7 +102,7 @@ class Agreement(NamedTuple):
 
 @dataclass(frozen=True)
 class Comparison:
-    """Tables beside each other.
+    """The result of comparing tables.
 
     Attributes:
         metric: the number that is compared.
@@ -301,7 +301,7 @@ def _answers(path: Path) -> Sequence[Answers]:
 
 
 def _by_place(keys: Iterable[Any]) -> dict[_Place, Any]:
-    """Returns rows or answers by method, with its settings, and condition."""
+    """Returns (method with settings, condition) -> row or answers."""
     found = {}
     for key in keys:
         factors = {
@@ -326,7 +326,7 @@ def _shipped(wanted: Mapping[str, object]) -> _Table:
 def _common(
     own: Sequence[_Table], shipped: _Table, paths: Sequence[Path]
 ) -> tuple[list[tuple[object, ...]], list[str]]:
-    """Returns the conditions that all tables have, and what to say of it."""
+    """Returns the conditions that all tables have, and notes for the user."""
     common = own[0].conditions
     for table in own[1:]:
         common = [one for one in common if one in set(table.conditions)]
@@ -346,7 +346,7 @@ def _common(
 
 
 def _apart(one: _Table, other: _Table) -> str:
-    """Returns why two tables have no condition in common."""
+    """Returns text that says why two tables have no condition in common."""
     rows = [list(table.rows.values()) for table in (one, other)]
     factors = {
         name: None for some in rows for row in some for name in row.factors
@@ -364,7 +364,7 @@ def _apart(one: _Table, other: _Table) -> str:
 
 
 def _on(table: _Table, common: Iterable[tuple[object, ...]]) -> _Table:
-    """Returns a table with some of its conditions."""
+    """Returns a table reduced to some of its conditions."""
     kept = set(common)
     rows = {place: row for place, row in table.rows.items() if place[1] in kept}
     return replace(table, rows=rows)
@@ -374,7 +374,7 @@ def _differences(
     entries: Mapping[str, tuple[_Table, str]],
     common: Sequence[tuple[object, ...]],
 ) -> list[Compared]:
-    """Compares each two methods whose answers in all conditions are there."""
+    """Compares each two methods that have answers in all conditions."""
     asked: dict[str, list[Answers]] = {}
     for name, (table, method) in entries.items():
         places = [(method, one) for one in common]
@@ -435,7 +435,7 @@ def _agreement(first: _Table, second: _Table, metric: str) -> Agreement:
 def _values(
     table: _Table, methods: Sequence[str], metric: str
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Returns the mean values (M,) of methods, and those of samples (B, M)."""
+    """Returns means (M,) of methods, and their bootstrap samples (B, M)."""
     ranked, samples = ranking(
         row for (method, _), row in table.rows.items() if method in methods
     )

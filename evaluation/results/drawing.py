@@ -1,4 +1,4 @@
-"""The common part of all figures: colours, sizes and files."""
+"""Functions and constants of all figures: colours, sizes and files."""
 
 from collections.abc import Sequence
 from pathlib import Path
@@ -38,13 +38,13 @@ _WEBP_QUALITY = 82
 
 
 def unit(rgb: tuple[int, int, int]) -> tuple[float, float, float]:
-    """Returns a colour from 0 to 1, as matplotlib takes it."""
+    """Returns a colour scaled to 0 to 1, as matplotlib needs it."""
     red, green, blue = rgb
     return red / 255.0, green / 255.0, blue / 255.0
 
 
 def plain(text: str) -> str:
-    """Returns text for a drawing, without dollars that begin formulas."""
+    """Returns text with escaped dollars, which would begin a formula."""
     return text.replace("$", r"\$")
 
 

@@ -59,8 +59,8 @@ def write_page(
 ) -> Path:
     """Writes `index.html`, which needs no other file.
 
-    Beside it stand the charts for print, and `summaries.csv` where there are
-    summaries of them, see `summarised`.
+    The charts for print are written beside it, and `summaries.csv` if charts
+    have summaries (see `summarised`).
 
     Args:
         results: the table, beside the page as `results.csv`.
@@ -68,8 +68,8 @@ def write_page(
         folder: folder in which the page is written.
         title: title of the page.
         about: the question, in words.
-        charts: see `charts`; the headline is what the first one shows. One
-            whose rows the table lacks is left out, and a note says so.
+        charts: see `charts`; the message of the first chart is the headline. A
+            chart without rows in the table is left out, with a note.
         experiment_text: the experiment as YAML.
         notes: what else a reader has to know, such as settings.
         on_note: takes a note on each chart that is left out.
@@ -231,7 +231,7 @@ def _cells(numbers: Summary) -> list[object]:
 
 
 def _shown(value: object) -> str:
-    """Returns a value for a reader."""
+    """Returns a value as text for a reader."""
     if value is None or (isinstance(value, float) and math.isnan(value)):
         return ""
     if value == math.inf:

@@ -236,7 +236,10 @@ def lifetimes(
 def _curve_of(
     curves: Mapping[float, Mapping[int, float]], seed: int
 ) -> tuple[list[float], list[float]]:
-    """Returns the times and shares of a seed, with what has a single seed."""
+    """Returns the times and shares of a seed.
+
+    A time that was measured with a single seed counts for every seed.
+    """
     points = [
         (at, some.get(seed, next(iter(some.values()))))
         for at, some in sorted(curves.items())

@@ -1,4 +1,4 @@
-"""The table of results, a number a row; and that of queries.
+"""The table of results, one number per row; and the table of queries.
 
 `results.csv` and `queries.csv` begin with the same columns: where and under
 which condition something was measured. All columns that are not named here are
@@ -39,7 +39,7 @@ _MEASURED = ("metric", "value", "low", "high", "n")
 # A factor, and two of its values: a drive's own stage, or that of the query.
 STAGE = "both.stage"
 OWN, LAST = "own", "last"
-# What `Key` gives by name beside factors, which cannot have such a name.
+# Names of other columns of `Key`, which no factor can have.
 _NAMED = frozenset(("label", *KEYS, *_MEASURED))
 # Columns of a query -> what kind of value they have.
 _ANSWERS = {
@@ -63,7 +63,7 @@ _ANSWERS = {
     "visible_change": float,
 }
 _NEEDED_ANSWERS = ("query_frame", "correct", "has_match", "score")
-# What stands for an empty cell.
+# Type -> value that stands for an empty cell.
 _EMPTY: dict[type, object] = {int: -1, float: math.nan, str: ""}
 _NUMBER = re.compile(
     r"[-+]?(\d+(\.\d*)?|\.\d+)(e[-+]?\d+)?", re.ASCII | re.IGNORECASE
@@ -87,13 +87,14 @@ _RANGES = (
         math.inf,
     ),
 )
-# Their intervals are of resampled queries, and may miss their own value by a
-# little.
+# Metrics whose intervals come from resampled queries, and may miss the value
+# itself by a little.
 _RESAMPLED = ("auc", "auc_strict", "r1")
 _OUTSIDE, _ROUNDED = 0.05, 1e-9
-# They are numbers of any queries.
+# Metrics that are known for any set of queries.
 _ALWAYS_KNOWN = ("auc", "auc_strict")
-# Columns of tables of earlier versions -> what makes such a table now.
+# Columns of tables of earlier versions -> the command that makes such a table
+# now.
 _FORMER = (
     ({"version", "db", "kept"}, "cns-drake study fresh"),
     ({"db", "cause", "level"}, "cns-drake study ladder"),
@@ -114,7 +115,7 @@ class Key:
         experiment: name of the experiment.
         map: name of the map.
         database: name of the drive that makes the database.
-        query: name of the drive that asks.
+        query: name of the drive whose scans are the queries.
         seed: seed of everything that is random.
         factors: column -> value of those that apply.
         task: `place`, `pose`, `localise`, `map`, `change`, `cost` or another.
@@ -208,7 +209,7 @@ class Row(Key):
 
 @dataclass(frozen=True, eq=False)
 class Answers(Key):
-    """What a method answered to Q queries.
+    """The answers of a method to Q queries.
 
     Attributes:
         columns: name -> (Q,) values, of the columns of `queries.csv`. NaN
@@ -420,7 +421,7 @@ def _answer_cell(value: Any, kind: type) -> str:
 def _answered(
     lines: Sequence[_Line], names: Iterable[str], task: str
 ) -> dict[str, np.ndarray]:
-    """Returns the columns of a key's lines, which fit each other."""
+    """Returns column -> values of a key's lines, after checking them."""
     columns: dict[str, np.ndarray] = {}
     for name in names:
         kind = _ANSWERS[name]
@@ -462,7 +463,7 @@ def _range(metric: str) -> tuple[float, float]:
 
 
 def _measured(one: _Line) -> dict[str, Any]:
-    """Returns what a row holds behind its key."""
+    """Returns a row's values that follow the columns of its key."""
     metric = one.text("metric")
     value, low, high = (
         one.value(name, float) for name in ("value", "low", "high")
@@ -516,7 +517,7 @@ class _Line:
         return cell
 
     def value(self, column: str, kind: type) -> Any:
-        """Returns a value of a kind, or what stands for an empty one."""
+        """Returns a cell as a value of a type; an empty cell has a stand-in."""
         cell = self.cells[self.columns[column]]
         if kind is bool:
             if cell.lower() not in _TRUTH:
@@ -587,7 +588,7 @@ class _Cells:
         needed: Iterable[str],
         known: Iterable[str] = (),
     ) -> _Cells:
-        """Reads a file, or the one in a folder that has the usual name."""
+        """Reads a file, or the file of the usual name in a folder."""
         path = Path(path)
         file = path / usual if path.is_dir() else path
         try:

@@ -22,9 +22,9 @@ from evaluation.recognition.protocol import PROTOCOL_COLUMNS
 _Item = TypeVar("_Item")
 _Key = TypeVar("_Key")
 
-# What a table shows of each item: the name of a column, or the name of its
-# group and its own -> the function that returns the value. An item may have
-# several rows; values are then arrays or lists with one for each of them.
+# Columns of a table of items: name of a column, or (name of its group, its own
+# name) -> function that returns the value of an item. An item may have several
+# rows; values are then arrays or lists with one for each of them.
 Columns = Mapping[str | tuple[str, str], Callable[[_Item], object]]
 
 MISSING = "–"
@@ -212,7 +212,7 @@ class Table:
         return [_latex_row(names), rules]
 
     def _full_names(self) -> list[str]:
-        """Returns the name of each column behind that of its group."""
+        """Returns the names of the columns, each after its group's name."""
         groups = [name for name, span in self.groups for _ in range(span)]
         return [
             f"{group} {name}".strip()
@@ -250,7 +250,7 @@ def protocol_columns(path: str) -> Columns[Any]:
 
 
 def _rows(values: Sequence[object]) -> list[tuple[object, ...]]:
-    """Returns rows of values, of which single ones stand in each row."""
+    """Returns rows made of values; a single value is repeated in each row."""
     lists = [v.tolist() if isinstance(v, np.ndarray) else v for v in values]
     number = max((len(v) for v in lists if isinstance(v, list)), default=1)
     columns = [v if isinstance(v, list) else [v] * number for v in lists]
@@ -294,7 +294,7 @@ def in_table_order(methods: Iterable[str]) -> list[str]:
 
 
 def by_pair(items: Iterable[Any]) -> dict[Any, list[Any]]:
-    """Returns the pair of items -> these."""
+    """Returns pair -> its items."""
     groups: dict[Any, list[Any]] = {}
     for one in items:
         groups.setdefault(one.pair, []).append(one)

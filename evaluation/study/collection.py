@@ -30,9 +30,9 @@ _UNPLACED = "map and stage are unknown: no scenario, and no name <map>_<stage>"
 class RecordingInfo:
     """A recording that exists or will be made, and its place in a study.
 
-    Stages of the city's life sort by name. The way is the route that the drive
-    takes (see `driven_way`); None if it is unknown. The recording is read from
-    the path, a file or folder, unless `made_by` opens it.
+    The names of a map's stages sort in the order of time. `way` is the route of
+    the drive (see `driven_way`); None if unknown. The recording is read from
+    `path`, a file or folder, unless `made_by` opens it.
     """
 
     name: str
@@ -74,7 +74,7 @@ class Run:
 
     @property
     def repeats(self) -> bool:
-        """Whether the run repeats a run by the study's own protocol."""
+        """Whether the run repeats another run, by the published protocol."""
         return self.queries != self.method.key
 
     @property

@@ -75,7 +75,7 @@ def find_evidence(
 
     Args:
         database: drive of the places.
-        query: drive whose scans asked.
+        query: drive of the queries.
         results: results of methods on this pair.
         protocol: protocol of the results.
         track: reports progress.
@@ -181,12 +181,12 @@ class _Shown:
 
     @cached_property
     def standing(self) -> np.ndarray:
-        """(M, 3) points of standing things, one for each cell."""
+        """(M, 3) points on upright objects, one for each cell."""
         return thin(self.points[self.points[:, 2] > _standing()], _CELL)
 
     @cached_property
     def tree(self) -> cKDTree:
-        """Finds the nearest of the standing points."""
+        """Search tree of the upright points."""
         return cKDTree(self.standing, balanced_tree=False, compact_nodes=False)
 
     def coinciding(self, points: np.ndarray) -> float:
@@ -244,11 +244,11 @@ def _change(
 
 
 def _fits(query: _Shown, places: Sequence[_Shown]) -> list[float]:
-    """Returns for each place the part of standing points that coincide.
+    """Returns for each place the share of upright points that coincide.
 
     The scans are aligned as well as possible, without their poses: the pose is
-    that of layered overlap. The lesser of the query's and the place's parts
-    counts.
+    that of layered overlap. The result is the lesser of the query's and the
+    place's shares.
     """
     shared = [0.0] * len(places)
     standing = [k for k, one in enumerate(places) if len(one.standing)]

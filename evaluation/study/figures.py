@@ -1,4 +1,4 @@
-"""What a study draws of its cities: figures, file names, what they show."""
+"""The figures that a study draws of its cities, and their file names."""
 
 from pathlib import Path
 

@@ -147,7 +147,7 @@ def measure_places(
     protocol: RetrievalProtocol,
     radii: tuple[float, ...],
 ) -> list[PlaceOutcome]:
-    """Returns two outcomes of each method by each radius of a match.
+    """Returns two outcomes of each method for each radius of a match.
 
     One is without the gate and one with it; queries are scored only once.
 
@@ -231,7 +231,11 @@ def _describe(
     protocol: RetrievalProtocol,
     reporter: Reporter,
 ) -> tuple[list[np.ndarray], Callable[[int], DescribedDrive]]:
-    """Returns the scans of a drive, and what gives each description once."""
+    """Returns a drive's scans, and a function: method's number -> description.
+
+    Call the function only once for each method, because a description is then
+    freed.
+    """
     if isinstance(drive, tuple):
         scans, *parts = drive
         return scans.read(), lambda k: parts[k].read()[1]

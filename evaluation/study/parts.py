@@ -44,14 +44,15 @@ from cns_drake.base.jobs.fingerprint import code_digest, fingerprint
 from cns_drake.base.jobs.step import Reporter, Step
 
 _LENGTH = struct.Struct("<Q")
-# What methods keep is their authors' affair.
+# Types in these modules belong to methods and are not checked.
 _METHODS = "evaluation.methods"
 _OWN_MODULE = re.compile(r"evaluation(\.[a-z]\w*)+")
 _MAGIC = b"cns-eval part 2\n"
 _LEVEL = 1
 # Greatest size of a line of inputs [bytes].
 _MOST_INPUTS = 1 << 24
-# Compressed bytes stand for so many times as many, or for so many, at most.
+# Limits of the uncompressed size: this multiple of the compressed bytes, or
+# this many bytes if that is more.
 _MOST_RATIO, _ALWAYS = 200, 1 << 27
 # Errors for a tree of another form or with other fields, and for headers of
 # arrays that NumPy cannot parse.
@@ -116,7 +117,7 @@ def decode(data: bytes) -> Any:
 
 
 class _Encoder:
-    """Makes a tree of a value; arrays that occur twice are stored once."""
+    """Turns a value into a tree; arrays that occur twice are stored once."""
 
     def __init__(self) -> None:
         self.arrays: list[np.ndarray] = []
@@ -164,7 +165,7 @@ class _Encoder:
 
 
 def _read_arrays(data: bytes, start: int) -> list[np.ndarray]:
-    """Returns the arrays from a place on."""
+    """Returns the arrays that are stored from an offset onwards."""
     stream = io.BytesIO(data)
     stream.seek(start)
     arrays = []
@@ -268,7 +269,7 @@ def _hints(kind: Any) -> dict[str, Any]:
 
 
 def _most(size: int) -> int:
-    """Returns how many bytes compressed ones may stand for, at most."""
+    """Returns the greatest uncompressed size of some compressed bytes."""
     return max(_MOST_RATIO * size, _ALWAYS)
 
 
@@ -356,7 +357,7 @@ class Part:
 
     @contextlib.contextmanager
     def _opened(self) -> Iterator[tuple[dict, BinaryIO]]:
-        """Yields header and value, which must have its full length."""
+        """Yields the header, and the value after checking its length."""
         check_regular(self.path)
         try:
             with open(self.path, "rb") as stream:
@@ -386,7 +387,7 @@ class Part:
 
 @dataclass(frozen=True)
 class MakePart(Step):
-    """Writes what a function returns as a part.
+    """Writes the result of a function as a part.
 
     Attributes:
         function: a function of a module, whose code counts as an input; it

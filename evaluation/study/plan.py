@@ -100,11 +100,11 @@ class Study:
         Files: `report.html`, which holds everything; `report.md`; `survival`,
         `tcr`, `place_recognition` and `poses`, and with costs `costs`, each as
         .csv (all numbers), .md and .tex; `results.csv`, the one table of all
-        studies; `metrics.csv`, the metrics of other
-        benchmarks; `differences.csv`, the differences between methods;
-        `why.csv`, the reasons for wrong best places; `queries.csv` and
+        studies; `metrics.csv`, the metrics of other benchmarks;
+        `differences.csv`, the differences between methods; `why.csv`, the
+        reasons for wrong best places; `queries.csv` and
         `queries_unchanged.csv`, every query of the pairs and of their controls;
-        and what is missing in the folder `figures`.
+        and those figures that do not exist yet in the folder `figures`.
 
         Args:
             pages: recording -> address of its 3-D page, relative to the report,
@@ -205,7 +205,7 @@ class Study:
         return jobs
 
     def _further(self, city: City, drive: RecordingInfo) -> tuple[Further, ...]:
-        """Returns what repetitions describe of a drive."""
+        """Returns the descriptions of a drive that repeated runs need."""
         roles: dict[tuple[MethodChoice, RetrievalProtocol], set[Role]]
         roles = defaultdict(set)
         for pair in city.recognition_pairs():
@@ -272,11 +272,11 @@ class Study:
     def _recognition_job(
         self, city: City, pair: Pair, name: str, *, explains: bool
     ) -> Job:
-        """Returns the job of a pair.
+        """Returns the job that runs the methods on a pair.
 
-        If it explains, it also finds why best places are wrong, and repeats
-        what is compared with published numbers. Of a control, whose faults
-        nobody asks for, it finds only how much matches show of the queries.
+        With `explains`, the job also finds why best places are wrong, and
+        repeats runs by the protocol of published numbers. For a control, it
+        finds only the overlap of queries with their matches.
         """
         database, query = pair
         surveys = [self._files.survey(one.name) for one in pair]
@@ -314,7 +314,7 @@ class Study:
         return Job(name, step, _survey_names(pair), cost)
 
     def _cost_job(self, pair: Pair, needs: tuple[str, ...]) -> Job:
-        """Returns the job that runs after all others, alone on the machine."""
+        """Returns the job that measures costs, after all others and alone."""
         places, queries = (self._files.survey(one.name) for one in pair)
         described = tuple(
             (places.described(one.key), queries.described(one.key))

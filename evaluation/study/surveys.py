@@ -41,7 +41,7 @@ _KEPT_FIELDS = ("x", "y", "z", "instance")
 
 
 class MappedDrive(RecentScans):
-    """A drive whose scans enter a map as they are read for the first time.
+    """A drive that adds each scan to a map when it is first read.
 
     Reading and unpacking scans takes longer than mapping them. In nearly
     increasing order, each scan is read only once.
@@ -76,7 +76,7 @@ class MappedDrive(RecentScans):
 
 
 class DriveSource(Protocol):
-    """Opens a drive; can be pickled."""
+    """A picklable object that opens a drive when it is called."""
 
     def __call__(self) -> Drive:
         """Opens the drive.
@@ -240,9 +240,10 @@ def survey_recording(
 
     Args:
         recording: the drive.
-        roles: whether it makes a database, asks queries, or both; it may have
-            no role.
-        asked: name of a description -> what is described; none without a role.
+        roles: whether the drive has places of the database, queries, or both;
+            the set may be empty.
+        asked: name of a description -> method, roles and protocol; empty
+            without a role.
         protocol: protocol of the frames that are shown and kept.
         track: reports progress.
         with_scans: whether to keep the scans of places and queries.
@@ -377,7 +378,7 @@ class Survey(Step):
 
     @property
     def _asked(self) -> dict[str, Further]:
-        """Name of each description -> what is described."""
+        """Name of each description -> method, roles and protocol."""
         asked = {
             one.key: (one, self.roles, self.protocol) for one in self.methods
         }

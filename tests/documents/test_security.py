@@ -20,7 +20,10 @@ def rows():
     page = documents.read("SECURITY.md")
     return [
         row
-        for header in ("| what | it cannot | test |", "| what | why | test |")
+        for header in (
+            "| file or input | what it cannot do | test |",
+            "| file or option | risk | test |",
+        )
         for row in documents.table(page, header)
     ]
 

@@ -1,1 +1,1 @@
-"""Recorded drives: what each offers, and the reader of MCAP files."""
+"""Recorded drives: their common interface, and the reader of MCAP files."""

@@ -1,4 +1,4 @@
-"""Undoing the distortion of scans that a moving LiDAR takes."""
+"""Removal of the motion distortion from scans of a moving LiDAR."""
 
 import numpy as np
 from scipy.interpolate import CubicSpline
@@ -9,11 +9,11 @@ from cns_drake.base.drives.drive import Drive
 from cns_drake.base.errors import InputError
 
 # Number of poses before and after a scan from which its motion is interpolated.
-# The ends of the splines are free; an error there fades to about a quarter from
-# pose to pose.
+# The splines have free ends; the error that this causes falls to about a
+# quarter with each pose.
 _REACH = 4
-# The points of a scan take about as long as from scan to scan. Times of another
-# unit are off by a thousand.
+# Largest ratio between the duration of a scan and the time between scans. The
+# two are about equal; in a wrong unit of time they differ by a factor of 1,000.
 _MOST_OFF = 300.0
 
 
@@ -30,8 +30,8 @@ def deskew(drive: Drive, index: int) -> np.ndarray:
     At the end of the drive the motion is extrapolated over one scan.
 
     Args:
-        drive: its scans have a field `t` [ns].
-        index: which scan.
+        drive: drive whose scans have a field `t` [ns].
+        index: number of the scan.
 
     Returns:
         A copy of the scan with other `x`, `y`, `z`.
@@ -77,7 +77,7 @@ def deskew(drive: Drive, index: int) -> np.ndarray:
 def _evaluate(
     times: np.ndarray, X_WS: np.ndarray, wanted: np.ndarray
 ) -> np.ndarray:
-    """Returns (M, 4, 4) poses at (M,) times, from N at (N,) [s]."""
+    """Returns poses (M, 4, 4) at (M,) times by splines through N poses [s]."""
     p = CubicSpline(times, X_WS[:, :3, 3])(wanted)
     R = RotationSpline(times, Rotation.from_matrix(X_WS[:, :3, :3]))(wanted)
     return poses.make_pose(R.as_matrix(), p)

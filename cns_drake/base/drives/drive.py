@@ -37,7 +37,7 @@ IMU_DTYPE = np.dtype(
         ("specific_force", "<f8", 3),
     ]
 )
-# Fields of a scenario that lead the vehicle.
+# Fields of a scenario that give the vehicle's path.
 _PATHS = ("route", "waypoints")
 # Fields that move the vehicle beside its path, or turn it round.
 _CHANGES = ("aside", "u_turns")
@@ -48,7 +48,7 @@ _NAME = re.compile(r"\w[\w.-]*")
 
 
 class ImuSamples(NamedTuple):
-    """Samples of an IMU that follow each other at an even rate.
+    """Consecutive samples of an IMU with a constant rate.
 
     Attributes:
         first: number of the first sample, counted from time zero, which has
@@ -67,12 +67,12 @@ class ImuSamples(NamedTuple):
 def driven_way(scenario: Mapping | None) -> dict | None:
     """Returns the fields of a scenario that determine the path of a drive.
 
-    Two drives with the same way differ at most in their surroundings and their
-    sensors.
+    Two drives for which these fields are equal differ at most in their
+    surroundings and their sensors.
 
     Returns:
-        The fields that have an effect, to be compared with those of other
-        drives; None if the scenario does not determine the path.
+        Field -> value, without fields that are empty or zero; None if the
+        scenario does not determine the path.
     """
     if scenario is None or not any(scenario.get(name) for name in _PATHS):
         return None
@@ -182,8 +182,8 @@ class Drive(abc.ABC):
     def datum(self) -> str | None:
         """Name of the survey grid (datum) in which W lies, if any.
 
-        World frames of two drives with one datum differ at most by the error of
-        their positioning, some ten metres.
+        The world frames of two drives with the same datum differ only by the
+        error of their positioning, some ten metres.
         """
         return None
 
@@ -202,7 +202,7 @@ class Drive(abc.ABC):
 
     @property
     def lidar_section(self) -> Mapping:
-        """Section of the scenario on this LiDAR; empty if it says nothing.
+        """Section of the scenario on this LiDAR; empty if there is none.
 
         This is the LiDAR with whose name the drive's name ends, or otherwise
         the first LiDAR.
@@ -249,7 +249,10 @@ def index_instances(table: Any, source: str) -> dict[int, Mapping]:
 
 @dataclass(frozen=True)
 class PlacedDrive:
-    """A drive that has been closed; of its scenario, only `map` is left."""
+    """Name, world frame and map of a drive, without its scans.
+
+    Of the scenario, only the field `map` is kept.
+    """
 
     name: str
     world_frame: str
@@ -257,14 +260,14 @@ class PlacedDrive:
 
     @classmethod
     def of(cls, drive: Drive) -> PlacedDrive:
-        """Returns the name of a drive's world frame and of its map."""
+        """Returns the name, world frame and map of a drive."""
         scenario = drive.scenario
         if scenario is not None:
             scenario = {k: v for k, v in scenario.items() if k == "map"}
         return cls(drive.name, drive.world_frame, scenario)
 
 
-# What has poses in a named world frame.
+# Drives, open or not, whose poses are in a named world frame.
 Placed = Drive | PlacedDrive
 
 
@@ -273,7 +276,8 @@ def check_same_world(
 ) -> None:
     """Raises an error if the poses of two drives cannot be compared.
 
-    Their maps must have the same name unless `across_maps`.
+    The names of their world frames must be equal and, unless `across_maps`,
+    those of their maps.
 
     Raises:
         InputError: if their world frames or their maps differ by name.

@@ -4,16 +4,17 @@ from typing import NamedTuple
 
 
 class LidarField(NamedTuple):
-    """What a LiDAR sees: number of rings, lowest and highest elevation."""
+    """Rings and vertical field of view of a LiDAR."""
 
     rings: int
     lowest_deg: float
     highest_deg: float
 
 
-# Preset, or unit of a public data set. Livox's units have no rings; theirs are
-# as many as of the `cns` preset. HeLiPR's Ouster is an OS2 with 128 channels
-# over 22.5 deg (its data sheet). NCLT's HDL-32E hangs upside down.
+# Preset, or unit of a public data set -> its field. Livox's units have no
+# rings; the number of the `cns` preset stands in. HeLiPR's Ouster is an OS2
+# with 128 channels over 22.5 deg (its data sheet). NCLT's HDL-32E hangs upside
+# down.
 _FIELDS = {
     "cns": LidarField(32, -22.5, 22.5),
     "os0-128": LidarField(128, -45.0, 45.0),

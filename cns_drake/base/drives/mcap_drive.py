@@ -26,30 +26,31 @@ _ODOMETRY_TOPIC = "/odometry"
 _IMU_TOPIC = "/imu/data"
 _TF_STATIC_TOPIC = "/tf_static"
 _KALIBR = "imu.yaml"
-# Messages that lie in a file this much later than others of their time are not
-# late but of a clock that was set back [s].
+# If log times in a file step back by more than this, the messages are not late:
+# the clock was set back [s].
 _LATEST = 1.0
 
 
 class McapDrive(Drive):
     """A recording on the topics /lidar/points, /odometry and /tf_static.
 
-    Without `/lidar/points`, the only topic of point clouds takes its place.
-    Of several LiDARs, `lidar` chooses one. The topic /imu/data is optional, and
-    so is /<lidar>/labels with `label` and `instance` of the same points. Images
-    are those of the first topic of compressed ones.
-    Scan i is the i-th message of that topic by log time. Its pose is
-    that of the `/odometry` message with exactly the same stamp, composed
-    with the sensor's place on the vehicle from `/tf_static`; nothing is
-    interpolated. Scans at both ends of the recording that have no pose, or no
-    labels, are left out, with a note: a recording that was cut off and repaired
-    lacks the last ones.
+    Without `/lidar/points`, the only topic of point clouds takes its place. If
+    there are several LiDARs, the argument `lidar` chooses one. Two topics are
+    optional: /imu/data, and /<lidar>/labels with `label` and `instance` of each
+    point. Images come from the first topic of compressed images.
 
-    Contradictions are refused: two poses for one stamp, two mounts of a sensor,
-    a frame that changes during the drive.
+    Scan i is the i-th point cloud of the LiDAR by log time. Its pose is that of
+    the `/odometry` message with exactly the same stamp, composed with the
+    sensor's place on the vehicle from `/tf_static`; nothing is interpolated.
+    Scans at both ends of the recording that have no pose, or no labels, are
+    left out, with a note: a recording that was cut off and repaired lacks the
+    last ones.
 
-    Opening reads the file's index. The first use of stamps or poses takes one
-    pass over the file; a scan takes one chunk.
+    Contradictions raise an error: two poses for one stamp, two mounts of a
+    sensor, or a frame that changes during the drive.
+
+    Opening reads the file's index. The first use of stamps or poses reads the
+    whole file once; reading a scan reads one chunk.
     """
 
     def __init__(self, path: Path, lidar: str | None = None):
@@ -147,7 +148,7 @@ class McapDrive(Drive):
 
     @property
     def distortion_note(self) -> str | None:
-        """Note that the scans have motion distortion, if they are known to.
+        """Note that the scans have motion distortion, if this is known.
 
         This is known only of simulated drives.
         """
@@ -199,7 +200,7 @@ class McapDrive(Drive):
             )
 
     def _labels(self, index: int, cloud: Any) -> np.ndarray | None:
-        """Returns the labels of a scan that has a topic for them."""
+        """Returns the labels of a scan from their own topic, if any."""
         topic = self._labels_topic
         if topic is None:
             return None
@@ -252,7 +253,7 @@ class McapDrive(Drive):
     def image_stamps_ns(self) -> np.ndarray:
         """(M,) int64 time of each image of the first camera [ns].
 
-        It is the log time, set to the clock of the stamps.
+        These are log times, converted to the clock of the stamps.
         """
         if not self._camera_topics:
             return super().image_stamps_ns
@@ -268,7 +269,7 @@ class McapDrive(Drive):
 
     @cached_property
     def _scans(self) -> np.ndarray:
-        """Where the scans are, without those at the ends that lack a pose."""
+        """Locations of the scans, except scans at the ends that lack a pose."""
         scans = self._all_scans
         odometry = self._file.locate(_ODOMETRY_TOPIC)
         num_labelled = len(scans)
@@ -368,7 +369,7 @@ class McapDrive(Drive):
         return self._mount(self._first(_IMU_TOPIC))
 
     def _mount(self, message: Any) -> np.ndarray:
-        """Returns the pose of a sensor's frame, that of its message, in B."""
+        """Returns the pose X_BS (4, 4) of a message's frame on the vehicle."""
         base = self._first(_ODOMETRY_TOPIC).child_frame_id
         return self._transforms.pose(base, message.header.frame_id)
 
@@ -390,7 +391,7 @@ class McapDrive(Drive):
             return mcap_messages.decode(data, self._message_types[topic])
 
     def _faults(self, where: str) -> contextlib.AbstractContextManager[None]:
-        """Turns a ValueError into one line that names file and place."""
+        """Turns a ValueError into an InputError that names file and place."""
         return value_errors(f"{self._path}: {where}")
 
     def _check_frame(

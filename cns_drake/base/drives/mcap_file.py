@@ -1,14 +1,15 @@
 """Random access to the messages of an MCAP file.
 
-The `mcap` package reads messages in time order, or all of a span of time.
-Reading a scan by its number needs the location of each message of a topic, and
-the one chunk that holds it. Both come from the index at the end of a complete
-file, so that opening a file of gigabytes reads a few kilobytes. All of that end
-is optional: where its numbers of messages do not confirm the index, the whole
-file is read once.
+The `mcap` package reads all messages, or those of a span of time, in the order
+of time. Reading a scan by its number needs the location of each message of a
+topic, and the one chunk that contains it. Both come from the index at the end
+of a complete file, so that opening a file of gigabytes reads a few kilobytes.
+The format makes this index optional. If the message counts at the end of the
+file do not confirm the index, the whole file is read once.
 
 The package checks only the checksums of chunks, and trusts the sizes that a
-chunk claims. Here damaged or hostile records are refused."""
+chunk claims. Here damaged or hostile records are refused.
+"""
 
 from collections.abc import Iterator
 import contextlib
@@ -48,8 +49,8 @@ from cns_drake.base.drives.mcap_records import (
 from cns_drake.base.errors import InputError
 from cns_drake.base.files import check_regular, user_errors
 
-# An index or a table of structures has a few megabytes, of which Python makes a
-# hundred times as much.
+# An index or a table of structures has a few megabytes; as Python objects it
+# takes a hundred times as much memory.
 SUMMARY_LIMIT_BYTES = 1 << 25
 _ATTACHMENT_LIMIT_BYTES = 1 << 23
 # Size of a chunk's record without its data.
@@ -63,7 +64,7 @@ _MESSAGE_HEADER = struct.Struct("<HIQQ")
 # A message index, after its record header: channel id, length of the rest.
 _INDEX_HEADER = struct.Struct("<HI")
 _INDEX_ENTRY = np.dtype([("log_time", "<u8"), ("offset", "<u8")])
-# The frame that is being read, and its neighbour when two of them interleave.
+# The chunk that is being read, and its neighbour where messages interleave.
 _CHUNKS_KEPT = 2
 # The location of a message: the number of its chunk in the file's index, the
 # offset of its record in the uncompressed chunk [bytes], its log time [ns] and
@@ -96,17 +97,18 @@ def _read_body(stream: BinaryIO, limit: int, what: str) -> bytes:
 
 @dataclass
 class _Contents:
-    """What a file holds.
+    """The contents of a file, by type of record.
 
     Attributes:
-        schemas: by id.
-        channels: likewise.
-        blocks: where each chunk, or message outside of chunks, begins in the
-            file [bytes], in its order.
-        indexes: for each block, channel id -> where its message index begins.
-        attachments: (name, where it begins) of each.
+        schemas: id -> schema.
+        channels: id -> channel.
+        blocks: offset in the file of each chunk, or of each message outside of
+            chunks, in the file's order [bytes].
+        indexes: for each block, channel id -> offset of the message index
+            [bytes].
+        attachments: (name, offset in the file [bytes]) of each.
         found: channel id -> (block, offset in it, log time [ns]) of each
-            message; None where the index has them.
+            message; None if the index has them.
         statistics: the file's own, if any.
     """
 
@@ -251,7 +253,8 @@ class McapFile:
         """Returns the content of the attachment of this name, if any.
 
         Raises:
-            InputError: if it cannot be read, or others of this name differ.
+            InputError: the attachment cannot be read, or several attachments of
+                this name differ.
         """
         content = None
         for found, offset in self._contents.attachments:
@@ -302,7 +305,7 @@ class McapFile:
         return locations[np.lexsort([locations[key] for key in _ORDER[::-1]])]
 
     def _indexed(self, numbers: list[int]) -> np.ndarray:
-        """Returns where the messages of channels are, by the index."""
+        """Returns the locations (N,) of channels' messages from the index."""
         parts = [np.empty(0, LOCATION)]
         with self._reading() as stream:
             # Many indexes at one place could claim more than the file holds.
@@ -321,8 +324,8 @@ class McapFile:
         """Finds everything in the file without any index.
 
         Raises:
-            InputError: if it cannot be read, or lacks what its statistics
-                count.
+            InputError: the file cannot be read, or has fewer messages than its
+                statistics state.
         """
         told = self._contents.statistics
         contents = _Contents(
@@ -440,7 +443,7 @@ class McapFile:
 
     @contextlib.contextmanager
     def _faults(self) -> Iterator[None]:
-        """Turns what a damaged file raises into one line."""
+        """Turns the errors of a damaged file into an InputError of one line."""
         try:
             yield
         except (

@@ -1,4 +1,4 @@
-"""Decodes messages of a recording, and refuses oversized or contrary ones."""
+"""Decodes messages of a recording; refuses oversized or inconsistent ones."""
 
 from collections.abc import Iterable
 import struct

@@ -1,9 +1,10 @@
-"""The records of an MCAP file, from its beginning on, without any index.
+"""The records of an MCAP file, read from its beginning without an index.
 
 The readers of the `mcap` package need an intact file and trust the sizes that
 it declares. Here every size is checked against the file and a limit before
 memory is reserved, and every checksum is checked. The reader finds the next
-intact chunk behind damage."""
+intact chunk behind damage.
+"""
 
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
@@ -49,8 +50,8 @@ _CHUNK_START = re.compile(
 _LONGEST_CHUNK_START = 9 + 28 + 8 + 8
 _FIRST_SEARCH_BLOCK = 4096
 _LAST_SEARCH_BLOCK = 4 * 1024 * 1024
-# Bytes that look like a chunk are read in vain. A hostile file could keep a
-# reader busy for days, hence a limit, in sizes of the file.
+# Limit of the bytes read in search of chunks, in multiples of the file's size:
+# a hostile file with many false chunks could keep a reader busy for days.
 _MOST_READ = 16
 _FAULTS = (
     McapError,
@@ -62,7 +63,7 @@ _FAULTS = (
 
 
 def parse_attachment(body: bytes) -> Attachment:
-    """Returns the attachment whose record has this content.
+    """Returns the attachment in the content of a record.
 
     Raises:
         ValueError: if its checksum is wrong, or a field is cut off.
@@ -89,7 +90,7 @@ class RecordContent(ReadDataStream):
         """Returns the next bytes.
 
         Raises:
-            ValueError: if there are fewer.
+            ValueError: there are not that many bytes left.
         """
         if not 0 <= length <= self.left:
             raise ValueError("a field reaches beyond the end of its record")
@@ -105,7 +106,7 @@ def uncompress(chunk: Chunk) -> bytes:
     Raises:
         ValueError: if it is damaged, too large or of unknown compression.
         RuntimeError: if lz4 finds it damaged.
-        zstandard.ZstdError: likewise.
+        zstandard.ZstdError: if zstd finds it damaged.
     """
     size = chunk.uncompressed_size
     if size > CHUNK_LIMIT_BYTES:
@@ -132,7 +133,7 @@ def uncompress(chunk: Chunk) -> bytes:
     return data
 
 
-# Opcode -> what reads the content of a record; those of chunks first.
+# Opcode -> function that reads a record's content; first records in chunks.
 _IN_CHUNKS: dict[int, Callable[[bytes], McapRecord]] = {
     Opcode.MESSAGE: lambda content: Message.read(
         RecordContent(content), len(content)
@@ -150,7 +151,7 @@ _READERS = {
 
 @dataclass(frozen=True)
 class Fault:
-    """Why a file cannot be read from an offset on [bytes]."""
+    """Why a file cannot be read from an offset [bytes] onwards."""
 
     offset: int
     text: str
@@ -175,12 +176,13 @@ def locate_records(
 ) -> Iterator[tuple[int, int, McapRecord | Fault]]:
     """Yields the records of an MCAP file, each with its place in the file.
 
-    They are the records that `read_records` yields.
+    These are the records that `read_records` yields.
 
     Yields:
-        The offset of a chunk in the file and that of a record in the
-        uncompressed chunk, or the offset of a record in the file and 0 [bytes];
-        and the record.
+        Two offsets [bytes], and the record. For a record in a chunk, the
+        offsets are those of the chunk in the file and of the record in the
+        uncompressed chunk. For any other record, they are its offset in the
+        file and 0.
     """
     size = stream.seek(0, os.SEEK_END)
     stream.seek(0)

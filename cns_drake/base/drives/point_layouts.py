@@ -241,19 +241,18 @@ def from_layout(
     Args:
         points: (N,) in any layout.
         labels: (N,) records of other fields of the same points, if any.
-        is_calibrated: asked whether a byte of intensity is one of calibrated
-            returns, which have 0 to 255 in any layout.
+        is_calibrated: returns whether intensities of the `autoware` layout are
+            calibrated. Calibrated intensities keep their range of 0 to 255.
 
     Returns:
-        (N,). `velodyne` has `t` [ns] in place of `time` [s]; a `t` of floats
-        becomes one of nanoseconds; `autoware` has `t` and `ring` in place of
-        `time_stamp` and `channel`, and intensities from 0 to 1 unless they are
-        calibrated. Times whose
-        unit is not certain stay as they are. Where nothing changes, `points`
-        itself.
+        (N,) points; `points` itself if nothing changes. In `velodyne`, `time`
+        [s] becomes `t` [ns]. In `autoware`, `time_stamp` and `channel` become
+        `t` and `ring`, and intensities are scaled to 0 to 1 unless they are
+        calibrated. A floating-point `t` becomes whole nanoseconds, unless its
+        unit is not certain.
 
     Raises:
-        ValueError: if the labels are not those of as many points.
+        ValueError: the numbers of labels and points differ.
     """
     names = points.dtype.names or ()
     columns = {name: points[name] for name in names}
@@ -287,7 +286,7 @@ def from_layout(
 
 
 def _nanoseconds(times: np.ndarray | None) -> np.ndarray | None:
-    """Returns floats as nanoseconds since the stamp, if they surely are times.
+    """Returns times as nanoseconds since the stamp, if the unit is certain.
 
     Some drivers count backwards from the last point, or since 1970.
 

@@ -32,12 +32,12 @@ for _path in sorted(_FOLDER.glob("*/msg/*.msg")):
 
 
 def message_class(message_type: str) -> type:
-    """Returns the class of a type of messages."""
+    """Returns the Python class of a message type."""
     return _TYPESTORE.types[message_type]
 
 
 def make_message(message_type: str, **fields: Any) -> Any:
-    """Returns a message of plain values.
+    """Returns a message made from plain values.
 
     Fields that are left out are zero or empty. A field that is a message takes
     that message, a mapping of its fields, or all of its fields in order.
@@ -50,7 +50,7 @@ def make_message(message_type: str, **fields: Any) -> Any:
 
 
 def _value(kind: tuple, given: Any) -> Any:
-    """Returns a value as a field of a kind has it; its zero for None."""
+    """Converts a value to the type of a message's field; None becomes zero."""
     node, inner = kind
     if node is Nodetype.NAME:
         if dataclasses.is_dataclass(given):

@@ -27,9 +27,10 @@ if TYPE_CHECKING:
 # Environment variable with the address of a scheduler; the name is Dask's.
 _ADDRESS_VARIABLE = "DASK_SCHEDULER_ADDRESS"
 
-# Takes a message of a job: the kind, the job's name, and values. Besides what
-# the job reports itself these are "started", "ended", and at last "result" with
-# the exception that it ended by, or None. It is called from any thread.
+# A function that takes a message about a job: the kind of message, the job's
+# name, and values. Besides the job's own reports, the kinds are "started",
+# "ended" and, at last, "result" with the exception that ended the job, or None.
+# It may be called from any thread.
 Listener = Callable[..., None]
 # How long a scheduler may take to answer [s].
 _ANSWER_TIMEOUT = 10.0
@@ -57,8 +58,8 @@ class Cluster:
     def slots(self) -> int | None:
         """Number of jobs that run at once; None if it is not fixed.
 
-        A foreign scheduler gets all jobs at once, since others may use it, and
-        it may start workers for them.
+        An existing scheduler gets all jobs at once: it may have other users,
+        and may start workers for the jobs.
         """
         return self.num_workers if self.scheduler is None else None
 
@@ -77,7 +78,7 @@ def choose_cluster(num_jobs: int | None, scheduler: str | None) -> Cluster:
     """Returns the cluster that the options --jobs and --scheduler name.
 
     Args:
-        num_jobs: `--jobs`: work on this machine, so many jobs at a time.
+        num_jobs: `--jobs`: number of jobs that run at a time, on this machine.
         scheduler: `--scheduler`. Without both options, the environment variable
             DASK_SCHEDULER_ADDRESS names the scheduler. Without that, the jobs
             run on this machine, one for each core.
@@ -102,7 +103,7 @@ def choose_cluster(num_jobs: int | None, scheduler: str | None) -> Cluster:
 
 
 class LocalWorkers:
-    """Runs jobs in processes of this machine, which end with it.
+    """Runs jobs in processes of this machine; they end with this process.
 
     No port is opened, since anyone who reached it could run programs here.
     """
@@ -166,9 +167,9 @@ class DaskWorkers:
             name,
             job,
             self._id,
-            # Up to the first "-", a kind whose duration Dask learns: only then
-            # it moves jobs from a worker to an idle one. A new key each time:
-            # an old one would stand for the old result.
+            # Dask learns the durations of tasks by the part of the key before
+            # the first "-", and only then moves tasks from a busy worker to an
+            # idle one. Each key is new: an old key would return the old result.
             key=f"{_KIND}-{name} {self._count}-{self._id}",
             priority=priority,
             pure=False,
@@ -216,7 +217,7 @@ class LostSchedulerError(InputError):
 
 @contextlib.contextmanager
 def dask_workers(address: str, listener: Listener) -> Iterator[DaskWorkers]:
-    """Yields the workers of the scheduler at an address.
+    """Yields the `DaskWorkers` of the scheduler at an address.
 
     Raises:
         InputError: if it does not answer.

@@ -1,9 +1,9 @@
 """Fingerprints: short texts of all that a result depends on.
 
-Two results of equal fingerprints are the same. Code counts by the modules
-that are imported, directly or not, found in their sources: a change of any
-other module leaves a result as it is. The libraries that compute count by
-their versions.
+Two results with equal fingerprints are the same. A fingerprint covers the
+modules that the code imports, directly or indirectly, so that changes to other
+modules leave results valid. Of the libraries that influence numbers, it covers
+the versions.
 """
 
 from __future__ import annotations
@@ -46,7 +46,7 @@ def code_digest(*modules: str, without: tuple[str, ...] = ()) -> str:
 
     Args:
         modules: full names; `<package>.*` stands for all modules in it.
-        without: packages that do not matter, in spite of being imported.
+        without: packages to leave out even if they are imported.
     """
     named: list[_Module] = []
     for name in modules:
@@ -68,13 +68,13 @@ def script_digest(path: Path) -> str:
 
 
 class _Module(NamedTuple):
-    """A module, found or not; its name starts from the folder `root`."""
+    """A module, which may not exist; its name is relative to folder `root`."""
 
     root: Path
     name: str
 
     def parents(self) -> Iterator[_Module]:
-        """Yields the packages that it is in."""
+        """Yields the packages that contain the module."""
         name = self.name
         while name := name.rpartition(".")[0]:
             yield _Module(self.root, name)
@@ -84,9 +84,10 @@ class _Imports(NamedTuple):
     """The imports of a module.
 
     Attributes:
-        names: (module, name in it or "") of each import that is run.
-        offered: name -> module, of imports for type checkers alone: in a
-            package they give the modules of names that are imported late.
+        names: (module, name imported from it or "") of each import that runs.
+        offered: name -> module, of imports under TYPE_CHECKING. In a package,
+            they tell which modules define the names that it imports on first
+            use.
     """
 
     names: tuple[tuple[str, str], ...]
@@ -104,7 +105,7 @@ def _source(module: _Module) -> Path | None:
 
 
 def _imported(module: _Module) -> Iterator[_Module]:
-    """Yields what a module imports, if it is ours or beside it."""
+    """Yields imported modules that are ours or beside the module."""
     for home, name in _imports_of(module).names:
         own = home.partition(".")[0] in _PACKAGES
         package = _Module(_ROOT if own else module.root, home)
@@ -211,7 +212,7 @@ def _names_of(node: ast.AST, package: str) -> Iterator[tuple[str, str]]:
 
 
 def _data_files(module: Path) -> Iterator[Path]:
-    """Yields the files beside a module, or in folders there, that it names."""
+    """Yields data files that a module names: beside it or in folders there."""
     text = module.read_bytes()
     for path in sorted(module.parent.iterdir()):
         if path.suffix == ".py" or path.name.encode() not in text:

@@ -18,11 +18,12 @@ from cns_drake.base.progress_bars import (
     shown_times,
 )
 
-# A job that takes less than this share of its cost was done before, and is no
-# measure of the pace.
+# A job that takes less than this share of its expected time was done before. It
+# is left out of the estimate of the pace.
 _REAL_SHARE = 0.05
-# The first scans of a run also load programs and cities. Work that should take
-# less than this [s], or than a tenth of all, is no measure of the pace either.
+# The first scans of a run also load programs and cities. The pace is not
+# estimated before work of this expected time [s], or of a tenth of the total,
+# is done.
 _LEAST_MEASURED = 1.0
 
 
@@ -49,7 +50,7 @@ class _Work:
 
 
 class TimeLeft:
-    """How long many jobs still take, by their costs and the pace so far.
+    """Estimate of the time left for jobs, from their costs and the pace.
 
     All times must be of one clock [s].
     """

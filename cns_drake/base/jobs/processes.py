@@ -2,9 +2,9 @@
 
 Each job has a process with its own interpreter. Its memory is freed with the
 process (Python systems in a Drake diagram are not freed otherwise), and a crash
-does not reach the other jobs. On Linux the processes are forked from one of
-`multiprocessing` that has imported what its parent had imported, which takes
-seconds. On other systems the libraries do not support forks.
+does not reach the other jobs. Imports take seconds. On Linux, job processes are
+therefore forked from the fork server of `multiprocessing`, which has imported
+the parent's modules. On other systems the libraries do not support forks.
 """
 
 from collections.abc import Callable, Iterable, Iterator
@@ -34,8 +34,7 @@ from cns_drake.base.process import look_seldom
 
 # How long a process may take to close its files after SIGTERM [s].
 PATIENCE = 30.0
-# File descriptors: a job prints to that of errors, whatever replaces it in
-# here.
+# File descriptors. Whatever a job prints goes to stderr.
 _STDOUT, _STDERR = 1, 2
 # How often a parent checks whether its job was cancelled [s].
 _LOOK_INTERVAL = 0.2
@@ -44,9 +43,10 @@ _DEATH_TIME = 1.0
 # Environment variable with the names of the modules to import beforehand.
 _MODULES_VARIABLE = "CNS_DRAKE_JOB_MODULES"
 
-# A job takes and frees the same arrays thousands of times. The C library would
-# return their memory each time: Dask's workers set it so, and its own guess may
-# be wrong. Fetching memory anew takes longer than filling it [bytes].
+# Settings of the C library's memory allocation [bytes]. A job allocates and
+# frees the same arrays thousands of times. By Dask's settings, and sometimes by
+# the library's own, their memory would go back to the system each time;
+# fetching it again takes longer than filling it.
 ALLOCATION = {
     "MALLOC_MMAP_THRESHOLD_": str(1 << 25),  # The largest that glibc takes.
     "MALLOC_TRIM_THRESHOLD_": str(1 << 28),
@@ -98,7 +98,7 @@ def run_process(
             kind, text = _listen(ours, on_message, is_wanted)
         finally:
             status = _end(process)
-            if status == -signal.SIGKILL:  # It has left its lock.
+            if status == -signal.SIGKILL:  # The killed process left its lock.
                 with interrupts.uninterrupted():
                     output = pickle.loads(job).output
                 if output is not None:
@@ -115,7 +115,7 @@ def _start(connection: Connection, job: bytes) -> BaseProcess:
         with _starting, _environment_of_jobs():
             process.start()
     except (EOFError, OSError) as error:
-        # A new one starts only when the dead one has gone.
+        # A new fork server starts only after the dead one has disappeared.
         time.sleep(_DEATH_TIME)
         raise ProcessDiedError("the process that starts jobs died") from error
     return process
@@ -123,7 +123,7 @@ def _start(connection: Connection, job: bytes) -> BaseProcess:
 
 @contextlib.contextmanager
 def _environment_of_jobs() -> Iterator[None]:
-    """Sets what a new interpreter finds, as its environment and its script."""
+    """Sets environment variables and `__main__` for a new interpreter."""
     modules = [
         name
         for name in list(sys.modules)
@@ -156,7 +156,7 @@ def _listen(
     on_message: Callable[..., None],
     is_wanted: Callable[[], bool],
 ) -> tuple[str, str]:
-    """Returns the last message of a job, "" if it just ended."""
+    """Returns kind and text of a job's last message; "" and "" if none came."""
     with contextlib.suppress(EOFError, ConnectionError):
         while is_wanted():
             if connection.poll(_LOOK_INTERVAL):
@@ -189,7 +189,7 @@ def _describe(status: int) -> str:
 
 
 def _work(connection: Connection, job: bytes) -> None:
-    """Runs a job; its whole process."""
+    """Runs a job: the main function of its process."""
     interrupts.interrupt_on_termination(once=True)
     # In its own session, which Ctrl-C does not reach: the interrupted parent
     # ends its jobs in good order.
@@ -242,7 +242,7 @@ def _run(job: bytes, reporter: Reporter) -> tuple[str, str]:
 
 
 def nothing_left(step: Step) -> bool:
-    """Returns whether a step is known to be done; False if unclear."""
+    """Returns whether a step is done; False if that cannot be determined."""
     try:
         return step.is_done()
     except InputError:
@@ -260,7 +260,7 @@ def end_with_parent() -> None:
 
 
 def _prepare(modules: Iterable[str]) -> None:
-    """Imports modules in the process from which those of jobs are forked."""
+    """Imports modules in the process from which job processes are forked."""
     # Python looks for modules in the current folder first.
     leave_out_folder(sys.path)
     look_seldom()

@@ -122,7 +122,7 @@ class _Run:
         self._faults: dict[str, str] = {}
 
     def run(self) -> None:
-        """Runs until nothing more can be done."""
+        """Runs jobs until none is left that can run."""
         self._submit_ready()
         try:
             while self._submitted:
@@ -217,7 +217,7 @@ class _Run:
             self._shown.note(f"{name}: failed: {fault}")
 
     def _stop(self) -> None:
-        """Ends what is running, and waits until it has closed its files."""
+        """Ends running jobs, and waits until they have closed their files."""
         self._submitted.clear()
         self._workers.stop()
         deadline = time.monotonic() + processes.PATIENCE

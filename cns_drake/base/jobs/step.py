@@ -1,7 +1,7 @@
-"""A piece of work: its inputs, what it does and the files it leaves.
+"""A piece of work, with its inputs and the files that it writes.
 
-A step leaves files and nothing else. An interrupted study goes on where it was
-when the same steps are run again, on any machine.
+A step has no other result than its files. An interrupted study goes on where it
+was when the same steps are run again, on any machine.
 """
 
 import abc
@@ -71,17 +71,17 @@ class Step(abc.ABC):
         """Returns whether all files of the step exist and are up to date.
 
         Raises:
-            InputError: that cannot be found out.
+            InputError: a file that decides this cannot be read.
         """
 
     @abc.abstractmethod
     def run(self, reporter: Reporter) -> None:
         """Does the work of the step.
 
-        It never leaves an incomplete file under a final name.
+        An incomplete file never has its final name.
 
         Raises:
-            InputError: it cannot be done.
+            InputError: the work cannot be done.
         """
 
     def made_of(self, inputs: Mapping[str, object]) -> dict[str, object]:
@@ -91,11 +91,11 @@ class Step(abc.ABC):
 
 @dataclass(frozen=True)
 class Steps(Step):
-    """Several steps one after the other, each unless it is done.
+    """Several steps run in order; steps that are done already are skipped.
 
     Attributes:
-        place: the file or folder that they write; see `Step.output`.
-        steps: the steps, of which none needs a later one.
+        place: the file or folder that the steps write; see `Step.output`.
+        steps: the steps, each after those that it needs.
     """
 
     place: Path

@@ -1,7 +1,8 @@
-"""The building stock: parametric buildings, and landmarks.
+"""Buildings of every archetype, drawn at random or fixed (landmarks).
 
-`archetypes.yaml` describes sizes, colours and parameters of each archetype. Its
-class, of the same name, builds it; `sample` draws the parameters and builds:
+`archetypes.yaml` describes the sizes, colours and parameters of each archetype.
+A class named like the archetype builds it. `sample` draws the parameters and
+then builds:
 
     footprint = shapely.box(-12, -9, 12, 9)     # front: the edge of least y
     model = sample("brick_block", footprint, 24.0, rng, name="block_003")
@@ -34,7 +35,7 @@ from cns_drake.city.geometry.structures import Model
 
 __all__ = ["ARCHETYPES", "sample"]
 
-# Name -> description.
+# Name of an archetype -> its description.
 ARCHETYPES = {
     name: Archetype(name=name, **values)
     for name, values in parse_yaml(
@@ -42,7 +43,7 @@ ARCHETYPES = {
     ).items()
     if name != "shared"
 }
-# Name -> class, such as `brick_block` -> `BrickBlock`.
+# Name of an archetype -> its class, such as `brick_block` -> `BrickBlock`.
 BUILDERS: dict[str, type[Building]] = {
     re.sub("(?<!^)(?=[A-Z])", "_", one.__name__).lower(): one
     for one in Building.__subclasses__()
@@ -58,24 +59,26 @@ def sample(
     name: str = "building",
     blind_edges: Collection[int] = (),
 ) -> Model:
-    """Draws one building of an archetype and builds it.
+    """Returns a building of an archetype, with parameters drawn at random.
 
     Args:
         archetype: key of `ARCHETYPES`.
         footprint: ground of the building, in the building's frame S [m]. The
             front is the edge between its first two corners; for a rectangle,
-            the edge of least y. Eaves, balconies and canopies reach out of the
+            the edge of least y. Eaves, balconies and canopies extend beyond the
             footprint by at most the archetype's `overhang`.
-        height: top of the building: parapet, ridge or spire; only roof
-            equipment and chimneys may rise above it [m].
+        height: height of the parapet, ridge or spire [m]. Only roof equipment
+            and chimneys may rise above it.
         rng: the only source of variation.
-        name: the structure's name, which its own meshes carry.
-        blind_edges: edges that nothing may cross, counter-clockwise from the
-            front. The building has plain walls there, or keeps a distance.
+        name: name of the structure, with which the names of its own meshes
+            begin.
+        blind_edges: edges that no part may cross, numbered counter-clockwise
+            from the front. At these edges the building has plain walls, or
+            keeps a distance.
 
     Raises:
-        ValueError: the archetype needs a rectangle and gets none, or the
-            footprint or the height is outside what it can fill.
+        ValueError: the archetype needs a rectangle but the footprint is none,
+            or it cannot be built with this footprint or height.
     """
     kind = ARCHETYPES[archetype]
     height = round(height, 3)

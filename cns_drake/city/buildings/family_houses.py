@@ -1,4 +1,4 @@
-"""Houses for a family or two: wings under gables or hips, porches, garages."""
+"""Houses for one or two families, with gables or hips, porches and garages."""
 
 import numpy as np
 
@@ -24,9 +24,10 @@ _SIDE_PITCH_M = 3.8
 def storeys_for(
     height: float, floor: float, span: float, pitch_deg: float
 ) -> int:
-    """Returns the storeys that bring a roof over `span` closest to a pitch.
+    """Returns the number of storeys that brings a roof closest to a pitch.
 
-    The ridge is at `height`, the ground floor at `floor` [m].
+    The roof spans `span` and fills the height between the storeys and its
+    ridge, which is at `height`. The ground floor is at `floor` [m].
     """
     wanted = wings.ridge_rise(span, pitch_deg)
     room = height - ROOF_M - floor - 0.15
@@ -37,13 +38,13 @@ def storeys_for(
 def wall_top_for(
     height: float, floor: float, span: float, storeys: int
 ) -> float:
-    """Returns the height of the walls below a ridge [m]."""
+    """Returns the height of the walls below a ridge at `height` [m]."""
     wanted = floor + storeys * STOREY_M + 0.15
     return min(wanted, height - ROOF_M - 0.08 * span)
 
 
 def _window_rows(p: Building, wing: Wing, storeys: int) -> Openings:
-    """Returns a box's windows, the sides' further apart."""
+    """Returns the windows of a wing; those of its sides are further apart."""
     openings, width = Openings(p, wing, p.boxes), p.window_width
     for edges, step in (((0, 2), p.window_pitch), ((1, 3), _SIDE_PITCH_M)):
         openings.add_rows(edges, p.floor, STOREY_M, storeys, step, width)
@@ -51,7 +52,7 @@ def _window_rows(p: Building, wing: Wing, storeys: int) -> Openings:
 
 
 def _close_box(p: Building, wing: Wing, openings: Openings) -> None:
-    """Adds the walls and the roof around a box's openings."""
+    """Adds the walls of a wing around its openings, and its roof."""
     openings.add_casings((0,), p.casing)
     bands = (Band(0.0, p.floor, -0.04),) if p.floor > 0 else ()
     low = wing.wall_top + 0.4
@@ -62,9 +63,9 @@ def _close_box(p: Building, wing: Wing, openings: Openings) -> None:
 def _garage_wing(
     kind: str, x0: float, x1: float, y0: float, y1: float, most: float
 ) -> Wing:
-    """Returns a garage no deeper than 6.5 m and no higher than `most`.
+    """Returns a garage at most 6.5 m deep and at most `most` high [m].
 
-    Its roof is `flat`, `gable`, `shed` or `hip`.
+    Its roof, `kind`, is `flat`, `gable`, `shed` or `hip`.
     """
     wall_top, span = 2.65, x1 - x0
     rise = {"flat": 0.5, "gable": 0.3 * span, "shed": 0.2 * span,
@@ -75,7 +76,7 @@ def _garage_wing(
 
 
 def _add_garage(p: Building, garage: Wing) -> None:
-    """Adds a garage, its door in front."""
+    """Adds a garage whose door is in front."""
     openings = Openings(p, garage, p.boxes)
     length = garage.x1 - garage.x0
     openings.add_garage_door(0, length / 2, min(length - 0.7, 4.9))
@@ -112,10 +113,11 @@ class DetachedHouse(Building):
         _add_chimney(self)
 
     def _lay_out(self) -> None:
-        """Places the boxes of the house.
+        """Chooses the wings of the house.
 
-        The first one is `main`, of `storeys`. In x `free` is the part of its
-        front that no wing hides; `ahead` is the room in front of it [m].
+        The first wing is `main`, with `storeys` storeys. `free` is the stretch
+        in x of its front that no other wing hides, and `ahead` the depth of
+        free ground in front of it [m].
         """
         x0, y0, x1, y1 = self.site.bounds
         left, right, back = x0 + _MARGIN, x1 - _MARGIN, y1 - _MARGIN
@@ -176,7 +178,7 @@ def _add_main(p: DetachedHouse) -> None:
 
 
 def _add_porch(p: DetachedHouse, free: bays.Span) -> None:
-    """Roofs the door; a `full` porch runs along the free front."""
+    """Adds a roof over the door; a `full` porch runs along the free front."""
     wall = p.main.wall(0)
     a, b = free
     door = (a + b) / 2
@@ -253,9 +255,9 @@ class Bungalow(Building):
         add_chimney(self, "chimney", spot, self.colours["base"], scale=scale)
 
     def _lay_out(self) -> None:
-        """Places the main box, wings in front of it and the carport.
+        """Chooses the main wing, the wings in front of it and the carport.
 
-        In x `free` is the part of its front that no wing hides [m].
+        `free` is the stretch in x of its front that no other wing hides [m].
         """
         x0, y0, x1, y1 = self.site.bounds
         left, right = x0 + _BUNGALOW_MARGIN, x1 - _BUNGALOW_MARGIN
@@ -369,7 +371,7 @@ class SemiDetached(Building):
 
 
 def _middles(p: SemiDetached, main: Wing) -> tuple[float, float]:
-    """Returns the x of the bays in the main wall's coordinates [m]."""
+    """Returns the middles of the two bays along the main wall [m]."""
     half = (main.x1 - main.x0) / 2
     # Doors take the middle or the ends; bays take the rest of each half.
     u = 0.6 * half if p.doors_inside else 0.36 * half
@@ -399,7 +401,7 @@ def _gabled_bays(p: SemiDetached, main: Wing) -> tuple[Wing, ...]:
 def _add_entrances(
     p: SemiDetached, main: Wing, openings: Openings, y0: float
 ) -> None:
-    """Adds the doors under one roof or two, and bays on the ground."""
+    """Adds the doors under one or two roofs, and bays on the ground floor."""
     wall = main.wall(0)
     half = wall.length / 2
     room = main.y0 - y0 - 0.1

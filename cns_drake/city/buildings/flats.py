@@ -1,4 +1,4 @@
-"""Flats around a court, around a stair, in a garden."""
+"""Blocks of flats: around a court, around a stair, and in a garden."""
 
 import itertools
 
@@ -28,7 +28,7 @@ from cns_drake.city.geometry import Mesh, MeshShape, merge_meshes
 
 
 class CourtBlock(Building):
-    """The court block: ranges around a court under a mansard with dormers."""
+    """The court block: wings around a court, a mansard roof with dormers."""
 
     def build(self) -> None:
         """Builds the block on a rectangle, its court open to the back."""
@@ -71,7 +71,7 @@ def _add_ground(p: CourtBlock, plan: np.ndarray) -> float:
 def _add_oriels(
     p: CourtBlock, plan: np.ndarray, z0: float, count: int, storey: float
 ) -> None:
-    """Bay windows that hang on the street front from the first floor up."""
+    """Adds bay windows to the street front, from the first floor upwards."""
     half, r = 0.75, p.oriel_reach
     outline = [(-half - 0.5, 0.0), (-half, -r), (half, -r), (half + 0.5, 0.0)]
     floor = Facade(storey, (Band(0.9, storey - 0.5, 0.14),))
@@ -122,7 +122,7 @@ def _mansard(
 
 
 def _dormer(p: CourtBlock, x: float, z0: float, z1: float) -> Mesh:
-    """A dormer whose back runs into the slope, in wall coordinates."""
+    """Returns a dormer whose back is in the roof, in wall coordinates."""
     low, high = z0 + 0.4, min(z0 + 2.4, z1 - 0.2)
     deep = p.mansard_inset
     body = [
@@ -133,7 +133,8 @@ def _dormer(p: CourtBlock, x: float, z0: float, z1: float) -> Mesh:
     ]
     walls = massing.skirt(body, body, low, high)
     lid = massing.box(x - 0.9, x + 0.9, -deep, 0.15, high, high + 0.2)
-    # The back wall is inside the roof; the sill stands before the window.
+    # Left out: the back wall, which is inside the roof. The sill stands in
+    # front of the window.
     front = Mesh(walls.vertices, walls.faces[1:])
     sill = massing.box(x - 0.8, x + 0.8, -0.6, 0.05, low - 0.15, low + 0.1)
     return merge_meshes(front, lid, sill)
@@ -173,7 +174,7 @@ class WalkUp(Building):
 
 
 def _bay_front(p: WalkUp, body: np.ndarray) -> tuple[np.ndarray, list[int]]:
-    """Returns the plan, its front with bays, and the walls with stairs."""
+    """Returns the outline with bays in front, and the walls with stairs."""
     (x0, y0), (x1, y1) = body[0], body[2]
     count = max(1, round((x1 - x0) / p.section))
     bounds = np.linspace(x0, x1, count + 1)
@@ -274,7 +275,7 @@ def _add_top(
 
 
 def _both(first: Layout, second: Layout) -> Layout:
-    """Returns the layout of two layouts that do not meet."""
+    """Returns a layout with the reliefs of two layouts that do not overlap."""
 
     def layout(edge: int, length: float) -> list[Relief]:
         return [*first(edge, length), *second(edge, length)]
@@ -357,7 +358,7 @@ def _add_house(
 def _add_verandas(
     p: GardenFlats, wing: Wing, storeys: int, storey: float, number: int
 ) -> None:
-    """Adds verandas left and right of the entrance, one on another."""
+    """Adds verandas above one another, left and right of the entrance."""
     wall = wing.wall(0)
     width = min(p.veranda_width, wall.length / 2 - 2.2)
     if width < 2.0:

@@ -1,4 +1,4 @@
-"""Halls under one wide roof: barns, sports halls, sheds at the water."""
+"""Halls under one wide roof: barns, sports halls and waterfront sheds."""
 
 import itertools
 
@@ -59,7 +59,7 @@ class Barn(Building):
 
 
 def _add_box(p: Barn, wing: Wing, boxes: list[Wing]) -> None:
-    """Adds the barn itself, with its doors, or the lean-to."""
+    """Adds the main box of the barn with its doors, or the lean-to."""
     openings = Openings(p, wing, boxes)
     head = round(min(2.0, wing.wall_top - 0.3), 2)
     window = bays.window(0.9, 1.1, head, _RECESS)
@@ -81,7 +81,8 @@ def _aisle(p: Barn, main: Wing, limits: tuple[float, float, float]) -> Wing:
     high = main.wall_top + 0.1
     low = max(1.9, high - 0.3 * p.aisle)
     high = max(high, low + 0.25)
-    # Behind the barn, or beside it: its roof falls away from there.
+    # The lean-to stands behind or beside the barn: the side to which its roof
+    # falls.
     area = (main.x0 + 1.0, main.y1 - 0.05, main.x1 - 1.0, back)
     if along_y:
         a, b = main.x1 - 0.05, right
@@ -186,7 +187,7 @@ class SportsHall(Building):
 
 
 def _halls(p: SportsHall, area: massing.Area, along_y: bool) -> list[Wing]:
-    """Returns one hall, or the two halves of a butterfly."""
+    """Returns the one hall, or the two halves under a butterfly roof."""
     x0, y0, x1, y1 = area
     top = p.height - 0.15
     span = (x1 - x0) if along_y else (y1 - y0)
@@ -247,7 +248,7 @@ def _add_frames(p: SportsHall, hall: Wing, halls: list[Wing]) -> None:
 
 
 def _add_annex(p: SportsHall, halls: list[Wing], y0: float) -> None:
-    """Adds the low front: an entrance between changing rooms."""
+    """Adds the low front part: an entrance between changing rooms."""
     x0, x1 = min(w.x0 for w in halls), max(w.x1 for w in halls)
     margin, h = 0.06 * (x1 - x0), p.annex_height
     area = (x0 + margin, y0 + 1.6, x1 - margin, halls[0].y0 + 0.05)
@@ -302,7 +303,7 @@ class WaterfrontHall(Building):
 
 
 def _walls(p: WaterfrontHall) -> walls.Facade:
-    """Tall windows between the piers, doors under every few of them."""
+    """Returns walls with tall windows between piers, and doors among them."""
     head = p.eaves - 1.0
     window = bays.window(
         p.pitch - 1.6, 2.2, head, p.window_depth, mullions=1,
@@ -324,7 +325,7 @@ def _walls(p: WaterfrontHall) -> walls.Facade:
 def _dock(
     p: WaterfrontHall, x0: float, x1: float, y0: float, front: float
 ) -> list[Mesh]:
-    """A loading platform under a canopy on posts, steps at both ends."""
+    """Returns a loading platform under a canopy, with steps at both ends."""
     high = p.dock_height
     a, b = x0 + 2.0, x1 - 2.0
     platform = massing.standing(a, b, y0 + 0.4, front, high, bottom=True)
@@ -362,7 +363,7 @@ def _roof(p: WaterfrontHall, plan: np.ndarray) -> Mesh:
 
 
 def _ridge(p: WaterfrontHall, x0: float, x1: float, y: float) -> list[Mesh]:
-    """A monitor along the ridge with ventilators at equal distances."""
+    """Returns a monitor along the ridge with evenly spaced ventilators."""
     top, low = p.height - 0.25, p.height - 1.1
     length = x1 - x0
     a, b = x0 + 0.15 * length, x1 - 0.15 * length
@@ -375,7 +376,7 @@ def _ridge(p: WaterfrontHall, x0: float, x1: float, y: float) -> list[Mesh]:
 
 
 def _sawtooth(x0: float, x1: float, rise: float) -> list:
-    """Upright glazing and the slopes that fall away from it."""
+    """Returns the roof line: upright glazing, and slopes that fall from it."""
     teeth = max(2, round((x1 - x0) / 7.0))
     step = (x1 - x0) / teeth
     line = [(x0, 0.0)]
@@ -385,7 +386,7 @@ def _sawtooth(x0: float, x1: float, rise: float) -> list:
 
 
 def _profile(roof: str, a: float, b: float, rise: float) -> list:
-    # The monitor on the ridge stands above the roof by what is kept here.
+    # Leaves room for the monitor, which rises above the ridge.
     rise -= 0.6
     half, middle = (b - a) / 2, (a + b) / 2
     if roof == "gable":

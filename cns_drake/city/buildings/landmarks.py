@@ -1,7 +1,7 @@
-"""Landmarks: archetypes whose buildings are data, a few models of each.
+"""Landmarks: archetypes whose buildings are a few fixed models from files.
 
-A folder of `landmark_models`, called after its archetype and a letter, has the
-meshes of one model as OBJ files, and `model.yaml`:
+Each folder of `landmark_models` is named after its archetype and a letter. It
+has the meshes of one model as OBJ files, and `model.yaml`:
 
     size: [50, 30]        # of its lot, about the origin [m]
     overhang: [1.5, 1.5]  # of its eaves beyond the lot, along x and y [m]
@@ -56,15 +56,15 @@ LANDMARKS = _folders()
 
 
 class Landmark(Building):
-    """One of the models of a landmark, stretched to the lot and the height."""
+    """One of the models of a landmark, stretched to the size of the lot."""
 
     def build(self) -> None:
-        """Adds the parts of the model on a rectangle."""
+        """Adds the parts of the model, on a rectangle."""
         x0, y0, x1, y1 = self.site.bounds
         folder = self.pick(LANDMARKS[self.kind.name])
         model = _read(folder)
         lot, size = np.array((x1 - x0, y1 - y0)), np.array(model.size)
-        # Overhanging parts must not reach further out of a wider lot.
+        # On a lot wider than the model, overhanging parts keep their reach.
         reach = np.where(lot > size, 2 * np.array(model.overhang), 0.0)
         stretch = np.array(
             [*(lot + reach) / (size + reach), self.height / model.height]
@@ -93,7 +93,10 @@ def _read(folder: Path) -> _Model:
 
 
 def _stretched(mesh: Mesh, along: np.ndarray) -> Mesh:
-    """Returns a stretched mesh, its foundation as deep as it was."""
+    """Returns a mesh stretched along x, y and z by the factors `along`.
+
+    What lies below the ground, its foundation, keeps its depth.
+    """
     vertices = mesh.vertices * along
     below = mesh.vertices[:, 2] < 0.0
     vertices[below, 2] = mesh.vertices[below, 2]

@@ -1,4 +1,4 @@
-"""Shops of one storey: a strip, a row of kiosks, a supermarket."""
+"""Shops of one storey: strips of shops, rows of kiosks and supermarkets."""
 
 import numpy as np
 
@@ -22,7 +22,7 @@ _FRONT_M, _BACK_M = 0.4, 0.1
 
 
 class ShopStrip(Building):
-    """The strip of shops: low flat-roofed units side by side, each its own."""
+    """The strip of shops: low flat-roofed units side by side, all different."""
 
     def build(self) -> None:
         """Builds the strip along the front of a rectangle."""
@@ -51,7 +51,7 @@ class ShopStrip(Building):
 
 
 def _top(p: ShopStrip, tall: bool) -> float:
-    """Returns the parapet of a unit that is not the highest [m]."""
+    """Returns the parapet's height for a unit that is not the highest [m]."""
     drop = p.steps * p.whole(0, 3)
     if tall or p.height < p.ground + 3.4:
         return round(max(p.height - drop, p.ground + 0.4), 2)
@@ -84,7 +84,7 @@ def _add_unit(p: ShopStrip, wing: Wing, tall: bool) -> None:
 
 
 def _add_parapet(p: ShopStrip, wing: Wing, cladding: str) -> None:
-    """Frames the parapet's front: a coping, or piers at its ends."""
+    """Adds a coping along the parapet's front, or piers at its ends."""
     wall, top = wing.wall(0), wing.top
     length = wall.length
     if p.chance(0.5):
@@ -279,7 +279,7 @@ def _add_dock(p: Supermarket, hall: Wing) -> None:
     """Adds a loading dock with its roof and a wall beside the hall."""
     wall = hall.wall(3 if p.dock_left else 1)
     reach = p.dock_depth - 0.4
-    # Near the back, whichever way the wall runs.
+    # At the back end of the side wall, whose direction depends on the side.
     a, b = (1.0, 10.0) if p.dock_left else (wall.length - 10.0, wall.length - 1)
     a, b = max(a, 0.5), min(b, wall.length - 0.5)
     posts = (
@@ -302,7 +302,7 @@ def _add_dock(p: Supermarket, hall: Wing) -> None:
 
 
 def _add_shelters(p: Supermarket, wall: details.WallFrame) -> None:
-    """Adds bent roofs for trolleys in front of the canopy's ends."""
+    """Adds curved shelters for trolleys in front of the canopy's ends."""
     y = p.canopy + 0.1
     for k in range(p.shelters):
         x = 3.2 if k == 0 else wall.length - 3.2

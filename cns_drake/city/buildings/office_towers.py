@@ -1,4 +1,4 @@
-"""Towers of offices, one of them under construction."""
+"""Office towers, one of them under construction."""
 
 from collections.abc import Callable, Sequence
 import itertools
@@ -23,7 +23,7 @@ from cns_drake.city.geometry import Mesh, MeshShape, merge_meshes
 
 
 class BandedTower(Building):
-    """The banded office tower: round corners, bands of glass, gardens."""
+    """The banded office tower: round corners, ribbon windows, garden floors."""
 
     def build(self) -> None:
         """Builds the tower on a rectangle."""
@@ -62,7 +62,7 @@ class BandedTower(Building):
 def _add_lobby(p: BandedTower, plan: np.ndarray) -> float:
     h = p.lobby
     pane = bays.ribbon(0.2, h - 0.9, 0.3, 0.16)
-    # Long walls may meet at right angles, where recesses must not touch.
+    # Long walls may meet at right angles, where their recesses must not touch.
     short, long = (bays.rhythm(3.2, [pane], m) for m in (0.1, 0.45))
 
     def glazing(edge: int, length: float) -> Sequence[Relief]:
@@ -84,9 +84,10 @@ def _add_garden(
     height: float,
     number: int,
 ) -> float:
-    """Adds an open floor: columns around a smaller glazed core.
+    """Adds an open garden floor; returns its top [m].
 
-    It ends at `plan`; `inner` is the smallest outline of the storeys above.
+    It has columns around a smaller glazed core. Its slab has the outline
+    `plan`; `inner` is the smallest outline of the storeys above.
     """
     limit = massing.inset_limit(inner)
     core = massing.inset(inner, min(2.8, 0.6 * limit))
@@ -109,9 +110,10 @@ def _add_garden(
 def _stack(
     p: BandedTower, plan: np.ndarray, counts: tuple[int, int, float], name: str
 ) -> Callable[[float, int], float]:
-    """Returns a function that places storeys of one outline.
+    """Returns a function that adds a stack of storeys with one outline.
 
-    It gets their bottom and the number of the stack, and returns their top [m].
+    The function gets the height of their bottom and the number of the stack,
+    and returns the height of their top [m].
     """
     groups, per_group, storey = counts
     step = per_group * storey
@@ -123,7 +125,7 @@ def _stack(
     facade = Facade(storey, bands, glass=(p.recess,)).stacked(per_group)
     pieces = [facade_mesh(plan, facade)]
     if p.fins > 0:
-        # They cross the sunshades and meet those above and below.
+        # The piers cross the sunshades and join the piers above and below.
         pieces.append(details.piers(
             plan, p.fins, 0.18, p.ledge + 0.1, 0.0, step,
             depth=p.recess + 0.05, margin=0.8,
@@ -152,7 +154,7 @@ def _stack(
 
 
 class GridTower(Building):
-    """The gridded office tower: deep frames, plant floors, offset slabs."""
+    """The gridded office tower: deep frames, louvred floors, offset slabs."""
 
     @property
     def margin(self) -> float:
@@ -179,7 +181,7 @@ class GridTower(Building):
 
 
 def _plan(p: GridTower, site: Site) -> np.ndarray:
-    """Returns the outline, its front first, a little within the site."""
+    """Returns the outline, slightly within the site; the front comes first."""
     x0, y0, x1, y1 = site.bounds
     base = massing.rectangle(x0 + 0.3, y0 + 0.3, x1 - 0.3, y1 - 0.3)
     if p.plan == "notched":
@@ -210,10 +212,10 @@ def _add_grid_tower_lobby(p: GridTower, plan: np.ndarray) -> float:
 def _add_grid(
     p: GridTower, plan: np.ndarray, z0: float, goal: float, part: str
 ) -> float:
-    """Adds storeys behind frames; returns their top [m]."""
+    """Adds storeys behind frames up to about `goal`; returns their top [m]."""
     unit = p.storey * (2 if p.double else 1)
     groups, per_group, height = tiers.divided(goal - z0, unit, 7)
-    # A part of the beam closes the storey's top.
+    # Part of the beam closes the storey at its top.
     low, high = round(p.beam - 0.25, 2), height - 0.25
     frame = bays.window(
         p.pitch - p.pier, low, high, p.recess, pier=p.pier / 2,
@@ -269,7 +271,7 @@ class UnfinishedTower(Building):
 
 
 def _columns(p: UnfinishedTower, plan: np.ndarray) -> list[massing.Point]:
-    """Returns where the columns stand."""
+    """Returns the places of the columns."""
     x0, y0, x1, y1 = massing.extent(plan)
     places = []
     for a, b in ((x0, x1), (y0, y1)):
@@ -280,12 +282,12 @@ def _columns(p: UnfinishedTower, plan: np.ndarray) -> list[massing.Point]:
 
 
 def _add_frame(p: UnfinishedTower, plan: np.ndarray) -> None:
-    """Adds a storey's columns and the slab on them, over and over."""
+    """Adds the columns and the slab of every storey."""
     columns, low = _columns(p, plan), p.storey - _SLAB_M
     top = p.storeys * p.storey
     pieces = [massing.post(x, y, 0.25, low + 0.02, 0.0) for x, y in columns]
     pieces.append(massing.prism(plan, low, p.storey, bottom=True))
-    # Columns of the storey to come, and their bars.
+    # The stubs of the next storey's columns, and their reinforcing bars.
     stubs = [massing.prism(plan, -massing.FOUNDATION_M, 0.05)]
     for x, y in columns:
         foot = (x - 0.25, x + 0.25, y - 0.25, y + 0.25)
@@ -306,7 +308,7 @@ def _add_frame(p: UnfinishedTower, plan: np.ndarray) -> None:
 
 
 def _add_core(p: UnfinishedTower, plan: np.ndarray) -> None:
-    """Adds the core with its doorways and the form that climbs on it."""
+    """Adds the core with its doorways, and the climbing formwork on it."""
     x0, y0, x1, y1 = massing.extent(plan)
     x, y = (x0 + x1) / 2, (y0 + y1) / 2
     a, b = p.core[0] * (x1 - x0) / 2, p.core[1] * (y1 - y0) / 2
@@ -338,7 +340,7 @@ def _add_cladding(p: UnfinishedTower, plan: np.ndarray) -> None:
     pitch = max(p.pitch / 2, max(np.ptp(plan, axis=0)) / 8)
     rows = bays.rhythm(pitch, [bays.window(pitch - 0.5, 0.7, head, 0.2)], 0.5)
     facade = Facade(p.storey, (Band(0.0, 0.2, -0.08),), rows, (0.2,))
-    # The panels' backs, seen from within, and their top edge.
+    # The backs of the panels, which are seen from within, and their top edges.
     backs = massing.skirt(plan[::-1], plan[::-1], 0.0, p.storey)
     rim = massing.skirt(outer, plan, p.storey, p.storey)
     walls = [facade_mesh(outer, facade), backs, rim]
@@ -367,7 +369,7 @@ def _add_props(p: UnfinishedTower, plan: np.ndarray) -> None:
 
 
 def _add_scaffolds(p: UnfinishedTower, plan: np.ndarray) -> None:
-    """Adds scaffolds: standards of full height, and lifts between them."""
+    """Adds scaffolds: uprights of full height, with platforms between them."""
     lifts = max(2, int(p.scaffold_top * p.storey / _LIFT_M))
     per_group = -(-lifts // 6)
     groups = -(-lifts // per_group)
@@ -417,14 +419,14 @@ def _add_hoist(p: UnfinishedTower, plan: np.ndarray) -> None:
 
 
 def _repeated(pieces: list[Mesh], count: int, step: float) -> Mesh:
-    """Returns `count` copies of some meshes above one another."""
+    """Returns meshes repeated `count` times, one above another."""
     storey = merge_meshes(*pieces)
     copies = (storey.moved((0.0, 0.0, k * step)) for k in range(count))
     return merge_meshes(*copies)
 
 
 def _scaffold_level(xs: list[float]) -> Mesh:
-    """One lift of a scaffold: boards, a guard rail, braces."""
+    """Returns one platform of a scaffold: boards, a guard rail and braces."""
     a, b, top = xs[0], xs[-1], _LIFT_M
     pieces = [massing.box(a, b, 0.55, 1.5, top - 0.12, top - 0.05)]
     for z in (0.5, 1.0):

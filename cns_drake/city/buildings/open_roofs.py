@@ -1,4 +1,4 @@
-"""Roofs on posts: gas stations, and pavilions in parks."""
+"""Buildings with open roofs on posts: gas stations and park pavilions."""
 
 import itertools
 import math
@@ -26,7 +26,7 @@ _RECESS = 0.18
 
 
 class GasStation(Building):
-    """The gas station: pumps under a canopy, a shop, a car wash and prices."""
+    """The gas station: pumps under a canopy, shop, car wash and price sign."""
 
     def build(self) -> None:
         """Builds the station on a rectangle, its forecourt in front."""
@@ -47,7 +47,7 @@ class GasStation(Building):
 
 
 def _rows(p: GasStation, canopy: np.ndarray) -> list[float]:
-    """Returns where the rows of pumps lie, in y [m]."""
+    """Returns the y of each row of pumps [m]."""
     (_, y0), (_, y1) = canopy[0], canopy[2]
     return [y0 + (k + 0.5) * (y1 - y0) / p.lanes for k in range(p.lanes)]
 
@@ -139,7 +139,7 @@ def _add_sign(p: GasStation, xs: bays.Span, y0: float) -> None:
 
 
 def _pump() -> Mesh:
-    """A double-sided pump with its screen and nozzles, on z = 0."""
+    """Returns a double-sided pump with screens and nozzles, on z = 0."""
     pieces = [massing.box(-0.38, 0.38, -0.22, 0.22, 0.0, 1.65, bottom=False)]
     for side in (-1.0, 1.0):
         y0, y1 = sorted((side * 0.2, side * 0.3))
@@ -167,13 +167,13 @@ class ParkPavilion(Building):
 
 
 def _add_round(p: ParkPavilion, center: massing.Point, reach: float) -> None:
-    """Adds a deck, posts or glazed walls, and a roof over a polygon."""
+    """Adds a polygonal deck, posts or glazed walls, and a roof."""
     phase = -math.pi / 2 + math.pi / p.sides
     count = max(2, round(p.floor / 0.17))
     radius = (reach - 0.45 * 0.3 * count) / math.cos(math.pi / p.sides)
     radius = min(radius, reach, 7.0)
     plan = massing.regular_polygon(radius, p.sides, center, phase)
-    # The front edge is the one that looks to -y: it ends at `phase`.
+    # The front edge, which faces -y, ends at the corner of `phase`.
     plan = np.roll(plan, 1, axis=0)
     p.add_to("stone", massing.prism(plan, -massing.FOUNDATION_M, p.floor))
     wall = details.WallFrame(plan, 0)
@@ -204,7 +204,7 @@ def _add_round(p: ParkPavilion, center: massing.Point, reach: float) -> None:
 
 
 def _add_glazing(p: ParkPavilion, plan: np.ndarray) -> None:
-    """Adds walls of glass over a parapet, a door in front."""
+    """Adds glass walls above a parapet, with a door in front."""
     window = bays.ribbon(0.8, p.eaves - 0.5, 0.12, 0.3)
     door = bays.window(1.5, 0.05, p.eaves - 0.5, 0.12, mullions=1)
     rows = bays.rhythm(2.0, [window], 0.1)
@@ -218,7 +218,7 @@ def _add_glazing(p: ParkPavilion, plan: np.ndarray) -> None:
 def _add_round_roof(
     p: ParkPavilion, center: massing.Point, plan: np.ndarray, z: float
 ) -> None:
-    """Adds a cone, straight or bent, with its lantern and finial."""
+    """Adds a conical or bell-shaped roof with its lantern and finial."""
     eaves = massing.inset(plan, -_EAVES_M * 0.8)
     top = p.height - 0.5
     head = top - 1.0 if p.lantern else top
@@ -253,7 +253,7 @@ def _add_round_roof(
 
 
 def _add_shelter(p: ParkPavilion, area: massing.Area) -> None:
-    """Adds a hipped or gabled roof on posts, tables and a hearth."""
+    """Adds a hipped or gabled roof on posts, with tables and a hearth."""
     x0, y0, x1, y1 = area
     a, b = x0 + _EAVES_M + 0.1, x1 - _EAVES_M - 0.1
     c, d = y0 + _EAVES_M + 0.1, y1 - _EAVES_M - 0.1

@@ -1,4 +1,4 @@
-"""Buildings for everybody: schools and chapels."""
+"""Public buildings: schools and chapels."""
 
 import numpy as np
 
@@ -71,7 +71,7 @@ def _add_classes(p: School, bar: np.ndarray) -> float:
 
 
 def _add_entrance(p: School, bar: np.ndarray, top: float) -> None:
-    """Adds a stair hall with glass, a canopy on posts and steps."""
+    """Adds a glazed stair hall with steps and a canopy on posts."""
     wall = details.WallFrame(bar, 0)
     share = 0.72 if p.mirrored else 0.28
     x, half = share * wall.length, min(p.entrance, 0.4 * wall.length) / 2
@@ -98,7 +98,7 @@ def _add_entrance(p: School, bar: np.ndarray, top: float) -> None:
 
 
 def _add_back_wing(p: School, bar: np.ndarray, back: float, top: float) -> None:
-    """Adds a lower wing behind, on the side away from the gymnasium."""
+    """Adds a lower wing at the back, on the side away from the gymnasium."""
     (a, _), (b, y) = bar[0], bar[2]
     wide = min(9.0, 0.4 * (b - a))
     x0 = b - wide - 0.3 if p.mirrored else a + 0.3
@@ -153,25 +153,26 @@ _THICK = 0.2
 
 
 class Chapel(Building):
-    """The chapel: a nave under a steep roof, a tower or a cote, a porch."""
+    """The chapel: a nave with a steep roof, a tower or bell cote, a porch."""
 
     def build(self) -> None:
         """Builds the chapel along the longer side of a rectangle.
 
-        Its door is in front, or on the left where it lies along x.
+        Its door is in front, or on the left if the longer side lies along x.
         """
         x0, y0, x1, y1 = self.site.bounds
         if y1 - y0 >= x1 - x0:
             _add_all(self, x1 - x0, y1 - y0)
             self.turn((x0, y0, 0.0), 0.0)
         else:
-            # The chapel is built along y, then turned a quarter to the right.
+            # The chapel is built along y, then turned by a quarter to the
+            # right.
             _add_all(self, y1 - y0, x1 - x0)
             self.turn((x0, y1, 0.0), -np.pi / 2)
 
 
 def _add_all(p: Chapel, width: float, length: float) -> None:
-    """Adds the chapel over 0..width, 0..length, its door at y = 0."""
+    """Adds the chapel on 0..width by 0..length, with its door at y = 0."""
     nave = _nave(p, width, length)
     boxes = [nave]
     tower = porch = None
@@ -295,7 +296,7 @@ def _spire(p: Chapel, tower: Wing) -> list[Mesh]:
             massing.spire(waist, center, knee, tip),
         ]
     elif p.spire == "broach":
-        # Eight sides on a square: a low pyramid with a needle through it.
+        # A low octagonal pyramid on the square tower, with a needle through it.
         ring = massing.regular_polygon(0.5 * tower.width, 8, center, np.pi / 8)
         pieces += [
             massing.spire(eaves, center, z + 0.2, z + 0.45 * (tip - z)),
@@ -357,7 +358,7 @@ def _porch(nave: Wing) -> Wing:
 
 
 def _annex(nave: Wing, width: float) -> Wing | None:
-    """Returns a vestry beside the choir, where there is room."""
+    """Returns a vestry beside the choir, or None if there is no room for it."""
     room = width - _CHAPEL_MARGIN - nave.x1, nave.x0 - _CHAPEL_MARGIN
     side = int(room[1] > room[0])
     if room[side] < 1.5:

@@ -1,4 +1,4 @@
-"""Houses in a row: single, as a terrace, above a shop."""
+"""Row houses: single ones, terraces, and houses above a shop."""
 
 import copy
 import math
@@ -36,9 +36,10 @@ def _add_unit(
     part: str = "",
     door_material: str = "accent",
 ) -> Wing:
-    """Adds a house on an area; its stoop in front stays free. Returns its box.
+    """Adds a house on an area, and returns its wing.
 
-    Names of its own visuals start with `part`.
+    Ground in front of the house stays free for the stoop. The names of its own
+    visuals start with `part`.
     """
     wing, storeys = _unit_box(p, area, blind)
     openings = Openings(p, wing)
@@ -68,7 +69,7 @@ def _add_unit(
 def _unit_box(
     p: Building, area: massing.Area, blind: frozenset[int]
 ) -> tuple[Wing, int]:
-    """Returns the walls under their roof, and the storeys above `p.floor`."""
+    """Returns the wing of a house, and its storeys above `p.floor`."""
     x0, y0, x1, y1 = area
     across = p.roof in ("front", "stepped")
     span = (x1 - x0) if across else (y1 - y0)
@@ -96,7 +97,7 @@ def _unit_box(
 def _add_entrance(
     p: Building, wing: Wing, openings: Openings, material: str
 ) -> float:
-    """Adds the door on its landing; returns where it is [m]."""
+    """Adds the door on its landing; returns its place along the wall [m]."""
     wall = wing.wall(0)
     inset = min(0.95, 0.3 * wall.length)
     x = inset if p.door_left else wall.length - inset
@@ -143,7 +144,7 @@ def _add_bay(
 
 
 def _add_roof(p: Building, wing: Wing) -> None:
-    """Adds a roof with its dormers, firewalls or steps."""
+    """Adds a roof with its dormers, firewalls or stepped gables."""
     low = wing.wall_top + 0.45
     attic = wings.attic_window(0.8, low, low + 1.1, wings.GLASS_M)
     wings.add_roof(p, wing, None if p.roof == "stepped" else attic)
@@ -160,13 +161,13 @@ def _add_roof(p: Building, wing: Wing) -> None:
 
 
 def _stepped_gable(wing: Wing, wall: details.WallFrame) -> list[Mesh]:
-    """Steps up to the middle of a gable."""
+    """Returns the steps that rise to the middle of a gable."""
     middle = wing.width / 2
     rise = wing.top + 0.4 - wing.wall_top
     count = max(3, round(rise / 0.9))
     pieces = []
     for k in range(count):
-        # Each step covers the slope below it.
+        # Each step is wide enough to hide the slope behind it.
         half = max(middle * (1.0 - k / count), 0.5)
         low = wing.wall_top + rise * (k / count) - 0.3
         top = wing.wall_top + rise * (k + 1) / count
@@ -176,7 +177,7 @@ def _stepped_gable(wing: Wing, wall: details.WallFrame) -> list[Mesh]:
 
 
 def _add_gable_windows(out: Assembly, wing: Wing) -> None:
-    """Puts windows into the steps, their frames in front of the wall."""
+    """Adds windows to a stepped gable, with frames in front of the wall."""
     x, z = wing.width / 2, wing.wall_top + 0.4
     spots = [x - 1.1, x + 1.1] if wing.top - wing.wall_top > 3.2 else [x]
     for edge in (0, 2):
@@ -190,7 +191,7 @@ def _add_gable_windows(out: Assembly, wing: Wing) -> None:
 
 
 def _add_stack(p: Building, wing: Wing, name: str) -> None:
-    """Stands a chimney on the roof of a house."""
+    """Adds a chimney to the roof of a house."""
     yaw = math.pi / 2
     if p.roof in ("front", "stepped"):
         x = wing.x0 + 0.3 * wing.width
@@ -206,7 +207,7 @@ def _add_stack(p: Building, wing: Wing, name: str) -> None:
 
 
 def _front_site(p: Building) -> tuple[float, float, frozenset[int]]:
-    """Returns where the sides of a house are, and those of neighbours.
+    """Returns the x of a house's left and right wall, and its blind edges.
 
     Eaves and cornices stay on the lot, except towards the neighbours.
     """
@@ -254,7 +255,7 @@ _DOORS = ("accent", "trim", "roof")
 
 
 class Terrace(Building):
-    """The terrace: a row of narrow houses, alike but not the same."""
+    """The terrace: a row of narrow houses, similar but not the same."""
 
     def build(self) -> None:
         """Builds the terrace along the front of a rectangle."""
@@ -276,9 +277,9 @@ class Terrace(Building):
             )  # fmt: skip
 
     def _varied(self, k: int) -> Building:
-        """Returns one house: single things differ, the rest stays.
+        """Returns the k-th house, which differs from its neighbours in details.
 
-        It gathers what it is made of where the terrace does.
+        Its parts and meshes are collected in those of the terrace.
         """
         house: Any = copy.copy(self)
         if self.chance(self.crossed) and k > 0:

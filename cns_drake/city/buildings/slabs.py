@@ -1,4 +1,4 @@
-"""Slabs of flats: loggias, balconies, galleries."""
+"""Slab blocks of flats, with loggias, balconies or galleries."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ _ROOF_ITEMS = ("tank", "tank", "mast", "vents", "stair_house", "dish")
 
 
 class SlabTower(Building):
-    """The concrete slab: loggias, a stair tower, pilotis, a low pavilion."""
+    """The concrete slab block: loggias, a stair tower, pillars, a pavilion."""
 
     def build(self) -> None:
         """Builds the slab along x on a rectangle."""
@@ -60,7 +60,7 @@ class SlabTower(Building):
 
 
 def _add_hall(p: SlabTower, slab: np.ndarray) -> float:
-    """A glazed hall behind rows of pillars that carry the slab."""
+    """Adds a glazed hall behind the slab's pillars; returns its top [m]."""
     h = p.ground_height
     hall = massing.inset(slab, (2.4, 0.4, 2.4, 0.4))
     pane = bays.ribbon(0.5, h - 0.6, 0.25, 0.3)
@@ -92,14 +92,14 @@ def _storey(p: SlabTower, storey: float) -> Facade:
 
 
 def _add_stair(p: SlabTower, shaft: np.ndarray) -> None:
-    """A shaft beside the slab, lit by a slit from the ground to its top."""
+    """Adds a stair tower beside the slab, with a window slit of full height."""
     slit = bays.window(1.2, 1.0, p.height - 2.0, 0.3)
     walls = tiers.shaft_walls(p.height, slit, slit, 2.0, (0.5, 0.15))
     p.add("stairs", massing.foundation(shaft), tiers.block(shaft, walls, 0.0))
 
 
 def _add_pavilion(p: SlabTower, xs: bays.Span, ys: bays.Span) -> None:
-    """A low glazed pavilion in the open part of the site."""
+    """Adds a low glazed pavilion in the open part of the site."""
     width = 0.55 * (xs[1] - xs[0])
     left = xs[0] if p.stair_left else xs[1] - width
     depth = min(ys[1] - ys[0], 14.0)
@@ -119,7 +119,7 @@ _FRONT_M = 1.7
 
 
 class BalconyFlats(Building):
-    """The white slab of flats: stacks of balconies, staggered sections."""
+    """The white slab block: stacks of balconies, staggered sections."""
 
     def build(self) -> None:
         """Builds the slab along the front of a rectangle."""
@@ -160,7 +160,7 @@ class BalconyFlats(Building):
 
 
 def _sections(p: BalconyFlats, site: Site) -> list[np.ndarray]:
-    """Returns the rectangles of the sections, left to right."""
+    """Returns the outlines of the rectangular sections, left to right."""
     x0, y0, x1, _ = site.bounds
     bounds = np.round(np.linspace(x0, x1, p.sections + 1), 2).tolist()
     fronts = [y0 + _FRONT_M + p.stagger * (k % 2) for k in range(p.sections)]
@@ -177,7 +177,7 @@ def _window(p: BalconyFlats, storey: float, sill: float = 0.85) -> bays.Bay:
 def _facade(
     p: BalconyFlats, storey: float, walls: list[_Front], *, ground: bool = False
 ) -> Facade:
-    """Returns a storey; the ground floor has doors and a plinth."""
+    """Returns a storey's walls; the ground floor has doors and a plinth."""
     window, french = _window(p, storey), _window(p, storey, 0.12)
     slit = bays.window(1.3, 0.3, storey, p.recess)
     door = bays.window(1.6, 0.0, 2.3, p.recess, mullions=1)
@@ -211,7 +211,7 @@ def _add_balconies(
     z0: float,
     stack: tuple[int, int, float],
 ) -> None:
-    """Places the balconies of a few storeys above one another."""
+    """Adds the balconies of several storeys, one above another."""
     groups, per_group, storey = stack
     pieces: list[Mesh] = []
     joined = p.balconies == "ribbons"
@@ -234,7 +234,11 @@ def _add_balconies(
 def _stair(
     p: BalconyFlats, front: _Front, top: float, highest: bool
 ) -> list[Mesh]:
-    """A canopy at the door, and the stair where it stands out."""
+    """Returns a canopy over the door, and what shows of the stair.
+
+    That is a stair tower in front of the wall, or on the highest section a
+    house on the roof.
+    """
     x, wall = front.stair, front.wall
     pieces = [
         wall.box(x - 1.5, x + 1.5, -0.05, 1.4, 2.55, 2.75),
@@ -254,7 +258,7 @@ def _stair(
 
 
 def _outline(sections: list[np.ndarray]) -> tuple[np.ndarray, list[int]]:
-    """Returns the outline of all sections, and their front edges."""
+    """Returns the outline of all sections, and which edges are in front."""
     points: list[np.ndarray] = []
     fronts = []
     for section in sections:
@@ -270,7 +274,7 @@ def _outline(sections: list[np.ndarray]) -> tuple[np.ndarray, list[int]]:
 
 
 class _Front:
-    """The front of a section: bays, the stair's bay, and balcony bays."""
+    """The front wall of a section, with the bays of stair and balconies."""
 
     def __init__(self, p: BalconyFlats, plan: np.ndarray, edge: int) -> None:
         self.edge = edge
@@ -288,14 +292,14 @@ class _Front:
 
     @property
     def stair(self) -> float:
-        """The stretch of the stair along the wall [m]."""
+        """Middle of the stair's bay along the wall [m]."""
         return sum(self.cells[self.middle]) / 2
 
 
 def _runs(
     cells: list[bays.Span], spots: list[int], joined: bool
 ) -> list[bays.Span]:
-    """Returns the stretches with balconies, neighbours joined or not."""
+    """Returns stretches with balconies; neighbours are merged if `joined`."""
     runs: list[tuple[float, float]] = []
     for k in spots:
         a, b = cells[k]
@@ -307,7 +311,7 @@ def _runs(
 
 
 class GalleryFlats(Building):
-    """The bar of flats: galleries before the doors, loggias behind."""
+    """The gallery block: walkways along the doors, loggias at the back."""
 
     def build(self) -> None:
         """Builds the bar along x on a rectangle."""
@@ -376,7 +380,7 @@ def _gallery_flats_storey(
 def _add_galleries(
     p: GalleryFlats, slab: np.ndarray, edge: int, stack: tuple[int, int, float]
 ) -> None:
-    """Adds one gallery per storey, posts through all, and screens."""
+    """Adds a gallery to each storey, with continuous posts, and screens."""
     wall = details.WallFrame(slab, edge)
     end, reach = wall.length, p.gallery - 0.05
     groups, per_group, storey = stack

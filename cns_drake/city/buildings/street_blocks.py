@@ -1,4 +1,4 @@
-"""Blocks along a street: shops below, flats or offices above."""
+"""Street blocks: shops on the ground floor, flats or offices above."""
 
 from collections.abc import Sequence
 
@@ -17,7 +17,7 @@ from cns_drake.city.facades import (
 )
 from cns_drake.city.geometry.mesh import Mesh
 
-# Higher houses have their fire stairs inside.
+# Taller houses have their fire stairs inside.
 _MOST_FLIGHTS = 8
 
 
@@ -176,7 +176,7 @@ def _add_corner_building_shops(
 def _add_first_floor(
     p: CornerBuilding, plan: np.ndarray, blind: frozenset[int], z0: float
 ) -> float:
-    """The tall main floor: arched windows, balconies in front of some."""
+    """Adds the tall main floor with arched windows; returns its top [m]."""
     h = p.first_height
     arched = bays.arched(p.window_width, 0.5, h - 1.6, p.recess)
     plain = bays.window(p.window_width, 0.5, h - 0.9, p.recess)
@@ -206,7 +206,7 @@ def _center(p: CornerBuilding, plan: np.ndarray) -> np.ndarray:
 
 
 def _dome(p: CornerBuilding, plan: np.ndarray, z0: float) -> list[Mesh]:
-    """A drum over the corner under a dome, a cone or an open lantern."""
+    """Returns a drum over the corner with a dome, cone or open lantern."""
     center, r = _center(p, plan), 0.62 * p.radius
     top, height = p.height, p.height - z0
     drum_top = round(z0 + 0.4 * height, 2)
@@ -237,15 +237,15 @@ def _dome(p: CornerBuilding, plan: np.ndarray, z0: float) -> list[Mesh]:
 
 
 def _is_front(plan: np.ndarray, edge: int) -> bool:
-    """Whether a wall looks to the front or belongs to the curve."""
+    """Returns whether a wall faces the front or is part of the round corner."""
     along = plan[(edge + 1) % len(plan)] - plan[edge]
     return edge == 0 or (along[0] > 0.1 and abs(along[1]) > 0.1)
 
 
 class Office(Building):
-    """The mid-rise office: shops and a lobby below, window bands, a penthouse.
+    """The mid-rise office: a lobby and shops, window bands, a penthouse.
 
-    `style` is `ribbon` (bands of glass), `frame` (deep square frames) or
+    `style` is `ribbon` (ribbon windows), `frame` (deep square frames) or
     `grooves` (piers from the first floor to the top).
     """
 
@@ -313,7 +313,7 @@ def _add_windows(p: Office, z0: float, goal: float) -> float:
 
 
 def _add_penthouse(p: Office, outline: np.ndarray, roof: float) -> float:
-    # It starts on the roof; its own parapet ends at the full height.
+    # The penthouse starts on the roof; its parapet ends at the full height.
     height = round(p.height - roof, 3)
     eaves = height - 0.9
     bands = (Band(0.9, eaves - 0.3, 0.3), Band(eaves, eaves + 0.3, -0.7))
@@ -350,7 +350,7 @@ class CornerStore(Building):
 
 
 def _plan(p: CornerStore, rectangle: np.ndarray) -> tuple[np.ndarray, int]:
-    """Returns the five corners, and the edge across the cut-off one."""
+    """Returns the five corners, and which edge cuts off the corner."""
     (x0, y0), (x1, y1) = rectangle[0], rectangle[2]
     c = p.cut
     if p.corner == 1:
@@ -398,7 +398,7 @@ def _add_parapet(
     z0: float,
     blind: frozenset[int],
 ) -> None:
-    """Adds the cornice and the roof, higher above the corner."""
+    """Adds the cornice and the roof; the parapet is higher at the corner."""
     rim = round(p.height - p.raised - z0, 3)
     bands = tiers.cornice(rim - 0.1, p.cornice, thickness=0.45, steps=2)
     crown = Facade(rim, bands, plain=blind)
@@ -410,7 +410,7 @@ def _add_parapet(
 
 
 def _corner_sign(p: CornerStore, wall: details.WallFrame) -> list[Mesh]:
-    """A canopy above the door and an upright sign over it."""
+    """Returns a canopy above the door and an upright sign over it."""
     middle, z = wall.length / 2, p.ground - 0.55
     half = 0.5 * wall.length - 0.25
     lid = (middle - half, middle + half, -0.05, 0.9, z - 0.25, z)

@@ -1,4 +1,4 @@
-"""Towers that step back: setbacks, podiums, a hotel behind its forecourt."""
+"""Towers with setbacks or podiums, and a hotel behind its forecourt."""
 
 import math
 
@@ -154,7 +154,7 @@ _HOTEL_ROOF_ITEMS = ("cooling_tower", "air_handler", "mast", "vents", "ac_unit")
 
 
 class Hotel(Building):
-    """The hotel: balconies along rounded walls, a forecourt, a rooftop bar."""
+    """The hotel: balconies along rounded walls, a forecourt, a roof-top bar."""
 
     def build(self) -> None:
         """Builds the hotel on a rectangle, behind a forecourt."""
@@ -185,7 +185,7 @@ def _add_hotel_lobby(p: Hotel, plan: np.ndarray, y0: float) -> float:
     glazing = bays.rhythm(p.pitch, [pane], margin=0.5)
     layout = bays.with_door(glazing, bays.entrance(4.4, 3.4, 1.5), 6.4)
     bands = (Band(0.0, 0.4, -0.1), Band(h - 0.8, h - 0.3, -0.4))
-    # The drive-in roof stands on four pillars in the forecourt.
+    # The canopy of the drive stands on four pillars in the forecourt.
     middle = float(np.mean(plan[:2, 0]))
     front = float(plan[0, 1])
     left, right, z = middle - 6.0, middle + 6.0, 4.2
@@ -222,7 +222,7 @@ def _add_rooms(p: Hotel, plan: np.ndarray, z0: float, goal: float) -> float:
 
 
 def _add_sign(p: Hotel, plan: np.ndarray) -> None:
-    """A blade sign up the front, at one end of the balconies."""
+    """Adds an upright sign to the front, at one end of the balconies."""
     front = details.WallFrame(plan, 0)
     x = 0.4 if p.sign_left else front.length - 0.4
     low, high = p.ground_height + 3.0, 0.7 * p.height
@@ -238,7 +238,7 @@ class PodiumTower(Building):
     """The podium tower: a block of shops with a tower set back on its roof."""
 
     def build(self) -> None:
-        """Builds podium and tower on a rectangle."""
+        """Builds the podium and the tower on a rectangle."""
         (x0, y0, x1, y1), base = self.site.bounds, self.site.outline
         top, walls = _add_shops(self), _podium_storey(self)
         top = tiers.add_storeys(
@@ -308,7 +308,7 @@ def _add_tower(p: PodiumTower, plan: np.ndarray, z0: float) -> None:
 
 
 def _add_garden(p: PodiumTower, tower: np.ndarray, z: float) -> None:
-    """Planters and a pergola on the widest strip of the podium's roof."""
+    """Adds planters and a pergola to the podium roof's widest free strip."""
     x0, y0, x1, y1 = p.site.bounds
     (tx0, ty0), (tx1, ty1) = tower[0], tower[2]
     strips = (
@@ -329,7 +329,7 @@ def _add_garden(p: PodiumTower, tower: np.ndarray, z: float) -> None:
 
 
 def _garden(length: float, width: float) -> Mesh:
-    """Planters along x, behind them the posts and beams of a pergola."""
+    """Returns planters along x, with a pergola behind them."""
     planters = (
         (u * length, (u + 0.12) * length, 0.0, 1.2, -0.1, 0.8)
         for u in (0.1, 0.32, 0.54, 0.76)

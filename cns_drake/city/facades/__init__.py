@@ -1,4 +1,4 @@
-"""One grammar of walls, windows, doors, shop fronts, balconies and roofs."""
+"""What facades are made of: walls, windows, doors, balconies and roofs."""
 
 from cns_drake.city.facades.assembly import Assembly, Building, Rgb, Site
 from cns_drake.city.facades.details import add_railing

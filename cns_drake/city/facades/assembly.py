@@ -1,4 +1,4 @@
-"""What every building is made from: ground, random draws, collected parts."""
+"""The base class of all buildings: its site, random draws, collected parts."""
 
 from __future__ import annotations
 
@@ -39,9 +39,9 @@ class Site:
     """The ground of a building, a simple polygon in the building's frame S [m].
 
     The front is the edge between the first two corners; for a rectangle, the
-    edge of least y. Edges are numbered counter-clockwise, from the front on.
-    `blind_edges` are built against a neighbour. The names of the building's own
-    meshes begin with `<name>_`.
+    edge of least y. Edges are numbered counter-clockwise from the front, which
+    is 0. `blind_edges` are built against a neighbour. The names of the
+    building's own meshes begin with `<name>_`.
     """
 
     footprint: Polygon
@@ -50,18 +50,19 @@ class Site:
 
     @property
     def outline(self) -> np.ndarray:
-        """The (N, 2) corners, counter-clockwise, the front edge first."""
+        """The (N, 2) corners [m], counter-clockwise from the front edge."""
         exterior = self.footprint.exterior
         points = np.array(exterior.coords[:-1], dtype=float)
         if not exterior.is_ccw:
             # After the reversal the former first edge runs from 1 to 0.
             points = np.roll(points[::-1], 2, axis=0)
         if self.is_rectangle:
-            # The corner from which the edge of least y starts.
+            # The corner from which the edge of least y starts: the lowest,
+            # leftmost one.
             start = int(np.lexsort((points[:, 0], points[:, 1]))[0])
             points = np.roll(points, -start, axis=0)
-            # Whole centimetres, never outside the footprint, keep the meshes'
-            # text short.
+            # Whole centimetres make the text of the meshes shorter. They are
+            # rounded inwards, so that they never lie outside the footprint.
             low, high = points[0], points[2]
             low = np.ceil(np.round(100.0 * low, 3)) / 100.0
             high = np.floor(np.round(100.0 * high, 3)) / 100.0
@@ -98,9 +99,10 @@ class Site:
         return [k for k, e in flanks.items() if not e & self.blind_edges]
 
     def blind_in(self, number: int, count: int) -> frozenset[int]:
-        """Returns the blind sides of one of `count` units in a row.
+        """Returns the blind edges of unit `number` of `count` units in a row.
 
-        Units are numbered from left to right.
+        Units are numbered from left to right. A unit is blind towards its
+        neighbours in the row, and at the ends of the row where the site is.
         """
         outer = {3: number == 0, 1: number + 1 == count}
         return frozenset(
@@ -110,9 +112,10 @@ class Site:
         )
 
     def detached(self, gap: float) -> Site:
-        """Returns the site with its blind edges moved in by `gap`.
+        """Returns the site with its blind edges moved inwards by `gap` [m].
 
-        A building on it stands free, overhangs included.
+        With a gap at least as wide as its overhangs, a building on this site
+        touches no neighbour.
         """
         outline = self.outline
         gaps = [gap * (k in self.blind_edges) for k in range(len(outline))]
@@ -141,7 +144,7 @@ class Site:
 
 
 class Archetype(BaseModel, frozen=True, extra="forbid"):
-    """The description of a kind of building: a `name` in `archetypes.yaml`.
+    """An archetype: the fields of one entry of `archetypes.yaml`.
 
     That file explains the fields.
     """
@@ -158,20 +161,20 @@ class Archetype(BaseModel, frozen=True, extra="forbid"):
     parameters: dict[str, Any] = {}
 
 
-# Plinths and pilasters may stand this far outside the footprint; above
-# `HEAD_ROOM_M` the archetype's own overhang holds.
+# Plinths and pilasters may stand this far outside the footprint [m]. Above
+# `HEAD_ROOM_M`, the archetype's own overhang applies.
 GROUND_OVERHANG_M = 0.35
 HEAD_ROOM_M = 2.3
 
 
 @dataclass
 class Assembly:
-    """Collects the parts and meshes of one building: a builder fills it.
+    """Collects the parts and meshes of one building, which a builder adds.
 
-    Meshes become a part of their own (`add`), or are gathered by material
-    (`paint`, `add_to`). Each material becomes one part, so that a small
+    `add` makes one part of the meshes it gets. `paint` and `add_to` collect
+    meshes by material instead: each material becomes one part, so that a
     building of many small pieces has few visuals. Parts without a colour of
-    their own have `rgb`.
+    their own have the colour `rgb`.
     """
 
     site: Site
@@ -186,36 +189,36 @@ class Assembly:
     def uniform(
         self, low: float, high: float, digits: int | None = None
     ) -> float:
-        """Draws a number, rounded to decimal digits if these are given."""
+        """Returns a random number, rounded to `digits` decimals if given."""
         value = float(self.rng.uniform(low, high))
         return value if digits is None else round(value, digits)
 
     def whole(self, low: int, high: int) -> int:
-        """Draws a whole number from `low` to below `high`."""
+        """Returns a random integer from `low` to below `high`."""
         return int(self.rng.integers(low, high))
 
     def chance(self, share: float) -> bool:
-        """Draws True with the given probability."""
+        """Returns True with the probability `share`, and otherwise False."""
         return bool(self.rng.random() < share)
 
     def pick(self, choices: Sequence[T]) -> T:
-        """Draws one of the choices, all equally likely."""
+        """Returns one of the choices at random, all equally likely."""
         return pick(self.rng, choices)
 
     def some_of(self, words: str, low: int, high: int) -> list[str]:
-        """Returns a random number of words from the beginning of a text.
+        """Returns the first few of the words in a text, their number at random.
 
-        The number of words is from `low` to below `high`.
+        The number of words is at least `low` and less than `high`.
         """
         return words.split()[: self.whole(low, high)]
 
     def add(
         self, part: str, *meshes: Mesh, z: float = 0.0, rgb: Rgb | None = None
     ) -> None:
-        """Merges meshes into one mesh of this building, at a height.
+        """Adds meshes as one part with one mesh, raised by `z` [m].
 
-        Meshes without any faces (pilasters on walls too short for them) are
-        left out.
+        Meshes without any faces (such as pilasters on walls too short for them)
+        are left out.
         """
         mesh = merge_meshes(*meshes)
         if mesh.faces:
@@ -223,24 +226,24 @@ class Assembly:
             self.place(part, shape, (0.0, 0.0, z), rgb=rgb)
 
     def paint(self, **colours: Rgb) -> None:
-        """Names the materials of this building, with their colours."""
+        """Sets the colours of the building's materials, by name."""
         self._colours = colours
         self._pieces = {material: [] for material in colours}
 
     def add_to(self, material: str, *meshes: Mesh) -> None:
-        """Adds meshes to the parts with a material."""
+        """Adds meshes to the part of a material."""
         if material not in self._pieces:
             raise ValueError(f"unknown material {material}")
         self._pieces[material] += meshes
 
     def turn(self, translation: ArrayLike, yaw: float) -> None:
-        """Rotates the whole building about z by `yaw`, then translates it."""
+        """Rotates the building about z by `yaw` [rad], and translates it."""
         for material, pieces in self._pieces.items():
             mesh = merge_meshes(*pieces).moved(translation, yaw)
             self._pieces[material] = [mesh]
 
     def finish(self, footprint: BaseGeometry) -> Model:
-        """Returns the building, with a part for each material in use."""
+        """Returns the finished building, with one part for each material."""
         for material, pieces in self._pieces.items():
             self.add(material, *pieces, rgb=self._colours[material])
         return Model(tuple(self.parts), self.meshes, footprint)
@@ -262,13 +265,13 @@ class Assembly:
         count: int,
         rgb: Rgb | None = None,
     ) -> None:
-        """Adds a mesh and places it several times, one above another.
+        """Adds a mesh, and places several copies of it above one another.
 
         Args:
-            part: stem of the visuals' names.
+            part: beginning of the visuals' names.
             mesh: the mesh in the building's frame [m].
             z0: height of the lowest copy [m].
-            step: distance between two copies [m].
+            step: vertical distance from one copy to the next [m].
             count: number of copies.
             rgb: colour; by default the building's.
         """
@@ -292,7 +295,7 @@ class Assembly:
         yaw: float = 0.0,
         rgb: Rgb | None = None,
     ) -> None:
-        """Places a shape as one visual.
+        """Adds a part: one visual of a shape, at a place.
 
         Args:
             part: name of the visual.
@@ -307,10 +310,10 @@ class Assembly:
 
 
 class Building(Assembly, abc.ABC):
-    """A building of an archetype: it draws its parameters, then builds itself.
+    """A building of an archetype: draws its parameters and builds itself.
 
-    Functions that add something to a building take the building as `p`. They
-    read its parameters, and add to it what they make. Only roof equipment and
+    Functions that add something to a building take the building as `p`, read
+    its parameters, and add parts and meshes to it. Only roof equipment and
     chimneys may rise above its `height` [m].
     """
 
@@ -321,7 +324,7 @@ class Building(Assembly, abc.ABC):
         height: float,
         rng: np.random.Generator,
     ) -> None:
-        """Draws the parameters, then the colours."""
+        """Draws the parameters and then the colours of the building."""
         super().__init__(site, rng)
         self.kind, self.height = kind, height
         draws = (self.uniform, self.whole, self.chance, self.pick, self.some_of)
@@ -352,4 +355,4 @@ class Building(Assembly, abc.ABC):
 
     @abc.abstractmethod
     def build(self) -> None:
-        """Adds all parts of the building to its assembly."""
+        """Adds all parts of the building."""

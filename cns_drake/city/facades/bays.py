@@ -1,7 +1,8 @@
-"""The vocabulary of facades: windows, shop fronts, doors, and their rhythm.
+"""Bays of facades (windows, shop fronts, doors), and layouts that repeat them.
 
-A bay fills a stretch x0..x1 of a wall with relief; a layout repeats bays
-along the walls of a storey. All heights are above the storey's floor [m].
+A bay is a function that returns the reliefs on a stretch x0..x1 of a wall. A
+layout repeats bays along the walls of a storey. All heights are above the
+storey's floor [m].
 """
 
 from collections.abc import Callable, Sequence
@@ -9,12 +10,12 @@ from collections.abc import Callable, Sequence
 from cns_drake.city.facades.walls import Arch, Layout, Patch, Relief
 
 Bay = Callable[[float, float], list[Relief]]
-# Start and end of a stretch [m].
+# Start and end of a stretch of a wall [m].
 Span = tuple[float, float]
 
 
 def _cm(value: float) -> float:
-    """Rounds to whole centimetres, which keeps the meshes' files small."""
+    """Returns a length rounded to centimetres, which keeps mesh files small."""
     return round(value, 2)
 
 
@@ -24,7 +25,7 @@ def _centred(x0: float, x1: float, width: float) -> tuple[float, float]:
 
 
 def blank(x0: float, x1: float) -> list[Relief]:
-    """A bay of plain wall."""
+    """Returns no reliefs: a bay of plain wall."""
     return []
 
 
@@ -43,15 +44,15 @@ def window(
     """Returns a bay with a recessed window.
 
     Args:
-        width: width of the window, less where the bay is narrow [m].
-        sill: bottom of the glass above the floor [m].
-        head: top of the glass [m].
-        depth: depth of the glass behind the wall [m].
-        mullions: upright bars that divide it.
-        transom: height of a horizontal bar [m].
-        ledge: how far the sill sticks out [m].
-        hood: how far the lintel sticks out [m].
-        pier: least wall left on either side [m].
+        width: width of the window; less in a bay that is too narrow for it [m].
+        sill: height of the bottom of the glass [m].
+        head: height of the top of the glass [m].
+        depth: distance of the glass behind the wall [m].
+        mullions: number of upright bars.
+        transom: height of a horizontal bar; None for no bar [m].
+        ledge: how far the sill sticks out of the wall [m].
+        hood: how far the lintel sticks out of the wall [m].
+        pier: least width of wall on either side [m].
     """
 
     def bay(x0: float, x1: float) -> list[Relief]:
@@ -75,7 +76,7 @@ def window(
 
 
 def ribbon(sill: float, head: float, depth: float, post: float) -> Bay:
-    """Returns a bay of a ribbon window, with a post beside the next bay."""
+    """Returns a bay of a ribbon window, with a post at its ends [m]."""
     return window(1e3, sill, head, depth, pier=post / 2)
 
 
@@ -90,15 +91,13 @@ def arched(
 ) -> Bay:
     """Returns a bay with a round-headed recess in its middle.
 
-    The head is a half circle unless `rise` flattens it.
-
     Args:
-        width: width of the recess, less if the bay is too narrow [m].
-        bottom: height of its foot above the wall's [m].
+        width: width of the recess; less in a bay that is too narrow for it [m].
+        bottom: height of its foot [m].
         spring: height at which the arch begins [m].
-        depth: how far it lies behind the wall [m].
-        rise: height of the arch; by default half the width [m].
-        pier: least width of wall on each side [m].
+        depth: distance of its back behind the wall [m].
+        rise: height of the arch; by default half the width, a half circle [m].
+        pier: least width of wall on either side [m].
     """
 
     def bay(x0: float, x1: float) -> list[Relief]:
@@ -124,11 +123,11 @@ def shop_front(
     The door is recessed. Bays without 1.6 m of room stay plain.
 
     Args:
-        head: top of the glass above the wall's foot [m].
-        depth: how far the glass lies behind the wall [m].
+        head: height of the top of the glass [m].
+        depth: distance of the glass behind the wall [m].
         riser: height of the riser below the glass [m].
         pier: width of wall on each side [m].
-        door: whether there is a door; else a post divides the glass.
+        door: whether there is a door; otherwise a post divides the glass.
     """
 
     def bay(x0: float, x1: float) -> list[Relief]:
@@ -153,7 +152,7 @@ def shop_front(
 def entrance(
     width: float, height: float, depth: float = 0.9, *, surround: float = 0.2
 ) -> Bay:
-    """Returns a bay with a deep doorway in a frame that stands out."""
+    """Returns a bay with a deep doorway, whose frame stands out of the wall."""
 
     def bay(x0: float, x1: float) -> list[Relief]:
         a, b = _centred(x0, x1, min(width, x1 - x0 - 1.0))
@@ -169,9 +168,9 @@ def entrance(
 
 
 def house_door(width: float, z0: float, z1: float, depth: float) -> Bay:
-    """Returns a bay with a doorway above steps.
+    """Returns a bay with a doorway from z0 to z1, for a door above steps [m].
 
-    It has two leaves, a fanlight and a flat surround.
+    The door has two leaves, a fanlight and a flat surround.
     """
 
     def bay(x0: float, x1: float) -> list[Relief]:
@@ -188,7 +187,7 @@ def house_door(width: float, z0: float, z1: float, depth: float) -> Bay:
 
 
 def bar(width: float, z0: float, z1: float, depth: float) -> Bay:
-    """Returns a bay with an upright bar in its middle, at a given depth."""
+    """Returns a bay with an upright bar in its middle, at a depth [m]."""
 
     def bay(x0: float, x1: float) -> list[Relief]:
         a, b = _centred(x0, x1, width)
@@ -217,10 +216,11 @@ def loggia(
     """Returns a bay with a balcony inside the wall, behind a solid rail.
 
     Args:
-        width: width of the balcony, less if the bay is too narrow [m].
-        depth: how far its back lies behind the wall [m].
-        rail: top of the rail above the wall's foot [m].
-        head: top of the opening above the wall's foot [m].
+        width: width of the balcony; less in a bay that is too narrow for it
+            [m].
+        depth: distance of its back behind the wall [m].
+        rail: height of the top of the rail [m].
+        head: height of the top of the opening [m].
         pier: least width of wall on each side [m].
     """
 
@@ -236,10 +236,11 @@ def loggia(
 
 
 def stretches(length: float, pitch: float, margin: float) -> list[Span]:
-    """Returns equal bays of about `pitch` that divide a wall.
+    """Returns start and end of equal bays that divide a wall [m].
 
-    They keep clear of its ends. A wall too short for that gets one narrower
-    bay, or none.
+    The bays are about `pitch` wide and keep `margin` away from both ends of the
+    wall. A wall too short for a bay of that width gets one narrower bay, or
+    none.
     """
     room = length - 2 * margin
     count = max(int(room / pitch + 0.4), int(room > 0.6 * pitch))
@@ -250,7 +251,7 @@ def stretches(length: float, pitch: float, margin: float) -> list[Span]:
 
 
 def bounds(cells: Sequence[Span]) -> list[float]:
-    """Returns start and end of a row of adjoining cells."""
+    """Returns the start of the first of adjoining cells, and all ends [m]."""
     return [cells[0][0], *(end for _, end in cells)]
 
 
@@ -260,7 +261,11 @@ def plain(edge: int, length: float) -> list[Relief]:
 
 
 def rhythm(pitch: float, bays: Sequence[Bay], margin: float = 0.5) -> Layout:
-    """Returns a layout that repeats bays from both ends of a wall."""
+    """Returns a layout that repeats `bays` along each wall.
+
+    The bays take turns from both ends towards the middle. They are about
+    `pitch` wide, and keep `margin` away from the ends of the wall [m].
+    """
 
     def layout(edge: int, length: float) -> list[Relief]:
         cells = stretches(length, pitch, margin)
@@ -274,9 +279,10 @@ def rhythm(pitch: float, bays: Sequence[Bay], margin: float = 0.5) -> Layout:
 
 
 def with_middle(layout: Layout, bay: Bay, width: float) -> Layout:
-    """Returns a layout with a bay in the middle of the wall.
+    """Returns a layout with one more bay, in the middle of each wall.
 
-    It replaces the bays that it touches.
+    The bay is `width` wide [m] and replaces the reliefs that it touches. Walls
+    shorter than the bay stay as they are.
     """
 
     def combined(edge: int, length: float) -> list[Relief]:
@@ -294,12 +300,15 @@ def with_middle(layout: Layout, bay: Bay, width: float) -> Layout:
 
 
 def alone(bay: Bay, width: float) -> Layout:
-    """Returns a layout with one bay in the middle of a plain wall."""
+    """Returns a layout with one bay, in the middle of a plain wall."""
     return with_middle(plain, bay, width)
 
 
 def by_edge(layouts: dict[int, Layout], otherwise: Layout) -> Layout:
-    """Returns a layout that differs between walls."""
+    """Returns a layout that has a layout of its own for some edges.
+
+    All other edges get the layout `otherwise`.
+    """
 
     def layout(edge: int, length: float) -> Sequence[Relief]:
         return layouts.get(edge, otherwise)(edge, length)
@@ -308,8 +317,8 @@ def by_edge(layouts: dict[int, Layout], otherwise: Layout) -> Layout:
 
 
 def with_door(layout: Layout, door: Bay, width: float) -> Layout:
-    """Returns a layout with a door in the middle of the front.
+    """Returns a layout with one more bay, a door in the middle of the front.
 
-    It replaces the bays that it touches.
+    The door replaces the reliefs that it touches.
     """
     return by_edge({0: with_middle(layout, door, width)}, layout)

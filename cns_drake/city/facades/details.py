@@ -1,7 +1,7 @@
 """Solid details of facades: canopies, balconies, steps, porches, bay windows.
 
-A detail is placed on a wall by a `WallFrame`, in whose coordinates x runs
-along the wall, y outwards and z up.
+A `WallFrame` places a detail on a wall. In its wall coordinates, x runs along
+the wall, y outwards and z up.
 """
 
 from collections.abc import Collection, Iterable, Sequence
@@ -14,12 +14,15 @@ from cns_drake.city.facades import bays, massing, roofs, walls
 from cns_drake.city.facades.assembly import Assembly, Rgb
 from cns_drake.city.geometry.mesh import Mesh, box_mesh, merge_meshes
 
-# Height that the shared flight of fire stairs climbs; parts scale it [m].
+# Height of the shared mesh of fire stairs, which is scaled to the storey [m].
 FIRE_STAIRS_STOREY_M = 3.4
 
 
 class WallFrame:
-    """Carries geometry from a wall's own coordinates to the building's [m]."""
+    """Converts geometry from wall coordinates to the building's frame [m].
+
+    In wall coordinates, x runs along the wall, y outwards and z up.
+    """
 
     def __init__(self, outline: ArrayLike, edge: int):
         outline = np.asarray(outline, dtype=float)
@@ -31,7 +34,7 @@ class WallFrame:
         self._outward = np.array([self._along[1], -self._along[0]])
 
     def place(self, mesh: Mesh, z: float = 0.0) -> Mesh:
-        """Returns a mesh given in wall coordinates in the building's frame.
+        """Returns a mesh of wall coordinates in the building's frame [m].
 
         Wall coordinates (x along, y outwards, z up) are left-handed, so the
         faces are reversed.
@@ -42,25 +45,41 @@ class WallFrame:
         return Mesh(vertices, mesh.faces).turned()
 
     def box(self, *limits: float, bottom: bool = True) -> Mesh:
-        """Returns `massing.box`, given in wall coordinates."""
+        """Returns a box in the building's frame, given in wall coordinates.
+
+        The limits are those of `massing.box` [m].
+        """
         return self.place(massing.box(*limits, bottom=bottom))
 
     def standing(self, *limits: float, bottom: bool = False) -> Mesh:
-        """Returns `massing.standing`, given in wall coordinates."""
+        """Returns a box on the ground, given in wall coordinates.
+
+        The box is in the building's frame. The limits are those of
+        `massing.standing` [m].
+        """
         return self.place(massing.standing(*limits, bottom=bottom))
 
     @property
     def heading(self) -> float:
-        """Direction of the wall, left to right seen from outside [rad]."""
+        """Direction of the wall in the building's frame, left to right [rad].
+
+        Left and right are as seen from outside.
+        """
         return math.atan2(self._along[1], self._along[0])
 
     def point(self, x: float, y: float) -> np.ndarray:
-        """Returns a point given in wall coordinates in the building's frame."""
+        """Returns x and y in the building's frame of a point on the ground [m].
+
+        The point is `x` along the wall and `y` out of it.
+        """
         return self._start + x * self._along + y * self._outward
 
 
 def canopy(x0: float, x1: float, reach: float, z: float) -> Mesh:
-    """Returns a flat canopy with a fascia, hung on two slanted rods."""
+    """Returns a flat canopy with a fascia, hung on two slanted rods.
+
+    It is in wall coordinates [m].
+    """
     rods = [
         beam((x, 0.05, z + 1.2), (x, reach - 0.3, z + 0.3), 0.08)
         for x in (x0 + 0.4, x1 - 0.4)
@@ -72,7 +91,10 @@ def canopy(x0: float, x1: float, reach: float, z: float) -> Mesh:
 def front_canopy(
     outline: ArrayLike, half: float, reach: float, z: float
 ) -> Mesh:
-    """Returns a canopy above the door in the middle of the front."""
+    """Returns a canopy above a door in the middle of the front wall [m].
+
+    It is in the building's frame, and `half` is half its width.
+    """
     front = WallFrame(outline, 0)
     middle = front.length / 2
     return front.place(canopy(middle - half, middle + half, reach, z))
@@ -107,16 +129,17 @@ def awnings(
     shape: tuple[float, float, float, float],
     door: float = -math.inf,
 ) -> list[Mesh]:
-    """Returns awnings above a share of the shops along a wall.
+    """Returns awnings above some of the shops along a wall.
 
     Args:
         wall: the wall.
         cells: start and end of each shop along the wall [m].
         rng: draws which shops have one.
         share: probability that a shop has one.
-        shape: how much narrower than its shop an awning is on either side, its
-            reach, its lower and its upper edge [m].
-        door: distance from the wall's middle within which shops have none [m].
+        shape: four lengths [m]: how much narrower than its shop an awning is on
+            either side; its reach; the heights of its lower and its upper edge.
+        door: shops whose distance from the wall's middle is less than this have
+            none [m].
     """
     narrower, reach, z0, z1 = shape
     middle, pieces = wall.length / 2, []
@@ -174,15 +197,15 @@ def piers(
 
     Args:
         outline: (N, 2) corners of the walls in the building's frame,
-            anticlockwise [m].
-        pitch: distance between two of them, about [m].
+            counter-clockwise [m].
+        pitch: approximate distance from one pier to the next [m].
         width: width of each [m].
         reach: how far they reach out of the wall [m].
         z0: height of their feet [m].
         z1: height of their tops [m].
-        depth: how far they go into the wall, past recessed glass [m].
-        margin: distance of the outermost ones' middles from the wall's ends
-            [m].
+        depth: how far they reach into the wall, past recessed glass [m].
+        margin: distance of the middle of the outermost piers from the wall's
+            ends [m].
         entrance: width in the middle of the front that stays free [m].
         skip: edges of the outline that get none.
     """
@@ -221,9 +244,10 @@ def pilasters(
 
     Args:
         outline: (N, 2) corners of the walls in the building's frame,
-            anticlockwise [m].
-        pitch: width of a bay, as of `bays.rhythm` [m].
-        margin: distance of the bays from corners, as of `bays.rhythm` [m].
+            counter-clockwise [m].
+        pitch: width of a bay, as given to `bays.rhythm` [m].
+        margin: distance of the bays from corners, as given to `bays.rhythm`
+            [m].
         every: number of bays from one pilaster to the next.
         width: width of a pilaster [m].
         reach: how far it reaches out of the wall [m].
@@ -255,10 +279,10 @@ def corner_piers(
 
     Args:
         outline: (N, 2) corners of the walls in the building's frame,
-            anticlockwise [m].
+            counter-clockwise [m].
         width: length of each flank [m].
         reach: how far they reach out of the walls [m].
-        depth: how far they go into the walls, past recessed glass [m].
+        depth: how far they reach into the walls, past recessed glass [m].
         z0: height of their feet [m].
         z1: height of their tops [m].
         skip: edges whose corners get none.
@@ -291,9 +315,9 @@ def corner_piers(
 def _pier(
     x: float, width: float, depth: float, reach: float, z0: float, z1: float
 ) -> Mesh:
-    """A box in wall coordinates.
+    """Returns a box with a back, in wall coordinates.
 
-    It has a back, too: piers are deeper than walls, and near a corner their
+    It needs a back because piers are deeper than walls: near a corner their
     backs show in the recesses of the next wall.
     """
     a, b = x - width / 2, x + width / 2
@@ -345,9 +369,9 @@ def column(x: float, y: float, z0: float, z1: float, radius: float) -> Mesh:
 
 
 def beam(start: ArrayLike, end: ArrayLike, width: float) -> Mesh:
-    """Returns a bar of square section between two points.
+    """Returns a bar of square section between two points [m].
 
-    One point must not be vertically above the other.
+    The points must not lie vertically above one another.
     """
     start, end = np.asarray(start, float), np.asarray(end, float)
     length = float(np.linalg.norm(end - start))
@@ -361,9 +385,9 @@ def beam(start: ArrayLike, end: ArrayLike, width: float) -> Mesh:
 
 
 _POST_M = 0.16
-# Depth of the windows of bays [m].
+# Depth of the windows in bay windows [m].
 _RECESS = 0.1
-# Length of the shared panel of railing [m].
+# Length of the shared mesh of a railing [m].
 RAILING_M = 2.0
 
 
@@ -382,19 +406,19 @@ def add_porch(
 ) -> None:
     """Adds a roofed porch in front of a wall.
 
-    Its materials are `trim` and `roof`. The roof ends 0.25 m further out than
-    the posts.
+    Its materials are `trim` and `roof`. The roof extends 0.25 m beyond the
+    posts.
 
     Args:
         out: the building under assembly, which gets the parts.
         wall: the wall.
         x0: left end along the wall [m].
         x1: right end along the wall [m].
-        reach: how far the posts stand from the wall [m].
+        reach: distance of the posts from the wall [m].
         deck: height of the floor [m].
         eaves: height of the underside of the beam on the posts [m].
         top: height of the top of the roof [m].
-        roof: `shed`, `gable` (a pediment over all of it) or `flat`.
+        roof: `shed`, `gable` (a pediment across the full width) or `flat`.
         posts: number of posts, at least 2.
     """
     pieces = [massing.box(x0, x1, -0.05, reach, -massing.FOUNDATION_M, deck)]
@@ -469,14 +493,14 @@ def add_railing(
     z: float,
     rgb: Rgb,
 ) -> None:
-    """Places the shared panel of railing between two points of a wall.
+    """Places the shared mesh of a railing between two points at a wall.
 
     Args:
         out: the building under assembly, which gets the parts.
         part: name of the visual.
         wall: the wall.
-        start: first point, along and out of the wall [m].
-        end: last point, along and out of the wall [m].
+        start: first point: distances along the wall and out of it [m].
+        end: last point, in the same way [m].
         z: height of the floor [m].
         rgb: colour.
     """
@@ -503,10 +527,10 @@ def add_bay_window(
     storeys: int = 1,
     canted: bool = True,
 ) -> None:
-    """Adds a bay window, on the ground or hung on the wall.
+    """Adds a bay window that stands on the ground or hangs on the wall.
 
-    It has a row of windows for each storey, and becomes `glass`, `roof` and
-    `walls`.
+    It has a row of windows for each storey. Its materials are `glass`, `roof`
+    and `walls`.
 
     Args:
         out: the building under assembly, which gets the parts.
@@ -514,10 +538,10 @@ def add_bay_window(
         x: middle of the window along the wall [m].
         width: width along the wall [m].
         reach: how far it reaches out of the wall [m].
-        z0: height of its foot; 0 stands it on the ground [m].
+        z0: height of its foot; at 0 it stands on the ground [m].
         z1: height of its top [m].
         storeys: number of storeys between foot and top.
-        canted: whether its sides are slanted; else it is a box.
+        canted: whether its sides are slanted; otherwise it is a box.
     """
     a, b = x - width / 2, x + width / 2
     if canted:
@@ -565,7 +589,7 @@ def add_bay_window(
 def chimney_breast(
     wall: WallFrame, x: float, width: float, reach: float, top: float
 ) -> Mesh:
-    """Returns a chimney up a wall, slimmer above its shoulders.
+    """Returns a chimney in front of a wall, narrower above its shoulders.
 
     Args:
         wall: the wall.
@@ -595,10 +619,11 @@ def casings(
     style: str,
     reach: float = 0.05,
 ) -> list[Mesh]:
-    """Returns the frames of a wall's windows, in wall coordinates.
+    """Returns frames around a wall's windows, in wall coordinates [m].
 
-    Windows are the reliefs at the depths of `glass`. Styles are `frame` (a ring
-    of boards), `sill` and `shutters`; boards reach out of the wall [m].
+    Windows are the reliefs whose depth is in `glass`. `style` is `frame` (a
+    ring of boards), `sill` or `shutters`. The boards reach out of the wall by
+    `reach`.
     """
     pieces = []
     for r in reliefs:
@@ -617,7 +642,7 @@ def casings(
 
 
 def _ring(r: walls.Relief, width: float, reach: float) -> Mesh:
-    """Boards around an opening, mitred at its corners."""
+    """Returns boards around an opening, mitred at its corners."""
     w = width
     outer = [(r.x0 - w, r.z0 - w), (r.x0 - w, r.z1 + w),
              (r.x1 + w, r.z1 + w), (r.x1 + w, r.z0 - w)]  # fmt: skip

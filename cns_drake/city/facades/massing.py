@@ -1,7 +1,8 @@
-"""Outlines and solids that buildings are put together from.
+"""Outlines and solids from which buildings are put together.
 
-Outlines are (N, 2) corners, counter-clockwise, the front edge first; every
-solid is closed from the sides that can be seen and wound outwards.
+Outlines are (N, 2) corners [m], counter-clockwise, with the front edge first.
+The faces of a solid look outwards, and it is closed on all sides that can be
+seen.
 """
 
 from collections.abc import Callable, Collection, Sequence
@@ -18,12 +19,13 @@ Point = tuple[float, float]
 Corners = list[np.ndarray]
 # x0, y0, x1, y1.
 Area = tuple[float, float, float, float]
-# Buildings reach below their own ground level, for the ground has relief.
+# Buildings reach this far below their own ground level, since the ground is not
+# flat [m].
 FOUNDATION_M = 0.5
 
 
 def rectangle(x0: float, y0: float, x1: float, y1: float) -> np.ndarray:
-    """Returns the four corners of a rectangle; the first edge is at y0."""
+    """Returns the corners (4, 2) of a rectangle; the first edge is at y0."""
     return np.array([(x0, y0), (x1, y0), (x1, y1), (x0, y1)], dtype=float)
 
 
@@ -33,7 +35,7 @@ def regular_polygon(
     center: ArrayLike = (0.0, 0.0),
     phase: float = 0.0,
 ) -> np.ndarray:
-    """Returns `count` points on a circle."""
+    """Returns (count, 2) points on a circle, the first one at angle `phase`."""
     angles = phase + np.arange(count) * 2 * math.pi / count
     return np.asarray(center) + radius * np.column_stack(
         [np.cos(angles), np.sin(angles)]
@@ -48,9 +50,9 @@ def square(x: float, y: float, half: float) -> np.ndarray:
 def inset(points: ArrayLike, distance: ArrayLike) -> np.ndarray:
     """Returns an outline with each edge moved inwards.
 
-    The distance is one for all edges, or one per edge [m]; a negative one moves
-    the edge outwards. Corners keep their order. Distances must be small
-    compared with the lengths of the edges.
+    The distance is one for all edges, or an array with one per edge [m]; a
+    negative distance moves an edge outwards. The corners keep their order.
+    Distances must be small compared with the lengths of the edges.
     """
     points = np.asarray(points, dtype=float)
     distances = np.broadcast_to(np.asarray(distance, float), len(points))
@@ -68,7 +70,7 @@ def inset(points: ArrayLike, distance: ArrayLike) -> np.ndarray:
 
 
 def inset_limit(points: ArrayLike) -> float:
-    """Returns how far `inset` can go until an edge loses 70 % of its length."""
+    """Returns the inset at which some edge has lost 70 % of its length [m]."""
     points = np.asarray(points, dtype=float)
     probe = 1e-3
     length = np.linalg.norm(np.roll(points, -1, axis=0) - points, axis=1)
@@ -83,9 +85,9 @@ def rounded(
 ) -> np.ndarray:
     """Returns an outline whose convex corners are rounded by chords.
 
-    Chords are at most `step` long [m]. `corners` gives the radius of each
-    corner by number [m]. The first edge is what the arcs leave of the first
-    edge given.
+    Chords are at most `step` long [m]. `corners` maps the number of a corner to
+    its radius [m]. The first edge of the result is what the arcs leave of the
+    outline's first edge.
     """
 
     def arc(
@@ -111,9 +113,10 @@ def rounded(
 
 
 def flat(points: ArrayLike, z: float, *, up: bool = True) -> Mesh:
-    """Returns a horizontal surface that fills an outline.
+    """Returns a horizontal surface that fills an outline, at the height z.
 
-    Convex outlines become quads and at most one triangle, others triangles.
+    Convex outlines become quadrilaterals and at most one triangle, and others
+    triangles.
     """
     points = np.asarray(points, dtype=float)
     if _is_convex(points):
@@ -131,12 +134,15 @@ def flat(points: ArrayLike, z: float, *, up: bool = True) -> Mesh:
 
 
 def _at(points: np.ndarray, z: float | np.ndarray) -> np.ndarray:
-    """Returns an outline's corners at one height, or each at its own."""
+    """Returns the corners (N, 3) of an outline, at one height or one each."""
     return np.column_stack([points, np.broadcast_to(z, len(points))])
 
 
 def _turns(points: np.ndarray) -> np.ndarray:
-    """Returns twice the signed area of each corner's triangle."""
+    """Returns (N,) the cross product of the two edges at each corner [m^2].
+
+    It is positive where the outline turns left.
+    """
     into = points - np.roll(points, 1, axis=0)
     out = np.roll(points, -1, axis=0) - points
     return into[:, 0] * out[:, 1] - into[:, 1] * out[:, 0]
@@ -147,10 +153,10 @@ def _is_convex(points: np.ndarray) -> bool:
 
 
 def skirt(lower: ArrayLike, upper: ArrayLike, z0: float, z1: float) -> Mesh:
-    """Returns the faces from one outline up to another, seen from outside.
+    """Returns the walls from an outline at z0 to another at z1.
 
-    Both outlines have the same number of corners and pairwise parallel
-    edges, so that the faces are plane.
+    The faces look outwards. Both outlines have the same number of corners, and
+    parallel edges in pairs, so that the faces are plane.
     """
     lower, upper = np.asarray(lower, float), np.asarray(upper, float)
     n = len(lower)
@@ -171,7 +177,7 @@ def skirt(lower: ArrayLike, upper: ArrayLike, z0: float, z1: float) -> Mesh:
 def prism(
     points: ArrayLike, z0: float, z1: float, *, bottom: bool = False
 ) -> Mesh:
-    """Returns an upright solid; its hidden bottom is left open."""
+    """Returns an upright solid over an outline; by default without bottom."""
     pieces = [skirt(points, points, z0, z1), flat(points, z1)]
     if bottom:
         pieces.append(flat(points, z0, up=False))
@@ -179,17 +185,17 @@ def prism(
 
 
 def frustum(lower: ArrayLike, upper: ArrayLike, z0: float, z1: float) -> Mesh:
-    """Returns a tapering solid without a bottom."""
+    """Returns a tapering solid between two outlines, without a bottom."""
     return merge_meshes(skirt(lower, upper, z0, z1), flat(upper, z1))
 
 
 def sloped_prism(
     points: ArrayLike, z0: float, height: float, low: float
 ) -> Mesh:
-    """Returns a solid under a plane that rises along y.
+    """Returns a solid with a sloping top that rises along y.
 
     Its top is `height` above z0 at the outline's greatest y, and `low` times
-    `height` above z0 at the least y.
+    `height` above z0 at its least y.
     """
     points = np.asarray(points, dtype=float)
     n, y = len(points), points[:, 1]
@@ -219,7 +225,7 @@ def tent(eaves: ArrayLike, tip: ArrayLike, z0: float, z1: float) -> Mesh:
 def revolved(
     profile: Sequence[Point], count: int, center: ArrayLike = (0.0, 0.0)
 ) -> Mesh:
-    """Returns the surface that a profile sweeps around an upright axis.
+    """Returns the surface that a profile sweeps around a vertical axis.
 
     The profile is a list of (radius, z) pairs from the bottom up [m]. If the
     last radius is zero, the surface ends in a tip; otherwise a lid closes the
@@ -242,10 +248,10 @@ def revolved(
 
 
 def extruded(profile: Sequence[Point], x0: float, x1: float) -> Mesh:
-    """Returns a shed: a roof line drawn along x, with its end walls.
+    """Returns a roof over a line that is drawn out along x, with end walls.
 
     The line consists of (y, z) points with rising y [m]. The end walls reach
-    down to its first point.
+    down to the height of its first point.
     """
     base = profile[0][1]
     faces = Faces()
@@ -283,9 +289,9 @@ class Faces:
 
 
 def bar(section: Sequence[Point | np.ndarray], y0: float, y1: float) -> Mesh:
-    """Returns a solid of one section, convex, from y0 to y1.
+    """Returns a solid with a convex cross section, from y0 to y1 [m].
 
-    The section's (x, z) corners run counter-clockwise seen from y0.
+    The section's (x, z) corners run counter-clockwise, seen from y0.
     """
     n = len(section)
     vertices = np.array([(x, y, z) for y in (y0, y1) for x, z in section])
@@ -306,7 +312,7 @@ def shortest_side(points: ArrayLike) -> float:
 
 
 def extent(points: np.ndarray) -> Area:
-    """Returns the bounding box of an outline [m]."""
+    """Returns x0, y0, x1, y1 of an outline's bounding box [m]."""
     return (*points.min(axis=0), *points.max(axis=0))
 
 
@@ -317,7 +323,7 @@ def roof_pan(
     points = np.asarray(points, dtype=float)
     inner = inset(points, thickness)
     coping = skirt(points, inner, z_top, z_top)
-    # Seen from the roof the wall faces inwards: an outline run backwards.
+    # Inner walls face inwards: the outline is run through backwards.
     wall = skirt(inner[::-1], inner[::-1], z_floor, z_top)
     return merge_meshes(coping, wall, flat(inner, z_floor))
 
@@ -331,7 +337,7 @@ def box(*limits: float, bottom: bool = True) -> Mesh:
 def standing(*limits: float, bottom: bool = False) -> Mesh:
     """Returns a box with x0, x1, y0, y1 and z1 that stands on the ground [m].
 
-    Its foot is out of sight.
+    It reaches down to `FOUNDATION_M` below the ground.
     """
     *spot, z1 = limits
     return box(*spot, -FOUNDATION_M, z1, bottom=bottom)
@@ -340,35 +346,35 @@ def standing(*limits: float, bottom: bool = False) -> Mesh:
 def post(
     x: float, y: float, half: float, z1: float, z0: float = -FOUNDATION_M
 ) -> Mesh:
-    """Returns a square post whose foot is out of sight below the ground.
+    """Returns a square post that stands on the ground.
 
     Args:
         x: x of its middle in the building's frame [m].
         y: y of its middle in the building's frame [m].
-        half: half its side [m].
+        half: half the length of its side [m].
         z1: height of its top [m].
-        z0: height of its foot [m].
+        z0: height of its foot; by default hidden below the ground [m].
     """
     return box(x - half, x + half, y - half, y + half, z0, z1, bottom=False)
 
 
 def foundation(points: ArrayLike) -> Mesh:
-    """Returns the walls of an outline below the ground."""
+    """Returns the walls below the ground under an outline."""
     return skirt(points, points, -FOUNDATION_M, 0.0)
 
 
 def chamfered(points: np.ndarray, cut: float) -> np.ndarray:
-    """Returns an outline with convex corners cut off.
+    """Returns an outline with its convex corners cut off.
 
-    Each cut takes `cut` metres of both edges.
+    Each cut starts `cut` metres from the corner on both edges.
     """
     return _replaced(points, lambda k, p, a, b: [p - a * cut, p + b * cut])
 
 
 def notched(points: np.ndarray, depth: float) -> np.ndarray:
-    """Returns an outline without a square at each convex corner.
+    """Returns an outline with a square cut out of each convex corner.
 
-    The side of a square is `depth` [m].
+    The side of the square is `depth` [m].
     """
     d = depth
     return _replaced(
@@ -381,10 +387,12 @@ def _replaced(
     corner: Callable[[int, np.ndarray, np.ndarray, np.ndarray], Corners],
     chosen: Collection[int] | None = None,
 ) -> np.ndarray:
-    """Replaces convex corners, or those chosen, by several each.
+    """Returns an outline with several corners in place of some corners.
 
-    `corner` gets its number, its place, and the directions of the edges before
-    and after it. The first edge stays the first one.
+    All convex corners are replaced, or those `chosen` by number. The function
+    `corner` returns the new ones. It gets the corner's number, its place, and
+    the directions of the edges before and after it. The first edge stays the
+    first one.
     """
     points = np.asarray(points, dtype=float)
     result: Corners = []
@@ -405,9 +413,9 @@ def _replaced(
 def stadium(
     x0: float, y0: float, x1: float, y1: float, step: float = 3.0
 ) -> np.ndarray:
-    """Returns (N, 2) the outline of a rectangle whose short ends are arcs [m].
+    """Returns the outline (N, 2) of a rectangle with half circles as ends [m].
 
-    The rectangle is longer along x, and its ends are half circles.
+    The rectangle is longer along x.
 
     Args:
         x0: left end [m].
@@ -429,7 +437,7 @@ def stadium(
 def u_shape(
     x0: float, y0: float, x1: float, y1: float, wing: float, back: float
 ) -> np.ndarray:
-    """Returns (8, 2) the outline of a building with a court open to the back.
+    """Returns the outline (8, 2) of a building with a court open to the back.
 
     Its wings are left and right of the court [m].
 
@@ -439,7 +447,7 @@ def u_shape(
         x1: right end [m].
         y1: back [m].
         wing: width of each wing [m].
-        back: depth of the front range [m].
+        back: depth of the part in front of the court [m].
     """
     a, b, c = x0 + wing, x1 - wing, y0 + back
     xs = (x0, x1, x1, b, b, a, a, x0)
@@ -449,7 +457,7 @@ def u_shape(
 def l_shape(
     x0: float, y0: float, x1: float, y1: float, wing: float, back: float
 ) -> np.ndarray:
-    """Returns (6, 2) the outline of a front range with a wing on the left [m].
+    """Returns the L-shaped outline (6, 2) of a front part and a left wing [m].
 
     Args:
         x0: left end [m].
@@ -457,14 +465,17 @@ def l_shape(
         x1: right end [m].
         y1: back [m].
         wing: width of the wing [m].
-        back: depth of the front range [m].
+        back: depth of the front part [m].
     """
     a, c = x0 + wing, y0 + back
     return np.column_stack([(x0, x1, x1, a, a, x0), (y0, y0, c, c, y1, y1)])
 
 
 def mirrored(points: np.ndarray) -> np.ndarray:
-    """Returns an outline mirrored left to right about its middle."""
+    """Returns an outline mirrored left to right about its middle.
+
+    The front edge stays first, and the corners counter-clockwise.
+    """
     points = np.asarray(points, dtype=float)
     middle = (points[:, 0].min() + points[:, 0].max()) / 2
     flipped = np.column_stack([2 * middle - points[:, 0], points[:, 1]])
@@ -475,7 +486,7 @@ def mirrored(points: np.ndarray) -> np.ndarray:
 def edges_on(
     plan: np.ndarray, outline: np.ndarray, edges: Collection[int]
 ) -> frozenset[int]:
-    """Returns the edges of a plan that are part of some edges of an outline."""
+    """Returns the edges of a plan that lie on some edges of an outline."""
     found = set()
     ends = np.roll(plan, -1, axis=0)
     for k, (a, b) in enumerate(zip(plan, ends, strict=True)):

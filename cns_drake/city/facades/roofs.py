@@ -1,8 +1,8 @@
-"""Roofs: shells over a line, gable walls beneath them, hips, equipment.
+"""Roofs: shells along a roof line, gable walls, hips and roof equipment.
 
-A roof line is the upper surface of a roof seen along its ridge: (across, z)
-points, `across` rising. The roof lies along x, its line in y, unless
-`along_y` turns it.
+A roof line is the upper surface of a roof, seen along its ridge: (across, z)
+points with rising `across` [m]. By default the ridge runs along x, and `across`
+is y; with `along_y` it is the other way round.
 """
 
 from collections.abc import Sequence
@@ -19,7 +19,8 @@ from cns_drake.city.facades.walls import Patch
 from cns_drake.city.geometry.mesh import Mesh, merge_meshes
 
 Line = Sequence[tuple[float, float]]
-# Gables reach this far into the roof above them, lest rays slip between [m].
+# Gables reach this far into the roof above them, so that no ray slips between
+# the two [m].
 _INTO_ROOF = 0.03
 
 
@@ -79,7 +80,10 @@ def barrel_line(
 
 
 def with_eaves(line: Line, low: float, high: float) -> list[bays.Span]:
-    """Returns a roof line whose end slopes are longer by these runs [m]."""
+    """Returns a roof line with its two end slopes lengthened [m].
+
+    `low` and `high` are how far they go beyond the first and the last point.
+    """
     (a, za), (b, zb) = line[0], line[1]
     (c, zc), (d, zd) = line[-2], line[-1]
     first = (a - low, za - low * (zb - za) / (b - a))
@@ -88,7 +92,7 @@ def with_eaves(line: Line, low: float, high: float) -> list[bays.Span]:
 
 
 def line_height(line: Line, across: float) -> float:
-    """Returns the height of a roof line at one place [m]."""
+    """Returns the height of a roof line at the place `across` [m]."""
     us, zs = np.transpose(line)
     return float(np.interp(across, us, zs))
 
@@ -101,7 +105,7 @@ def shell(
     *,
     along_y: bool = False,
 ) -> Mesh:
-    """Returns a roof over a line, of even thickness measured upright.
+    """Returns a roof of even vertical thickness over a roof line.
 
     Args:
         line: (across, height) points of its upper surface [m].
@@ -141,8 +145,8 @@ def gable_wall(
     """Returns the wall between a height and a roof line, in wall coordinates.
 
     Args:
-        line: underside of the roof, as (along the wall, height), from a to b at
-            least at z [m].
+        line: underside of the roof as (along the wall, height) points [m]. It
+            runs from a to b, and nowhere below z.
         a: left end along the wall [m].
         b: right end along the wall [m].
         z: height of the wall's foot [m].
@@ -185,14 +189,14 @@ def gable_glass(holes: Sequence[Patch]) -> Mesh:
 def hip(
     outline: ArrayLike, z: float, top: float, eaves: ArrayLike, fascia: float
 ) -> Mesh:
-    """Returns a hipped roof over a rectangle, boxed in below its eaves.
+    """Returns a hipped roof over a rectangle, closed below its eaves.
 
     Args:
         outline: (4, 2) corners in the building's frame [m].
         z: height of the underside of the eaves [m].
         top: height of the ridge [m].
         eaves: overhang, one for all edges or one for each [m].
-        fascia: height of the upright edge of the eaves [m].
+        fascia: height of the vertical edge of the eaves [m].
     """
     outer = massing.inset(outline, -np.asarray(eaves))
     slopes = massing.skirt(outer, _ridge(outer), z + fascia, top)
@@ -200,23 +204,23 @@ def hip(
 
 
 def _boxed_eaves(outer: np.ndarray, z: float, fascia: float) -> list[Mesh]:
-    """Returns the underside of the eaves and their upright edge."""
+    """Returns the underside of the eaves and their vertical edge."""
     edge = massing.skirt(outer, outer, z, z + fascia)
     return [massing.flat(outer, z, up=False), edge]
 
 
 def _ridge(rectangle: np.ndarray) -> np.ndarray:
-    """Returns the ridge of a hip as corners that meet in pairs.
+    """Returns (4, 2) the points on the ridge above the corners of a rectangle.
 
-    Moving all sides in by half the shorter one leaves a line, on a square
-    a point.
+    Two corners share each end of the ridge; on a square, all four share one
+    point.
     """
     ends = np.roll(rectangle, -1, axis=0)
     sides = np.linalg.norm(ends - rectangle, axis=1)
     return massing.inset(rectangle, float(sides.min()) / 2)
 
 
-# Radius of the room that each piece needs [m].
+# Radius of the free area that each piece needs [m].
 _RADIUS = {
     "ac_unit": 1.6,
     "air_handler": 3.8,
@@ -242,7 +246,7 @@ def add_chimney(
     yaw: float = 0.0,
     scale: tuple[float, float, float] = (1.0, 1.0, 1.0),
 ) -> None:
-    """Stands a shared chimney on a pitched roof.
+    """Adds a shared chimney to a pitched roof.
 
     Args:
         out: the building under assembly, which gets the parts.
@@ -265,7 +269,7 @@ def equip_roof(
     clear: float = 1.0,
     prefix: str = "",
 ) -> None:
-    """Stands equipment on a flat roof without overlaps, as far as it fits.
+    """Adds equipment to a flat roof, without overlaps; omits what does not fit.
 
     The random generator of `out` draws places, headings and sizes.
 
@@ -275,7 +279,7 @@ def equip_roof(
         z: height of the roof [m].
         items: names of the equipment, the most important first.
         clear: least distance to the edge of the roof [m].
-        prefix: begin of the visuals' names.
+        prefix: beginning of the visuals' names.
     """
     room, rng = Polygon(roof), out.rng
     x0, y0, x1, y1 = room.bounds

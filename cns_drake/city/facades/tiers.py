@@ -1,4 +1,4 @@
-"""Stacks storeys into a building: ground floor, storeys, crown, roof."""
+"""Builds up a building from ground floor, storeys, top walls and roof."""
 
 from collections.abc import Sequence
 import math
@@ -13,13 +13,13 @@ from cns_drake.city.facades.roofs import equip_roof
 from cns_drake.city.facades.walls import Band, Facade, facade_mesh, glass_mesh
 from cns_drake.city.geometry.mesh import Mesh, merge_meshes
 
-# A pane cuts this far into the reveals in front of it, so that no ray passes
-# between the two [m].
+# A pane reaches this far into the reveals in front of it, so that no ray passes
+# between them [m].
 _PANE_OVERLAP = 0.004
 
 
 def add_awnings(p: Building, pieces: Sequence[Mesh]) -> None:
-    """Adds awnings to a building, in a colour of their own."""
+    """Adds awnings to a building, as a material with a colour of its own."""
     if pieces:
         rgb = pick(p.rng, p.kind.choices["awnings"])
         p.add("awnings", *pieces, rgb=rgb)
@@ -28,13 +28,14 @@ def add_awnings(p: Building, pieces: Sequence[Mesh]) -> None:
 def divided(
     height: float, storey: float, most: int = 10
 ) -> tuple[int, int, float]:
-    """Returns groups and storeys per group that fill a height.
+    """Returns how storeys of about one height are divided into groups.
 
     There are at most `most` groups; each becomes one visual.
 
     Returns:
-        Number of groups, storeys in a group, height of a storey in whole
-        millimetres, so that storeys placed on one another leave no gap [m].
+        The number of groups, the number of storeys in a group, and the height
+        of a storey [m]. It is rounded down to millimetres, so that stacked
+        storeys leave no gap.
     """
     count = max(1, round(height / storey))
     per_group = -(-count // most)
@@ -55,7 +56,7 @@ def add_ground(
     Args:
         out: the building under assembly, which gets the parts.
         outline: (N, 2) corners of the walls in the building's frame,
-            anticlockwise [m].
+            counter-clockwise [m].
         facade: the walls and their openings.
         extras: further meshes of the floor, in the building's frame.
         part: name of the visual.
@@ -79,20 +80,20 @@ def add_storeys(
 ) -> float:
     """Adds `groups` times `per_group` storeys; returns their top [m].
 
-    If all glass has one depth, one pane behind the walls closes all windows;
-    nothing else may then be deeper. Glass of several depths is repeated with
-    the storeys.
+    If all glass has the same depth, one pane behind the walls closes all
+    windows; no other relief may then be deeper. Glass of several depths is
+    repeated with every storey.
 
     Args:
         out: the building under assembly, which gets the parts.
         outline: (N, 2) corners of the walls in the building's frame,
-            anticlockwise [m].
+            counter-clockwise [m].
         facade: the walls of one storey.
         z0: height of the lowest floor [m].
         groups: number of visuals, one above another.
-        per_group: storeys in the mesh of one visual.
-        extras: further meshes of each storey, with z from its floor.
-        part: stem of the visuals' names.
+        per_group: number of storeys in the mesh of one visual.
+        extras: further meshes of each storey, with z measured from its floor.
+        part: beginning of the visuals' names.
     """
     pieces = [facade_mesh(outline, facade.stacked(per_group))]
     for k in range(per_group):
@@ -111,7 +112,7 @@ def add_storeys(
 
 
 def _pane(outline: ArrayLike, facade: Facade, z0: float, z1: float) -> Mesh:
-    """Returns the pane behind all walls but plain ones."""
+    """Returns one pane behind all walls except plain ones."""
     edges = range(len(np.asarray(outline)))
     depth = facade.glass[0] - _PANE_OVERLAP
     plan = massing.inset(
@@ -132,24 +133,24 @@ def add_grooved(
     most: int = 4,
     plain: frozenset[int] = frozenset(),
 ) -> float:
-    """Adds storeys of upright piers with windows over spandrels between them.
+    """Adds storeys whose windows lie between upright piers; returns their top.
 
-    Bands that run around the building and piers as tall as the tier cost a
-    fraction of single windows.
+    The top is less than `goal` by millimetres [m]. Bands around the building
+    and piers of full height need far fewer faces than single windows.
 
     Args:
-        p: the building. Its parameters are `storey_height`, `spandrel`, of the
-            wall under the windows, `ledge`, the reach of a lip there, `recess`,
-            the depth of the windows, `pitch`, `pier` and `pier_reach`, of the
-            piers, whose width may be 0, and `solid_corner`, the width of
-            solid corners, 0 for glass around the corner [m].
-        z0, goal: bottom, and about the top [m].
+        p: the building. These of its parameters are lengths [m]:
+            `storey_height`; `spandrel`, the height of the wall under the
+            windows; `ledge`, the reach of a lip there; `recess`, the depth of
+            the windows; `pitch`, `pier` (its width may be 0) and `pier_reach`
+            of the piers; `solid_corner`, the width of solid corners (0 for
+            glass around the corner).
+        outline: (N, 2) corners of the walls, counter-clockwise [m].
+        z0, goal: height of the bottom, and approximate height of the top [m].
+        part: beginning of the visuals' names.
         rise: how far the piers rise above the storeys [m].
-        most: greatest number of visuals that the storeys become.
+        most: greatest number of visuals.
         plain: edges without any relief.
-
-    Returns:
-        Their top, less than `goal` by millimetres [m].
     """
     groups, per_group, storey = divided(goal - z0, p.storey_height, most)
     depth = p.recess
@@ -177,7 +178,7 @@ def add_grooved(
 
 
 def block(outline: ArrayLike, facade: Facade, z0: float) -> Mesh:
-    """Returns walls with a flat lid, glass and all, as one mesh."""
+    """Returns walls with their glass and a flat lid, as one mesh."""
     pieces = [
         facade_mesh(outline, facade, z0),
         massing.flat(outline, z0 + facade.height),
@@ -195,7 +196,7 @@ def shaft_walls(
     rim: tuple[float, float],
     glass: tuple[float, ...] = (),
 ) -> Facade:
-    """Returns the walls of a stair: one bay in front, one behind.
+    """Returns the walls of a stair tower, with one bay in front, one behind.
 
     Both bays are in the middle of their walls.
 
@@ -224,12 +225,12 @@ def add_crown(
     thickness: float = 0.3,
     items: Sequence[str] = (),
 ) -> float:
-    """Adds the top of the walls and the roof; returns the roof's height [m].
+    """Adds the top walls and the roof; returns the height of the roof [m].
 
     Args:
         out: the building under assembly, which gets the parts.
         outline: (N, 2) corners of the walls in the building's frame,
-            anticlockwise [m].
+            counter-clockwise [m].
         facade: the topmost walls.
         z0: height of their foot [m].
         parapet: height of the walls above the roof [m].
@@ -260,7 +261,10 @@ def _add_glass(
 def cornice(
     height: float, reach: float, *, thickness: float = 0.9, steps: int = 3
 ) -> tuple[Band, ...]:
-    """Returns bands that step out towards `reach` below `height`."""
+    """Returns bands that step outwards up to a height.
+
+    The topmost one ends at `height` and sticks out by `reach` [m].
+    """
     step = thickness / steps
     return tuple(
         Band(

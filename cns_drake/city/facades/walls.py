@@ -1,11 +1,11 @@
 """Walls with relief: windows, ledges and pilasters as a grid of depths.
 
-A wall is described in its own panel coordinates: x along the wall seen from
-outside (left to right), z up, depth inwards (negative: sticks out). Patches
-painted on the panel cut it into cells, each with one depth; the surface between
-them, with every reveal, sill and ledge, follows from the depths alone and is
-closed for any patches. Walls around a polygon are mitred at its corners, so
-that a ledge runs around them.
+A wall is described in panel coordinates: x along the wall from left to right
+(seen from outside), z up, and depth inwards; a negative depth sticks out.
+Patches painted on the panel divide it into cells with one depth each. The
+depths determine the whole surface, with every reveal, sill and ledge, and it is
+closed whatever the patches are. Walls around a polygon are mitred at its
+corners, so that a ledge runs around them.
 """
 
 from __future__ import annotations
@@ -21,10 +21,10 @@ from numpy.typing import ArrayLike
 
 from cns_drake.city.geometry.mesh import Mesh
 
-# Patches keep this distance from the ends of a wall: two walls meet there, and
-# close only if their relief is the same [m].
+# Patches keep this distance from the ends of a wall [m]: two walls meet there,
+# and the corner is closed only if their reliefs are the same.
 END_MARGIN_M = 0.01
-# Chords of an arch, for narrow windows and for anything wider than 2 m.
+# Number of chords of an arch, for narrow windows and for those wider than 2 m.
 _NARROW_ARCH, _WIDE_ARCH, _WIDE_ARCH_M = 4, 6, 2.0
 
 
@@ -37,7 +37,7 @@ class Band(NamedTuple):
 
 
 class Patch(NamedTuple):
-    """A rectangle of the wall pushed inwards (or out, depth < 0) [m]."""
+    """A rectangle of the wall, pushed in by `depth`, or out if negative [m]."""
 
     x0: float
     x1: float
@@ -47,9 +47,9 @@ class Patch(NamedTuple):
 
 
 class Arch(NamedTuple):
-    """A round-headed recess; the head is half an ellipse above z_spring.
+    """A round-headed recess [m]; its head is half an ellipse above z_spring.
 
-    It must lie on wall of depth 0, and nothing may be painted over it.
+    It must lie on wall of depth 0, and no later relief may lie over it.
     """
 
     x0: float
@@ -64,7 +64,7 @@ Relief = Patch | Arch
 
 
 class Corner(NamedTuple):
-    """A corner of a face of a wall; `row` is the row of cells it bounds."""
+    """A corner of a wall's face [m]; `row` is the face's row of cells."""
 
     x: float
     z: float
@@ -74,17 +74,17 @@ class Corner(NamedTuple):
 
 @dataclass(frozen=True)
 class WallCells:
-    """The cells of one wall: their breaks, their depths, and its arches.
+    """The cells of one wall: their boundaries, their depths, and its arches.
 
-    Only rows of the same group may share a face, because the others end
-    at different places.
+    Only rows of the same group may share a face, because rows of other groups
+    end at different places.
     """
 
     xs: list[float]
     zs: list[float]
     groups: np.ndarray
     depths: np.ndarray
-    hidden: np.ndarray  # True where an arch brings its own faces.
+    hidden: np.ndarray  # True where an arch has its own faces.
     arches: tuple[Arch, ...]
 
     @staticmethod
@@ -99,15 +99,15 @@ class WallCells:
 
         Args:
             length: length of the wall [m].
-            zs: rising heights that cut the wall into rows [m].
+            zs: rising heights that divide the wall into rows [m].
             groups: (rows,) group of each row; only rows of one group share a
                 face.
             bands: strips along the whole wall.
-            reliefs: openings and arches, later ones over earlier ones.
+            reliefs: openings and arches; later ones cover earlier ones.
 
         Raises:
-            ValueError: a relief leaves the wall, or an arch lies on cells
-                of another depth than 0.
+            ValueError: a relief extends beyond the wall, or an arch lies on
+                cells whose depth is not 0.
         """
         for relief in reliefs:
             if (
@@ -141,7 +141,7 @@ Quads = Iterator[list[Corner]]
 
 
 def wall_quads(grid: WallCells, glass: tuple[float, ...]) -> Quads:
-    """Yields the quads of a wall, counter-clockwise seen from outside."""
+    """Yields the quadrilaterals of a wall, counter-clockwise from outside."""
     for arch in grid.arches:
         yield from _arch_reveals(arch)
         if arch.depth not in glass:
@@ -152,7 +152,7 @@ def wall_quads(grid: WallCells, glass: tuple[float, ...]) -> Quads:
 
 
 def glass_quads(grid: WallCells, glass: tuple[float, ...]) -> Quads:
-    """Yields the quads of the panes, which `wall_quads` leaves out."""
+    """Yields the quadrilaterals of the panes, which `wall_quads` leaves out."""
     for arch in grid.arches:
         if arch.depth in glass:
             yield from _arch_back(arch)
@@ -173,7 +173,7 @@ def _span(breaks: list[float], low: float, high: float) -> slice:
 
 
 def _front_quads(grid: WallCells, left_out: np.ndarray) -> Quads:
-    """Yields the fewest fronts that a simple greedy merging finds."""
+    """Yields the fronts of cells; cells of one depth are merged greedily."""
     xs, zs, depths = grid.xs, grid.zs, grid.depths
     groups = np.broadcast_to(grid.groups[:, None], depths.shape)
     keys = np.stack([depths, groups])
@@ -195,7 +195,10 @@ def _front_quads(grid: WallCells, left_out: np.ndarray) -> Quads:
 def _merged(
     keys: np.ndarray, left_out: np.ndarray
 ) -> list[tuple[int, int, int, int]]:
-    """Covers cells of equal keys by (row0, row1, column0, column1) blocks."""
+    """Returns blocks (row0, row1, column0, column1) of cells with equal keys.
+
+    Together they cover all cells that are not left out.
+    """
     todo = ~left_out
     blocks = []
     num_rows, num_columns = todo.shape
@@ -216,7 +219,7 @@ def _merged(
 
 
 def _reveal_quads(grid: WallCells) -> Quads:
-    """Yields the faces across the steps between cells of other depth."""
+    """Yields the faces between neighbouring cells of different depths."""
     xs, zs, depths = grid.xs, grid.zs, grid.depths
     num_rows, num_columns = depths.shape
     for j in range(1, num_columns):
@@ -243,7 +246,7 @@ def _reveal_quads(grid: WallCells) -> Quads:
 def _runs(
     steps: list[tuple[float, float]],
 ) -> Iterator[tuple[int, int, tuple[float, float]]]:
-    """Yields (start, end, step) of equal neighbours that are real steps."""
+    """Yields (start, end, step) of runs of equal steps that are not zero."""
     start = 0
     for k in range(1, len(steps) + 1):
         if k == len(steps) or steps[k] != steps[start]:
@@ -253,7 +256,7 @@ def _runs(
 
 
 def _arch_outline(arch: Arch) -> tuple[list[float], list[float]]:
-    """Returns x and z of the head's points, left to right."""
+    """Returns x and z of the points on an arch's head, left to right."""
     middle, half = (arch.x0 + arch.x1) / 2, (arch.x1 - arch.x0) / 2
     rise = arch.z1 - arch.z_spring
     count = _WIDE_ARCH if 2 * half > _WIDE_ARCH_M else _NARROW_ARCH
@@ -267,7 +270,7 @@ def _arch_outline(arch: Arch) -> tuple[list[float], list[float]]:
 
 
 def _arch_reveals(arch: Arch) -> Quads:
-    """Yields spandrels, soffit, jambs and the floor of an arch."""
+    """Yields the faces of an arch between the wall and its back."""
     (x, z), d = _arch_outline(arch), arch.depth
     head = list(zip(x, z, strict=True))
     for a, b in itertools.pairwise(head):
@@ -281,7 +284,7 @@ def _arch_reveals(arch: Arch) -> Quads:
 
 
 def _arch_back(arch: Arch) -> Quads:
-    """Yields the back wall of an arch, slice upon slice."""
+    """Yields the back wall of an arch, in horizontal slices."""
     (x, z), d = _arch_outline(arch), arch.depth
     n = len(x) - 1
     slices = [((x[0], arch.z0), (x[n], arch.z0), (x[n], z[n]), (x[0], z[0]))]
@@ -294,7 +297,7 @@ def _arch_back(arch: Arch) -> Quads:
 
 
 def _face(*corners: tuple[tuple[float, float], float]) -> list[Corner]:
-    """Corners of a face inside a wall, each ((x, z), depth)."""
+    """Returns a face inside a wall, from corners ((x, z), depth)."""
     return [Corner(x, z, depth, 0) for (x, z), depth in corners]
 
 
@@ -312,12 +315,13 @@ class Facade:
 
     Attributes:
         height: height of the walls [m].
-        bands: strips around the building, painted in order; else depth 0.
+        bands: strips around the building, painted in order; the rest has depth
+            0.
         layout: (edge index, edge length [m]) -> patches, painted in order.
-        glass: depths whose fronts are glass; `facade_mesh` leaves them open
-            for `glass_mesh` or a pane behind all windows to close.
-        plain: edges without any relief, where bands end flush: walls
-            against a neighbour. They meet the others at real corners.
+        glass: depths at which fronts are glass. `facade_mesh` leaves them open;
+            `glass_mesh` closes them, or a pane behind all windows.
+        plain: edges without any relief, such as walls against a neighbour.
+            Bands end there with a corner of their own, flush with the wall.
     """
 
     height: float
@@ -327,7 +331,7 @@ class Facade:
     plain: frozenset[int] = frozenset()
 
     def stacked(self, count: int) -> Facade:
-        """Returns the facade of `count` copies of the storeys, stacked."""
+        """Returns the facade of `count` storeys, one above another."""
         bands = tuple(lifted(b, k * self.height) for k in range(count)
                       for b in self.bands)  # fmt: skip
 
@@ -355,12 +359,12 @@ def lifted(item: _Strip, dz: float) -> _Strip:
 def facade_mesh(points: ArrayLike, facade: Facade, z0: float = 0.0) -> Mesh:
     """Returns the walls around (N, 2) counter-clockwise corners, without glass.
 
-    Walls start at z0 [m] and are open at bottom and top: at both ends every
-    cell is closed back to depth 0, so walls stacked on the same outline join
-    without gaps.
+    Walls start at z0 [m] and are open at the bottom and the top. There every
+    cell is closed back to depth 0, so that walls stacked on the same outline
+    join without gaps.
 
     Raises:
-        ValueError: a patch leaves its wall.
+        ValueError: a patch extends beyond its wall.
     """
     return _quads_mesh(points, facade, z0, wall_quads)
 
@@ -376,14 +380,14 @@ def single_wall(
     reliefs: Sequence[Relief],
     fronts: Sequence[Iterable[float]],
 ) -> list[Mesh]:
-    """Returns a wall that touches no other, in wall coordinates.
+    """Returns a wall that touches no other wall, in wall coordinates.
 
-    Reliefs are painted in order and stay clear of both ends [m]. The wall
-    without its glass comes first, then one mesh of panes for each depth in
-    `fronts`.
+    Reliefs are painted in order and keep clear of both ends of the wall [m].
+    The first mesh is the wall without its glass. It is followed by one mesh of
+    panes for each set of depths in `fronts`.
 
     Raises:
-        ValueError: a relief leaves the wall.
+        ValueError: a relief extends beyond the wall.
     """
     zs = breaks(height, [v for r in reliefs for v in (r.z0, r.z1)])
     rows = np.zeros(len(zs) - 1, dtype=int)
@@ -394,7 +398,7 @@ def single_wall(
     meshes = []
     for quads in found:
         corners = [(x, -depth, z) for quad in quads for x, z, depth, _ in quad]
-        # These coordinates are left-handed.
+        # Panel coordinates are left-handed.
         faces = np.arange(len(corners)).reshape(-1, 4)[:, ::-1].tolist()
         vertices = np.array(corners).reshape(-1, 3)
         meshes.append(_welded(vertices, list(map(tuple, faces))))
@@ -421,7 +425,7 @@ def _quads_mesh(
 
 
 def _welded(vertices: np.ndarray, faces: list[tuple[int, ...]]) -> Mesh:
-    """Returns the mesh with coinciding vertices (to 1 um) merged."""
+    """Returns the mesh with vertices merged that coincide within 1 um."""
     keys = np.round(vertices, 6)
     unique, inverse = np.unique(keys, axis=0, return_inverse=True)
     inverse = inverse.reshape(-1)
@@ -431,9 +435,9 @@ def _welded(vertices: np.ndarray, faces: list[tuple[int, ...]]) -> Mesh:
 def _panel(
     points: np.ndarray, edge: int, facade: Facade
 ) -> tuple[WallCells, Callable[[Corner], np.ndarray]]:
-    """Returns the cells of one wall, and where their corners are in x and y.
+    """Returns the cells of one wall, and a function that places their corners.
 
-    There they meet those of the neighbouring walls.
+    At the ends of the wall, its corners meet those of the neighbouring walls.
     """
     count = len(points)
     before, after = (edge - 1) % count, (edge + 1) % count
@@ -448,8 +452,8 @@ def _panel(
     reliefs = () if is_plain else facade.layout(edge, length)
     bounds = [v for r in (*reliefs, *facade.bands) for v in (r.z0, r.z1)]
     zs = breaks(facade.height, bounds)
-    # The depths at the ends of the neighbouring walls, row by row. Above
-    # and below the wall every cell closes back to depth 0.
+    # The depths at the ends of the neighbouring walls, row by row. Above and
+    # below the wall, every cell is closed back to depth 0.
     ends = np.zeros((2, len(zs) + 1))
     for row, z in enumerate((np.array(zs[1:]) + zs[:-1]) / 2, start=1):
         inside = [band for band in facade.bands if band.z0 < z < band.z1]
@@ -475,11 +479,12 @@ def _panel(
 
 
 def _shift(a: np.ndarray, b: np.ndarray, depth: float, other: float) -> float:
-    """Returns by how much a wall at `depth` shortens between directions.
+    """Returns how much a wall at `depth` is shortened at a corner [m].
 
-    Two lines that leave the corner at the turn t, moved inwards by `depth` and
-    `other`, meet (other - depth cos t) / sin t along the first one; for equal
-    depths this is depth tan(t / 2).
+    `a` and `b` are the directions of the two walls. Two lines that leave the
+    corner at the turn t, moved inwards by `depth` and `other`, meet at (other -
+    depth cos t) / sin t along the first one; for equal depths this is depth
+    tan(t / 2).
     """
     cosine, sine = float(a @ b), float(a[0] * b[1] - a[1] * b[0])
     return 0.0 if abs(sine) < 1e-6 else (other - depth * cosine) / sine

@@ -1,9 +1,8 @@
-"""Houses of several wings: boxes that may overlap, each under its own roof.
+"""Houses of several wings: boxes that may overlap, each with its own roof.
 
 Walls have windows and doors where no other wing hides them.
 
-A wing's edges count like those of a rectangle: 0 front, 1 right, 2 back,
-3 left.
+The edges of a wing are numbered: 0 front, 1 right, 2 back, 3 left.
 """
 
 from __future__ import annotations
@@ -19,7 +18,7 @@ from cns_drake.city.facades import bays, details, massing, roofs, walls
 from cns_drake.city.facades.assembly import Assembly
 from cns_drake.city.geometry.mesh import Mesh
 
-# The windows of a gable: (from, to) -> holes.
+# Returns the windows of a gable between two places along its wall.
 Attic = Callable[[float, float], list[walls.Patch]]
 # Overlap of a roof's underside with the top of the walls [m].
 _SEAT = 0.02
@@ -31,15 +30,15 @@ class Roof:
 
     Attributes:
         kind: `gable`, `gambrel`, `barrel`, `shed`, `hip` or `flat`.
-        along_y: whether the ridge runs from the front to the back; a shed
-            roof rises across the ridge's direction.
+        along_y: whether the ridge runs from the front to the back. A shed roof
+            rises across this direction.
         eaves: overhang below the slopes [m].
         verge: overhang beyond the gables [m].
-        thickness: thickness of the roof, measured upright [m].
-        ridge: place of a gable roof's ridge as a part of the span.
-        parapet: parapet of a flat roof [m].
-        falling: whether a shed roof falls along its line instead of rising:
-            to the back, or to the right if `along_y`.
+        thickness: vertical thickness of the roof [m].
+        ridge: place of a gable roof's ridge, as a share of the span.
+        parapet: height of a flat roof's parapet [m].
+        falling: whether a shed roof falls to the back (to the right if
+            `along_y`) instead of rising.
     """
 
     kind: str = "gable"
@@ -54,10 +53,11 @@ class Roof:
 
 @dataclass(frozen=True)
 class Wing:
-    """A box of a house, with the top of its walls and of its roof [m].
+    """A box-shaped part of a house with its own roof; all lengths in [m].
 
-    The top of a flat roof is the parapet. Edges built against a neighbour are
-    `blind`: flush and plain.
+    `wall_top` is the height of its walls and `top` that of its ridge, or of the
+    parapet of a flat roof. Edges built against a neighbour are `blind`: flush
+    and plain.
     """
 
     x0: float
@@ -74,15 +74,15 @@ class Wing:
         area: massing.Area, wall_top: float, top: float, roof: Roof,
         blind: Collection[int] = (),
     ) -> Wing:  # fmt: skip
-        """Returns a wing with its walls on whole centimetres.
+        """Returns a wing whose walls stand on whole centimetres.
 
-        Whole centimetres keep the meshes' text short.
+        Whole centimetres make the text of the meshes shorter.
 
         Args:
             area: x0, y0, x1, y1 in the building's frame [m].
             wall_top: height of the walls [m].
             top: height of the ridge [m].
-            roof: kind of the roof.
+            roof: shape of the roof.
             blind: edges whose walls have no openings.
         """
         a, b, c, d, e = (round(float(v), 2) for v in (*area, wall_top))
@@ -96,7 +96,7 @@ class Wing:
         return Wing.at(area, top - rim, top, Roof("flat", parapet=parapet))
 
     def mirrored(self, width: float) -> Wing:
-        """Returns the wing with x replaced by `width` - x."""
+        """Returns the wing mirrored left to right: x becomes `width` - x."""
         blind = frozenset((0, 3, 2, 1)[k] for k in self.blind)
         x0, x1 = round(width - self.x1, 2), round(width - self.x0, 2)
         return replace(self, x0=x0, x1=x1, blind=blind)
@@ -124,7 +124,7 @@ class Wing:
 
     @property
     def floor(self) -> float:
-        """Height of a flat roof within its parapet [m]."""
+        """Height of a flat roof's surface inside its parapet [m]."""
         return self.top - self.roof.parapet
 
     @property
@@ -132,15 +132,12 @@ class Wing:
         return massing.rectangle(self.x0, self.y0, self.x1, self.y1)
 
     def wall(self, edge: int) -> details.WallFrame:
-        """Returns the frame of one of the walls."""
+        """Returns the wall frame of an edge."""
         return details.WallFrame(self.outline, edge)
 
     @property
     def line(self) -> list[tuple[float, float]]:
-        """Upper surface of the roof between the walls, without eaves.
-
-        It is a line of (across, height) [m].
-        """
+        """The roof line between the walls as (across, z), without eaves [m]."""
         roof = self.roof
         a, b = (self.x0, self.x1) if roof.along_y else (self.y0, self.y1)
         z = self.wall_top + roof.thickness - _SEAT
@@ -157,11 +154,11 @@ class Wing:
 
     @property
     def gables(self) -> tuple[int, int]:
-        """The edges below the ends of the ridge, at its start and end."""
+        """The two edges below the start and the end of the ridge."""
         return (0, 2) if self.roof.along_y else (3, 1)
 
     def covers(self, x: float, y: float) -> bool:
-        """Returns whether a point lies within the walls."""
+        """Returns whether a point on the ground lies within the walls."""
         return self.x0 < x < self.x1 and self.y0 < y < self.y1
 
 
@@ -171,9 +168,9 @@ def add_roof(
     attic: Attic | None = None,
     material: str = "walls",
 ) -> None:
-    """Adds a wing's roof, as `roof`, and gables of a material.
+    """Adds a wing's roof, and its gables in a given material.
 
-    `attic` gives the windows of the gables.
+    `attic` returns the windows of the gables.
     """
     roof, outline, line = wing.roof, wing.outline, wing.line
     is_free = [k not in wing.blind for k in range(4)]
@@ -195,7 +192,8 @@ def add_roof(
     start, end = wing.ridge
     start -= roof.verge * is_free[start_edge]
     end += roof.verge * is_free[end_edge]
-    # A shed roof has no eaves at its upper end: its top is the wing's.
+    # A shed roof has no eaves at its upper end, which is at the top of the
+    # wing.
     ends = [is_free[low_edge], is_free[high_edge]]
     if roof.kind == "shed":
         ends[0 if roof.falling else 1] = False
@@ -217,7 +215,7 @@ def add_roof(
         if holes:
             out.add_to("glass", wall.place(roofs.gable_glass(holes)))
     if roof.kind == "shed":
-        # The tall side, from the walls up to the roof.
+        # The tall side of a shed roof: the wall above the other walls.
         wall = wing.wall(low_edge if roof.falling else high_edge)
         top = [(x, wing.top - roof.thickness) for x in (0.0, wall.length)]
         shield = roofs.gable_wall(top, 0.0, wall.length, wing.wall_top)
@@ -227,11 +225,11 @@ def add_roof(
 def _seen_from(
     wing: Wing, edge: int, line: list[bays.Span]
 ) -> list[tuple[float, float]]:
-    """Returns the underside of the roof in a gable's wall coordinates."""
+    """Returns the underside of the roof in the wall coordinates of a gable."""
     thickness = wing.roof.thickness
     start, end = line[0][0], line[-1][0]
-    # Walls run counter-clockwise: seen from the front and from the right
-    # side the line keeps its sense.
+    # Walls run counter-clockwise. Seen from the front and from the right, the
+    # line therefore keeps its direction.
     if edge in (0, 1):
         return [(u - start, z - thickness) for u, z in line]
     return [(end - u, z - thickness) for u, z in reversed(line)]
@@ -246,13 +244,15 @@ def _fits(hole: walls.Patch, under: list[bays.Span]) -> bool:
 def attic_window(
     width: float, z0: float, z1: float, depth: float, count: int = 1
 ) -> Attic:
-    """Returns windows side by side in the middle of a gable.
+    """Returns a function that returns the windows of a gable.
+
+    The windows are side by side in the middle of the gable.
 
     Args:
         width: width of each window [m].
         z0: height of their sills [m].
         z1: height of their heads [m].
-        depth: how far they lie behind the wall [m].
+        depth: distance of the glass behind the wall [m].
         count: number of windows.
     """
 
@@ -270,7 +270,7 @@ def attic_window(
 
 
 def ridge_rise(span: float, pitch_deg: float) -> float:
-    """Returns how high a ridge rises over a span at a pitch [m]."""
+    """Returns how high a ridge is above the eaves, for a span and pitch [m]."""
     return span / 2 * math.tan(math.radians(pitch_deg))
 
 
@@ -294,7 +294,7 @@ def add_dormer(
     height: float,
     roof: str = "gable",
 ) -> None:
-    """Adds a dormer on the slope that rises behind a wall, if it fits.
+    """Adds a dormer to the slope that rises behind a wall, if there is room.
 
     Args:
         out: the building under assembly, which gets the parts.
@@ -354,19 +354,19 @@ def add_dormers(
     roof: str,
     pitch: float = 9.0,
 ) -> None:
-    """Adds dormers side by side on the front slope of a wing.
+    """Adds dormers side by side to the front slope of a wing.
 
     The wing has a `gable` or `gambrel` roof along the front. On a gambrel roof
-    they stand on the steep part, without a pitched roof.
+    the dormers stand on the steep part, and have no pitched roof.
 
     Args:
         out: the building under assembly, which gets the parts.
         wing: the wing.
         start: where they begin along the front wall [m].
         end: where they end along the front wall [m].
-        count: the most dormers.
+        count: greatest number of dormers.
         roof: their roof: `gable`, `shed` or `flat`.
-        pitch: greatest distance between the middles of two dormers [m].
+        pitch: greatest distance from the middle of one dormer to the next [m].
     """
     (u0, z0), (u1, z1) = wing.line[:2]
     slope, room = (z1 - z0) / (u1 - u0), z1 - z0
@@ -390,7 +390,7 @@ def add_dormers(
 def free_stretches(
     wing: Wing, edge: int, others: Iterable[Wing], z: float
 ) -> list[tuple[float, float]]:
-    """Returns the parts of a wall that no other wing hides at a height."""
+    """Returns the stretches of a wall that no wing hides at a height [m]."""
     wall = wing.wall(edge)
     cuts = {0.0, wall.length}
     hiding = [w for w in others if w is not wing and w.top > z]
@@ -414,7 +414,7 @@ def free_stretches(
 
 
 class Openings:
-    """The windows and doors of a wing, by edge."""
+    """Collects the windows and doors of a wing, edge by edge, and builds it."""
 
     def __init__(
         self, out: Assembly, wing: Wing, others: Sequence[Wing] = ()
@@ -430,15 +430,15 @@ class Openings:
         choices: Sequence[bays.Bay],
         margin: float = 0.5,
     ) -> None:
-        """Repeats bays along the free parts of walls.
+        """Adds rows of bays to the free parts of walls.
 
-        Bays take turns from both ends towards the middle. Parts that other
-        wings hide at the height z are not free.
+        The choices take turns from both ends towards the middle. A part of a
+        wall is free if no other wing hides it at the height z.
 
         Args:
             edges: numbers of the walls.
             z: height at which a wall must be free [m].
-            pitch: width of a bay, about [m].
+            pitch: approximate width of a bay [m].
             choices: bays that take turns.
             margin: distance of the bays from the ends of a free part [m].
         """
@@ -451,7 +451,7 @@ class Openings:
                 ]
 
     def put(self, edge: int, x: float, width: float, bay: bays.Bay) -> None:
-        """Puts a bay around x, replacing the bays that it touches there."""
+        """Adds a bay around x, in place of the bays that it touches [m]."""
         x0, x1 = x - width / 2, x + width / 2
         new = bay(x0, x1)
         if not new:
@@ -471,14 +471,14 @@ class Openings:
     def clear(
         self, edge: int, x0: float, x1: float, z0: float, z1: float
     ) -> None:
-        """Removes the reliefs that touch a part of a wall.
+        """Removes the reliefs that touch a rectangle of a wall.
 
         Args:
             edge: number of the wall.
-            x0: start of the part along the wall [m].
-            x1: end of the part along the wall [m].
-            z0: lower height of the part [m].
-            z1: upper height of the part [m].
+            x0: start of the rectangle along the wall [m].
+            x1: end of the rectangle along the wall [m].
+            z0: lower height of the rectangle [m].
+            z1: upper height of the rectangle [m].
         """
         self._reliefs[edge] = [
             r
@@ -487,9 +487,9 @@ class Openings:
         ]
 
     def layout(self, edge: int, length: float) -> list[walls.Relief]:
-        """Returns all reliefs of a wall, for a facade.
+        """Returns all reliefs of a wall; it is the layout of a `Facade`.
 
-        Bands end at arches, which need flat wall around them.
+        Bands stop beside arches, which need flat wall around them.
         """
         found: list[walls.Relief] = []
         for relief in self._reliefs[edge]:
@@ -504,9 +504,10 @@ class Openings:
         bands: Sequence[walls.Band] = (),
         material: str = "walls",
     ) -> None:
-        """Adds the walls on their foundation, with their panes as `glass`.
+        """Adds the walls on their foundation, and their panes as `glass`.
 
-        `glass` gives the depths of the openings that have panes [m].
+        The argument `glass` gives the depths of the openings that have panes
+        [m].
         """
         wing = self._wing
         bands, glass = tuple(bands), tuple(glass)
@@ -528,9 +529,9 @@ class Openings:
         material: str = "walls",
         attic: Attic | None = None,
     ) -> None:
-        """Adds the walls, see `add_walls`, and the roof on them.
+        """Adds the walls (see `add_walls`) and the roof on them.
 
-        `attic` gives the windows of its gables.
+        `attic` returns the windows of its gables.
         """
         self.add_walls(glass, bands, material)
         add_roof(self._out, self._wing, attic, material)
@@ -548,17 +549,17 @@ class Openings:
     ) -> None:
         """Adds a row of windows to each storey of a wing.
 
-        Windows of the ground floor are a quarter wider.
+        Windows of the ground floor are wider by a quarter.
 
         Args:
             edges: numbers of the walls.
             floor: height of the lowest floor [m].
             storey: height of a storey [m].
             count: number of storeys.
-            pitch: distance between two windows, about [m].
+            pitch: approximate distance from one window to the next [m].
             width: width of a window [m].
             margin: least distance of windows from corners [m].
-            head: top of a window above its floor [m].
+            head: height of the top of a window above its floor [m].
         """
         for k in range(count):
             z = floor + k * storey
@@ -577,7 +578,7 @@ class Openings:
         lights: float = 0.0,
         material: str = "accent",
     ) -> None:
-        """Adds a door with its leaf, and windows beside it if wanted.
+        """Adds a door with its leaf, and side windows if wanted.
 
         Args:
             edge: number of the wall.
@@ -585,7 +586,7 @@ class Openings:
             floor: height of its threshold [m].
             width: width of the door [m].
             height: height of the door [m].
-            lights: width of a window on each side; 0 for none [m].
+            lights: width of the window on each side; 0 for none [m].
             material: material of the leaf.
         """
         half, top = width / 2, round(floor + height, 2)
@@ -609,7 +610,7 @@ class Openings:
     def add_garage_door(
         self, edge: int, x: float, width: float, height: float = 2.15
     ) -> None:
-        """Adds a sectional door with ribs, as `trim`."""
+        """Adds a garage door with horizontal ribs, in the material `trim`."""
         a, b = round(x - width / 2, 2), round(x + width / 2, 2)
         hole: list[walls.Relief] = [walls.Patch(a, b, 0.0, height, DOOR_M)]
         self.put(edge, x, width + 0.3, lambda x0, x1: hole)
@@ -623,7 +624,7 @@ class Openings:
             self._out.add_to("trim", self._wing.wall(edge).place(panel))
 
     def add_casings(self, edges: Sequence[int], style: str) -> None:
-        """Frames the windows of some walls, see `details.casings`."""
+        """Adds frames to the windows of some walls; see `details.casings`."""
         material = "accent" if style == "shutters" else "trim"
         for edge in edges:
             wall = self._wing.wall(edge)
@@ -645,14 +646,15 @@ class Openings:
     ) -> None:
         """Adds shops side by side between two points of a wall.
 
-        Fascias have the material `sign`, blades `trim`, awnings `awning`.
+        Their fascias have the material `sign`, hanging signs `trim` and awnings
+        `awning`.
 
         Args:
             edge: number of the wall.
             start: where the shops begin along the wall [m].
             end: where they end along the wall [m].
             height: height of the ground floor [m].
-            width: width of a shop, about [m].
+            width: approximate width of a shop [m].
             awnings: share of the shops that have an awning.
             reach: how far an awning reaches out of the wall [m].
         """
@@ -676,7 +678,7 @@ class Openings:
                 self._out.add_to("awning", wall.place(shade))
             if self._out.chance(0.4):
                 x = x0 + 0.25 if self._out.chance(0.5) else x1 - 0.25
-                # Blades hang above heads, like awnings.
+                # Hanging signs, like awnings, are above people's heads.
                 z = max(2.4, head + 0.1)
                 blade = wall.box(x - 0.06, x + 0.06, 0.1, 0.9, z, z + 0.8)
                 self._out.add_to("trim", blade)
@@ -689,7 +691,7 @@ GLASS_M, DOOR_M = 0.12, 0.2
 def sash(
     width: float, z: float, sill: float, head: float, bars: int = 0
 ) -> bays.Bay:
-    """Returns a bay with a window of a storey.
+    """Returns a bay with a window of one storey.
 
     Args:
         width: width of the window [m].
@@ -703,7 +705,7 @@ def sash(
 
 
 def _leaf(x0: float, x1: float, z0: float, z1: float) -> list[Mesh]:
-    """A door leaf with a raised frame, in wall coordinates."""
+    """Returns a door leaf with a raised frame, in wall coordinates."""
     shift = (0.0, -DOOR_M, 0.0)
     panels = [
         details.board(x0, x1, z0, z1, 0.04),

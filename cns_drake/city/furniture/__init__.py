@@ -1,1 +1,1 @@
-"""Objects on streets, squares and building sites, besides plants."""
+"""Objects other than plants on streets, squares and building sites."""

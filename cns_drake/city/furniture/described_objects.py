@@ -1,4 +1,4 @@
-"""Objects that `objects.yaml` describes: parts, placed by formulas."""
+"""Builds the objects of `objects.yaml`, whose parts are given by formulas."""
 
 from collections.abc import Iterator, Mapping
 from functools import partial
@@ -27,13 +27,14 @@ from cns_drake.city.geometry.structures import (
 
 _FILE = parse_yaml(Path(__file__).with_name("objects.yaml").read_bytes())
 _COLOURS = _FILE.pop("colours")
-# Keys of a part that are no formulas, or belong to all of its copies.
+# Keys of a part that are no formulas, or are evaluated once for all of its
+# copies.
 _PLAIN = frozenset({"name", "mesh", "repeat", "if", "draw", "parts"})
 _Names = dict[str, Any]
 
 
 def _functions(rng: np.random.Generator) -> _Names:
-    """Returns what formulas know besides an object's own numbers."""
+    """Returns the functions and colours that all formulas may use."""
 
     def uniform(low: float = 0.0, high: float = 1.0) -> float:
         return float(rng.uniform(low, high))
@@ -63,7 +64,7 @@ def _build(
     """Returns an object from its description.
 
     Raises:
-        TypeError: it has no such parameter.
+        TypeError: the object has no such parameter.
     """
     names = _functions(rng)
     known = entry.get("parameters", {})
@@ -77,7 +78,7 @@ def _build(
 
 
 def _parts(group: Mapping[str, Any], names: _Names) -> Iterator[Part]:
-    """Yields the parts of a group, such as a whole object."""
+    """Yields the parts of a group of parts, such as a whole object."""
     for name, formula in group.get("draw", {}).items():
         names[name] = value_of(formula, names)
     if "parts" not in group:
@@ -94,7 +95,7 @@ def _parts(group: Mapping[str, Any], names: _Names) -> Iterator[Part]:
 
 
 def _spread(k: int, distance: float, count: int) -> float:
-    """Returns the place of the k-th of some things in a row about 0."""
+    """Returns the place of the k-th of some things in a row centred on 0."""
     return distance * (k - (count - 1) / 2)
 
 
@@ -130,7 +131,7 @@ def _part(entry: Mapping[str, Any], names: _Names) -> Part:
     return Part(name, shape, triple(at), rpy, rgb)
 
 
-# Kind, such as `street_lights` -> name of an object -> its builder.
+# Kind of object, such as `street_lights` -> name of an object -> its builder.
 DESCRIBED: dict[str, dict[str, Builder]] = {
     kind: {
         name: Builder(entry["class"], partial(_build, entry))

@@ -1,4 +1,4 @@
-"""Fences, walls and hedges: runs of panels."""
+"""Fences, walls and hedges: rows of equal panels."""
 
 from dataclasses import dataclass
 from functools import partial
@@ -15,9 +15,10 @@ _LONGEST = 8
 
 @dataclass(frozen=True)
 class RunKind:
-    """A kind of fence, from `fences.yaml`; panels have nominal sizes [m].
+    """A kind of fence, from `fences.yaml`, with the size of its panels [m].
 
-    A post that ends the run has its x size, y from, y to and z to [m].
+    If there is an `end_post`, it closes the last panel. Its numbers are its
+    size in x, its least and greatest y, and its height [m].
     """
 
     panel: float
@@ -27,7 +28,7 @@ class RunKind:
     semantic_class: str = "fence"
 
 
-# By the stems of their meshes' names.
+# Name of a kind, with which the names of its meshes begin -> the kind.
 RUN_KINDS = {
     name: RunKind(**values)
     for name, values in parse_yaml(
@@ -45,8 +46,8 @@ def run(
 ) -> structures.Model:
     """Returns a fence of several panels in a random colour.
 
-    The kind is one of `RUN_KINDS`. The height is the nominal one if not given
-    [m].
+    The name is a key of `RUN_KINDS`. Without a `height`, the fence has that of
+    its kind [m].
 
     Raises:
         ValueError: the length or the height is not positive.

@@ -1,4 +1,4 @@
-"""Parked vehicles: body types, colours, and single cars made from them.
+"""Parked vehicles, drawn from body types and colours.
 
 Vehicle frame: x forward, y left, z up; the origin is on the ground below the
 middle of the vehicle.
@@ -42,7 +42,7 @@ FORMS = {
 
 
 def car(rng: np.random.Generator, *, form: str) -> structures.Model:
-    """Returns a vehicle of one of `FORMS`, slightly scaled and painted."""
+    """Returns a vehicle of a form in `FORMS`, with random paint and scale."""
     size = rng.uniform(0.97, 1.03, 3)
     scale = structures.triple(round(float(s), 3) for s in size)
     paint = PAINTS[int(rng.integers(len(PAINTS)))]

@@ -1,1 +1,1 @@
-"""From a folder of YAML files to the stages of a city as SDF."""
+"""Writes the stages of a city as SDF from a folder of YAML files."""

@@ -1,4 +1,4 @@
-"""From a road network and a plan to all structures of a city."""
+"""Returns all structures of a city from a road network and a plan."""
 
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from pathlib import Path
@@ -44,9 +44,9 @@ from cns_drake.roads.network import RoadNetwork, load_road_network
 
 
 class City(NamedTuple):
-    """A whole city: the ground first, then the things on it.
+    """A whole city: its structures (ground first), and its parked cars.
 
-    `cars` are the weights of its parked cars.
+    `cars` maps the name of a parked car to its weight in the random choice.
     """
 
     structures: tuple[Structure, ...]
@@ -54,14 +54,22 @@ class City(NamedTuple):
 
 
 class Streets(NamedTuple):
-    """Streets that a city is built along.
+    """The streets along which a city is built; all areas are in W [m].
 
-    Sidewalks are `kerb_height` above the surface [m], or as high as `kerbs`
-    gives for a place. `junctions` is the area of all junctions. Margins are
-    strips beside the streets that stay free, and buildings stand along them.
-    Nothing is built or planted in `reserved`, either. All areas are in W [m].
-    `furnish` places the streets' furniture, after the buildings and before all
-    else. `park` parks cars in the streets, last of all.
+    Attributes:
+        areas: carriageways, sidewalks and medians.
+        surface: heights of the carriageways.
+        kerb_height: height of sidewalks above the carriageway [m], where
+            `kerbs` does not give another one for a place.
+        junctions: area of all junctions.
+        margins: strips beside the streets that stay free. Buildings stand along
+            them.
+        reserved: area in which nothing is built or planted either.
+        structures: structures of the streets themselves.
+        furnish: places the objects of the streets, after the buildings and
+            before everything else.
+        park: parks cars in the streets, last of all.
+        kerbs: height of the kerb by place, where it differs.
     """
 
     areas: Areas
@@ -77,7 +85,7 @@ class Streets(NamedTuple):
 
 
 def meshes_of(structures: Iterable[Structure]) -> dict[str, Mesh]:
-    """Returns name -> mesh of all meshes of structures.
+    """Returns all meshes of structures by name.
 
     Raises:
         ValueError: if two different meshes have the same name, or one has no
@@ -117,7 +125,9 @@ def make_city(world: Path) -> City:
 
 
 def lay_out(network: RoadNetwork, plan: CityPlan, source: str) -> City:
-    """Returns a city that is made from a road network and a plan.
+    """Returns the city made from a road network and a plan.
+
+    Errors name the `source` of the plan.
 
     Raises:
         InputError: if the plan names something unknown or impossible.
@@ -137,9 +147,10 @@ def lay_out(network: RoadNetwork, plan: CityPlan, source: str) -> City:
 
 
 def build_along(streets: Streets, plan: CityPlan, source: str) -> City:
-    """Returns a city that is made along streets.
+    """Returns the city made along streets.
 
-    Things that need most room, or that fit in the fewest places, come first.
+    Things that need most room, or that fit in the fewest places, are placed
+    first. Errors name the `source` of the plan.
 
     Raises:
         InputError: if the plan names something unknown or impossible.
@@ -186,7 +197,11 @@ def build_along(streets: Streets, plan: CityPlan, source: str) -> City:
 
 
 def _check_names(plan: CityPlan, source: str) -> None:
-    """Raises InputError for names that are in no registry."""
+    """Checks that all names in a plan are known.
+
+    Raises:
+        InputError: if an archetype, object or car is unknown.
+    """
 
     def require(field: str, names: Iterable[str]) -> None:
         registry = ARCHETYPES if field.endswith(".rows") else OBJECTS

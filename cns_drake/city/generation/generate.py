@@ -33,17 +33,18 @@ from cns_drake.city.plan.stages import Stages, load_stages
 from cns_drake.scene.labels import MAX_INSTANCE
 from cns_drake.scene.semantics import CLASS_IDS, CLASS_RGB
 
-# A structure that has moved farther than this is a new one [m].
+# A structure that has moved farther than this counts as a new one [m].
 _SAME_PLACE = 0.3
 _COLUMNS = ("name", "class", "x", "y", "tags")
 
 
 class Renaming(NamedTuple):
-    """The new names of the structures that a file of stages names.
+    """What has become of the names in a file of stages, in a changed city.
 
-    Structures that still stand at their place are `renamed`. All others are
-    `lost`, even if another structure has their name now. Patterns are `unclear`
-    if they now match different structures.
+    `renamed` maps the old names of structures that still stand at their place
+    to their new names. Structures that no longer do are `lost`, even if another
+    structure has their name now. Patterns are `unclear` if they now match
+    different structures.
     """
 
     renamed: dict[str, str]
@@ -65,10 +66,11 @@ class _Row(NamedTuple):
 def find_renaming(
     stages: Path, table: Path, structures: Sequence[Structure]
 ) -> Renaming:
-    """Returns the new names of structures that a `stages.yaml` names.
+    """Returns the new names of the structures that `stages.yaml` names.
 
-    The table is the `structures.csv` of the city for which `stages.yaml` was
-    written. A structure at the same place counts as the same structure.
+    `table` is the `structures.csv` of the city for which `stages.yaml` was
+    written, and `structures` are those of the present city. A structure at the
+    same place counts as the same structure.
 
     Raises:
         InputError: a file cannot be read.
@@ -88,7 +90,8 @@ def find_renaming(
             if _has_changed(name, before, names, successor):
                 unclear.append(name)
         elif name not in before:
-            # A new name, or a slip, which generating reports.
+            # The name is new or misspelt. Generating the stages reports
+            # misspelt names.
             continue
         elif name not in successor:
             lost.append(name)
@@ -98,7 +101,7 @@ def find_renaming(
 
 
 def renamed_text(stages: Path, renamed: Mapping[str, str]) -> str:
-    """Returns the text of a file of stages with structures renamed.
+    """Returns the text of a file of stages with the structures renamed.
 
     Comments and order stay as they are.
 
@@ -125,9 +128,9 @@ def _text(path: Path) -> str:
 
 
 def _name_nodes(path: Path) -> list[yaml.ScalarNode]:
-    """Returns the scalars of a file of stages that name structures."""
+    """Returns the YAML scalars in a file of stages that name structures."""
     read_yaml(path)  # Errors in one line.
-    # Only the slower loader has the place of a node in the text.
+    # Only this slower loader records where in the text a node is.
     root = yaml.compose(_text(path), yaml.SafeLoader)
     lists = [
         node
@@ -144,7 +147,7 @@ def _name_nodes(path: Path) -> list[yaml.ScalarNode]:
         )
     ]
     lists += [node for _, node in _items(root, "lots")]
-    # The node of an alias is visited once.
+    # A node that aliases refer to several times is replaced only once.
     scalars = {
         id(node): node
         for group in lists
@@ -156,7 +159,7 @@ def _name_nodes(path: Path) -> list[yaml.ScalarNode]:
 
 
 def _items(node: yaml.Node | None, key: str) -> list[tuple[str, yaml.Node]]:
-    """Returns the pairs of the mapping that a mapping has under a key."""
+    """Returns key and value of each pair in the mapping under a key."""
     return [
         pair
         for name, value in _pairs(node)
@@ -166,7 +169,7 @@ def _items(node: yaml.Node | None, key: str) -> list[tuple[str, yaml.Node]]:
 
 
 def _pairs(node: yaml.Node | None) -> list[tuple[str, yaml.Node]]:
-    """Returns the pairs of a mapping, with those merged into it."""
+    """Returns the pairs of a mapping, with those merged into it (`<<`)."""
     if not isinstance(node, yaml.MappingNode):
         return []
     pairs = []
@@ -187,7 +190,10 @@ def _has_changed(
     today: Iterable[str],
     successor: Mapping[str, str],
 ) -> bool:
-    """Returns whether a pattern matches others, besides new or lost ones."""
+    """Returns whether a pattern now matches other structures than before.
+
+    Structures that are new or lost do not count.
+    """
     meant = {
         successor[name]
         for name in before
@@ -215,7 +221,7 @@ def _read(table: Path) -> list[_Row]:
 def _successors(
     before: Sequence[_Row], today: Sequence[_Row]
 ) -> dict[str, str]:
-    """Returns the new name of a structure that has kept its place."""
+    """Returns old name -> new name of structures that have kept their place."""
     if not before or not today:
         return {}
     tree = cKDTree([row.xy for row in today])
@@ -223,7 +229,7 @@ def _successors(
     for row in before:
         for k in tree.query_ball_point(row.xy, _SAME_PLACE):
             other = today[k]
-            # At one place there is one structure of a kind. Where there are
+            # Usually there is one structure of a kind at a place. If there are
             # two, such as the grounds of two districts, their names decide.
             if (
                 row.stem == other.stem
@@ -241,8 +247,8 @@ def _successors(
     return found
 
 
-# Meshes are named relative to the SDF file, so that a stage needs no package
-# map: it parses from wherever the world's folder lies.
+# Paths of meshes are relative to the SDF file. A stage therefore needs no
+# package map, wherever the world's folder is.
 def stage_sdf(
     world: str,
     structures: Iterable[Structure],
@@ -250,13 +256,14 @@ def stage_sdf(
     comment: str,
     before: Iterable[str] = (),
 ) -> str:
-    """Returns a world with all structures as visuals of one static link.
+    """Returns the SDF of a world: all structures as visuals of one static link.
 
-    A static scene is parsed fastest as one link with many visuals, and it
-    carries no collision geometry because nothing ever touches it. The
-    visual's name is `<structure>/<part>`; Drake keeps it as the geometry
-    name, which is how a LiDAR return finds its structure. `comment` is one line
-    for the reader of the file. `before` is the SDF text of other visuals.
+    Drake parses a static scene fastest as one link with many visuals. The link
+    has no collision geometry, because nothing ever touches it. A visual is
+    named `<structure>/<part>`. Drake keeps this as the name of the geometry,
+    from which the structure of a LiDAR return is found. `comment` is one line
+    for the reader of the file, and `before` the SDF text of other visuals,
+    which come first.
     """
     lines = [
         '<?xml version="1.0"?>',
@@ -287,10 +294,10 @@ def _visual(structure: Structure, part: Part) -> str:
 
 
 def _pose(structure: Structure, part: Part) -> str:
-    """Returns X_WP as `x y z roll pitch yaw`.
+    """Returns the pose X_WP of a part as SDF text: `x y z roll pitch yaw`.
 
-    SDF's roll-pitch-yaw is Rz(yaw) Ry(pitch) Rx(roll), and a structure only
-    turns about z, so that R_WP = R_WS R_SP just adds its yaw.
+    SDF's roll-pitch-yaw is Rz(yaw) Ry(pitch) Rx(roll). A structure only turns
+    about z, so R_WP = R_WS R_SP only adds the structure's yaw.
     """
     roll, pitch, yaw = part.rpy
     angles = (roll, pitch, yaw + structure.yaw)
@@ -322,7 +329,7 @@ def _number(value: float, decimals: int) -> str:
 
 
 def structure_table(structures: Iterable[Structure]) -> str:
-    """Returns the CSV that maps instance ids to names and classes."""
+    """Returns the CSV table of instance ids, names and classes."""
     names = "instance", "name", "class", "label", "x", "y", "z", "yaw", "tags"
     rows = (
         [
@@ -345,10 +352,10 @@ def render_city(
     progress: Callable[[str], None] = lambda line: None,
     stages_text: str | None = None,
 ) -> dict[str, str]:
-    """Returns the text of every generated file by its relative path.
+    """Returns the text of every generated file of a city, by relative path.
 
-    `stages_text` is the coming content of `stages.yaml`; by default the present
-    one.
+    `stages_text` is the new content of `stages.yaml`; by default the file is
+    read.
 
     Raises:
         InputError: if the stages cannot be used or the city has too many
@@ -374,17 +381,16 @@ def render_stages(
     progress: Callable[[str], None] = lambda line: None,
     origin: str | None = None,
 ) -> dict[str, str]:
-    """Returns the text of the files of some stages by their relative paths.
+    """Returns the text of the files of some stages, by relative path.
 
     Args:
         world: name of the map.
         city: the whole city.
-        stages: what the stages lack.
+        stages: what each stage lacks.
         wanted: names of the stages to write.
-        source: the file of the stages, for messages.
-        progress: takes a line for the user after each file.
-        origin: comment for readers of the files that says where the city is
-            from.
+        source: the file of the stages, which errors name.
+        progress: is called with one line for the user after each file.
+        origin: comment for readers of the files about the origin of the city.
 
     Raises:
         InputError: if a structure cannot be lower or under construction as
@@ -430,29 +436,26 @@ def generate_city(
     *,
     repair_stages: bool = False,
 ) -> list[Path]:
-    """Writes all generated files of a world folder.
+    """Writes all generated files of a world folder, and returns their paths.
 
-    The same inputs give the same bytes. Each file is replaced at once, and
-    stages and meshes that no longer belong to the city are removed.
+    The same inputs give the same bytes. Each file is replaced atomically.
+    Stages and meshes that no longer belong to the city are removed.
 
     Args:
         world: the folder.
-        progress: takes one line at a time.
-        repair_stages: whether `stages.yaml` is brought up to a plan that
-            has grown: structures that stand where they stood, and have
-            another name than in `structures.csv`, get it there, too.
-
-    Returns:
-        The paths of all generated files.
+        progress: is called with one line at a time.
+        repair_stages: whether to rename structures in `stages.yaml`, if the
+            city now has other names than `structures.csv` for structures at the
+            same place.
 
     Raises:
-        InputError: if an input cannot be used or a file not be written; if
-            a structure in `stages.yaml` has another name now, and that is
-            not to be repaired; or if one is gone, and that cannot be.
+        InputError: if an input cannot be used or a file cannot be written; if a
+            structure in `stages.yaml` has another name now and `repair_stages`
+            is false; or if such a structure no longer exists.
     """
     world = Path(world)
     if (world / MESH_FOLDER).is_symlink():
-        # The files there may be another map's.
+        # The linked folder may belong to another map.
         raise InputError(f"{world / MESH_FOLDER}: a link instead of a folder")
     files = _rendered(world, progress, repair_stages)
     with user_errors(world / MESH_FOLDER):
@@ -468,7 +471,7 @@ def generate_city(
 def _rendered(
     world: Path, progress: Callable[[str], None], repair_stages: bool
 ) -> dict[str, str]:
-    """Returns the text of every file to write by its relative path."""
+    """Returns the text of every file to write, by relative path."""
     city = make_city(world)
     text = _stages_text(world, city, repair_stages, progress)
     files = render_city(world, city, progress, text)
@@ -491,7 +494,7 @@ def _stages_text(
     except InputError:
         if repair:
             raise
-        # A faulty table will be written anew; faulty stages are reported
+        # A faulty table is written anew anyway, and faulty stages are reported
         # later.
         return None
     if not repair:
@@ -522,7 +525,7 @@ def differing_files(
     *,
     repair_stages: bool = False,
 ) -> list[Path]:
-    """Returns the files that would change if the city were generated anew."""
+    """Returns the files that would change if the city were generated again."""
     world = Path(world)
     files = _rendered(world, progress, repair_stages)
     stale = _generated(world) - {world / name for name in files}
@@ -536,7 +539,7 @@ def differing_files(
 
 
 def _generated(world: Path) -> set[Path]:
-    """Returns the files in a world folder that a generator wrote."""
+    """Returns the files in a world folder that the generator wrote."""
     return {
         *world.glob(stage_name("*")),
         *(world / MESH_FOLDER).glob("*.obj"),

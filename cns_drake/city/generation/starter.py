@@ -1,7 +1,7 @@
-"""First inputs of a city besides its roads.
+"""Writes first inputs of a city whose roads exist already.
 
-A user who has drawn `roads.yaml` gets a plan of districts, two stages and two
-drives, as files to change at will.
+A user who has drawn `roads.yaml` gets a plan with districts, two stages and two
+drives, as files to edit.
 """
 
 from collections import defaultdict
@@ -25,13 +25,13 @@ from cns_drake.roads.carriageway import Areas
 from cns_drake.roads.network import RoadNetwork, load_road_network
 from cns_drake.roads.route import draw_route
 
-# The world reaches this far beyond the roads [m].
+# The generated world extends this far beyond the roads [m].
 _MARGIN = 45.0
-# Blocks with less ground than this are squares [m^2].
+# A block with less ground than this becomes a square [m^2].
 _SQUARE = 900.0
-# Slivers between carriageways with less than this belong to the outskirts.
+# Smaller pieces of ground between carriageways belong to the outskirts [m^2].
 _LEAST_BLOCK = 60.0
-# Part of the buildings that stand in the first stage.
+# Share of the buildings that stand in the first stage.
 _STANDING = 0.65
 _ROUTE_LENGTH = 1200.0
 _SPEEDS = {
@@ -48,16 +48,16 @@ def start_city(
 ) -> list[Path]:
     """Writes the missing inputs of a city in a folder with `roads.yaml`.
 
-    `city.yaml` gets a district for each block between the roads, `stages.yaml`
-    a stage 01 without the buildings and trees in the east and a whole stage 02.
-    Each stage gets a drive on a route drawn at random. `progress` takes a line
-    for each file that is written.
+    `city.yaml` gets a district for each block between the roads. `stages.yaml`
+    gets a stage 01 without the buildings and trees in the east, and a stage 02
+    with everything. Each stage gets a drive on a random route. `progress` is
+    called with a line for each file that is written.
 
     Returns:
         The files written; existing files stay as they are.
 
     Raises:
-        InputError: if the roads cannot be used, or a file not be written.
+        InputError: if the roads cannot be used, or a file cannot be written.
     """
     network = load_road_network(MapFolder(world).roads)
     written = []
@@ -97,7 +97,7 @@ def start_city(
 
 
 def _drive(network: RoadNetwork, stage: str, rng: np.random.Generator) -> dict:
-    """Returns a scenario that drives through one stage."""
+    """Returns a scenario of a drive through one stage, as YAML data."""
     route = draw_route(network, _ROUTE_LENGTH, rng)
     return {
         "map": ".",
@@ -108,7 +108,7 @@ def _drive(network: RoadNetwork, stage: str, rng: np.random.Generator) -> dict:
 
 
 def starter_plan(areas: Areas, seed: int) -> dict:
-    """Returns a plan for `CityPlan`, where each block has its own character."""
+    """Returns a plan with a character for each block, to fill `CityPlan`."""
     folder = resources.files("cns_drake.city.generation")
     text = folder.joinpath("characters.yaml").read_text(encoding="utf-8")
     templates = yaml.safe_load(text)
@@ -129,7 +129,7 @@ def starter_plan(areas: Areas, seed: int) -> dict:
         if is_outside or piece.area < _LEAST_BLOCK:
             continue
         if not characters:
-            # Every character is used once before one is used again.
+            # Every character is used once before any is used again.
             characters = list(rng.permutation(list(templates["blocks"])))
         district = templates["square"]
         if piece.area >= _SQUARE:
@@ -149,7 +149,7 @@ def starter_plan(areas: Areas, seed: int) -> dict:
 
 
 def starter_stages(city: City) -> dict:
-    """Returns two stages; the first lacks the structures in the east."""
+    """Returns two stages; the first one lacks the structures in the east."""
     kinds = "building", "vegetation"
     standing = [s for s in city.structures if s.semantic_class in kinds]
     buildings = [s for s in standing if s.semantic_class == "building"]

@@ -1,4 +1,4 @@
-"""Meshes, polygons and the structures that are made of them."""
+"""Meshes and polygons, and the structures made of them."""
 
 from cns_drake.city.geometry.mesh import (
     FOLDER,

@@ -10,8 +10,8 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import ArrayLike
 
-# Coordinates are stored in whole millimetres: far below LiDAR precision, and
-# it keeps the files small and equal from machine to machine.
+# Coordinates are stored in whole millimetres. This is far below LiDAR
+# precision, and makes the files small and the same on every machine.
 _DECIMALS = 3
 
 
@@ -22,7 +22,7 @@ class Mesh:
     Attributes:
         vertices: (N, 3) float64 positions in the mesh frame [m].
         faces: vertex indices (0-based) of each face, counter-clockwise seen
-            from outside; 3 or 4 per face, quadrilaterals plane and convex.
+            from outside; 3 or 4 per face. Quadrilaterals are plane and convex.
     """
 
     vertices: np.ndarray
@@ -42,11 +42,9 @@ class Mesh:
 
     @cached_property
     def _corners(self) -> np.ndarray:
-        """The faces as (F, 4) vertex indices.
-
-        Triangles have their last one twice.
-        """
-        # Arrays are made of iterators several times faster than of tuples.
+        """The faces as (F, 4) vertex indices; triangles repeat the last one."""
+        # NumPy makes arrays from iterators several times faster than from
+        # tuples.
         numbers = np.fromiter(map(len, self.faces), np.int64, len(self.faces))
         corners = np.fromiter(
             itertools.chain.from_iterable(self.faces), np.int64, numbers.sum()
@@ -56,7 +54,7 @@ class Mesh:
         return corners[begin + np.minimum(np.arange(4), last)]
 
     def with_vertices(self, vertices: np.ndarray) -> Mesh:
-        """Returns the mesh with its vertices moved to (N, 3) [m]."""
+        """Returns the mesh with its vertices replaced by (N, 3) others [m]."""
         mesh = Mesh(vertices, self.faces)
         mesh.__dict__["_corners"] = self._corners
         return mesh
@@ -64,24 +62,24 @@ class Mesh:
     def moved(
         self, translation: ArrayLike = (0.0, 0.0, 0.0), yaw: float = 0.0
     ) -> Mesh:
-        """Returns the mesh rotated about z by `yaw`, then translated."""
+        """Returns the mesh rotated about z by `yaw` [rad], then translated."""
         c, s = np.cos(yaw), np.sin(yaw)
         R = np.array([[c, -s, 0.0], [s, c, 0.0], [0.0, 0.0, 1.0]])
         return self.with_vertices(self.vertices @ R.T + np.asarray(translation))
 
     def turned(self) -> Mesh:
-        """Returns the mesh with reversed faces."""
+        """Returns the mesh with its faces reversed: inside and outside swap."""
         return Mesh(self.vertices, tuple(face[::-1] for face in self.faces))
 
     def to_obj(self) -> str:
-        """Returns the mesh as OBJ text with coordinates in millimetres.
+        """Returns the mesh as OBJ text, its coordinates rounded to millimetres.
 
-        Vertices that coincide after rounding are merged, faces that
-        collapse are dropped; the same mesh always gives the same text.
+        Vertices that coincide after rounding are merged, and faces that
+        collapse are dropped. The same mesh always gives the same text.
         """
         thousandths = np.rint(self.vertices * 10**_DECIMALS).astype(np.int64)
         unique, inverse = np.unique(thousandths, axis=0, return_inverse=True)
-        # 15 digits are as exact as the numbers, without any noughts at the end.
+        # 15 digits are exact here, and leave out zeros at the end.
         lines = [
             f"v {x:.15g} {y:.15g} {z:.15g}\n"
             for x, y, z in (unique / 10**_DECIMALS).tolist()
@@ -119,10 +117,10 @@ FOLDER = Path(__file__).parents[1] / "object_meshes"
 
 
 def object_mesh(name: str) -> Mesh:
-    """Returns the shared mesh with this name.
+    """Returns the shared object mesh with this name.
 
     Raises:
-        FileNotFoundError: there is none.
+        FileNotFoundError: there is no such mesh.
     """
     return read_mesh(FOLDER / f"{name}.obj")
 
@@ -132,7 +130,7 @@ def read_mesh(path: Path) -> Mesh:
     """Returns the mesh in an OBJ file that the city generator wrote.
 
     Raises:
-        FileNotFoundError: there is none.
+        FileNotFoundError: there is no such file.
     """
     vertices: list[list[float]] = []
     faces: list[tuple[int, ...]] = []

@@ -1,4 +1,4 @@
-"""Polygons of the ground: triangles, tiles, surfaces, walls, taken places."""
+"""Polygons on the ground: triangulation, tiles, surfaces, walls, occupancy."""
 
 from collections.abc import Callable, Iterable, Iterator, Sequence
 import itertools
@@ -14,22 +14,22 @@ from shapely.geometry.base import BaseGeometry
 from cns_drake.city.geometry.mesh import Mesh
 
 _MM = 1000.0
-# A corner or point as whole millimetres.
+# A corner or point in whole millimetres.
 _Point = tuple[int, int]
 
 
 def triangulate(polygon: Polygon) -> np.ndarray:
     """Returns a polygon as (M, 3, 2) counter-clockwise triangles [m].
 
-    Vertices are those of the polygon, rounded to millimetres; its edges are
-    edges of triangles.
+    Their vertices are those of the polygon, rounded to millimetres. All edges
+    of the polygon are edges of triangles.
 
     Args:
-        polygon: valid, also after rounding; holes may touch the outer ring
-            and each other in points.
+        polygon: valid, also after rounding; holes may touch the outer ring and
+            each other in points.
 
     Raises:
-        ValueError: the polygon is found not to be valid.
+        ValueError: the polygon turns out not to be valid.
     """
     polygon = shapely.orient_polygons(shapely.normalize(polygon))
     rings = [_ring(ring) for ring in (polygon.exterior, *polygon.interiors)]
@@ -47,7 +47,7 @@ def triangulate(polygon: Polygon) -> np.ndarray:
 
 
 def _ring(ring: LinearRing) -> list[_Point]:
-    """Returns a ring's corners without repetitions, from the least one on."""
+    """Returns a ring's corners without repetitions, the smallest one first."""
     xy = np.array(ring.coords)[:-1, :2]
     points = [tuple(p) for p in np.rint(xy * _MM).astype(int).tolist()]
     corners = [p for k, p in enumerate(points) if p != points[k - 1]]
@@ -60,12 +60,13 @@ def _ring(ring: LinearRing) -> list[_Point]:
 def _with_corners_on_edges(
     ring: list[_Point], corners: list[_Point]
 ) -> list[_Point]:
-    """Returns a ring with a corner wherever another ring touches it."""
+    """Returns a ring with more corners, where other rings touch its edges."""
     points = np.array(corners, dtype=np.int64)
     starts = np.array(ring, dtype=np.int64)
     ways = np.roll(starts, -1, axis=0) - starts
     result = []
-    # Some edges at a time, for there may be thousands, and as many corners.
+    # The edges are handled in portions: thousands of edges and thousands of
+    # corners would need too much memory at once.
     parts = 1 + len(ring) * len(corners) // 1_000_000
     for some in np.array_split(np.arange(len(ring)), parts):
         way = ways[some, None]
@@ -87,16 +88,17 @@ def _edges(ring: list[_Point]) -> Iterator[tuple[_Point, _Point]]:
 
 
 def _cross(a: _Point, b: _Point, c: _Point) -> int:
-    """Returns twice the area of a triangle, positive counter-clockwise."""
+    """Returns twice the area of a triangle; positive if counter-clockwise."""
     return (b[0] - a[0]) * (c[1] - a[1]) - (b[1] - a[1]) * (c[0] - a[0])
 
 
 def _bridge(outer: list[_Point], holes: list[list[_Point]]) -> list[_Point]:
-    """Returns one ring that runs into every hole and back again."""
+    """Returns one ring that leads into every hole and back again."""
     ring = outer
     left = sorted(holes, key=lambda hole: max(hole), reverse=True)
     while left:
-        # The hole that reaches furthest to the right sees the ring.
+        # From the hole that reaches furthest to the right, the ring can be
+        # seen.
         hole = left.pop(0)
         walls = [*_edges(ring), *(e for h in (hole, *left) for e in _edges(h))]
         touching = _insert_touching(ring, hole)
@@ -107,7 +109,10 @@ def _bridge(outer: list[_Point], holes: list[list[_Point]]) -> list[_Point]:
 def _insert_touching(
     ring: list[_Point], hole: list[_Point]
 ) -> list[_Point] | None:
-    """Runs around a hole at a corner that it shares; None if there is none."""
+    """Returns a ring that also runs around a hole, from a corner they share.
+
+    It is None if they share no corner.
+    """
     for k, corner in enumerate(hole):
         for i in (i for i, other in enumerate(ring) if other == corner):
             if _opens_towards(ring, i, hole[(k + 1) % len(hole)]):
@@ -118,7 +123,10 @@ def _insert_touching(
 def _insert_apart(
     ring: list[_Point], hole: list[_Point], walls: list[tuple[_Point, _Point]]
 ) -> list[_Point]:
-    """Runs to a hole along a line that crosses no wall, and back."""
+    """Returns a ring that also runs around a hole that it does not touch.
+
+    It leads there and back along a line that crosses none of the walls.
+    """
     k = hole.index(max(hole))
     for i in sorted(
         range(len(ring)),
@@ -136,7 +144,7 @@ def _square_distance(a: _Point, b: _Point) -> int:
 
 
 def _opens_towards(ring: list[_Point], i: int, target: _Point) -> bool:
-    """Returns whether a point is in the inner angle at a corner of a ring."""
+    """Returns whether a point lies in the inner angle at the i-th corner."""
     before, at, after = ring[i - 1], ring[i], ring[(i + 1) % len(ring)]
     is_left_of_in = _cross(before, at, target) > 0
     is_left_of_out = _cross(at, after, target) > 0
@@ -158,16 +166,17 @@ def _crosses(p: _Point, q: _Point, a: _Point, b: _Point) -> bool:
 
 
 def _is_between(p: _Point, q: _Point, c: _Point) -> bool:
-    """Returns whether a point on the line pq is on the segment."""
+    """Returns whether c, on the line through p and q, lies between them."""
     return all(min(p[k], q[k]) <= c[k] <= max(p[k], q[k]) for k in range(2))
 
 
 def cut_ears(
     ring: Sequence[_Point], fans: bool = False
 ) -> list[tuple[int, ...]]:
-    """Returns triangles, as indices of corners, that fill a ring.
+    """Returns triangles that fill a ring, as indices of its corners.
 
-    The ring may touch itself. Fans of thin triangles are avoided unless `fans`.
+    The ring may touch itself. Unless `fans` is set, fans of thin triangles are
+    avoided.
 
     Raises:
         ValueError: the ring crosses itself, or runs clockwise.
@@ -198,7 +207,7 @@ def cut_ears(
 def _any_inside(
     points: np.ndarray, triangle: tuple[_Point, _Point, _Point]
 ) -> bool:
-    """Returns whether a triangle has any of (N, 2) points but its corners."""
+    """Returns whether any points (N, 2), except its corners, are inside."""
     x, y = points.T
     inside = np.ones(len(points), dtype=bool)
     is_corner = np.zeros(len(points), dtype=bool)
@@ -213,7 +222,7 @@ def _flip(
     triangles: Iterable[Sequence[_Point]],
     fixed: set[frozenset[_Point]],
 ) -> list[tuple[_Point, _Point, _Point]]:
-    """Flips inner edges until every circumcircle is empty (Lawson)."""
+    """Returns a Delaunay triangulation with fixed edges, by flips (Lawson)."""
     # Directed edge -> the third corner of the triangle on its left.
     apex: dict[tuple[_Point, _Point], _Point] = {}
     for a, b, c in triangles:
@@ -254,10 +263,10 @@ def _in_circle(a: _Point, b: _Point, c: _Point, d: _Point) -> bool:
 # Height above W's origin [m] at arrays of x and y [m].
 HeightMap = Callable[[np.ndarray, np.ndarray], np.ndarray]
 Shape = TypeVar("Shape", bound=BaseGeometry)
-# Polygons are snapped to whole millimetres like the meshes, so that shapes
-# which share an edge keep sharing it.
+# Polygons are rounded to millimetres like the meshes, so that shapes that share
+# an edge keep sharing it [m].
 _GRID = 0.001
-# Slivers that polygon differences leave behind [m^2].
+# Polygons smaller than this are slivers, left over by set operations [m^2].
 _SLIVER = 0.01
 
 
@@ -267,8 +276,8 @@ def snap(geometry: BaseGeometry) -> BaseGeometry:
 
 
 def hull_of(xy: np.ndarray) -> BaseGeometry:
-    """Returns the convex hull of places (N, 2)."""
-    # Points are made one at a time, which takes far longer than a line.
+    """Returns the convex hull of points (N, 2)."""
+    # GEOS makes points one at a time, which takes far longer than a line.
     make = shapely.linestrings if len(xy) > 1 else shapely.multipoints
     hull = shapely.convex_hull(make(xy))
     assert isinstance(hull, BaseGeometry)
@@ -276,7 +285,7 @@ def hull_of(xy: np.ndarray) -> BaseGeometry:
 
 
 def placed(shape: Shape, xy: Sequence[float], yaw: float) -> Shape:
-    """Returns a shape turned about the origin [rad], then moved by xy [m]."""
+    """Returns a shape turned about the origin by `yaw`, then moved by xy."""
     c, s = math.cos(yaw), math.sin(yaw)
     return affine_transform(shape, [c, -s, s, c, *xy])
 
@@ -284,8 +293,8 @@ def placed(shape: Shape, xy: Sequence[float], yaw: float) -> Shape:
 def polygons_of(geometry: BaseGeometry) -> list[Polygon]:
     """Returns the polygons of a geometry without slivers, in fixed order.
 
-    The order is by the lower left corner of the bounds, so that it does not
-    depend on how the geometry was made.
+    They are in the order of the lower left corners of their bounds, which does
+    not depend on how the geometry was made.
     """
     parts = [
         part
@@ -296,7 +305,7 @@ def polygons_of(geometry: BaseGeometry) -> list[Polygon]:
 
 
 def tiles(geometry: BaseGeometry, size: float) -> Iterator[MultiPolygon]:
-    """Yields the parts of polygons in the squares of a grid in W."""
+    """Yields the part of a geometry in each square of a grid in W."""
     _, squares = _squares(geometry, size)
     pieces = shapely.intersection(geometry, squares)
     for piece in shapely.set_precision(pieces, _GRID):
@@ -307,7 +316,10 @@ def tiles(geometry: BaseGeometry, size: float) -> Iterator[MultiPolygon]:
 def _squares(
     geometry: BaseGeometry, size: float
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Returns the (N, 2) lower left corners and (N,) squares that are hit."""
+    """Returns the corners (N, 2) and the boxes (N,) of squares that are hit.
+
+    The corners are the lower left ones [m].
+    """
     if geometry.is_empty:
         return np.zeros((0, 2)), np.zeros(0, object)
     x0, y0, x1, y1 = np.floor(np.array(geometry.bounds) / size).astype(int)
@@ -321,10 +333,10 @@ def _squares(
 def surface_mesh(
     geometry: BaseGeometry, height: HeightMap | float, spacing: float = 0.0
 ) -> Mesh:
-    """Returns a horizontal mesh that fills polygons in W at a height [m].
+    """Returns a mesh over polygons in W, at a height or on a height map [m].
 
-    With a positive `spacing` they are first cut into squares of this size [m],
-    so that the mesh can follow a height map.
+    With a positive `spacing`, the polygons are first divided into squares of
+    this size [m], so that the mesh can follow a height map.
     """
     squares = np.zeros((0, 4, 2))
     pieces: list[BaseGeometry | None] = [geometry]
@@ -347,7 +359,7 @@ def surface_mesh(
 
     for piece, polygons in zip(pieces, parts, strict=True):
         if piece is None:
-            # A square of the grid stays one face where it is plane.
+            # A square of the grid stays one face if it is plane.
             ring = next(whole)
             for face in [ring] if next(is_plane) else halves + ring[3]:
                 add(face)
@@ -362,12 +374,12 @@ def surface_mesh(
 def _cut_into_squares(
     geometry: BaseGeometry, size: float
 ) -> tuple[np.ndarray, list[BaseGeometry | None]]:
-    """Cuts polygons along a world-anchored grid.
+    """Divides polygons along a grid that is fixed in W.
 
     Returns:
-        (N, 4, 2) corners of the squares that lie wholly inside, counter-
-        clockwise from the right and lower one; and in the order of the grid
-        the pieces in all squares, None for each whole one.
+        First, the (N, 4, 2) corners of the squares that lie wholly inside,
+        counter-clockwise from the lower right one. Second, the piece in each
+        square in the order of the grid; None for each whole square.
     """
     corners, squares = _squares(geometry, size)
     is_whole = shapely.contains_properly(geometry, squares)
@@ -385,10 +397,9 @@ def wall_mesh(
     *,
     along: BaseGeometry | None = None,
 ) -> Mesh:
-    """Returns upright walls on the edges of polygons in W, seen from inside.
+    """Returns vertical walls on the edges of polygons in W, facing inwards.
 
-    The walls face the interior. Where `along` is given, only edges whose middle
-    lies in this area get one.
+    With `along`, only edges whose middle lies in this area get a wall.
     """
     starts, ends = [], []
     for polygon in polygons_of(geometry):
@@ -404,8 +415,8 @@ def wall_mesh(
         middle = (start + end) / 2
         keep = shapely.contains_xy(along, middle[:, 0], middle[:, 1])
         start, end = start[keep], end[keep]
-    # From the interior, which lies to the left of start -> end, the wall
-    # reads end, start at the foot and start, end at the top.
+    # Seen from the interior, which is to the left of start -> end, a wall's
+    # corners are end, start at the foot, then start, end at the top.
     vertices = np.concatenate(
         [
             np.column_stack([end, _heights(end, bottom)]),
@@ -428,9 +439,9 @@ def _heights(xy: np.ndarray, height: HeightMap | float) -> np.ndarray:
 
 
 def _quad(polygon: Polygon) -> np.ndarray | None:
-    """Returns the (4, 2) corners of a polygon that is an upright rectangle.
+    """Returns the corners (4, 2) of a polygon that is an axis-aligned box.
 
-    Its area fills its bounds. The corners are counter-clockwise.
+    It is None for any other polygon. The corners are counter-clockwise.
     """
     x0, y0, x1, y1 = polygon.bounds
     if (
@@ -444,7 +455,7 @@ def _quad(polygon: Polygon) -> np.ndarray | None:
 
 
 def _are_planes(rings: np.ndarray, height: HeightMap | float) -> np.ndarray:
-    """Returns which of (N, 4, 2) rings have their corners in one plane."""
+    """Returns (N,) whether the corners of (N, 4, 2) rings lie in one plane."""
     z = np.round(_heights(rings.reshape(-1, 2), height), 3).reshape(-1, 4)
     return abs(z[:, 0] - z[:, 1] + z[:, 2] - z[:, 3]) < 0.0005
 
@@ -452,8 +463,8 @@ def _are_planes(rings: np.ndarray, height: HeightMap | float) -> np.ndarray:
 class Occupancy:
     """The ground that is taken, as a growing set of polygons in W.
 
-    A few thousand polygons are expected; candidates are found by bounds in
-    one vectorised comparison, and only those are checked exactly.
+    It is made for a few thousand polygons: one vectorised comparison of bounds
+    finds the candidates, and only these are checked exactly.
     """
 
     def __init__(self) -> None:
@@ -479,8 +490,8 @@ class Occupancy:
     ) -> bool:
         """Returns whether a polygon in W keeps clear of all taken ground.
 
-        With a clearance of 0 polygons may touch [m]; a taken polygon to
-        `ignore` may be closer, but not overlapped.
+        With a clearance of 0, polygons may touch [m]. The taken polygon
+        `ignore` may be closer than the clearance, but may not be overlapped.
         """
         x0, y0, x1, y1 = geometry.bounds
         taken = self._bounds[: len(self._geometries)]

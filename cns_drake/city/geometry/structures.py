@@ -1,4 +1,4 @@
-"""Structures: the named things a city is made of, and their parts."""
+"""Structures: the named things of which a city consists, and their parts."""
 
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
@@ -15,7 +15,7 @@ from cns_drake.city.geometry.polygons import hull_of, placed
 
 @dataclass(frozen=True)
 class MeshShape:
-    """A reference to a mesh by its name, scaled about the mesh origin."""
+    """A mesh, given by its name, scaled about the origin of the mesh."""
 
     mesh: str
     scale: tuple[float, float, float] = (1.0, 1.0, 1.0)
@@ -48,10 +48,10 @@ Shape = MeshShape | BoxShape | CylinderShape | SphereShape
 
 @dataclass(frozen=True)
 class Part:
-    """One visual, at xyz and rpy in the structure frame S [m, rad].
+    """One visual of a structure, at xyz and rpy in its frame S [m, rad].
 
-    Its name is unique within the structure, e.g. `storey_03`. Without `rgb` it
-    has the colour of the class.
+    Its name is unique within the structure, e.g. `storey_03`. Without `rgb`,
+    the part has the colour of the structure's class.
     """
 
     name: str
@@ -63,7 +63,7 @@ class Part:
 
 @dataclass(frozen=True)
 class Model:
-    """The result of a builder: parts in S, the meshes they refer to by name.
+    """What a builder returns: parts in S, and the meshes they use, by name.
 
     The footprint is the ground area that the model needs, in S [m].
     """
@@ -74,7 +74,7 @@ class Model:
 
     @property
     def num_triangles(self) -> int:
-        """Number of triangles of all parts; other shapes count as boxes."""
+        """Number of triangles of all parts; 12 for each part without mesh."""
         return sum(
             self.meshes[part.shape.mesh].num_triangles
             if isinstance(part.shape, MeshShape)
@@ -85,11 +85,11 @@ class Model:
 
 @dataclass(frozen=True)
 class Structure:
-    """A model, and the place of its frame S in the world [m, rad].
+    """A named model, and the pose of its frame S in the world W [m, rad].
 
     The name is stable and unique in the city, e.g. `tower_017`. Tags are words
-    that the layout and the stages may use, e.g. the name of the block. Classes
-    are the keys of `cns_drake.scene.semantics.CLASS_IDS`.
+    that the layout and the stages may use, such as the name of the block. The
+    semantic class is a key of `cns_drake.scene.semantics.CLASS_IDS`.
     """
 
     name: str
@@ -101,12 +101,12 @@ class Structure:
 
     @property
     def footprint_W(self) -> BaseGeometry:
-        """Ground area of the model, seen from above, in the world [m]."""
+        """Ground area of the model, seen from above, in W [m]."""
         return placed(self.model.footprint, self.xyz[:2], self.yaw)
 
     @property
     def p_WFs(self) -> np.ndarray:
-        """Feet of the model: its (N, 3) lowest points, in the world [m]."""
+        """The (N, 3) lowest points of the model (its feet), in W [m]."""
         model = self.model
         meshes = [part_mesh(part, model.meshes) for part in model.parts]
         p_SPs = np.concatenate([mesh.vertices for mesh in meshes])
@@ -116,7 +116,7 @@ class Structure:
     def p_WP(
         self, p_SP: tuple[float, float, float]
     ) -> tuple[float, float, float]:
-        """Returns the position in the world of a point P given in S [m]."""
+        """Returns the position in W of a point P that is given in S [m]."""
         c, s = math.cos(self.yaw), math.sin(self.yaw)
         x, y, z = p_SP
         return (
@@ -127,12 +127,12 @@ class Structure:
 
 
 # Posts and trunks reach this far into the ground, so that no gap shows where
-# the ground falls away a little [m].
+# the ground falls a little [m].
 ROOT_DEPTH = 0.3
-# Parts above this height (crowns, signs, mast arms) leave the ground below them
-# free [m].
+# Only parts below this height take ground. Crowns, signs and mast arms above it
+# leave the ground free [m].
 HEADROOM = 2.4
-# The lowest points of a model up to this height are its feet [m].
+# The points of a model up to this far above its lowest one are its feet [m].
 _FEET = 0.05
 _FOOTPRINT_MARGIN = 0.02
 _ROUND_SIDES = 12
@@ -140,10 +140,10 @@ _ROUND_SIDES = 12
 
 @dataclass(frozen=True)
 class Builder:
-    """How to make objects of one kind, by `build(rng, **parameters) -> Model`.
+    """Makes objects of one kind, by `build(rng, **parameters) -> Model`.
 
     Every parameter has a default; most defaults are drawn from `rng`. The same
-    generator state gives the same model.
+    state of the generator gives the same model.
     """
 
     semantic_class: str
@@ -230,16 +230,16 @@ def block(
 
 
 def triple(values: Iterable[float]) -> tuple[float, float, float]:
-    """Returns three numbers, such as those of an array, as floats."""
+    """Returns three values, such as those of an array, as a tuple of floats."""
     x, y, z = values
     return float(x), float(y), float(z)
 
 
 def assemble(*parts: Part) -> Model:
-    """Returns the model that consists of the given parts.
+    """Returns a model of the given parts, with their meshes.
 
-    Their meshes are `object_meshes`. The footprint is the convex hull of all
-    geometry below `HEADROOM`.
+    The meshes are those of `object_meshes`. The footprint is the convex hull of
+    all geometry below `HEADROOM`.
     """
     shapes = [part.shape for part in parts]
     names = [shape.mesh for shape in shapes if isinstance(shape, MeshShape)]
@@ -250,7 +250,7 @@ def assemble(*parts: Part) -> Model:
 def ground_footprint(
     parts: Sequence[Part], meshes: Mapping[str, Mesh]
 ) -> Polygon:
-    """Returns the convex hull, in S, of the parts below `HEADROOM`."""
+    """Returns the convex hull (x, y) in S of the parts below `HEADROOM`."""
     corners: list[np.ndarray] = [np.zeros((0, 2))]
     for part in parts:
         mesh = part_mesh(part, meshes)
@@ -266,13 +266,17 @@ def ground_footprint(
             a, b = a[cut], b[cut]
             t = (HEADROOM - a[:, 2]) / (b[:, 2] - a[:, 2])
             corners.append(a[:, :2] + t[:, None] * (b - a)[:, :2])
-    # Rounded to millimetres: the last bits of a sine differ between machines.
+    # Rounded to millimetres, because the last bits of a sine differ between
+    # machines.
     hull = hull_of(np.round(np.concatenate(corners), 3))
     return hull.buffer(_FOOTPRINT_MARGIN, join_style="mitre")
 
 
 def ground_triangles(structures: Iterable[Structure]) -> np.ndarray:
-    """Returns the (M, 3, 3) triangles of ground, whose meshes are in W [m]."""
+    """Returns the triangles (M, 3, 3) of the ground, in W [m].
+
+    The meshes of the structures must be given in W.
+    """
     meshes = [m for one in structures for m in one.model.meshes.values()]
     found = [mesh.vertices[mesh.triangles()] for mesh in meshes]
     return np.concatenate([np.zeros((0, 3, 3)), *found])
@@ -281,17 +285,17 @@ def ground_triangles(structures: Iterable[Structure]) -> np.ndarray:
 def part_triangles(
     part: Part, meshes: Mapping[str, Mesh]
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Returns a part's (N, 3) vertices in S and (M, 3) triangles.
+    """Returns the vertices (N, 3) of a part in S, and its triangles (M, 3).
 
-    Round shapes become the prisms and the octahedra-like hulls that just
-    contain them, so that a footprint made from them is never too small.
+    Round shapes become polyhedra that just contain them, so that a footprint
+    made from them is never too small.
     """
     mesh = part_mesh(part, meshes)
     return mesh.vertices, mesh.triangles()
 
 
 def part_mesh(part: Part, meshes: Mapping[str, Mesh]) -> Mesh:
-    """Returns a part's mesh in S, round shapes as in `part_triangles`."""
+    """Returns a part's mesh in S; round shapes are as in `part_triangles`."""
     shape = part.shape
     scale = np.ones(3)
     if isinstance(shape, MeshShape):
@@ -307,7 +311,7 @@ def part_mesh(part: Part, meshes: Mapping[str, Mesh]) -> Mesh:
 
 
 def rotation(rpy: tuple[float, float, float]) -> np.ndarray:
-    """Returns R = Rz(yaw) Ry(pitch) Rx(roll), as in SDF."""
+    """Returns the rotation matrix Rz(yaw) Ry(pitch) Rx(roll), as in SDF."""
     (cr, sr), (cp, sp), (cy, sy) = ((np.cos(a), np.sin(a)) for a in rpy)
     return np.array(
         [
@@ -319,7 +323,7 @@ def rotation(rpy: tuple[float, float, float]) -> np.ndarray:
 
 
 def _round_mesh(radius: float, length: float) -> Mesh:
-    """Returns the prism that just contains an upright cylinder."""
+    """Returns a prism that just contains an upright cylinder."""
     angle = 2 * np.pi * np.arange(_ROUND_SIDES) / _ROUND_SIDES
     ring = radius / np.cos(np.pi / _ROUND_SIDES)
     x, y = ring * np.cos(angle), ring * np.sin(angle)

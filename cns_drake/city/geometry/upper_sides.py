@@ -1,16 +1,16 @@
-"""The sides of triangles that look upwards, and their height at any place."""
+"""The upward-facing triangles of solids, and their height at any place."""
 
 import numpy as np
 import shapely
 
-# The z of a unit normal is greater than this on faces that look upwards.
+# A face looks upwards if the z of its unit normal is greater than this.
 _UPWARDS = 0.05
 
 
 def long_normals(triangles: np.ndarray) -> np.ndarray:
     """Returns the cross products (M, 3) of two edges of triangles (M, 3, 3).
 
-    These are normals whose length is twice the area of the triangle. For a few
+    Each is a normal of the triangle, whose length is twice the area. For a few
     triangles, this function is faster than `np.cross`.
     """
     u = triangles[:, 1] - triangles[:, 0]
@@ -22,25 +22,28 @@ def long_normals(triangles: np.ndarray) -> np.ndarray:
 
 
 def unit_normals(triangles: np.ndarray) -> np.ndarray:
-    """Returns the unit normals (M, 3) of triangles (M, 3, 3), or zeros."""
+    """Returns the unit normals (M, 3) of triangles (M, 3, 3).
+
+    They are zero for triangles without area.
+    """
     normal = long_normals(triangles)
     size = np.linalg.norm(normal, axis=1, keepdims=True)
     return normal / np.where(size > 1e-9, size, np.inf)
 
 
 def looks_up(triangles: np.ndarray) -> np.ndarray:
-    """Returns which of the triangles (M, 3, 3) look upwards."""
+    """Returns (M,) which of the triangles (M, 3, 3) face upwards."""
     return np.asarray(unit_normals(triangles)[:, 2] > _UPWARDS)
 
 
 def turned_up(triangles: np.ndarray) -> np.ndarray:
-    """Returns triangles (M, 3, 3), all facing upwards."""
+    """Returns the triangles (M, 3, 3), all turned to face upwards."""
     is_down = unit_normals(triangles)[:, 2] < 0.0
     return np.where(is_down[:, None, None], triangles[:, ::-1], triangles)
 
 
 def from_above(triangles: np.ndarray) -> np.ndarray:
-    """Returns triangles (M, 3, 3) as (M,) polygons seen from above."""
+    """Returns triangles (M, 3, 3) as polygons (M,), seen from above."""
     return np.asarray(shapely.polygons(triangles[:, :, :2]), object)
 
 
@@ -56,7 +59,7 @@ class UpperSides:
     """The upper sides of solids, with their height at any place."""
 
     def __init__(self, triangles: np.ndarray):
-        """Keeps those of solids' triangles (M, 3, 3) that look upwards [m]."""
+        """Keeps those of solids' triangles (M, 3, 3) that face upwards [m]."""
         self._triangles = triangles[looks_up(triangles)]
         self._normals = unit_normals(self._triangles)
         self._tree = shapely.STRtree(from_above(self._triangles))
@@ -64,7 +67,7 @@ class UpperSides:
     def heights(self, xy: np.ndarray) -> np.ndarray:
         """Returns the height (N,) of the highest surface at (N, 2) places [m].
 
-        It is -inf where there is none.
+        It is -inf where there is no surface.
         """
         highest = np.full(len(xy), -np.inf)
         place, triangle = self._tree.query(shapely.points(xy), "intersects")
@@ -75,5 +78,5 @@ class UpperSides:
         return highest
 
     def hides(self, points: np.ndarray) -> np.ndarray:
-        """Returns which points (N, 3) lie below a surface."""
+        """Returns (N,) which of the points (N, 3) lie below a surface."""
         return np.asarray(self.heights(points[:, :2]) > points[:, 2])

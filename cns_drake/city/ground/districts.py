@@ -1,4 +1,4 @@
-"""Divides the ground between the streets among a plan's districts."""
+"""Divides the ground between the streets into the districts of a plan."""
 
 from typing import NamedTuple
 
@@ -14,10 +14,10 @@ from cns_drake.city.plan.city_plan import CityPlan, DistrictPlan, PatchPlan
 
 
 class District(NamedTuple):
-    """A district with all of its ground in W [m].
+    """A district and its ground, in W [m].
 
-    Each kind of ground has an area; together these areas are `area`. Terraces
-    are patches that are level.
+    `grounds` maps each kind of ground to its area; together these areas are
+    `area`. Terraces are patches that are level.
     """
 
     plan: DistrictPlan
@@ -29,14 +29,14 @@ class District(NamedTuple):
 def share_out(
     plan: CityPlan, streets: BaseGeometry, source: str
 ) -> list[District]:
-    """Returns the ground of each district, in the order of the plan.
+    """Returns the districts with their ground, in the order of the plan.
 
-    Carriageways, sidewalks and medians are `streets`, in W [m]; `source` is the
-    name of the plan's file, for messages.
+    `streets` is the area of carriageways, sidewalks and medians in W [m].
+    `source` is the name of the plan's file, which errors name.
 
     Raises:
         InputError: if a block or area is outside the city or on ground that is
-            taken, or if ground is left over.
+            taken, or if some ground belongs to no district.
     """
     free = snap(box(*plan.bounds)).difference(streets)
     districts = []
@@ -79,7 +79,7 @@ def _polygon(corners: list[tuple[float, float]], field: str) -> Polygon:
 
 
 def _grounds(plan: DistrictPlan, area: MultiPolygon) -> dict[str, MultiPolygon]:
-    """Returns the kinds of ground; where patches overlap, the first wins."""
+    """Returns the area of each kind of ground; the first patch has priority."""
     pieces: dict[str, list[BaseGeometry]] = {}
     rest: BaseGeometry = area
     for patch in plan.patches:

@@ -1,8 +1,7 @@
-"""The height of the finished ground: level streets, or streets with slopes.
+"""The height of the finished ground: level, or between sloping streets.
 
-Between streets that lie at different heights the ground is a smooth field
-that meets every sidewalk at its height. Buildings and terraces hold level
-pads in it.
+Between streets at different heights the ground is a smooth field that meets
+every sidewalk at its height. Buildings and terraces stand on level pads in it.
 """
 
 from collections.abc import Iterable, Sequence
@@ -22,20 +21,20 @@ from cns_drake.roads import street_areas
 _NODES = 2.0
 # Width of the level ground around buildings [m].
 _APRON = 0.6
-# Nodes this close to a pad are level with it [m].
+# Nodes within this distance of a pad have its height [m].
 _HELD = 1.0
-# Over this distance the field is drawn to the exact height of a street or
-# pad [m].
+# Within this distance of a street or pad, the field is adjusted to the exact
+# height there [m].
 _REACH = 4.0
-# The nodes' heights are rounded, so that the last bits of a solver never show
-# in a file [m].
+# Decimals of the nodes' heights [m]; rounding hides the last bits of the
+# solver, which would otherwise show in files.
 _ROUNDING = 6
 # Nearer than this counts as touching [m].
 _TOUCHING = 1e-6
 
 
 class Pad(NamedTuple):
-    """Ground that is held level at a height, both in W [m]."""
+    """An area of level ground and its height, both in W [m]."""
 
     area: BaseGeometry
     height: float
@@ -43,26 +42,32 @@ class Pad(NamedTuple):
 
 @dataclass(frozen=True)
 class LevelGround:
-    """The ground at a height [m] of a city whose streets are all level."""
+    """The ground of a city whose streets all have the same height [m].
+
+    Inside `pads` the ground has their height.
+    """
 
     height: float
     pads: tuple[Pad, ...] = ()
     is_level = True
 
     def __call__(self, x: np.ndarray, y: np.ndarray) -> np.ndarray:
-        """Returns the (N,) heights at points in W [m]."""
+        """Returns the heights (N,) of the ground at points in W [m]."""
         return np.full(np.shape(x), self.height)
 
 
 class SlopingGround:
-    """Sidewalks that follow their roads, and the field between them.
+    """The ground of a city with sloping streets, as a height over x and y.
 
-    The field is harmonic: each node has the mean height of its neighbours.
-    Nodes on streets and pads have given heights, and across the rim of the city
-    the field is level. At the distance d from a street or pad the field is
-    averaged with the exact height there, with weight 1/d - 1/R against 1/R of
-    the field (Shepard's interpolation, R the reach). It meets the edge exactly
-    and without a step.
+    Sidewalks follow their roads. Between the streets and level pads the height
+    is a harmonic field on a grid: each node has the mean height of its
+    neighbours. Nodes on streets and pads have given heights; at the rim of the
+    city the field is level across the rim.
+
+    Within the reach R of a street or pad, at the distance d, the height is the
+    mean of the field, with weight 1/R, and of the exact height of the street or
+    pad, with weight 1/d - 1/R (Shepard's interpolation). It thus meets their
+    edges without a step.
     """
 
     is_level = False
@@ -79,12 +84,12 @@ class SlopingGround:
 
         Args:
             surface: heights of the roads.
-            kerb_height: height of sidewalks above the roads [m], one or by
-                place.
+            kerb_height: height of sidewalks above the roads [m], as one number
+                or by place.
             streets: area of carriageways, sidewalks and medians in W [m].
             bounds: x0, y0, x1, y1 of the city in W [m].
             pads: level areas outside the streets; of two that meet, the first
-                wins.
+                one takes precedence.
         """
         self.pads = tuple(pads)
         self._surface = surface
@@ -101,7 +106,7 @@ class SlopingGround:
         self._z = self._field()
 
     def __call__(self, x: np.ndarray, y: np.ndarray) -> np.ndarray:
-        """Returns the (N,) heights at points in W [m]."""
+        """Returns the heights (N,) of the ground at points in W [m]."""
         x, y = np.asarray(x, dtype=float), np.asarray(y, dtype=float)
         z = self._interpolate(x, y)
         inside = shapely.intersects_xy(self._streets, x, y)
@@ -120,7 +125,7 @@ class SlopingGround:
     def _drawn(
         self, x: np.ndarray, y: np.ndarray, field: np.ndarray
     ) -> np.ndarray:
-        """Returns the field drawn to the streets and pads nearby."""
+        """Returns the field, adjusted to the streets and pads nearby."""
         points = np.asarray(shapely.points(x, y))
         weight = np.full(len(x), 1 / _REACH)
         total = field * weight
@@ -139,7 +144,7 @@ class SlopingGround:
             )
             areas: np.ndarray = self._pad_tree.geometries[pad]
             gain = _gain(shapely.distance(points[near], areas))
-            # Only the first of the pads that touch a point counts.
+            # Of several pads that touch a point, only the first counts.
             order = np.lexsort((pad, near))
             near, pad, gain = near[order], pad[order], gain[order]
             touching = gain > _gain(np.array([2 * _TOUCHING]))[0]
@@ -190,16 +195,16 @@ def make_ground(
     bounds: tuple[float, float, float, float],
     pads: Sequence[Pad] = (),
 ) -> Ground:
-    """Returns the ground of a city.
-
-    It is level if all roads and pads are, and otherwise slopes.
+    """Returns the ground of a city: level if all roads and pads are level.
 
     Args:
         surface: heights of the roads.
-        kerb_height: height of sidewalks above the roads [m], one or by place.
+        kerb_height: height of sidewalks above the roads [m], as one number or
+            by place.
         streets: area of carriageways, sidewalks and medians in W [m].
         bounds: x0, y0, x1, y1 of the city in W [m].
-        pads: level areas outside the streets; of two that meet, the first wins.
+        pads: level areas outside the streets; of two that meet, the first one
+            takes precedence.
     """
     if callable(kerb_height):
         return SlopingGround(surface, kerb_height, streets, bounds, pads)
@@ -209,10 +214,7 @@ def make_ground(
 
 
 def aprons(buildings: Iterable[Structure], streets: BaseGeometry) -> list[Pad]:
-    """Returns the areas around buildings that are level with their floors.
-
-    They are in W [m].
-    """
+    """Returns pads around buildings, in W, level with their floors."""
     kerbside = streets.buffer(_APRON)
     pads = []
     for building in buildings:
@@ -224,7 +226,7 @@ def aprons(buildings: Iterable[Structure], streets: BaseGeometry) -> list[Pad]:
 
 
 def relaxed(z: np.ndarray) -> np.ndarray:
-    """Returns a grid of heights with its gaps (NaN) filled smoothly.
+    """Returns a grid of heights [m] with its gaps (NaN) filled smoothly.
 
     The height of every gap is the mean of its two to four neighbours, as in a
     harmonic field. At least one height must be given.
@@ -255,13 +257,13 @@ def relaxed(z: np.ndarray) -> np.ndarray:
 
 
 def _nodes(start: float, end: float) -> np.ndarray:
-    """Returns the coordinates of nodes that reach over both ends [m]."""
+    """Returns the coordinates of nodes from `start` to beyond `end` [m]."""
     first = np.floor(start / _NODES)
     return np.arange(first, np.ceil(end / _NODES) + 1) * _NODES
 
 
 def _segments(area: BaseGeometry) -> np.ndarray:
-    """Returns the (N, 2, 2) edges of an area's outlines."""
+    """Returns start and end (N, 2, 2) of the edges of an area's outlines."""
     rings = shapely.get_rings(shapely.get_parts(area))
     corners = [np.array(ring.coords)[:, :2] for ring in rings]
     return np.concatenate(
@@ -270,13 +272,13 @@ def _segments(area: BaseGeometry) -> np.ndarray:
 
 
 def _foot_points(p: np.ndarray, segments: np.ndarray) -> np.ndarray:
-    """Returns the (N, 2) points of (N, 2, 2) segments nearest to p."""
+    """Returns the point (N, 2) of each segment (N, 2, 2) nearest to p."""
     start, along = segments[:, 0], segments[:, 1] - segments[:, 0]
     part = ((p - start) * along).sum(axis=1) / (along**2).sum(axis=1)
     return start + np.clip(part, 0.0, 1.0)[:, None] * along
 
 
 def _gain(distance: np.ndarray) -> np.ndarray:
-    """Returns the weight of a height at a distance [1/m]."""
+    """Returns the weight of the exact height at a distance, 1/d - 1/R [1/m]."""
     weight = 1 / np.maximum(distance, _TOUCHING) - 1 / _REACH
     return np.maximum(weight, 0.0)

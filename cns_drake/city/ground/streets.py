@@ -30,22 +30,23 @@ from cns_drake.roads.centreline import sample_stations
 from cns_drake.roads.network import RoadNetwork
 from cns_drake.roads.road import ENDS, Direction, End, Road
 
-# Marks the structures that are ground: no stage lacks them.
+# Tag of structures that are ground. No stage may lack them.
 GROUND_TAG = "ground"
-# The ground is cut into squares of this size, so that the bounds of each part
-# are small [m].
+# The ground is divided into squares of this size, so that each part has small
+# bounds [m].
 TILE = 64.0
 # Width of the kerb stones [m].
 _KERB_WIDTH = 0.15
-# On slopes the meshes have vertices this far apart: the sharpest bend of a
-# ramp, by 10 % over 1 m, is then true to 13 mm, most of it to 2 mm [m].
+# On slopes, the vertices of meshes are this far apart [m]. The sharpest bend of
+# a ramp (10 % over 1 m) is then exact to 13 mm, and most of it to 2 mm.
 _SPACING = 1.0
-# The wider spacing is used where its chords are at least this true [m].
+# The wider spacing is used where the mesh then deviates by at most this much
+# [m].
 _WIDE_SPACING, _LEAST_SAG = 4.0, 0.004
-# On slopes sidewalks are edged by stones that reach this deep, so that no
-# slit opens towards the coarser mesh of the ground beside them [m].
+# On slopes, edging stones of sidewalks reach this deep, so that no gap opens
+# towards the coarser mesh of the ground beside them [m].
 _EDGING = 0.4
-# A tile whose heights differ by less is level [m].
+# A tile whose heights differ by less than this is level [m].
 _LEVEL = 1e-4
 # Edges that two polygons share are found within this distance [m].
 _NEAR = 0.01
@@ -57,7 +58,7 @@ _MEDIAN_RGB = (0.47, 0.55, 0.34)
 
 
 class Covering(NamedTuple):
-    """Ground of one kind, with the name and colour of its structure.
+    """Ground of one kind, and the name and colour of its structure.
 
     Its area is in W [m].
     """
@@ -68,17 +69,17 @@ class Covering(NamedTuple):
     rgb: tuple[float, float, float]
 
     def tiles(self) -> Iterator[tuple[str, MultiPolygon]]:
-        """Yields the name of each tile, and the polygons in it."""
+        """Yields the name and the polygons of each tile of the area."""
         for k, piece in enumerate(tiles(self.area, TILE)):
             yield f"tile_{k:02d}", piece
 
     def surface(
         self, height: HeightMap | float, spacing: float = 0.0
     ) -> Structure:
-        """Returns the upper side as meshes, one part per tile.
+        """Returns the upper side as a structure, with one part per tile.
 
-        A mesh that follows a height map has vertices `spacing` apart [m]; with
-        0 it has only those of the polygons.
+        If the height is a map, the vertices are `spacing` apart [m]; with a
+        spacing of 0 there are only those of the polygons.
         """
         return self.structure(
             {
@@ -88,7 +89,7 @@ class Covering(NamedTuple):
         )
 
     def structure(self, pieces: dict[str, Mesh]) -> Structure:
-        """Returns the structure of meshes that are given in W.
+        """Returns the structure made of meshes that are given in W.
 
         Meshes without faces, which come from slivers, are left out.
         """
@@ -105,7 +106,7 @@ class Covering(NamedTuple):
 
 
 def parking_bays(area: BaseGeometry) -> Covering:
-    """Returns the parking bays, from their area in W [m]."""
+    """Returns the covering of parking bays, from their area in W [m]."""
     return Covering("parking_bays", "parking", snap(area), _BAY_RGB)
 
 
@@ -135,8 +136,8 @@ def street_surfaces(
     Args:
         areas: the areas of the streets in W [m].
         surface: heights of the carriageway.
-        kerb: height of sidewalks and medians above the carriageway [m], one or
-            by place.
+        kerb: height of sidewalks and medians above the carriageway [m], as one
+            number or by place.
         coverings: parts of the carriageway with a surface of their own.
         kerbless: area in W without kerbs, where streets lead onto bridges.
     """
@@ -196,7 +197,7 @@ def _surface(
 ) -> Structure:
     """Returns the upper side of streets, with edging stones on slopes.
 
-    Slopes are edged along the line `edge` in W [m].
+    The stones stand along the line `edge` in W [m].
     """
     pieces = {}
     for part, piece, top, spacing in _street_tiles(ground, height):
@@ -210,7 +211,7 @@ def _surface(
 def _edging(
     piece: BaseGeometry, top: HeightMap, spacing: float, edge: BaseGeometry
 ) -> Mesh:
-    """Returns the stones along the part of an edge that borders a tile."""
+    """Returns the edging stones along the part of `edge` beside a piece."""
     rim = piece.buffer(1.0, join_style="mitre").difference(piece)
     return wall_mesh(
         shapely.segmentize(rim, spacing),
@@ -229,8 +230,9 @@ def _kerb_structure(
     ground = Covering("kerbs", "sidewalk", kerbs, _KERB_RGB)
     pieces = {}
     for part, piece, top, spacing in _street_tiles(ground, walk):
-        # The upstand faces the carriageway, so it is the carriageway's rim
-        # seen from inside, where this tile's kerb stones border on it.
+        # The upstand faces the carriageway. It is therefore the carriageway's
+        # rim, seen from inside, where the kerb stones of this tile border on
+        # it.
         near = piece.buffer(_NEAR)
         rim = shapely.segmentize(paved, spacing) if spacing > 0 else paved
         upstand = wall_mesh(rim, road, top, along=near)
@@ -241,7 +243,7 @@ def _kerb_structure(
 def _street_tiles(
     ground: Covering, height: HeightMap | float
 ) -> Iterator[tuple[str, BaseGeometry, HeightMap | float, float]]:
-    """Yields name, polygons, height and mesh spacing of each tile."""
+    """Yields the name, polygons, height and mesh spacing [m] of each tile."""
     for name, piece in ground.tiles():
         if not callable(height):
             yield name, piece, height, 0.0
@@ -257,7 +259,7 @@ def _street_tiles(
 
 
 def _sag(area: BaseGeometry, height: HeightMap) -> float:
-    """Returns how far chords of the wide spacing leave the slopes [m]."""
+    """Returns by how much a widely spaced mesh misses the slope [m]."""
     x0, y0, x1, y1 = area.buffer(1.0).bounds
     y, x = np.mgrid[y0:y1:_SPACING, x0:x1:_SPACING]
     near = shapely.dwithin(area, shapely.points(x, y), _WIDE_SPACING)
@@ -272,21 +274,23 @@ def _sag(area: BaseGeometry, height: HeightMap) -> float:
 
 
 _RGB = (0.80, 0.79, 0.74)
-# Paint lies this high, so that it is not in one plane with the road [m].
+# Paint lies this high above the road, so that they are not in one plane [m].
 _THICKNESS = 0.004
 _LINE_WIDTH = 0.14
 # Length of a dash of a lane line and of the gap behind it [m].
 _DASH, _GAP = 3.0, 6.0
-# Middle lines are drawn in pieces, so that they follow curves [m].
+# Lane lines are divided into pieces of at most this length, to follow curves
+# [m].
 _PIECE = 4.0
-# On slopes all paint is laid in pieces of this length [m].
+# On slopes all paint is divided into pieces of this length [m].
 _SLOPE_PIECE = 1.0
-# From a junction's edge to its crossing, and to the stop line behind [m].
+# From a junction's edge to both sides of its crossing, and to both sides of the
+# stop line behind it [m].
 _CROSSING = (0.8, 3.8)
 _STOP_LINE = (4.8, 5.2)
 # Width of a bar of a crossing, and distance from bar to bar [m].
 _BAR, _BAR_STEP = 0.5, 1.1
-# Roads shorter than this between their junctions get no markings [m].
+# Roads that are shorter than this between their junctions get no markings [m].
 _LEAST_LENGTH = 2 * _STOP_LINE[1] + 4.0
 
 
@@ -305,12 +309,15 @@ def marking_structure(network: RoadNetwork) -> Structure:
 
 
 def _is_junction(network: RoadNetwork, road: Road, end: End) -> bool:
-    """Returns whether a node is a junction, and not one road going on."""
+    """Returns whether the road ends in a junction, not just in another road."""
     return len(network.junctions[getattr(road, end)].arms) > 2
 
 
 def _lane_lines(road: Road) -> Iterator[tuple[float, float, float, float]]:
-    """Yields strips: first and last station, right and left offset."""
+    """Yields the strips of lane lines: two stations, right and left offset [m].
+
+    The stations are where the strip begins and ends along the road.
+    """
     first = road.first_station + _STOP_LINE[1]
     last = road.last_station - _STOP_LINE[1]
     for direction, count in road.lanes.items():
@@ -333,10 +340,13 @@ def _lane_lines(road: Road) -> Iterator[tuple[float, float, float, float]]:
 def _end_marks(
     road: Road, end: End
 ) -> Iterator[tuple[float, float, float, float]]:
-    """Yields the strips of a crossing and the stop line behind it."""
+    """Yields the strips of a crossing and of the stop line behind it [m].
+
+    They have the same form as in `_lane_lines`.
+    """
     edge = road.half_width
     for right in np.arange(-edge + 0.4, edge - _BAR, _BAR_STEP).tolist():
-        # A median may reach into the crossing: its bars stay away.
+        # Where a median reaches into the crossing, bars are left out.
         if not road.median or abs(right + _BAR / 2) > road.median / 2 + _BAR:
             yield *_from_end(road, end, _CROSSING), right, right + _BAR
     incoming: Direction = "forward" if end == "end" else "backward"
@@ -368,7 +378,7 @@ def _from_end(
 def _strip(
     road: Road, first: float, last: float, right: float, left: float
 ) -> Mesh:
-    """Returns the area between two stations and two offsets."""
+    """Returns paint between two stations and two offsets of a road [m]."""
     if np.ptp(road.height([first, (first + last) / 2, last])) > 0:
         ends = sample_stations(first, last, _SLOPE_PIECE)
         pairs = itertools.pairwise(ends)
@@ -380,7 +390,7 @@ def _strip(
 def _quadrilateral(
     road: Road, first: float, last: float, right: float, left: float
 ) -> Mesh:
-    """Returns the plane face between two stations and two offsets."""
+    """Returns one plane face between two stations and two offsets [m]."""
     corners = np.concatenate(
         [
             road.evaluate([first, last], right)[:, :3],

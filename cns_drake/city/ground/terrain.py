@@ -1,4 +1,4 @@
-"""The ground of districts: lawns with relief, paving, water behind quays."""
+"""The ground of districts: lawns with relief, paving, water and quays."""
 
 from collections.abc import Callable, Iterable, Sequence
 import math
@@ -31,17 +31,17 @@ _LOOK = {
     "water": ("other-ground", (0.25, 0.38, 0.45)),
 }
 _QUAY_RGB = (0.55, 0.53, 0.50)
-# Meshes of ground with relief have vertices this far apart [m].
+# Distance between the vertices of meshes of ground with relief [m].
 _SPACING = 4.0
-# Where the streets around differ by more than this in height, the meshes have
-# vertices this far apart [m].
+# If the heights of the streets around an area differ by more than `_GENTLE`,
+# vertices are only `_FINE_SPACING` apart [m].
 _GENTLE, _FINE_SPACING = 4.0, 2.0
-# Wavelengths of the swells [m].
+# Range of the wavelengths of the swells [m].
 _WAVELENGTHS = (22.0, 60.0)
 
 
 class GroundShape:
-    """Height of the finished ground inside and outside the streets."""
+    """The height of the finished ground, inside and outside the streets."""
 
     def __init__(
         self,
@@ -50,7 +50,7 @@ class GroundShape:
         buildings: BaseGeometry,
         rng_of: Callable[[str], np.random.Generator],
     ):
-        """Shapes the ground around the footprints of buildings in W."""
+        """Shapes the ground around the footprints of buildings, in W."""
         self.base = base
         self._swells = [
             _make_swell(district, buildings, rng_of(district.plan.name))
@@ -59,7 +59,7 @@ class GroundShape:
         ]
 
     def __call__(self, x: np.ndarray, y: np.ndarray) -> np.ndarray:
-        """Returns the height of the ground at points in W [m]."""
+        """Returns the height of the finished ground at points in W [m]."""
         x, y = np.asarray(x, dtype=float), np.asarray(y, dtype=float)
         z = self.base(x, y)
         for lawn, swell in self._swells:
@@ -72,14 +72,17 @@ class GroundShape:
 def _make_swell(
     district: District, buildings: BaseGeometry, rng: np.random.Generator
 ) -> tuple[BaseGeometry, HeightMap]:
-    """Returns a district's lawn, and its height above level ground in W."""
+    """Returns the area of a district's lawn, and its height above level ground.
+
+    The height is a function of x and y in W [m].
+    """
     plan = district.plan
     rows = []
     for wavelength in rng.uniform(*_WAVELENGTHS, 5):
         heading, phase = rng.uniform(0, 2 * math.pi, 2)
         k = 2 * math.pi / wavelength
         rows.append((k * math.cos(heading), k * math.sin(heading), phase))
-    # Rows of wave vector [rad/m] and phase [rad].
+    # Each row: the wave vector [rad/m] and the phase [rad].
     waves = np.array(rows)
     lawn = district.grounds["lawn"]
     level = unary_union([lawn.boundary, buildings.intersection(lawn)])
@@ -92,7 +95,8 @@ def _make_swell(
         rise = u * u * (3 - 2 * u)
         phase = np.outer(x, waves[:, 0]) + np.outer(y, waves[:, 1])
         wave = np.sin(phase + waves[:, 2]).mean(axis=1)
-        # The relief is never below level, so that no hollow collects water.
+        # The relief is nowhere below the level ground, so that it has no
+        # hollows where water would collect.
         return plan.relief * rise * (0.65 + 0.35 * wave)
 
     return lawn, height
@@ -101,12 +105,12 @@ def _make_swell(
 def ground_structures(
     districts: Sequence[District], shape: GroundShape, water_level: float
 ) -> list[Structure]:
-    """Returns the ground of all districts.
+    """Returns the structures of the ground of all districts.
 
     `shape` gives the height of everything except water.
     """
     structures = []
-    # Land within water is a bridge, and water passes below it.
+    # Land within water is a bridge, below which there is water.
     land = unary_union(
         [
             area
@@ -137,7 +141,7 @@ def ground_structures(
 
 
 def _slope(ground: Covering, shape: GroundShape) -> Structure:
-    """Returns ground that slopes between level pads, one part a tile."""
+    """Returns ground that slopes between level pads, with one part per tile."""
     is_gentle = _fall(ground.area, shape.base) < _GENTLE
     spacing = _SPACING if is_gentle else _FINE_SPACING
     pieces = {}
@@ -156,7 +160,7 @@ def _slope(ground: Covering, shape: GroundShape) -> Structure:
 
 
 def _fall(area: BaseGeometry, base: Ground) -> float:
-    """Returns the difference between the heights on an area's outline [m]."""
+    """Returns the difference of height along the outline of an area [m]."""
     outline = shapely.segmentize(area, _SPACING)
     return float(np.ptp(base(*shapely.get_coordinates(outline).T)))
 
@@ -168,7 +172,7 @@ def _quay(
     shape: GroundShape,
     water_level: float,
 ) -> Structure:
-    """Returns the walls where water borders on land, one part a tile."""
+    """Returns the walls between land and water, with one part per tile."""
     rim = water.boundary.buffer(0.3).intersection(land.buffer(0.6))
     quay = Covering(f"quay_{district}", "other-structure", rim, _QUAY_RGB)
     return quay.structure(
@@ -181,7 +185,7 @@ def _quay(
 
 # From the upper side of a bridge to its lower side [m].
 _DEPTH = 1.0
-# Distance of the piers from the banks, and how thick they are [m].
+# Distance of the piers from the banks, and their thickness [m].
 _SPAN = 10.5
 _PIER = 1.2
 # Edges that two polygons share are found within this distance [m].
@@ -191,7 +195,7 @@ _WATER_RGB = (0.25, 0.38, 0.45)
 
 
 def water_area(district: District, streets: BaseGeometry) -> BaseGeometry:
-    """Returns all water of a district, also below bridges."""
+    """Returns all water of a district in W, also below bridges."""
     if district.plan.area is None:
         return district.area
     below = Polygon(district.plan.area).intersection(streets)
@@ -207,8 +211,8 @@ def bridge_structures(
     """Returns the sides, undersides and piers of all bridges.
 
     There is a bridge where a street crosses a district of water, and where such
-    a district has a patch of land. Its upper side is the street or the patch.
-    `shape` gives the height of everything except water.
+    a district has a patch of land. The street or the patch is the upper side of
+    the bridge. `shape` gives the height of everything except water.
     """
     structures = []
     for district in districts:

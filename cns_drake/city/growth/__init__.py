@@ -1,1 +1,1 @@
-"""Younger cities: buildings that are still lower, and lots in other use."""
+"""Earlier stages: lower buildings, and lots with another use."""

@@ -1,7 +1,7 @@
-"""A building before its upper storeys were added.
+"""Makes a building as it was before its upper storeys were added.
 
-The part below the height stays as it is, to the millimetre: the street shows
-the same front. Above it the building gets a new roof.
+The part below the height stays as it is, to the millimetre, so that the street
+shows the same front. It gets a new roof.
 """
 
 from collections.abc import Sequence
@@ -27,9 +27,11 @@ from cns_drake.city.geometry import (
 
 # Walls and the glass behind them count as one if they are this close [m].
 _REVEAL = 0.7
-# Pieces of walls that end at a height by chance carry no roof [m^2].
+# Pieces of wall that happen to end at the height, and are smaller than this,
+# get no roof [m^2].
 _LEAST_ROOF = 4.0
-# Corners lie at whole millimetres; a cut between them meets none [m].
+# Corners have coordinates in whole millimetres. A cut this far above meets none
+# [m].
 _BETWEEN = 0.0005
 # A part that rises less than this above the height is no storey [m].
 _STOREY = 2.5
@@ -37,19 +39,19 @@ _PARAPET = 0.9
 _PARAPET_WIDTH = 0.3
 # The band that closes the walls starts this far below the roof [m].
 _BAND = 0.5
-# and stands out of them by this [m].
+# The band sticks out of the walls by this [m].
 _BAND_REACH = 0.04
 _ROOF_ITEMS = ("stair_house", "ac_unit", "vents", "skylight")
 _Point = list[float]
 
 
 def lowered(model: Model, height: float, name: str, seed: int) -> Model:
-    """Returns a building that ends at a height, under a flat roof.
+    """Returns a building that ends at a height, with a flat roof.
 
-    The roof is at `height` above the building's own ground [m]; its parapet and
-    the equipment on it, drawn from `seed`, reach higher. New meshes are
-    named after `name`. The model itself is returned if less than a storey
-    of it lies above `height`, or if nothing above `height` is enclosed.
+    The roof is at `height` above the building's own ground [m]. Its parapet and
+    its equipment, which `seed` draws, reach higher. The names of new meshes
+    begin with `name`. The model itself is returned if less than a storey of it
+    lies above `height`, or if its walls enclose nothing there.
     """
     if top_of(model) < height + _STOREY:
         return model
@@ -83,7 +85,7 @@ def lowered(model: Model, height: float, name: str, seed: int) -> Model:
 
 
 def top_of(model: Model) -> float:
-    """Returns the height of a building without its roof's equipment [m]."""
+    """Returns the height of a building without its roof equipment [m]."""
     return max(
         float(part_mesh(part, model.meshes).vertices[:, 2].max())
         for part in model.parts
@@ -92,16 +94,16 @@ def top_of(model: Model) -> float:
 
 
 def cut_at(mesh: Mesh, height: float) -> tuple[Mesh, np.ndarray]:
-    """Returns the part of a mesh below a height [m], and the cut.
+    """Returns the part of a mesh below a height [m], and the edges of the cut.
 
-    The part is open at the cut. The mesh must have plane, convex faces. The cut
-    is (N, 2, 2): the starts and ends of the edges in which it meets the faces
-    [m]. The back of a face is on the left of its edge.
+    The part is open at the cut. The mesh must have plane, convex faces. The
+    edges are (N, 2, 2): start and end of the segment in which the cut meets
+    each face [m]. The back of the face is on the left of the segment.
     """
     corners: list[_Point] = []
     faces: list[tuple[int, ...]] = []
     edges = []
-    # Numbers of Python: an array of a few is slow.
+    # Python numbers, because NumPy is slow for arrays of a few.
     vertices = mesh.vertices.tolist()
     for face in mesh.faces:
         ring = [vertices[k] for k in face]
@@ -113,8 +115,8 @@ def cut_at(mesh: Mesh, height: float) -> tuple[Mesh, np.ndarray]:
             ring, crossing = _clipped(ring, height)
             if len(crossing) == 2:
                 (x0, y0), (x1, y1) = crossing
-                # The inside of a wall is on the left of an edge that faces
-                # right.
+                # The inside of a wall is on the left of an edge whose face
+                # looks to the right.
                 right = (y1 - y0) * normal[0] - (x1 - x0) * normal[1]
                 edges.append(crossing if right > 0 else crossing[::-1])
         # The lower part of a quadrilateral may have five corners.
@@ -127,7 +129,7 @@ def cut_at(mesh: Mesh, height: float) -> tuple[Mesh, np.ndarray]:
 
 
 def _normal_of(ring: list[_Point]) -> tuple[float, float]:
-    """Returns x and y of a face's normal."""
+    """Returns x and y of a face's normal, not normalised."""
     (x0, y0, z0), (x1, y1, z1), (x2, y2, z2) = ring[:3]
     return (
         (y1 - y0) * (z2 - z0) - (z1 - z0) * (y2 - y0),
@@ -138,7 +140,7 @@ def _normal_of(ring: list[_Point]) -> tuple[float, float]:
 def _clipped(
     ring: list[_Point], height: float
 ) -> tuple[list[_Point], list[list[float]]]:
-    """Returns the corners of a face below a height, and where it is cut."""
+    """Returns the part of a face below a height, and the edges of the cut."""
     kept, crossing = [], []
     for p, q in zip(ring, [*ring[1:], ring[0]], strict=True):
         if p[2] <= height:
@@ -152,21 +154,23 @@ def _clipped(
 
 
 def enclosed(edges: np.ndarray) -> MultiPolygon:
-    """Returns the ground on the left of the cut edges (N, 2, 2) of walls [m].
+    """Returns the area on the left of the cut edges (N, 2, 2) of walls [m].
 
-    The polygons have holes for courtyards, and whole millimetres. They include
-    reveals, and the gaps between walls and what stands before them.
+    The polygons have holes for courtyards, and coordinates in whole
+    millimetres. They include reveals, and the gaps between walls and what
+    stands in front of them.
     """
     edges = edges[np.ptp(edges, axis=1).max(axis=1) > 0.001]
     lines = shapely.linestrings(edges)
     walls = unary_union(shapely.buffer(lines, _REVEAL, cap_style="square"))
     plan: BaseGeometry = MultiPolygon()
-    # From the outside inwards: courtyards are inside their buildings.
+    # Sorted from the outside inwards: courtyards lie inside their buildings.
     rings = [(Polygon(one.exterior), one) for one in polygons_of(walls)]
     for outer, ring in sorted(rings, key=lambda r: r[0].area, reverse=True):
         mine = edges[shapely.intersects(lines, ring)]
         a, b = (mine - mine.mean(axis=(0, 1))).transpose(1, 0, 2)
-        # Taken together, those of a building run counter-clockwise.
+        # The outer edges of a building run counter-clockwise, those of a
+        # courtyard clockwise.
         if (a[:, 0] * b[:, 1] - a[:, 1] * b[:, 0]).sum() > 0:
             plan = plan.union(_offset(outer, -_REVEAL))
         else:
@@ -183,20 +187,20 @@ def enclosed(edges: np.ndarray) -> MultiPolygon:
 
 
 def _offset(area: BaseGeometry, distance: float) -> BaseGeometry:
-    """Returns an area grown by a distance, with its corners [m]."""
-    # On edges in one line GEOS divides by zero on its way to the result.
+    """Returns an area grown by a distance [m], with its corners kept sharp."""
+    # For edges on one line, GEOS divides by zero on its way to a valid result.
     with np.errstate(divide="ignore", invalid="ignore"):
         return area.buffer(distance, join_style="mitre")
 
 
 def _add_roof(assembly: Assembly, plan: MultiPolygon, height: float) -> None:
-    """Closes the walls by a band, a parapet and a flat roof."""
+    """Closes the walls with a band, a parapet and a flat roof."""
     top = round(height + _PARAPET, 3)
     outer = snap(_offset(plan, _BAND_REACH))
     inner = snap(_offset(plan, -_PARAPET_WIDTH))
     assembly.add(
         "new_roof",
-        # Seen from outside, not from within.
+        # The wall is seen from outside, not from within.
         wall_mesh(outer, height - _BAND, top).turned(),
         surface_mesh(outer.difference(inner), top),
         wall_mesh(inner, height, top),
@@ -208,13 +212,13 @@ def _add_roof(assembly: Assembly, plan: MultiPolygon, height: float) -> None:
 
 
 def _is_shared(part: Part) -> bool:
-    """Whether a part is equipment, whose mesh other buildings use too."""
+    """Returns whether a part is equipment, whose mesh other buildings share."""
     shape = part.shape
     return isinstance(shape, MeshShape) and shape.mesh.startswith("roof_")
 
 
 def _wall_rgb(placed: Sequence[tuple[Part, Mesh]]) -> Rgb | None:
-    """Returns the colour of the building's largest part that is no glass."""
+    """Returns the colour of the building's largest part that is not glass."""
 
     def extent(one: tuple[Part, Mesh]) -> float:
         return float(np.prod(np.ptp(one[1].vertices, axis=0)))

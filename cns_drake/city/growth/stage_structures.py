@@ -1,7 +1,8 @@
 """The structures of a city at each of its stages.
 
-Plants are younger, buildings lower or under construction, or their lots are in
-another use."""
+At earlier stages, plants are younger, buildings are lower or under
+construction, or their lots have another use.
+"""
 
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
@@ -34,9 +35,10 @@ from cns_drake.city.plan.stages import LotUse, Stages
 
 
 def younger(model: Model, height: float) -> Model:
-    """Returns a plant that is scaled down to a height [m].
+    """Returns a plant scaled down to a height [m].
 
-    The plant stands on z = 0. A plant that is already lower is not changed.
+    The plant stands on z = 0. A plant that is already lower is returned
+    unchanged.
     """
     meshes = (part_mesh(part, model.meshes) for part in model.parts)
     top = max(mesh.vertices[:, 2].max() for mesh in meshes)
@@ -68,18 +70,18 @@ def scaled(model: Model, share: float) -> Model:
 _FRAME = "unfinished_tower"
 # Room for a crane beside the frame [m].
 _CRANE_ROOM = 7.0
-# The jib clears the frame by this [m].
+# The jib is this far above the frame [m].
 _CRANE_RISE = 14.0
 _CRANE_REACH = 30.0
-# Grid lines in each direction from which a rectangle on a lot is chosen.
+# A rectangle on a lot is chosen between this many grid lines in each direction.
 _MOST_SIDES = 12
 
 
 def building_site(model: Model, height: float, name: str, seed: int) -> Model:
     """Returns the unfinished frame of a building, with its crane.
 
-    The frame is `height` high [m]. Except for the jib, the model stays within
-    the building's footprint.
+    The frame is `height` high [m]. Except for the jib of the crane, the model
+    stays within the building's footprint.
 
     Raises:
         ValueError: there is no room for a frame.
@@ -120,10 +122,10 @@ def _beside(part: Part, xy: tuple[float, float]) -> Part:
 
 
 def largest_rectangle(footprint: BaseGeometry) -> Polygon:
-    """Returns a large rectangle along the axes that lies within a footprint.
+    """Returns a large axis-aligned rectangle that lies within a footprint.
 
-    If all edges of the footprint run along the axes, it is the largest.
-    Otherwise it is the largest whose sides pass through corners of the
+    It is the largest one if all edges of the footprint are axis-aligned.
+    Otherwise it is the largest one whose sides pass through corners of the
     footprint.
     """
     corners = shapely.get_coordinates(footprint.simplify(0.05))
@@ -142,16 +144,16 @@ def largest_rectangle(footprint: BaseGeometry) -> Polygon:
 
 
 def _spread(values: np.ndarray) -> np.ndarray:
-    """Returns at most a dozen of increasing values."""
+    """Returns at most a dozen of some increasing values, evenly chosen."""
     if len(values) <= _MOST_SIDES:
         return values
     kept = np.linspace(0, len(values) - 1, _MOST_SIDES).round().astype(int)
     return values[kept]
 
 
-# Distance to the edges of the lot, where the neighbours stand [m].
+# Distance of objects from the edges of the lot, where the neighbours stand [m].
 _MARGIN = 0.8
-# A smaller lot is a gap between houses [m^2].
+# A smaller lot is a gap between houses, and stays empty [m^2].
 _SMALLEST = 40.0
 _USES = parse_yaml(Path(__file__).with_name("lot_uses.yaml").read_bytes())
 USES: tuple[LotUse, ...] = get_args(LotUse)
@@ -175,7 +177,8 @@ def lot_objects(
 ) -> Iterator[Structure]:
     """Yields the structures on a lot before its building is built.
 
-    They are called after the building. `cars` are the weights of parked cars.
+    The names of the structures begin with that of the building. `cars` maps
+    parked cars to their weights in the random choice.
     """
     footprint = structure.model.footprint
     if use == "empty" or footprint.area < _SMALLEST:
@@ -206,7 +209,7 @@ def lot_objects(
 def _places(
     footprint: BaseGeometry, use: LotUse, rng: np.random.Generator
 ) -> Iterator[tuple[float, float, float]]:
-    """Yields x, y and heading of the places that are taken, in S."""
+    """Yields x, y [m] and heading [rad] of the objects on a lot, in S."""
     x0, y0, x1, y1 = largest_rectangle(footprint).bounds
     along, across = _USES[use]["pitch"]
     columns = max(1, math.floor((x1 - x0 - 2 * _MARGIN) / along))
@@ -229,11 +232,11 @@ def _places(
 
 
 class GrowingCity:
-    """A city and its stages.
+    """A city at all of its stages.
 
-    Its structures are first those of the whole city, then those that stand on
-    lots before the lots are built on. The instance id of a structure is its
-    number in this order, counted from 1, and is the same at all stages.
+    Its structures are first those of the whole city, then the objects on lots
+    that are not built on yet. The instance id of a structure is its number in
+    this order, counted from 1. It is the same at all stages.
     """
 
     def __init__(
@@ -242,9 +245,10 @@ class GrowingCity:
         stages: Stages,
         cars: Mapping[str, float],
     ):
-        """Fills the lots of a whole city, at its last stage.
+        """Adds the objects on lots to the structures of the whole city.
 
-        `cars` are the weights of those that are parked on lots.
+        The whole city is that of the last stage. `cars` maps parked cars to
+        their weights in the random choice.
         """
         self._stages = stages
         self._permanent = list(structures)
@@ -292,7 +296,7 @@ class GrowingCity:
 
 
 def _at_height(structure: Structure, height: float) -> Structure:
-    """Returns a structure that has not grown any higher yet."""
+    """Returns a structure that has only grown to a height so far [m]."""
     name, model = structure.name, structure.model
     if structure.semantic_class == "vegetation":
         return replace(structure, model=younger(model, height))
@@ -303,5 +307,5 @@ def _at_height(structure: Structure, height: float) -> Structure:
 
 
 def _seed(name: str) -> int:
-    """Returns a seed of a structure's own."""
+    """Returns a seed from the name of a structure."""
     return zlib.crc32(name.encode())

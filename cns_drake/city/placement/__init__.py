@@ -1,1 +1,1 @@
-"""Chooses the places of all structures."""
+"""Chooses the places of all structures of a city."""

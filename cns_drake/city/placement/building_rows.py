@@ -1,4 +1,4 @@
-"""Buildings at given places and in rows along the streets."""
+"""Places buildings at given places and in rows along the streets."""
 
 from dataclasses import dataclass, field
 import math
@@ -17,30 +17,31 @@ from cns_drake.city.placement.draft import Draft
 from cns_drake.city.placement.frontage import Lot, lines_along, lot_at
 from cns_drake.city.plan.city_plan import BuildingPlan, RowPlan
 
-# Neighbours closer than this get blank walls on the sides that face each
-# other; it is room for the eaves and balconies of both [m].
+# Neighbours closer than this get blank walls on the sides that face each other.
+# It leaves room for the eaves and balconies of both [m].
 _PARTY_WALL = 3.1
-# Buildings that are not neighbours in a row keep this distance [m].
+# Buildings that are not neighbours in one row keep this distance [m].
 _YARD = 3.1
-# A house stands as high as the ground this far in front of it [m].
+# A house stands at the height of the ground this far in front of it [m].
 _DOORSTEP = 1.0
-# If a lot does not fit, the next trial starts this much further on [m].
+# If a lot does not fit, the next one tried starts this much further on [m].
 _STEP = 1.0
-# Parts of the drawn width and depth that are tried in turn; never less than
-# the row's least.
+# Factors of the drawn width and depth that are tried in turn. The result is
+# never below the row's least width or depth.
 _SIZES = ((1.0, 1.0), (1.0, 0.7), (0.75, 1.0), (0.5, 1.0), (0.5, 0.5))
-# Walls that stand against each other may overlap by rounding [m].
+# Rounding may make walls of adjoining houses overlap by this much [m].
 _TOUCH = 0.005
-# Edges of a rectangle, counter-clockwise from the front.
+# Numbers of a rectangle's edges, counter-clockwise from the front.
 _RIGHT_EDGE, _LEFT_EDGE = 1, 3
 
 
 @dataclass
 class _House:
-    """A building that is to be built, its frame S at `xy` and `yaw` in W.
+    """A building to be built.
 
-    It has the height of its walls [m], the ground in W that was taken for it,
-    and the edges of the footprint with a neighbour wall to wall.
+    Its frame S is at `xy` and `yaw` in W [m, rad]. `height` is that of its
+    walls [m], and `taken` the ground in W that was taken for it. Its
+    `blind_edges` touch a neighbour.
     """
 
     archetype: str
@@ -53,11 +54,11 @@ class _House:
 
 
 def place_buildings(draft: Draft, district: District) -> None:
-    """Places a district's single buildings, then its rows.
+    """Adds a district's single buildings, then its rows, to a draft.
 
     Raises:
         InputError: if a single building has no room, or an archetype cannot be
-            built in the size of the plan.
+            built in the size that the plan gives.
     """
     name = district.plan.name
     draft.open_range()
@@ -135,14 +136,15 @@ def _single_house(
 def _row_houses(
     draft: Draft, district: District, row: RowPlan, rng: Generator
 ) -> list[_House]:
-    """Walks along the streets and takes a lot wherever one fits.
+    """Returns the houses of a row: one on each lot that fits along the streets.
 
-    Rows keep to the district's own ground: a patch is there to stay open.
+    Rows stay on the district's own ground, since patches are meant to stay
+    open.
     """
     area: BaseGeometry = district.grounds[district.plan.ground]
     if row.within is not None:
         area = area.intersection(Polygon(row.within))
-    # Lots that touch the rim of the area must not fail by rounding.
+    # Rounding must not reject lots that touch the edge of the area.
     limit = area.buffer(0.05)
     houses: list[_House] = []
     for line in lines_along(draft.frontage, area, row.setback):
@@ -176,10 +178,10 @@ def _fitting_house(
     previous: _House | None,
     rng: Generator,
 ) -> _House | None:
-    """Draws a house for the lot at `start`; None if it does not fit."""
+    """Returns a random house for the lot at `start`; None if none fits."""
     names = list(row.archetypes)
     if previous is not None and len(names) > 1:
-        # No two neighbours of the same kind.
+        # Neighbours are never of the same archetype.
         names = [name for name in names if name != previous.archetype]
     weights = np.array([row.archetypes[name] for name in names])
     archetype = names[rng.choice(len(names), p=weights / weights.sum())]
@@ -192,7 +194,8 @@ def _fitting_house(
         wanted = width * width_part, depth * depth_part
         size = np.maximum(wanted, (row.width[0], row.depth[0]))
         lot = lot_at(line, start, *np.clip(size, low, high).round(1).tolist())
-        # On a curve a lot's front is its chord, a little less than asked for.
+        # On a curve, the front of a lot is a chord, slightly shorter than asked
+        # for.
         if lot is None or lot.width < low:
             continue
         area = lot.footprint_W

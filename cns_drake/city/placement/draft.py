@@ -1,4 +1,4 @@
-"""A city in the making: the structures placed so far."""
+"""A city under construction: the structures placed so far."""
 
 from collections import Counter
 from collections.abc import Iterable
@@ -25,32 +25,38 @@ from cns_drake.city.plan.city_plan import CityPlan
 from cns_drake.city.plants.vegetation import SPECIES
 from cns_drake.roads.carriageway import Areas
 
-# Objects of one class that share one word in everyday use.
+# Semantic class -> the everyday word for its objects, as the stem of their
+# names.
 _WORDS = {"car": "car", "truck": "truck", "traffic-sign": "sign"}
 
 
 def name_stem(object_name: str) -> str:
-    """Returns the stem of an object's name, e.g. `tree` for a `lime_tree`."""
+    """Returns the stem of an object's name, such as `tree` for `lime_tree`."""
     if object_name in SPECIES:
         return "tree"
     return _WORDS.get(OBJECTS[object_name].semantic_class, object_name)
 
 
-# An object stands upright where the ground falls by at most this much below
-# it, half of it sunk in on the upper side [m].
+# An object stands upright if the ground below it falls by at most this much;
+# half of the fall is how deep it stands in the ground on the upper side [m].
 _STEEPEST = 0.5
-# Numbers in names start anew at multiples of this.
+# Ranges of numbers in names begin at multiples of this.
 _RANGE = 50
 
 
 class Draft:
     """Collects structures, gives them names and keeps them apart.
 
-    `streets` is all ground of the streets, sidewalks included. Buildings stand
-    along the `frontage`. `base` is the height of sidewalks and of the ground
-    between them, before buildings and relief change it. `ground` is the upper
-    sides of the finished ground, which is set once the buildings stand. All
-    these are in W. `source` is the name of the plan's file, for messages.
+    All areas and heights are in W [m].
+
+    Attributes:
+        streets: area of the streets, sidewalks included.
+        frontage: lines along which buildings stand.
+        base: height of sidewalks and of the ground between them, before
+            buildings and relief change it.
+        ground: upper sides of the finished ground; set once the buildings
+            stand.
+        source: name of the plan's file, which errors name.
     """
 
     def __init__(
@@ -74,25 +80,25 @@ class Draft:
         self._lanes.add(areas.lane_area)
 
     def rng(self, *words: str | int) -> np.random.Generator:
-        """Returns the random generator of one task, by the task's name.
+        """Returns the random generator of the task with this name.
 
-        Every task has its own, so that a change in one district does not change
-        the draws of others.
+        Every task has a generator of its own, so that a change in one district
+        does not change the random draws in others.
         """
         key = "/".join(map(str, words)).encode()
         return np.random.default_rng([self.plan.seed, zlib.crc32(key)])
 
     def task(self, *words: str | int) -> np.random.Generator:
-        """Starts a task: see `open_range` and `rng`."""
+        """Starts a task, see `open_range`; returns its generator, see `rng`."""
         self.open_range()
         return self.rng(*words)
 
     def open_range(self) -> None:
-        """Starts a new range of numbers for names in the next task.
+        """Lets the names of the next task begin with a new range of numbers.
 
-        In the same way, house numbers start anew with each street. Thus, an
-        object more or less in one task does not rename the objects of later
-        tasks, to which the lists of the stages refer.
+        House numbers, too, begin anew in each street. The lists of the stages
+        refer to names. With ranges, one object more or less in a task does not
+        rename the objects of later tasks.
         """
         for kind, count in self._counts.items():
             self._counts[kind] = -(-count // _RANGE) * _RANGE
@@ -110,19 +116,19 @@ class Draft:
     ) -> bool:
         """Returns whether an area in W is off the lanes and not taken.
 
-        The clearance is to taken ground, not to lanes [m]; a taken area to
-        `ignore` may be closer, but not overlapped.
+        The clearance applies to taken ground, not to lanes [m]. The taken area
+        `ignore` may be closer than the clearance, but may not be overlapped.
         """
         return self._lanes.is_free(area) and self._occupancy.is_free(
             area, clearance, ignore
         )
 
     def take(self, area: BaseGeometry) -> None:
-        """Marks an area in W as taken, so that later objects avoid it."""
+        """Marks an area in W as taken: no later object is placed there."""
         self._occupancy.add(area)
 
     def add_building(self, structure: Structure) -> None:
-        """Adds a building whose ground has been taken before."""
+        """Adds a building, on ground that has already been taken."""
         self.structures.append(structure)
         self._walls.add(structure.footprint_W)
 
@@ -139,18 +145,21 @@ class Draft:
         crown_part: float = 0.0,
         within: BaseGeometry | None = None,
     ) -> Structure | None:
-        """Places an object on the finished ground, if there is room.
+        """Places an object on the finished ground; None if there is no room.
 
-        It is one of `OBJECTS`. An object without room uses up a name as well,
-        so that the names of others do not depend on whether it fits.
+        An object without room uses up a name as well, so that the names of
+        others do not depend on whether it fits.
 
         Args:
+            name: key of `OBJECTS`.
+            model: the object.
             xy, yaw: position and heading in W [m, rad].
-            kind: stem of the structure's name; the object's by default.
-            clearance: least distance to all objects placed before [m].
-            crown_part: how much of the reach of a tree's crown must be
-                clear of buildings, from 0 to 1.
-            within: where given, the footprint must lie in this area.
+            tags: tags of the structure.
+            kind: stem of the structure's name; by default that of the object.
+            clearance: least distance from all objects placed before [m].
+            crown_part: share of the reach of a tree's crown that must be clear
+                of buildings, from 0 to 1.
+            within: area in which the footprint must lie; None for any.
         """
         x, y = (round(float(value), 3) for value in xy)
         structure = Structure(
@@ -169,7 +178,7 @@ class Draft:
             or (not crown.is_empty and not self._walls.is_free(crown))
         ):
             return None
-        # How far the ground falls below it [m].
+        # How much the ground falls below the object [m].
         corners = shapely.get_coordinates(footprint)
         fall = float(np.ptp(np.round(self.base(*corners.T), 3)))
         if fall > _STEEPEST:
@@ -181,20 +190,20 @@ class Draft:
         return structure
 
     def _foot(self, structure: Structure, fall: float) -> float:
-        """Returns the height of an object on ground that falls below it [m]."""
+        """Returns the z of an object on ground that falls by `fall` [m]."""
         p_WFs = structure.p_WFs
         assert self.ground is not None, "the ground has no shape yet"
         z = self.ground.heights(np.vstack([structure.xyz, p_WFs])[:, :2])
         z[0] -= fall / 2
         z[1:] -= p_WFs[:, 2].min()
-        # There is no ground in slits of a millimetre, and the water beside a
-        # quay is below no foot.
+        # The ground has no height in gaps of a millimetre. Next to a quay, no
+        # foot stands on the water.
         z = z[np.isfinite(z)]
         return round(float(z[z > z[0] - _STEEPEST].min()), 3)
 
 
 def _reach(model: Model) -> float:
-    """Returns how far a model's meshes reach from its middle [m]."""
+    """Returns the greatest distance of a model's meshes from its axis [m]."""
     reaches = [0.0]
     for part in model.parts:
         if isinstance(part.shape, MeshShape):

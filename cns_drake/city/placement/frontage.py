@@ -1,4 +1,4 @@
-"""Lines along streets, and lots cut off along them."""
+"""Lines along streets, and lots along these lines."""
 
 import itertools
 import math
@@ -13,23 +13,24 @@ from shapely.ops import linemerge
 from cns_drake.base.angles import wrapped
 from cns_drake.city.geometry.polygons import placed
 
-# A line that turns by more than this at one vertex has a corner there [rad].
+# A vertex at which a line turns by more than this is a corner [rad].
 _CORNER = math.radians(25)
-# Round corners of parallel lines: segments per quarter turn.
+# Number of segments per quarter turn at round corners of parallel lines.
 _QUAD_SEGMENTS = 16
-# The street may bend away from a lot's straight front by at most this angle at
-# either end; houses around a tighter curve, or into a corner, look askew.
+# At either end of a lot's straight front, the street may bend away by at most
+# this angle [rad]. Houses around a tighter curve, or in a corner, would look
+# askew.
 _BEND = math.radians(17)
-# Headings are taken over twice this length [m].
+# The heading at a place is that of a chord of twice this length [m].
 _SHORT = 0.25
 
 
 class Lot(NamedTuple):
-    """A rectangle of ground for one building, its front to the street.
+    """A rectangle of ground for one building; its front faces the street.
 
-    In the middle is its frame S, whose x axis runs along the front and whose y
-    axis points away from the street; `yaw` is its heading in W [rad]. Width and
-    depth are along these axes [m].
+    (x, y) is the middle of the lot in W, the origin of its frame S. The x axis
+    of S runs along the front, and its y axis points away from the street; `yaw`
+    is its heading in W [rad]. Width and depth are along these axes [m].
     """
 
     x: float
@@ -63,8 +64,8 @@ def lines_along(
 ) -> list[LineString]:
     """Returns the lines within an area, at a distance from the streets [m].
 
-    They are smooth pieces between corners, in fixed order; the street is on the
-    right of each piece.
+    The lines are divided at corners into smooth pieces, in fixed order. The
+    street is on the right of each piece.
     """
     edge = streets.buffer(distance, quad_segs=_QUAD_SEGMENTS).boundary
     cut = shapely.set_precision(edge.intersection(within), 0.001)
@@ -82,7 +83,7 @@ def lines_along(
 
 
 def station_at(line: LineString, s: float) -> Station:
-    """Returns position and heading at an arc length [m] of a line."""
+    """Returns the place and heading at an arc length of a line [m]."""
     before = line.interpolate(max(s - _SHORT, 0.0))
     after = line.interpolate(min(s + _SHORT, line.length))
     at = line.interpolate(s)
@@ -93,10 +94,9 @@ def station_at(line: LineString, s: float) -> Station:
 def lot_at(
     line: LineString, start: float, width: float, depth: float
 ) -> Lot | None:
-    """Returns the lot whose front starts at an arc length of a line.
+    """Returns the lot whose front begins at an arc length of a line [m].
 
-    Returns:
-        The lot, or None where the line ends or bends too much within it.
+    It is None if the line ends within the lot or bends too much.
     """
     end = start + width
     if end > line.length + 1e-6:
@@ -112,8 +112,8 @@ def lot_at(
     ends = (station_at(line, s) for s in (start + _SHORT, end - _SHORT))
     if any(abs(wrapped(at.yaw - yaw)) > _BEND for at in ends):
         return None
-    # On a line that bends around the street the chord comes closer to it
-    # than the line, so the front steps back by as much.
+    # Where the line bends around the street, its chord comes closer to the
+    # street. The front moves back by the difference.
     between = [
         np.array(line.interpolate(start + width * u).coords[0]) - a
         for u in np.linspace(0.1, 0.9, 9)
@@ -140,7 +140,7 @@ def _split_at_corners(line: LineString) -> list[LineString]:
     corners = np.flatnonzero(np.abs(turns) > _CORNER) + 1
     closed = bool(np.allclose(coordinates[0], coordinates[-1]))
     if closed and len(corners):
-        # Start a closed line at a corner, so that no piece is cut in two.
+        # A closed line starts at a corner, so that no piece is cut in two.
         shift = int(corners[0])
         coordinates = np.concatenate(
             [coordinates[shift:-1], coordinates[: shift + 1]]

@@ -1,4 +1,4 @@
-"""Every kind of small object that a city can place, by name."""
+"""All kinds of small objects that a city can place, by name."""
 
 from collections.abc import Mapping
 
@@ -12,7 +12,7 @@ from cns_drake.city.plants.vegetation import TREES
 
 
 def pick(weights: Mapping[str, float], rng: np.random.Generator) -> str:
-    """Returns a key, drawn with the given weights in their order."""
+    """Returns a key at random; `weights` gives the weight of each."""
     names = list(weights)
     p = np.array([weights[name] for name in names])
     return names[int(rng.choice(len(names), p=p / p.sum()))]

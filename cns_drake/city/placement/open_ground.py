@@ -1,4 +1,4 @@
-"""Objects on a district's own ground: trees, hedges, cars, benches."""
+"""Places objects on a district's own ground: trees, hedges, cars, benches."""
 
 from collections.abc import Mapping
 import itertools
@@ -24,13 +24,13 @@ from cns_drake.city.plan.city_plan import (
 
 # Least distance between two objects [m].
 _CLEARANCE = 0.15
-# Trees keep their crowns off walls: distance of the trunk from any building
-# as a part of the crown's reach.
+# A trunk's least distance from any building, as a share of the crown's reach:
+# it keeps crowns away from walls.
 _CROWN_PART = 0.8
-# Runs (fences, hedges) are at most this long, so that a stage can lack one of
-# them without lacking all [m].
+# Greatest length of a fence or hedge [m]. A longer line is divided, so that a
+# stage can lack one piece without lacking all of them.
 _LONGEST_RUN = 24.0
-# On slopes each run is at most this much higher than the next one [m].
+# On slopes, the height from one piece to the next is at most this [m].
 _HIGHEST_STEP = 0.3
 
 
@@ -97,10 +97,10 @@ def _place_run(
     end: np.ndarray,
     rng: Generator,
 ) -> None:
-    """Places fences or hedges end to end between two points."""
+    """Places fences or hedges end to end between two points, in W [m]."""
     length = float(np.hypot(*(end - start)))
     count = max(1, math.ceil(length / _LONGEST_RUN))
-    # On a slope runs go down it in steps.
+    # On a slope, the pieces go down in steps.
     line = np.linspace(start, end, math.ceil(length) + 1)
     fall = float(np.abs(np.diff(draft.base(*line.T))).sum())
     count = max(count, math.ceil(round(fall, 3) / _HIGHEST_STEP))
@@ -108,7 +108,7 @@ def _place_run(
     name = pick(plan.objects, rng)
     for k in range(count):
         middle = start + (end - start) * (k + 0.5) / count
-        # A finger's breadth between runs, so that they do not overlap.
+        # A small gap between pieces prevents overlaps.
         model = OBJECTS[name].build(
             rng, length=length / count - 0.06, **plan.parameters
         )
@@ -148,7 +148,7 @@ def place_car(
 
     Args:
         draft: the city so far, which gets the car.
-        cars: name of a car -> its weight in the draw.
+        cars: name of a car -> its weight in the random choice.
         xy: position of its middle in W [m].
         yaw: its heading [rad].
         rng: draws the car.
@@ -161,7 +161,7 @@ def place_car(
 def _scatter(
     draft: Draft, district: District, plan: ScatterPlan, rng: Generator
 ) -> None:
-    """Spreads objects at least `spacing` apart, by throwing darts."""
+    """Places objects at random, at least `spacing` apart (dart throwing)."""
     grounds = district.grounds.items()
     area = unary_union([area for kind, area in grounds if kind in plan.ground])
     if plan.within is not None:
@@ -179,8 +179,8 @@ def _scatter(
         if chosen and np.hypot(*(chosen - dart).T).min() < plan.spacing:
             continue
         chosen.append(dart)
-        # A number is drawn for every dart, so that the fill does not move
-        # others.
+        # Two numbers are drawn for every place, kept or not, so that another
+        # fill does not move the objects.
         keep, yaw = rng.uniform() < plan.fill, rng.uniform(-math.pi, math.pi)
         name = pick(plan.objects, rng)
         if keep:

@@ -1,4 +1,4 @@
-"""Objects along the streets: lights, signs, lamps, trees, parked cars."""
+"""Places objects along the streets: lights, signs, lamps, trees, cars."""
 
 from collections.abc import Sequence
 import math
@@ -20,11 +20,12 @@ from cns_drake.roads.road import Arm, Direction, Junction, Road
 
 # Distance of posts from the kerb [m].
 _FROM_KERB = 0.7
-# Where a small road meets others, a stop sign takes the lights' place.
+# At a road with at most this many lanes, a stop sign replaces the traffic
+# lights.
 _SMALL_ROAD_LANES = 2
-# Lights stand this far behind a junction, beside the stop line [m].
+# Traffic lights stand this far from the junction, beside the stop line [m].
 _LIGHT_DISTANCE = 4.8
-# Signs stand this far behind a junction [m].
+# Signs stand this far from the junction [m].
 _SIGN_DISTANCE = 9.0
 _SIGNS = ("sign_round", "sign_rectangular", "sign_triangular")
 
@@ -50,12 +51,14 @@ def _furnish_arm(
     def place(name: str, distance: float, side: int, turn: float) -> None:
         """Places an object beside the arm, `distance` from the junction [m].
 
-        On side 1 it is to the left seen from the junction, where incoming
-        traffic has it on the right. It turns from the arm's outward direction.
+        Side 1 is on the left, seen from the junction. Traffic that comes
+        towards the junction has it on the right; side -1 is the other one.
+        `turn` is the heading of the object relative to the arm's outward
+        direction [rad].
         """
         outwards = 1 if starts else -1
         edge = road.first_station if starts else road.last_station
-        # Behind a parking bay, where there is one.
+        # Behind the parking bays, if there are any.
         for width in (road.half_width, road.half_width + road.parking):
             x, y, _, heading = road.evaluate(
                 [edge + outwards * distance],
@@ -69,7 +72,7 @@ def _furnish_arm(
 
     if road.lanes[incoming]:
         if sum(road.lanes.values()) <= _SMALL_ROAD_LANES:
-            # The object faces the traffic that comes along the arm.
+            # It faces the traffic that comes along the arm.
             place("sign_stop", 1.0, 1, 0.0)
         else:
             place("traffic_light", _LIGHT_DISTANCE, 1, -math.pi / 2)
@@ -77,21 +80,22 @@ def _furnish_arm(
         place("sign_street_name", 0.2, 1, 0.0)
     if road.lanes[outgoing] and road.length > 2 * _SIGN_DISTANCE:
         sign = _SIGNS[int(rng.integers(len(_SIGNS)))]
-        # The object faces the traffic that comes out of the junction.
+        # It faces the traffic that comes out of the junction.
         place(sign, _SIGN_DISTANCE, -1, math.pi)
 
 
-# Distance of an object's nearest point from the kerb [m].
+# Distance from the kerb to an object's nearest point [m].
 _FROM_KERB_OF = {"lamp": 0.45, "tree": 0.9, "furniture": 0.6}
-# Within this distance of a junction only its own objects may stand [m].
+# Within this distance of a junction, only the junction's own objects may stand
+# [m].
 _JUNCTION_CLEARANCE = {"lamp": 1.0, "tree": 5.0, "furniture": 3.0}
-# Least distance between two objects, and of objects to lanes [m].
+# Least distance between two objects, and from objects to lanes [m].
 _CLEARANCE = 0.4
 _CROWN_PART = 0.85
 # Length of a parking bay along the street, least and greatest [m].
 _BAY_LENGTH = (5.6, 7.0)
 _BAY_FILL = 0.72
-# Drivers park a little closer to the kerb than to the lane [m].
+# Cars are parked a little closer to the kerb than to the lane [m].
 _TO_KERB = 0.08
 
 
@@ -113,7 +117,7 @@ def furnish_sidewalks(
 
 
 def park_along_streets(draft: Draft, network: RoadNetwork) -> None:
-    """Parks cars in the bays at the sides of the roads."""
+    """Parks cars in the parking bays along the roads."""
     for (name, side), bay in network.areas.parking_bays.items():
         road = network.roads[name]
         rng = draft.task("bays", name, side)
@@ -123,7 +127,8 @@ def park_along_streets(draft: Draft, network: RoadNetwork) -> None:
         while s < road.last_station:
             x, y, _, heading = road.evaluate([s], offset)[0]
             if shapely.contains_xy(bay, x, y) and rng.uniform() < _BAY_FILL:
-                # On the left of `forward` traffic runs the other way.
+                # On the left of the direction `forward`, traffic runs the other
+                # way.
                 yaw = heading + (math.pi if side == "left" else 0.0)
                 yaw += float(rng.uniform(-0.03, 0.03))
                 tags = ("bay", name)
@@ -146,7 +151,7 @@ def plant_medians(draft: Draft) -> None:
 
 
 def _middle_line(median: Polygon) -> LineString:
-    """Returns the long axis of a strip, without its round noses."""
+    """Returns the long axis of a strip, without its round ends."""
     corners = shapely.get_coordinates(median.minimum_rotated_rectangle)[:4]
     sides = np.roll(corners, -1, axis=0) - corners
     lengths = np.hypot(*sides.T)
@@ -165,7 +170,7 @@ def _walk(
     keep_off: BaseGeometry,
     rng: Generator,
 ) -> None:
-    """Walks along one sidewalk and places the objects of one task."""
+    """Places the objects of one task along one sidewalk."""
     s = float(rng.uniform(1.0, 8.0))
     while s < line.length - 1.0:
         at = station_at(line, s)
@@ -182,7 +187,10 @@ def _walk(
 def _draw(
     street: StreetPlan, task: str, rng: Generator
 ) -> tuple[float, str | None]:
-    """Returns the distance to the next place, and the object at this one."""
+    """Returns the distance to the next place [m], and the object at this place.
+
+    The object is None if the place stays empty.
+    """
     if task == "lamp":
         return street.lamp_spacing, street.lamp
     if task == "tree":
@@ -206,10 +214,10 @@ def _place(
     *,
     facing_street: bool = False,
 ) -> None:
-    """Places an object on a line and along it.
+    """Places an object on a line, with its heading along the line.
 
-    One that is `facing_street`, on the right of the line, turns to it and
-    stands back, so that its front (+x) touches the line.
+    With `facing_street`, it turns to the street on the right of the line, and
+    stands back so that its front (+x) touches the line.
     """
     model = OBJECTS[name].build(rng)
     xy, yaw = (at.x, at.y), at.yaw

@@ -18,9 +18,10 @@ from cns_drake.base.errors import validated
 from cns_drake.base.yaml_files import read_yaml
 from cns_drake.roads.road import MeshStem
 
-# A city's extent [m]: what is generated grows with its area.
+# Greatest extent of a city [m]; the size of the generated files grows with its
+# area.
 _LARGEST_SIDE = 10_000.0
-# No object is so large [m].
+# Greatest size of any object [m].
 _LARGEST_PARAMETER = 1000.0
 Point = tuple[float, float]
 Line = Annotated[list[Point], Field(min_length=2)]
@@ -40,9 +41,9 @@ def _not_huge(value: Any) -> Any:
     return value
 
 
-# Arguments of an object's builder.
+# Arguments for the builder of an object.
 Parameters = dict[str, Annotated[Any, AfterValidator(_not_huge)]]
-# Least and greatest value of a drawn number.
+# Least and greatest value of a random number.
 Range = Annotated[
     tuple[float, float],
     AfterValidator(_in_order),
@@ -60,14 +61,17 @@ class BuildingPlan(_Model):
     """One building at a given place.
 
     Attributes:
-        archetype: name of an archetype.
-        at: `[x, y]` of the middle of the footprint [m].
-        size: `[width along the front, depth]` [m]; give this or
-            `outline`.
-        outline: corners of the footprint relative to `at`, before turning [m].
-        yaw_deg: heading of the building [deg]; at 0 its front faces -y.
+        archetype: name of the archetype, which sets the look of the building.
+        at: `[x, y]` of the centre of the footprint [m].
+        size: `[width along the front, depth]` of a rectangular footprint [m].
+            Give `size` or `outline`.
+        outline: corners of the footprint [m], relative to `at` and before the
+            building is turned by `yaw_deg`.
+        yaw_deg: heading of the building [deg]. At 0 its front faces the
+            direction -y.
         height: height of the walls [m].
-        kind: beginning of its name; by default the archetype.
+        kind: first part of the building's name in the tables; by default the
+            archetype.
     """
 
     archetype: str
@@ -89,15 +93,19 @@ class RowPlan(_Model):
     """A row of buildings along the streets of a district.
 
     Attributes:
-        setback: distance from the inner edge of the sidewalk to the fronts [m].
-        archetypes: archetype -> weight in the random choice.
-        width: least and greatest width of a lot [m].
-        depth: least and greatest depth of a lot [m].
-        height: least and greatest height of the walls [m].
-        gap: least and greatest distance between neighbours [m].
-        fill: share of the lots that are built on.
-        kind: beginning of the buildings' names; by default the archetype.
-        within: corners of the area to which the row is limited [m].
+        setback: distance from the inner edge of the sidewalk to the building
+            fronts [m].
+        archetypes: weights of the archetypes in the random choice, by name,
+            such as `{house: 3, office: 1}`.
+        width: smallest and largest width of a lot [m]. Each lot's width is
+            drawn at random between them.
+        depth: smallest and largest depth of a lot [m].
+        height: smallest and largest height of the walls [m].
+        gap: smallest and largest gap between neighbouring buildings [m].
+        fill: share of the lots that have a building.
+        kind: first part of the buildings' names in the tables; by default the
+            archetype.
+        within: corners of an area [m]. The row has buildings only there.
     """
 
     setback: float = Field(default=2.0, ge=0)
@@ -115,11 +123,11 @@ class PatchPlan(_Model):
     """A part of a district with another kind of ground, such as a path.
 
     Attributes:
-        ground: kind of ground.
-        area: corners of the patch [m]; give this or `line`.
-        line: points of the middle line of a path [m].
-        width: width of the path [m].
-        level: height at which the patch is level [m]; by default it follows the
+        ground: kind of ground of the patch.
+        area: corners of the patch [m]. Give `area` or `line`.
+        line: points of the centre line of a path [m]. Give `area` or `line`.
+        width: width of the path along `line` [m].
+        level: height of a level patch [m]. By default the patch follows the
             ground around it.
     """
 
@@ -137,14 +145,15 @@ class PatchPlan(_Model):
 
 
 class ParkingPlan(_Model):
-    """A parking lot: a row of bays with parked cars.
+    """A row of parking bays with parked cars.
 
     Attributes:
-        start: `[x, y]` of one end of the open side of the bays [m].
-        end: `[x, y]` of the other end [m]; the bays lie on the left, seen from
-            `start`.
+        start: `[x, y]` of one end of the row, on the side from which cars enter
+            [m].
+        end: `[x, y]` of the other end of this side [m]. Seen from `start`, the
+            bays lie on the left.
         bay: width and depth of a bay [m].
-        fill: share of the bays that are taken.
+        fill: share of the bays that have a car.
     """
 
     start: Point
@@ -154,16 +163,18 @@ class ParkingPlan(_Model):
 
 
 class ScatterPlan(_Model):
-    """Plants or objects scattered over a district's open ground.
+    """Plants or objects at random places on a district's open ground.
 
     Attributes:
-        objects: object -> weight in the random choice.
-        spacing: least distance between two objects [m].
-        fill: share of the possible places that are used.
-        within: corners of the area to which the objects are limited [m].
-        clearance: least distance to buildings and streets [m].
+        objects: weights of the objects in the random choice, by name.
+        spacing: smallest distance between two objects [m].
+        fill: share of the possible places that get an object.
+        within: corners of an area [m]. The objects stand only there.
+        clearance: smallest distance of the objects from buildings and streets
+            [m].
         ground: kinds of ground on which the objects can stand.
-        kind: beginning of the objects' names; by default the object.
+        kind: first part of the objects' names in the tables; by default the
+            object.
     """
 
     objects: Weights = Field(min_length=1)
@@ -176,18 +187,20 @@ class ScatterPlan(_Model):
 
 
 class LinePlan(_Model):
-    """Objects along a line, such as trees of an avenue, a fence or benches.
+    """Objects along a line, such as an avenue of trees, a fence or benches.
 
     Attributes:
-        objects: object -> weight in the random choice.
-        points: points of the line [m]; the fronts of the objects face its
-            right.
-        spacing: least and greatest distance between two objects [m]. By default
-            each object is as long as a straight part of the line, as for fences
-            and hedges.
-        yaw_deg: heading of each object relative to the line [deg].
-        kind: beginning of the objects' names; by default the object.
-        parameters: arguments of the objects' builder.
+        objects: weights of the objects in the random choice, by name.
+        points: points of the line [m]. The objects face its right side.
+        spacing: smallest and largest distance between two objects [m]. Without
+            it, each straight part of the line is one object of the same length,
+            as for fences and hedges.
+        yaw_deg: angle by which each object is turned from its usual heading
+            along the line [deg].
+        kind: first part of the objects' names in the tables; by default the
+            object.
+        parameters: settings of the objects, such as `{height: 1.1}` for a
+            `garden_wall`.
     """
 
     objects: Weights = Field(min_length=1)
@@ -202,12 +215,13 @@ class ObjectPlan(_Model):
     """One object at a given place.
 
     Attributes:
-        object: name of an object.
-        at: `[x, y]` of the object [m].
+        object: name of the object to place.
+        at: `[x, y]` of its position [m].
         yaw_deg: heading of the object [deg].
-        kind: beginning of its name; by default the object.
-        parameters: arguments for the builder of the object, such as `{height:
-            1.1}` for a `garden_wall`.
+        kind: first part of the object's name in the tables; by default
+            `object`.
+        parameters: settings of the object, such as `{height: 1.1}` for a
+            `garden_wall`.
     """
 
     object: str
@@ -221,15 +235,17 @@ class StreetPlan(_Model):
     """The objects on the sidewalks in front of a district.
 
     Attributes:
-        trees: species -> weight in the random choice; without it there are no
-            trees.
-        tree_spacing: least and greatest distance between trees [m].
-        tree_gaps: share of the trees that are left out.
-        lamp: object that is used as street lamp.
-        lamp_spacing: distance between lamps [m].
-        furniture: object -> weight in the random choice.
-        furniture_spacing: least and greatest distance between pieces of
-            furniture [m].
+        trees: weights of the tree species in the random choice, by name.
+            Without it there are no trees.
+        tree_spacing: smallest and largest distance between neighbouring trees
+            [m].
+        tree_gaps: share of the trees that are left out at random.
+        lamp: name of the object to use as street lamp.
+        lamp_spacing: distance between neighbouring lamps [m].
+        furniture: weights of other objects, such as benches, in the random
+            choice, by name.
+        furniture_spacing: smallest and largest distance between neighbouring
+            pieces of furniture [m].
     """
 
     trees: Weights = Field(default_factory=dict)
@@ -245,24 +261,25 @@ class DistrictPlan(_Model):
     """A district: one block between streets, or another area.
 
     Attributes:
-        name: unique name, from lower-case letters, digits and underscores. It
-            is also part of the seed of the district.
-        block: `[x, y]` of a point in the block between streets that the
-            district fills [m]; give this, `area` or neither.
-        area: corners of the district [m]. Without `block` and `area`, the
-            district takes all ground that no other one has.
-        ground: kind of the ground.
-        relief: height of the swells in its lawns [m].
-        relief_margin: distance from paths and buildings over which the relief
-            rises [m].
-        patches: parts with another kind of ground.
+        name: unique name, from lower-case letters, digits and underscores. The
+            random draws in the district depend on it.
+        block: `[x, y]` of a point [m]. The district fills the block between
+            streets that contains this point. Give `block`, `area` or neither.
+        area: corners of the district [m]. A district with neither `block` nor
+            `area` takes all ground that no other district has.
+        ground: kind of ground of the district.
+        relief: height of the swells of its lawns [m]; 0 for level ground.
+        relief_margin: distance from paths and buildings over which the swells
+            rise to their full height [m].
+        patches: parts of the district with another kind of ground.
         buildings: single buildings.
         rows: rows of buildings along the streets.
-        parking: parking lots.
+        parking: rows of parking bays.
         objects: single objects.
-        lines: lines of objects.
-        scatter: scattered objects.
-        street: objects on its sidewalks; by default those of the city.
+        lines: objects along lines.
+        scatter: objects scattered at random.
+        street: objects on the sidewalks in front of the district; by default
+            those of the city.
     """
 
     name: str = Field(pattern=r"^[a-z][a-z0-9_]*$")
@@ -291,14 +308,19 @@ class CityPlan(_Model):
     """The file `city.yaml`: everything in a city except its roads.
 
     Attributes:
-        seed: seed of all random draws.
-        bounds: `[x0, y0, x1, y1]` of the generated world [m].
+        seed: seed of all random draws. Another seed makes another city along
+            the same streets.
+        bounds: `[x0, y0, x1, y1]`, the smallest and largest x and y of the
+            world [m].
         water_level: height of the water's surface [m].
-        cars: car -> weight in the random choice of parked cars.
-        street: objects on sidewalks, in districts that have none of their own.
-        medians: plants and lamps on the medians of roads, with the same fields;
-            by default as `street`.
-        districts: districts, in the order in which they take ground.
+        cars: weights of the models of cars in the random choice of parked cars,
+            by name.
+        street: objects on sidewalks, in front of districts without a `street`
+            of their own.
+        medians: plants and lamps on the medians of roads. By default as
+            `street`.
+        districts: districts of the city. If two overlap, the first in the list
+            gets the ground.
     """
 
     seed: int = Field(ge=0)
@@ -333,7 +355,7 @@ class CityPlan(_Model):
 
 
 def load_plan(path: Path) -> CityPlan:
-    """Reads `city.yaml`.
+    """Returns the plan in a file `city.yaml`.
 
     Raises:
         InputError: if it cannot be read or has a wrong key or type.

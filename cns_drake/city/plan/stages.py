@@ -1,4 +1,4 @@
-"""Stages of a city: how much younger than the whole city each one is."""
+"""The stages of a city: what each one lacks of the whole city."""
 
 from collections.abc import Collection, Iterable, Mapping
 from fnmatch import fnmatchcase
@@ -19,14 +19,14 @@ class _Model(BaseModel):
 
 
 class Growth(_Model):
-    """Structures that have not grown to their full height yet.
+    """Structures that are not as high yet as in the next stage.
 
     Attributes:
-        height: height of the structures above their own ground at this stage
-            [m].
-        structures: names in `structures.csv`; `*` stands for any text and `?`
-            for any letter.
-        but: names of structures to which this does not apply.
+        height: height of these structures at this stage, measured from the
+            ground below them [m].
+        structures: names of the structures, as in `structures.csv`. `*` stands
+            for any text and `?` for any letter.
+        but: names of structures to exclude again.
     """
 
     height: float = Field(gt=2.0, allow_inf_nan=False)
@@ -38,14 +38,16 @@ class Stage(_Model):
     """One stage: its story, and how it differs from the next stage.
 
     Attributes:
-        story: differences to the next stage that a visitor would notice.
-        absent: heading -> names of the structures that this stage lacks and the
-            next has; none in the last stage.
-        lower: heading -> buildings and plants that are lower than in the next
-            stage; none in the last stage.
-        sites: heading -> buildings that are under construction at this stage
-            only, as a frame of the given height with scaffolds and a crane.
-            Their lots need 16 m by 16 m.
+        story: text that says what a visitor would see change until the next
+            stage.
+        absent: structures that this stage lacks and the next stage has: lists
+            of names, each list under a heading of your choice. The last stage
+            has none.
+        lower: buildings and plants that are lower than in the next stage, under
+            headings of your choice. The last stage has none.
+        sites: buildings that are under construction at this stage only, under
+            headings of your choice. Each is a frame of the given height with
+            scaffolds and a crane, and needs a lot of 16 m by 16 m.
     """
 
     story: str
@@ -57,14 +59,15 @@ class Stage(_Model):
 class Stages(_Model):
     """The file `stages.yaml`: how the city looked at each stage.
 
-    Each stage lists only what the next stage adds or raises; the last stage is
-    the whole city. A stage therefore has all structures of the stage before,
-    none of them lower, except those that filled lots which are built on in
-    between.
+    The last stage is the whole city. Each earlier stage lists only what the
+    next stage adds or raises. A stage therefore has all structures of the stage
+    before, and none of them is lower. The only exception is what fills an empty
+    lot, such as a market: it goes when the lot is built on.
 
     Attributes:
-        stages: number of the stage, two digits in quotes, ascending -> stage.
-        lots: use -> buildings whose lots have this use until they are built:
+        stages: stages by number, in ascending order. A number has two digits in
+            quotes, such as `"01"`.
+        lots: buildings by the use that their lots have until they are built:
             `car_park`, `market`, `garden`, `yard` or `empty`. By default the
             use of a lot depends on its size.
     """
@@ -86,7 +89,7 @@ class Stages(_Model):
         }
 
     def heights(self, stage: str) -> dict[str, float]:
-        """Returns the height of each structure that is lower at a stage [m].
+        """Returns name -> height of the structures lower at a stage [m].
 
         Raises:
             KeyError: if there is no such stage.
@@ -100,7 +103,7 @@ class Stages(_Model):
         return heights
 
     def sites(self, stage: str) -> dict[str, float]:
-        """Returns the height of each building site at a stage [m]."""
+        """Returns the height of each building site at a stage, by name [m]."""
         return {
             name: group.height
             for group in self.stages[stage].sites.values()
@@ -120,8 +123,8 @@ def load_stages(
 ) -> Stages:
     """Returns the stages of `stages.yaml`, checked against all structures.
 
-    `text` is the coming content of the file; by default the present one.
-    Patterns are replaced by the names that they stand for.
+    `text` is the new content of the file; by default the file is read. Patterns
+    are replaced by the names that they match.
 
     Raises:
         InputError: if the file cannot be read, has a wrong key or type, its
@@ -137,7 +140,7 @@ def load_stages(
 
 
 class _Names:
-    """The names of a city's structures, by which patterns are resolved."""
+    """The names of a city's structures, to which patterns are resolved."""
 
     def __init__(self, path: Path, structures: Iterable[str]):
         self._path = path
@@ -145,7 +148,7 @@ class _Names:
         self._known = set(self._all)
 
     def of(self, field: str, patterns: Iterable[str]) -> list[str]:
-        """Returns the structures of names and patterns, in their order."""
+        """Returns the structures that names and patterns match, in order."""
         found: list[str] = []
         for pattern in patterns:
             names = [pattern]

@@ -1,1 +1,1 @@
-"""Trees."""
+"""The trees of a city."""

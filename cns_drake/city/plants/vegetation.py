@@ -1,4 +1,4 @@
-"""Trees."""
+"""Trees: their species, and single trees drawn at random."""
 
 from dataclasses import dataclass
 from functools import partial
@@ -19,9 +19,9 @@ from cns_drake.city.geometry import (
 
 @dataclass(frozen=True)
 class Species:
-    """A kind of tree, with the range of heights of planted ones [m].
+    """A species of tree, with the range of heights of planted ones [m].
 
-    People walk under the crown of `street` trees: it starts at 2.5 m or higher.
+    People can walk under `street` trees: their crowns start at 2.5 m or higher.
     """
 
     variants: int
@@ -31,7 +31,7 @@ class Species:
     street: bool = True
 
 
-# By the stems of their meshes' names.
+# Name of a species, with which the names of its meshes begin -> the species.
 SPECIES = {
     "plane_tree": Species(5, (8.5, 13.0), (0.36, 0.50, 0.24)),
     "lime_tree": Species(4, (7.8, 10.5), (0.30, 0.47, 0.22)),
@@ -47,7 +47,7 @@ STREET_TREES = tuple(name for name, kind in SPECIES.items() if kind.street)
 
 
 def mesh_names(species: str, variant: int) -> tuple[str, str]:
-    """Returns the names of the wood and the leaves of a variant."""
+    """Returns the names of the meshes of a variant: its wood and its leaves."""
     stem = f"{species}_{string.ascii_lowercase[variant]}"
     return f"{stem}_wood", f"{stem}_crown"
 
@@ -59,10 +59,11 @@ def tree(
     height: float | None = None,
     variant: int | None = None,
 ) -> Model:
-    """Returns one tree; whatever is not given is drawn at random.
+    """Returns one tree; parameters that are not given are drawn at random.
 
-    The `height` of its top is within the species' range, for the promised
-    clearance below the crown [m]; `variant` is the number of the mesh variant.
+    The `height` of its top must be within the species' range, so that street
+    trees have the promised clearance below the crown [m]. `variant` is the
+    number of the mesh variant.
     """
     kind = SPECIES[species]
     drawn_height = rng.uniform(*kind.height_range)
@@ -76,7 +77,7 @@ def tree(
         variant = drawn_variant
     names = wood, crown = mesh_names(species, variant)
     up = height / max(object_mesh(n).vertices[:, 2].max() for n in names)
-    # Tall trees are wider too, but less than in proportion.
+    # Tall trees are also wider, but less than in proportion.
     across = up**0.7 * stretch
     scale = triple(round(float(s), 3) for s in (*across, up))
     rgb = np.clip(kind.leaf_rgb * tint, 0, 1)

@@ -1,1 +1,1 @@
-"""Details for an imported city's bare shapes, by tags and at random."""
+"""Adds details to an imported city's bare shapes, by tags and at random."""

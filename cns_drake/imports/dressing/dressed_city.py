@@ -1,4 +1,7 @@
-"""A dressed city: its buildings, its streets, and the origin of each part."""
+"""Dresses a city: details on its buildings and along its streets.
+
+It also records which structures were added.
+"""
 
 from collections import Counter, defaultdict
 from collections.abc import Collection, Mapping, Sequence
@@ -45,13 +48,14 @@ from cns_drake.imports.ground import Ground, bottom_of
 from cns_drake.imports.staged_city import StagedCity
 from cns_drake.scene.labels import MAX_INSTANCE
 
-# A building whose feet are farther from the ground was sunk into it [m].
+# A building whose feet are farther from the ground than this was sunk into it
+# [m].
 _LET_IN = 2.0
 
 
 @dataclass(frozen=True)
 class Bare:
-    """A building by its surfaces, (M, 3, 3) each [m]."""
+    """A building by its surfaces, (M, 3, 3) triangles each [m]."""
 
     one: Imported
     walls: np.ndarray
@@ -66,7 +70,7 @@ class Bare:
 def all_laid_bare(
     buildings: Sequence[Imported], ground: Ground, seed: int
 ) -> list[Bare]:
-    """Returns all buildings, with lower variants in the same style."""
+    """Returns all buildings by surfaces; variants share a building's style."""
     found = []
     styles: dict[str, Style] = {}
     for one in sorted(buildings, key=lambda one: one.original != ""):
@@ -105,20 +109,21 @@ def _laid_bare(
     return Bare(one, walls, roof, rest, base, style, is_flat, rng)
 
 
-# Distance of the places on drives from which walls are looked at [m].
+# Distance between the places on drives from which walls are looked at [m].
 _SPACING = 4.0
 # Height of the eyes above the ground [m].
 _EYES = 2.0
-# A wall is looked at from this many nearest places, and this many others.
+# A wall is looked at from this many of the nearest places, and this many
+# others.
 _NEAREST, _OTHERS = 8, 24
-# A wall is visible if a probe is: at these parts of its length and height, this
-# far in front, and a little below its top [m].
+# A wall is visible if one of its probes is. Probes are at these parts of its
+# length and height, this far in front of it, and a little below its top [m].
 _PARTS = np.array([(x, z) for x in (0.04, 0.5, 0.96) for z in (0.3, 1.0)])
 _BEFORE, _BELOW_TOP = 0.3, 0.3
 
 
 class DriveViews:
-    """Places on drives from which a city is seen."""
+    """Places on drives, from which visible walls are found."""
 
     def __init__(
         self,
@@ -126,7 +131,7 @@ class DriveViews:
         ground: Ground,
         solids: np.ndarray,
     ):
-        """Prepares the views of at least one drive.
+        """Prepares the places of at least one drive.
 
         Solids (M, 3, 3) hide other things at all stages [m].
         """
@@ -136,26 +141,27 @@ class DriveViews:
         self._eyes = np.column_stack([self._xy, z])
         self._tree = KDTree(self._xy)
         self._scene = None
-        # Embree computes in float32, about the middle of the views.
+        # Embree computes in float32, so coordinates are relative to the middle
+        # of the places.
         self._middle = np.array([*self._xy.mean(axis=0), 0.0])
         if len(solids):
             self._scene = EmbreeScene()
             TriangleMesh(self._scene, (solids - self._middle).astype("f4"))
 
     def are_near(self, limits: np.ndarray, distance: float) -> np.ndarray:
-        """Returns which of N boxes lie within a distance of a drive [m].
+        """Returns which of N boxes are within a distance of a drive [m].
 
-        Limits (N, 2, 2) are their least and greatest x and y [m]; a circle
-        about each box counts.
+        `limits` (N, 2, 2) are their least and greatest x and y [m]. Each box is
+        taken as the circle around it.
         """
         middles = limits.mean(axis=1)
         reach = np.linalg.norm(limits[:, 1] - middles, axis=1)
         return np.asarray(self._tree.query(middles)[0] <= reach + distance)
 
     def distances(self, panels: Sequence[Panel], most: float) -> np.ndarray:
-        """Returns distances (N,) from panels to the nearest viewing place [m].
+        """Returns (N,) distances from panels to the nearest place seeing them.
 
-        Viewing places lie on the drives. The distance is infinite if no place
+        These places lie on the drives [m]. The distance is infinite if no place
         within `most` sees the panel.
         """
         pairs = [self._looks(panel, most) for panel in panels]
@@ -178,7 +184,7 @@ class DriveViews:
     def _looks(
         self, panel: Panel, most: float
     ) -> tuple[np.ndarray, np.ndarray]:
-        """Returns places (K,) in front of a panel, and distances (K,) [m]."""
+        """Returns (K,) which places face a panel, and their distances [m]."""
         middle = panel.origin[:2] + panel.along * panel.length / 2.0
         near = self._tree.query_ball_point(middle, most + panel.length / 2.0)
         index = np.array(near, dtype=int)
@@ -194,7 +200,7 @@ class DriveViews:
         return index[usable], distance[usable]
 
     def _is_seen(self, probes: np.ndarray, eyes: np.ndarray) -> np.ndarray:
-        """Returns (K,) bool: whether eyes (K, 3) see probes (K, P, 3)."""
+        """Returns (K,) which eyes (K, 3) see any of their probes (K, P, 3)."""
         if self._scene is None:
             return np.ones(len(eyes), dtype=bool)
         starts = np.repeat(eyes - self._middle, probes.shape[1], axis=0)
@@ -208,24 +214,24 @@ class DriveViews:
         return np.asarray((hits < 0).reshape(len(eyes), -1).any(axis=1))
 
 
-# Walls that are farther from all drives have no windows, and roofs no
-# equipment [m].
+# Walls farther than this from all drives get no windows, and roofs no equipment
+# [m].
 _WALLS_WITHIN, _ROOFS_WITHIN = 60.0, 100.0
-# About this many triangles are spent on openings, on the nearest walls first.
+# About this many triangles are used for openings, first on the nearest walls.
 _MOST_TRIANGLES = 1_100_000
 _OF_OPENING, _OF_WALL = 30, 40
 # Shops are on walls at most this far from a street [m].
 _SHOPS_WITHIN = 16.0
-# From this level of detail on a model has its own roof, and windows.
+# From these levels of detail on, a model has its own roof, and its own windows.
 _OWN_ROOF, _OWN_WINDOWS = 2.2, 3.0
 _NO_TRIANGLES = np.zeros((0, 3, 3))
 
 
 @dataclass(frozen=True)
 class DressedBuildings:
-    """The dressed buildings, by what they were before.
+    """Dressed buildings by the bare ones, and counts of their details.
 
-    Beside them are counts of added details by kind, and of buildings by the
+    `at_random` counts added details by kind. `by_file` counts buildings by the
     kind of look that the file gives.
     """
 
@@ -246,12 +252,13 @@ def dress_buildings(
     """Returns the buildings of a city with windows, doors and shops.
 
     A building looks the same in each stage and each import, since its random
-    draws depend on its name. Only the choice of walls with windows depends on
-    the drives, whose neighbourhood gets them. Doors and shops face streets.
+    draws depend on its name. The drives only decide which walls get windows:
+    those near them. Doors and shops face streets.
 
     Args:
-        structures: the structures of the city, of which buildings are dressed.
-        drives: the drives, whose distance decides the detail.
+        structures: the structures of the city, of which the buildings are
+            dressed.
+        drives: the drives, near which there is more detail.
         streets: the streets that doors and shops face.
         ground: the ground on which buildings stand.
         seed: seed of all random draws.
@@ -285,7 +292,7 @@ def dress_buildings(
 def _dressed(
     some: Bare, plans: Sequence[FacadePlan], paths: BaseGeometry, seed: int
 ) -> tuple[Model, Counter[str]]:
-    """Returns the model of a building, and counts of random details."""
+    """Returns the model of a dressed building, and counts of random details."""
     structure, style = some.one.structure, some.style
     footprint = structure.model.footprint
     out = Assembly(Site(Polygon(), structure.name), some.rng)
@@ -305,7 +312,7 @@ def _dressed(
     out.add_to("roof", to_mesh(some.roof))
     counts: Counter[str] = Counter()
     for plan in plans:
-        # A name that does not depend on the map's origin.
+        # The name must not depend on the map's origin.
         panel = plan.panel
         heading = np.degrees(np.arctan2(panel.along[1], panel.along[0]))
         wall = f"wall {panel.length:.1f} {heading:.0f}"
@@ -326,7 +333,7 @@ def _plans(
     views: DriveViews,
     paving: UpperSides,
 ) -> dict[int, list[FacadePlan]]:
-    """Returns the number of a building -> its walls to dress."""
+    """Returns number of a building -> plans of its walls to dress."""
     walls = [
         some.walls if some.one.lod < _OWN_WINDOWS else np.zeros((0, 3, 3))
         for some in bare
@@ -383,10 +390,10 @@ def _plans(
 def _seen(
     walls: Sequence[np.ndarray], views: DriveViews
 ) -> tuple[list[Panel], np.ndarray]:
-    """Returns the plane walls that drives see from near, and how near [m].
+    """Returns the plane walls visible from drives, and their distances [m].
 
-    The nearest come first, within the budget of triangles. Walls of each
-    building are upright triangles (M, 3, 3) [m].
+    The nearest walls come first, as many as the limit of triangles allows.
+    `walls` has the vertical triangles (M, 3, 3) of each building [m].
     """
     panels = find_panels(walls, lambda xy: views.are_near(xy, _WALLS_WITHIN))
     panels = [panel for panel in panels if panel.is_plane]
@@ -403,10 +410,11 @@ def _seen(
 
 @dataclass(frozen=True)
 class Dressing:
-    """A dressed city, and the guessed ground with its class and colour.
+    """A dressed city, what was added to it, and its ground if guessed.
 
-    Names of structures have the origin `dressed` or `lot`; all others are as
-    the file has them. Facts count parts from the file and at random.
+    `origins` maps the names of structures to `dressed` or `lot`; all others are
+    as in the file. `facts` counts parts from the file and at random. `bottom`
+    is the guessed ground with its class and colour.
     """
 
     city: StagedCity
@@ -424,12 +432,13 @@ def dress_city(
 ) -> Dressing:
     """Returns a city with details on its buildings and along its streets.
 
-    Objects that find a place are removed from the faults of the city.
+    Objects of the file that find a place are removed from the faults of the
+    city.
 
     Args:
         staged: the structures of each stage.
-        city: the city as the file has it.
-        drives: the drives, whose distance decides the detail.
+        city: the city as in the file.
+        drives: the drives, near which there is more detail.
         ground: the ground.
         seed: seed of all random draws.
 
@@ -439,7 +448,7 @@ def dress_city(
     always = set.intersection(*map(set, staged.standing.values()))
     is_paved = grounds.is_dense(staged.kept)
     kept, streets = staged.kept, city.streets
-    # Streets and sidewalks that the file lacks.
+    # Streets and sidewalks that the file does not have.
     laid: list[Imported] = []
     if drives:
         laid += grounds.missing_sidewalks(kept, streets, drives)
@@ -470,7 +479,7 @@ def dress_city(
     changed = dict(buildings.buildings)
     at_random = buildings.at_random + Counter(one.kind for one in added)
     terrain = [one for one in kept if one.kind == "TINRelief"]
-    # Whether the file has only the height of a ground, not its kind.
+    # True if the file gives only the height of the ground, not its kind.
     if is_paved and sum(one.is_ground for one in kept) == len(terrain):
         changed |= {
             one: replace(one, structure=grounds.paved(one.structure))

@@ -1,7 +1,7 @@
-"""The dressed walls and roofs of imported buildings.
+"""Walls and roofs with details for imported buildings.
 
 A wall is divided into storeys and bays, which are filled like those of
-generated buildings; a roof gets equipment or chimneys.
+generated buildings. A roof gets equipment or chimneys.
 """
 
 from __future__ import annotations
@@ -32,34 +32,36 @@ from cns_drake.imports.dressing.wall_panels import Panel
 from cns_drake.imports.faces import parts_of
 from cns_drake.imports.foreign_city import to_mesh
 
-# Between the end of a wall and its first bay [m].
+# Distance from the end of a wall to its first bay [m].
 _MARGIN = 0.5
 # Windows keep this distance from the foot and the top of their wall, and from
 # the ground [m].
 _FROM_FOOT, _FROM_TOP, _FROM_GROUND = 0.3, 0.12, 0.4
-# Below a roof a window may shrink to this part of its height.
+# Below a roof, a window may shrink to this share of its height.
 _LEAST_PART = 0.7
 # Probes are this far in front of a wall [m].
 _BEFORE = 0.4
-# The paving before a door is looked at this far from its wall, and the walls
-# beside it are this wide [m].
+# The height of the paving is taken this far in front of a door's wall. The
+# walls beside a door are this wide [m].
 _STEP, _JAMB = 0.15, 0.3
-# One door for each such length of a front [m].
+# A front has one door for every such length [m].
 _DOOR_EVERY = 16.0
 _DOOR_HEIGHT, _LEAST_DOOR = 2.2, 1.8
 _DOOR_WIDTH, _GATE_WIDTH = 1.15, 2.5
 _THRESHOLD, _SHOP_HEIGHT, _SHOP_WIDTH = 0.04, 2.9, 2.2
-# Depths of doors behind windows, and those of shop windows and gates [m].
+# How much deeper doors are than windows, and depths of shop windows and gates
+# [m].
 _DOOR_DEEPER, _SHOP_DEPTH, _GATE_DEPTH = 0.1, 0.35, 0.3
-# A wall stands on the ground if it begins at most this high above it [m].
+# A wall stands on the ground if it begins at most this high above the ground
+# [m].
 _ON_GROUND = 0.6
 
 
 class Opening(NamedTuple):
-    """A window or a door of a wall, in the panel's coordinates [m].
+    """A window or a door in a wall, in the coordinates of its panel [m].
 
-    Its row is a storey, and `nth` the number of its bay from the nearer end of
-    the wall. The kind is `window`, `shop`, `door` or `gate`.
+    `row` is its storey, and `nth` the number of its bay, counted from the
+    nearer end of the wall. The kind is `window`, `shop`, `door` or `gate`.
     """
 
     row: int
@@ -73,11 +75,16 @@ class Opening(NamedTuple):
 
 @dataclass(frozen=True)
 class FacadePlan:
-    """A wall with its openings.
+    """The plan of a wall: its panel, style and openings.
 
-    The heights of the lowest floor and of the ground in front are given in the
-    panel, and the nearest drive by its distance [m]. The top is free if nothing
-    is built against its upper edge.
+    Attributes:
+        panel: the wall.
+        style: the style of its building.
+        openings: its windows and doors.
+        floor, ground: heights of the lowest floor, and of the ground in front,
+            in the panel [m].
+        to_drive: distance of the nearest drive [m].
+        top_is_free: whether no building touches its upper edge.
     """
 
     panel: Panel
@@ -94,17 +101,20 @@ class FacadePlan:
 
     @property
     def on_street(self) -> list[Opening]:
-        """Openings on the ground floor."""
+        """Openings in the ground floor."""
         on_ground = self.stands_on_ground
         return [o for o in self.openings if o.row == 0 and on_ground]
 
     def is_in_the_way(self, z: float, reach: float) -> bool:
-        """Returns whether a part at height z hangs over a car's path [m]."""
+        """Returns whether a part at height z would block a car on a drive [m].
+
+        The part extends out of the wall by `reach`.
+        """
         is_low = z - self.ground < _TALLEST_CAR
         return is_low and self.to_drive < reach + _BESIDE
 
     def probes(self) -> np.ndarray:
-        """Returns points (N + 1, 3) in front of the openings and at the top."""
+        """Returns points (N + 1, 3) in front of each opening and the top."""
         panel = self.panel
         at = [((o.x0 + o.x1) / 2, (o.z0 + o.z1) / 2) for o in self.openings]
         at.append((panel.length / 2, panel.height - _FROM_FOOT))
@@ -112,11 +122,11 @@ class FacadePlan:
         return panel.place(x, z, _BEFORE)
 
     def threshold(self, door: Opening, paving: upper_sides.UpperSides) -> float:
-        """Returns the height of a door's threshold above the paving [m].
+        """Returns the height of a door's threshold, in the panel [m].
 
-        A step leads up to the threshold. The height is measured from the
-        highest paving before the door and in its recess, unless this is far
-        above or below the ground.
+        The threshold is one step above the highest paving in front of the door
+        and in its recess. Paving that is far above or below the ground does not
+        count.
         """
         depths = {"shop": _SHOP_DEPTH, "gate": _GATE_DEPTH}
         deep = depths.get(door.kind, self.style.depth + _DOOR_DEEPER)
@@ -131,9 +141,9 @@ class FacadePlan:
         return max((low if is_near else self.ground) + _THRESHOLD, 0.0)
 
     def without(self, is_hidden: np.ndarray) -> FacadePlan:
-        """Returns the plan without the openings whose probes are hidden.
+        """Returns the plan without openings whose probes are hidden.
 
-        They are marked in (N + 1,) bool.
+        `is_hidden` (N + 1,) is as long as `probes`.
         """
         pairs = zip(self.openings, is_hidden[:-1], strict=True)
         return replace(
@@ -152,7 +162,7 @@ def plan_facade(
         panel: the wall.
         style: the style of its building.
         base: height of the lowest floor of the building [m].
-        ground: height of the ground before the panel [m].
+        ground: height of the ground in front of the panel [m].
         to_drive: distance of the nearest drive [m].
     """
     floor, ground = base - panel.origin[2], ground - panel.origin[2]
@@ -199,7 +209,7 @@ def with_doors(plan: FacadePlan, paving: upper_sides.UpperSides) -> FacadePlan:
         return plan
     is_gate = plan.style.use in ("shed", "industrial")
     kind, width = ("gate", _GATE_WIDTH) if is_gate else ("door", _DOOR_WIDTH)
-    # A door must not reach into the windows above.
+    # A door must not extend into the windows above.
     above = min((o.z0 for o in plan.openings if o.row > 0), default=np.inf)
     most = min(plan.panel.height - _JAMB, above - 0.2)
     number = max(1, round(plan.panel.length / _DOOR_EVERY))
@@ -211,7 +221,7 @@ def with_doors(plan: FacadePlan, paving: upper_sides.UpperSides) -> FacadePlan:
     for o in plan.openings:
         middle = (o.x0 + o.x1) / 2
         has_room = middle - o.x0 >= width + 2 * _JAMB
-        # A house with a door only would have no window to the street.
+        # Otherwise a house would have a door but no window to the street.
         is_alone = len(doors) == len(street) and has_room
         door = o._replace(kind=kind, x1=middle if is_alone else o.x1)
         low = plan.threshold(door, paving) if o in doors else np.inf
@@ -232,20 +242,19 @@ _SIGN_REACH, _SIGN_HEIGHT = 0.15, 0.5
 _BALCONY_REACH, _BALCONY_WIDTH = 1.15, 3.0
 _AWNING_REACH, _AWNING_HEIGHT = 1.1, 0.55
 _SILL_REACH = 0.07
-# Windows farther from drives have no sills, or no bars, or lie on their wall
-# and not in recesses, and walls have no plinths [m].
+# Windows farther from drives than this have no sills, no bars, or no recesses;
+# then they lie on their wall, and walls have no plinths [m].
 _SILLS_WITHIN, _BARS_WITHIN, _RECESSES_WITHIN = 12.0, 20.0, 25.0
-# Narrower and lower windows have no bars [m].
+# Windows narrower than the first, or lower than the second, have no bars [m].
 _TWO_LEAVES, _TWO_PANES = 1.0, 1.5
-# Nothing lower than this may hang over a car's path, within this distance of
-# its middle [m].
+# Nothing below this height may extend over a car's path, within this distance
+# of the path's middle [m].
 _TALLEST_CAR, _BESIDE = 4.0, 2.5
-# Cornices of lower walls would collide with doors [m].
+# Cornices of walls lower than this would collide with doors [m].
 _LEAST_WALL = 2.5
-# Materials of the fronts of openings, and their depths where these lie on their
-# wall [m].
+# Material of the front of an opening -> its depth if it lies on the wall [m].
 _ON_WALL = {"glass": -0.02, "doors": -0.03, "frames": 0.0}
-# Distance of openings from the edge of a panel that is no rectangle [m].
+# Distance of openings from the edge of a panel that is not a rectangle [m].
 _FROM_EDGE = 0.1
 _EXACT, _LEAST_AREA = 1e-3, 1e-4
 
@@ -290,7 +299,7 @@ def add_facade(
 
 
 def _put(out: Assembly, material: str, panel: Panel, *meshes: Mesh) -> None:
-    """Adds meshes given in a wall's coordinates."""
+    """Adds meshes that are given in a wall's coordinates."""
     z = float(panel.origin[2])
     out.add_to(material, *(panel.frame.place(mesh, z) for mesh in meshes))
 
@@ -298,11 +307,11 @@ def _put(out: Assembly, material: str, panel: Panel, *meshes: Mesh) -> None:
 def _in_outline(
     plan: FacadePlan,
 ) -> tuple[FacadePlan, list[tuple[Relief, str]], tuple[float, ...]]:
-    """Returns a plan without the rows that leave the outline of its panel.
+    """Returns a plan without the rows that leave the panel's outline.
 
     Returns:
         The plan, its reliefs with their materials, and the rectangle x0, z0,
-        x1, z1 that holds them [m].
+        x1, z1 that contains them [m].
     """
     panel = plan.panel
     area = (0.0, 0.0, panel.length, panel.height)
@@ -325,7 +334,7 @@ def _in_outline(
 
 
 def _reliefs(opening: Opening, plan: FacadePlan) -> list[tuple[Relief, str]]:
-    """Returns the reliefs of an opening, with the materials of their fronts."""
+    """Returns the reliefs of an opening, and the materials of their fronts."""
     style, kind = plan.style, opening.kind
     x0, x1, z0 = opening.x0, opening.x1, opening.z0
     height = opening.z1 - z0
@@ -377,8 +386,9 @@ def _add_wall(
 ) -> None:
     """Adds a wall with its openings.
 
-    The area, see `_in_outline`, is cut out of it. Without recesses, panes and
-    doors lie on the wall, which takes far fewer triangles.
+    The `area` (see `_in_outline`) is cut out and filled with the openings.
+    Without recesses, panes and doors lie on the wall, which needs far fewer
+    triangles.
     """
     x0, z0, x1, z1 = area
     fronts = [
@@ -409,7 +419,7 @@ def _add_wall(
 def _add_plinth(
     out: Assembly, plan: FacadePlan, reliefs: Sequence[tuple[Relief, str]]
 ) -> int:
-    """Adds the plinth of a wall; returns whether it has one."""
+    """Adds the plinth of a wall, if any; returns the number of plinths."""
     panel, reach = plan.panel, _PLINTH_REACH
     top = plan.ground + plan.style.plinth
     is_there = plan.style.plinth and plan.stands_on_ground
@@ -427,7 +437,7 @@ def _add_plinth(
 
 
 def _has_balcony(opening: Opening) -> bool:
-    """Returns whether a window has a balcony: every other above ground."""
+    """Returns whether a window has a balcony, as every other upper one has."""
     return opening.row >= 1 and opening.nth % 2 == 1
 
 
@@ -469,12 +479,12 @@ def _add_signs(
     return Counter({"shop windows": len(shops), "awnings": len(awnings)})
 
 
-# A roof is level if the z of its unit normal is at least the first; level parts
-# of one height differ by less than the second [m].
+# A roof is level if the z of its unit normal is at least the first number.
+# Level parts have the same height if they differ by less than the second [m].
 _LEVEL, _SAME_HEIGHT = 0.999, 0.1
 _FLAT_PART = 0.6
 _LEAST_ROOF = 40.0  # [m^2]
-# Roof area for each piece of equipment [m^2], and the most pieces.
+# Roof area per piece of equipment [m^2], and the greatest number of pieces.
 _ROOF_EACH, _MOST = 90.0, 6
 _ITEMS = {
     "flats": "stair_house vents skylight tank vents dish",
@@ -486,15 +496,15 @@ _ITEMS = {
 }
 _CHIMNEYS = ("house", "flats", "public")
 _BRICK = (0.45, 0.27, 0.22)
-# Depth of a chimney's foot below the ridge, and its scale against the shared
-# mesh.
+# Depth of a chimney's foot below the ridge [m], and its scale relative to the
+# shared mesh.
 _BELOW_RIDGE, _CHIMNEY_SCALE = 0.35, 0.6
-# Points of a ridge are at most this much below its highest one [m].
+# Points of a ridge are at most this far below its highest one [m].
 _RIDGE = 0.15
 
 
 def is_flat_roof(roof: np.ndarray) -> bool:
-    """Returns whether most of a roof (M, 3, 3) is level."""
+    """Returns whether most of a roof's triangles (M, 3, 3) are level."""
     above = np.abs(upper_sides.long_normals(roof)[:, 2])
     level = np.abs(upper_sides.unit_normals(roof)[:, 2]) > _LEVEL
     return bool(above[level].sum() >= _FLAT_PART * above.sum())
@@ -503,7 +513,7 @@ def is_flat_roof(roof: np.ndarray) -> bool:
 def add_roof_pieces(
     out: Assembly, roof: np.ndarray, style: Style, is_flat: bool
 ) -> None:
-    """Adds the equipment of a roof with upper sides (M, 3, 3) [m]."""
+    """Adds equipment to a roof with upper sides (M, 3, 3) [m]."""
     items = _ITEMS.get(style.use, "").split()
     if is_flat and items and (found := _largest_level(roof)) is not None:
         area, z = found
@@ -515,7 +525,7 @@ def add_roof_pieces(
 
 
 def _largest_level(roof: np.ndarray) -> tuple[Polygon, float] | None:
-    """Returns the largest level part of a roof without holes, and its z."""
+    """Returns the largest level part of a roof, without holes, and its z."""
     level = roof[upper_sides.unit_normals(roof)[:, 2] > _LEVEL]
     best: tuple[Polygon, float] | None = None
     if not len(level):
@@ -536,7 +546,7 @@ def _largest_level(roof: np.ndarray) -> tuple[Polygon, float] | None:
 
 
 def _without_holes(area: Polygon) -> Polygon:
-    """Returns the largest piece of an area that is cut through its holes."""
+    """Returns the largest piece of an area that is divided at its holes."""
     while area.interiors:
         x0, y0, x1, y1 = area.bounds
         x = Polygon(area.interiors[0]).centroid.x
@@ -562,7 +572,7 @@ def _add_chimneys(out: Assembly, roof: np.ndarray) -> None:
     for k, share in enumerate(out.rng.uniform(0.12, 0.88, 2)[:count]):
         x, y, z = start + share * (end - start)
         height = float(sides.heights(np.array([[x, y]]))[0])
-        # Two gables may have no ridge between them.
+        # There may be no ridge between two gables.
         if height > z - 1.0:
             item = "chimney_row" if out.rng.random() < 0.3 else "chimney"
             scale = (_CHIMNEY_SCALE, _CHIMNEY_SCALE, _CHIMNEY_SCALE)

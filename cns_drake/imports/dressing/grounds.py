@@ -29,14 +29,14 @@ from cns_drake.imports.foreign_city import (
 from cns_drake.imports.ground import Ground
 from cns_drake.imports.options import ImportFaults
 
-# Within this distance of drives, sidewalks get kerbs, and missing ones are
-# added [m].
+# Within this distance of drives, sidewalks get kerbs and missing ones are added
+# [m].
 _WITHIN = 80.0
 KERB_HEIGHT, _KERB_DEPTH = 0.12, 0.25
 _KERB: Rgb = (0.60, 0.60, 0.58)
 _PAVED: Rgb = (0.57, 0.56, 0.53)
 _SIDEWALK = 2.0
-# Streets of these kinds have sidewalks if their tags give no answer.
+# Streets of these kinds have sidewalks unless their tags say otherwise.
 _WITH_SIDEWALKS = (
     "primary",
     "secondary",
@@ -44,15 +44,15 @@ _WITH_SIDEWALKS = (
     "unclassified",
     "residential",
 )
-# If buildings cover at least this part of a city's area, ground of unknown kind
-# is paved.
+# If buildings cover at least this share of a city's area, ground of unknown
+# kind is paved.
 _DENSE = 0.12
-# Areas are cut on this grid [m].
+# Grid size of set operations on areas [m].
 _GRID = 0.001
 
 
 def is_dense(structures: Sequence[Imported]) -> bool:
-    """Returns whether buildings cover much of their city."""
+    """Returns whether buildings cover a large part of their city."""
     outlines = [
         one.structure.model.footprint
         for one in structures
@@ -65,14 +65,14 @@ def is_dense(structures: Sequence[Imported]) -> bool:
 
 
 def paved(structure: Structure) -> Structure:
-    """Returns a ground structure in the colour of stones."""
+    """Returns a ground structure with the colour of paving stones."""
     model = structure.model
     parts = tuple(replace(part, rgb=_PAVED) for part in model.parts)
     return replace(structure, model=replace(model, parts=parts))
 
 
 def with_kerb(one: Imported) -> Imported:
-    """Returns a sidewalk with a vertical edge all around."""
+    """Returns a sidewalk with a vertical face along its whole edge."""
     structure = one.structure
     name = f"{structure.name}_kerb"
     edges = _outer_edges(turned_up(one.triangles))
@@ -94,7 +94,7 @@ def with_kerb(one: Imported) -> Imported:
 
 
 def _outer_edges(triangles: np.ndarray) -> np.ndarray:
-    """Returns the edges (N, 2, 3) that only one triangle (M, 3, 3) has."""
+    """Returns the edges (N, 2, 3) that only one of triangles (M, 3, 3) has."""
     corners = np.rint(triangles.reshape(-1, 3) * 1000.0).astype(np.int64)
     _, number = np.unique(corners, axis=0, return_inverse=True)
     number = number.reshape(-1, 3)
@@ -127,9 +127,10 @@ def missing_sidewalks(
     streets: Sequence[Street],
     drives: Sequence[WaypointDrive],
 ) -> Iterator[Imported]:
-    """Yields sidewalks of streets near drives whose tags do not mention any.
+    """Yields sidewalks near drives that the file does not have.
 
-    The ground must be level.
+    They are those of streets whose tags do not mention any. The ground must be
+    level.
     """
     paths = MultiLineString([drive.path for drive in drives])
     near = [
@@ -153,8 +154,8 @@ def missing_sidewalks(
     ]
     lanes = [line.buffer(street.width / 2.0, 4) for street, line in near]
     taken = np.concatenate([_upper_sides(shapes), lanes])
-    # The union of a whole city takes long: only polygons near each street
-    # count.
+    # The union of a whole city takes long, so only polygons near each street
+    # are used.
     tree = STRtree(taken)
     made: list[BaseGeometry] = []
     for street, line in lacking:
@@ -177,7 +178,7 @@ def missing_sidewalks(
 
 
 def _paved(name: str, semantic_class: str, surface: np.ndarray) -> Imported:
-    """Returns a road, or a sidewalk, of triangles (N, 3, 3) [m]."""
+    """Returns a road or a sidewalk made of triangles (N, 3, 3) [m]."""
     kind = semantic_class.capitalize()
     return make_imported(name, semantic_class, kind, {"surface": surface}, {})
 
@@ -188,16 +189,17 @@ def _areas(geometry: BaseGeometry) -> MultiPolygon:
 
 
 def _cut(area: BaseGeometry, other: BaseGeometry) -> MultiPolygon:
-    """Returns the polygons of one area outside of another."""
+    """Returns the polygons of an area outside of another area."""
     return _areas(shapely.difference(area, other, grid_size=_GRID))
 
 
-# Half of the width of a street of unknown width, and width of its sidewalks
+# Half the width of a street of unknown width, and the width of its sidewalks
 # [m].
 HALF_STREET = 3.9
-# A carriageway ends before walls; narrower sidewalks are left out [m].
+# A carriageway ends this far from walls, and narrower sidewalks are left out
+# [m].
 _FROM_WALL, _NARROWEST = 0.5, 0.6
-# Height of a carriageway above the ground, which it covers [m].
+# A carriageway is this far above the ground that it covers [m].
 _ABOVE = 0.02
 
 
@@ -206,9 +208,10 @@ def guessed_streets(
     drives: Sequence[WaypointDrive],
     ground: Ground,
 ) -> Iterator[Imported]:
-    """Yields a carriageway and sidewalks on the ground below drives.
+    """Yields a carriageway and sidewalks along drives, on the ground.
 
-    For a city without roads, whose drives are in the middle of its streets.
+    It is for a city without roads, whose drives are in the middle of its
+    streets.
     """
     paths = MultiLineString([drive.path for drive in drives]).simplify(0.05)
     near = near_drives(structures, drives)
@@ -250,8 +253,8 @@ def _laid(
 ) -> np.ndarray:
     """Returns an area laid above a ground, as triangles (N, 3, 3) [m].
 
-    Triangles (M, 3, 3) of the ground look upwards and meet the area; outlines
-    (M,) are theirs from above.
+    The triangles (M, 3, 3) of the ground look upwards and meet the area.
+    `outlines` (M,) are these triangles seen from above.
     """
     pieces = shapely.intersection(outlines, area, grid_size=_GRID)
     found = [np.zeros((0, 3, 3))]
@@ -266,18 +269,19 @@ def _laid(
     return turned_up(np.concatenate(found))
 
 
-# Widest gap that is paved [m], and least area of one [m^2].
+# Width of the widest gap, and area of the smallest one, that is paved [m, m^2].
 _WIDEST, _LEAST_AREA = 3.0, 0.05
-# Narrower parts are left open; a gap is at most this far from a sidewalk [m].
+# Parts narrower than this stay open. A gap is at most this far from a sidewalk
+# [m].
 _NARROWEST_GAP, _BESIDE = 0.1, 0.1
-# Gaps in one square of this size are one structure [m].
+# All gaps in a square of this size are one structure [m].
 _SQUARE = 50.0
 
 
 def paved_gaps(
     structures: Sequence[Imported], drives: Sequence[WaypointDrive]
 ) -> Iterator[Imported]:
-    """Yields sidewalks in the gaps near drives, on level ground."""
+    """Yields sidewalks that fill gaps near drives, on level ground."""
     near = near_drives(
         [one for one in structures if one.kind != "Tree"], drives
     )
@@ -333,7 +337,10 @@ def paved_gaps(
 def _upper_sides(
     structures: Sequence[Imported], with_lower: bool = True
 ) -> np.ndarray:
-    """Returns the triangles that look up, or down, as polygons from above."""
+    """Returns upward-looking triangles as polygons, seen from above.
+
+    By default, downward-looking triangles are included.
+    """
     triangles = joined(one.triangles for one in structures)
     if with_lower:
         triangles = turned_up(triangles)
@@ -342,15 +349,16 @@ def _upper_sides(
 
 
 def _flat_outline(one: Imported) -> BaseGeometry:
-    """Returns the area of a level structure from above."""
+    """Returns the area of a level structure, seen from above."""
     return shapely.coverage_union_all(_upper_sides([one]))
 
 
-# Streets get marks if they are this near to drives, and at least this wide [m].
+# Streets get marks if they are this close to drives and at least this wide [m].
 _MARKS_WITHIN, _LEAST_WIDTH = 80.0, 6.0
 _CLASSES = ("primary", "secondary", "tertiary")
-# Length of a dash, of its gap, its width, its height above the street, and the
-# free length before a junction besides half the street's width [m].
+# Length of a dash and of the gap after it, width of a dash, its height above
+# the street, and the length before a junction that stays free, in addition to
+# half the street's width [m].
 _DASH, _GAP, _WIDTH, _HEIGHT, _BEFORE = 3.0, 6.0, 0.12, 0.01, 4.0
 _WHITE: Rgb = (0.86, 0.86, 0.84)
 
@@ -377,7 +385,7 @@ def lane_marks(
             middles = np.arange(_GAP, line.length - _DASH, _DASH + _GAP)
             places = shapely.line_interpolate_point(line, middles)
             free = street.width / 2.0 + _BEFORE
-            # Without junctions the distance is NaN.
+            # Without any junction, the distance is NaN.
             kept = ~(shapely.distance(places, junctions) <= free)
             dashes = [_dash(line, s) for s in middles[kept].tolist()]
             if dashes:
@@ -391,7 +399,7 @@ def lane_marks(
 
 
 def _junctions(streets: Sequence[Street]) -> shapely.MultiPoint:
-    """Returns the places where more than two ends of streets meet."""
+    """Returns the places where more than two street ends meet."""
     ends = ends_at_nodes(streets)
     places = {
         node: place
@@ -402,7 +410,7 @@ def _junctions(streets: Sequence[Street]) -> shapely.MultiPoint:
 
 
 def _dash(line: LineString, s: float) -> np.ndarray:
-    """Returns a dash about a place of a line, (2, 3, 3) triangles [m]."""
+    """Returns a dash at arc length `s` of a line: triangles (2, 3, 3) [m]."""
     ends = [line.interpolate(s + k * _DASH / 2.0) for k in (-1.0, 1.0)]
     a, b = (np.array([end.x, end.y]) for end in ends)
     along = (b - a) / np.hypot(*(b - a))

@@ -1,4 +1,4 @@
-"""Small things along streets: those of the file, and others at random."""
+"""Small objects along streets: those of the file, and random ones."""
 
 from collections import Counter
 from collections.abc import Callable, Iterator, Sequence
@@ -41,15 +41,17 @@ from cns_drake.imports.foreign_city import (
 from cns_drake.imports.ground import Ground
 
 _TABLES = parse_yaml(Path(__file__).with_name("streets.yaml").read_bytes())
-# A thing on a carriageway is moved beside it, to this distance from its edge
-# [m].
+# Objects on a carriageway are moved to this distance beside its edge [m].
 FROM_EDGE = 0.6
 
 
 def beside_street(
     xy: np.ndarray, streets: Sequence[Street], courses: Sequence[LineString]
 ) -> tuple[np.ndarray, float]:
-    """Returns a place off the carriageway, and the heading to the street."""
+    """Returns a place beside the carriageway, and the heading to the street.
+
+    A place `xy` (2,) off all carriageways stays where it is [m, rad].
+    """
     point = Point(xy)
     distances = shapely.distance(courses, point)
     nearest = int(np.argmin(distances))
@@ -59,7 +61,7 @@ def beside_street(
     offset = xy - foot
     distance = float(np.hypot(*offset))
     if distance < 0.05:
-        # On the right of the street, as signs are.
+        # On the right of the street, where signs stand.
         offset = np.array([np.sin(station.yaw), -np.cos(station.yaw)])
         distance = 1.0
     outwards = offset / distance
@@ -71,20 +73,24 @@ def beside_street(
 def place_along(
     line: LineString, s: float, side: float, offset: float
 ) -> tuple[tuple[float, float], float]:
-    """Returns a place beside a line, right for side 1, and its heading."""
+    """Returns a place beside a line, and the heading of the object there.
+
+    The side is 1 for the right, and -1 for the left [m, rad].
+    """
     at = station_at(line, s)
     x = at.x + side * offset * float(np.sin(at.yaw))
     y = at.y - side * offset * float(np.cos(at.yaw))
     return (x, y), at.yaw
 
 
-# Sides of posts and balls; discs, such as signs, must differ from octagons.
+# Number of sides of posts and balls, and of discs. Discs such as signs must not
+# look like octagons.
 _SIDES, _SIDES_OF_DISC = 8, 20
 _POST, _DISC, _BALL = "round_post", "round_disc", "round_ball"
 
 
 def without_curves(model: Model) -> Model:
-    """Returns a model whose cylinders and spheres are polyhedra.
+    """Returns a model with polyhedra instead of cylinders and spheres.
 
     Their cross-sections have the same areas.
     """
@@ -108,33 +114,33 @@ def without_curves(model: Model) -> Model:
 
 
 def _turned(radius: list[float], z: list[float], sides: int) -> Mesh:
-    """Returns a solid of `revolved` whose polygons have the circles' areas."""
+    """Returns a solid of revolution with polygons of the circles' areas."""
     step = 2.0 * np.pi / sides
     wide = np.sqrt(step / np.sin(step)) * np.array(radius)
     vertices, triangles = revolved(wide, np.array(z), sides)
     return Mesh(vertices, tuple(map(tuple, triangles.tolist())))
 
 
-# Least distance of all objects from the middle of a drive [m].
+# Least distance of objects from the middle of a drive [m].
 _FROM_DRIVE = 1.7
 _FROM_WALL, _BETWEEN = 0.25, 0.2
-# Nothing stands where the ground falls by more below it, or on a street that is
-# this far above the guessed ground [m].
+# Nothing stands where the ground below it falls by more than this, or on a
+# street that is this far above the guessed ground [m].
 _STEEPEST, _BRIDGE = 0.5, 1.0
-# Radius about the middle of a trunk that nothing else takes [m].
+# Radius around the middle of a trunk that no other object takes [m].
 _TRUNK = 0.4
-# Classes of structures against which nothing stands.
+# Classes of structures that nothing may touch.
 _SOLID = ("building", "fence", "other-structure")
 
 
 @dataclass
 class StreetThings:
-    """The placed things.
+    """The placed objects and their counts.
 
-    Three kinds of things are counted: things from the file; things placed at
-    random; and things of the file that are left out, since they would stand in
-    the way of a drive, in a wall or in each other. Trees of the file that were
-    on a carriageway are moved beside it.
+    `by_file` counts objects of the file, `at_random` random ones, and `no_room`
+    objects of the file that are left out because they would block a drive, or
+    stand in a wall or in each other. `moved` has trees of the file that stood
+    on a carriageway and were moved beside it.
     """
 
     structures: list[Imported] = field(default_factory=list)
@@ -147,7 +153,7 @@ class StreetThings:
 
 
 class StreetRoom:
-    """The room for things: what is taken, and by what."""
+    """The room for objects: which ground is taken, and by what."""
 
     def __init__(
         self,
@@ -157,14 +163,14 @@ class StreetRoom:
         bottom: Sequence[Structure],
         found: StreetThings,
     ):
-        """Prepares what stands already.
+        """Takes the ground of everything that stands already.
 
         Args:
             structures: structures of the city.
             drives: the drives, which are kept free.
-            ground: the ground on which things stand.
+            ground: the ground on which objects stand.
             bottom: structures of the ground.
-            found: gets the things that are placed.
+            found: gets the objects that are placed.
         """
         self.found = found
         self._ground = ground
@@ -212,13 +218,14 @@ class StreetRoom:
         yaw: float,
         rng: np.random.Generator,
     ) -> bool:
-        """Places an object on the lowest ground below it, if there is room.
+        """Places an object if there is room; returns whether there was.
 
-        Only cars stand on carriageways.
+        It stands on the lowest ground below it. Only cars stand on
+        carriageways.
 
         Args:
             name: name of the new structure.
-            kind: kind of object, the name of its mesh.
+            kind: kind of object, a key of `OBJECTS`.
             xy: position of its middle in W [m].
             yaw: its heading [rad].
             rng: draws its variant and colours.
@@ -235,7 +242,7 @@ class StreetRoom:
         )
         feet = structure.p_WFs[:, :2]
         heights, guessed = self._laid.heights(feet), self._ground.height(feet)
-        # A street far above the guessed ground is a bridge, or a roof.
+        # A street far above the guessed ground is a bridge or a roof.
         is_laid = np.isfinite(heights) & (heights < guessed + _BRIDGE)
         heights = np.where(is_laid, heights, guessed)
         z = round(float(heights.min()), 3)
@@ -272,18 +279,20 @@ def title_of(kind: str) -> str:
 
 
 def _footing(footprint: BaseGeometry, z: float) -> np.ndarray:
-    """Returns the bounds of a footprint as triangles (2, 3, 3) [m]."""
+    """Returns the bounding box of a footprint as triangles (2, 3, 3) [m]."""
     x0, y0, x1, y1 = footprint.bounds
     a, b, c, d = ((x0, y0, z), (x1, y0, z), (x1, y1, z), (x0, y1, z))
     return np.array([(a, b, c), (a, c, d)])
 
 
-# Cars farther from all drives are left out [m].
+# Cars farther than this from all drives are left out [m].
 ROWS_WITHIN = 70.0
-# Cars: distances in a row, part of the places that are taken, distance of
-# their middle from the edge, and of rows from other streets [m].
+# Parked cars: least and greatest distance in a row, share of the places that
+# are taken, distance of their middle from the kerb, and of rows from other
+# streets [m].
 _CAR_EVERY, _CARS, _FROM_KERB, _FROM_CROSSING = (5.8, 7.2), 0.6, 1.05, 5.0
-# A car along a row; a bay across one, its width and length; between bays [m].
+# Length of a place along a row; width and length of a bay across one; width of
+# the aisle between bays [m].
 _ROW_PITCH, _BAY, _AISLE = 6.2, (2.6, 5.0), 5.5
 
 
@@ -303,9 +312,9 @@ def may_park_on(side: str, street: Street) -> bool:
 
 
 class Row(NamedTuple):
-    """A street: its name, middle, half width, and where cars may park.
+    """A street: its name, middle line, half its width [m], and where cars park.
 
-    They may park on the right, and on the left.
+    `may_park` says whether they may park on the right, and whether on the left.
     """
 
     name: str
@@ -330,7 +339,7 @@ def park_along(
             is_taken = rng.random() < _CARS
             yaw += float(rng.uniform(-0.02, 0.02))
             form = pick(_TABLES["vehicles"], rng)
-            # Without other streets the distance is NaN.
+            # Without other streets, the distance is NaN.
             is_clear = not others.distance(Point(xy)) <= _FROM_CROSSING
             if is_taken and is_clear:
                 kind = f"car_{row.name}_{int(s)}_{'lr'[side > 0]}"
@@ -340,7 +349,7 @@ def park_along(
 
 
 def fill_car_park(placing: StreetRoom, one: Imported, seed: int) -> None:
-    """Parks cars along the longer sides of an area."""
+    """Parks cars along the longer sides of a car park."""
     outline = MultiPoint(one.triangles.reshape(-1, 3)[:, :2])
     box = np.array(outline.minimum_rotated_rectangle.boundary.coords)
     if len(box) != 5 or not placing.is_near(box, ROWS_WITHIN):
@@ -375,9 +384,9 @@ def fill_car_park(placing: StreetRoom, one: Imported, seed: int) -> None:
                 placing.found.at_random["Parked vehicles"] += 1
 
 
-# Things farther from all drives are left out [m].
+# Objects farther than this from all drives are left out [m].
 _THINGS_WITHIN = 100.0
-# Lamps at random: their distance, from those of the file too [m].
+# Distance between random lamps, and from them to those of the file [m].
 _LAMP_EVERY = 27.0
 _SMALL_EVERY = 22.0
 
@@ -393,15 +402,15 @@ def dress_streets(
 ) -> StreetThings:
     """Returns the small objects along the streets of a city.
 
-    Those of the file come first. Drives are kept free of objects; without any
-    drive nothing is placed.
+    Objects of the file are placed first. Drives are kept free of objects;
+    without any drive nothing is placed.
 
     Args:
         structures: what stands already.
-        things: small things of the file.
-        streets: the streets along which things are added.
+        things: small objects of the file.
+        streets: the streets along which objects are added.
         drives: the drives, which are kept free.
-        ground: the ground on which things stand.
+        ground: the ground on which objects stand.
         bottom: structures of the ground.
         seed: seed of all random draws.
     """
@@ -434,7 +443,7 @@ def dress_streets(
 def _rows(
     streets: Sequence[Street], drives: Sequence[WaypointDrive]
 ) -> Iterator[Row]:
-    """Yields the streets, or else drives in the middle of streets."""
+    """Yields the streets; without streets, drives as middles of streets."""
     for street in streets:
         may_park = (may_park_on("right", street), may_park_on("left", street))
         half = street.width / 2.0
@@ -451,7 +460,7 @@ def _off_carriageway(
     streets: Sequence[Street],
     courses: Sequence[LineString],
 ) -> Imported:
-    """Returns a tree beside the carriageway, if it was on it or its kerb."""
+    """Returns a tree, moved off the carriageway and its kerb if necessary."""
     structure = tree.structure
     xy = np.array(structure.xyz[:2])
     if not streets or not placing.is_near(np.array([xy] * 2), _THINGS_WITHIN):
@@ -497,7 +506,7 @@ def _place_thing(
 
 
 def _light(placing: StreetRoom, row: Row, rng: np.random.Generator) -> None:
-    """Sets lamps along a street where the file has none."""
+    """Places lamps along a street where the file has none."""
     s, side = float(rng.uniform(3.0, 12.0)), 1.0
     while s < row.line.length:
         for offset in (row.half + FROM_EDGE, row.half - 0.4, 2.3):
@@ -507,7 +516,7 @@ def _light(placing: StreetRoom, row: Row, rng: np.random.Generator) -> None:
                 for x, y in placing.lamps
             ):
                 break
-            # The lamp's arm reaches over the street.
+            # The lamp's arm extends over the street.
             yaw += side * np.pi / 2.0
             lamp = f"lamp_post_{row.name}_{int(s)}"
             if placing.place(lamp, "lamp_post", xy, yaw, rng):
@@ -517,7 +526,7 @@ def _light(placing: StreetRoom, row: Row, rng: np.random.Generator) -> None:
 
 
 def _furnish(placing: StreetRoom, row: Row, rng: np.random.Generator) -> None:
-    """Sets small things along a street if the file has none at all."""
+    """Places small objects along a street if the file has none at all."""
     s = float(rng.uniform(3.0, 12.0))
     while s < row.line.length:
         side = 1.0 if rng.random() < 0.5 else -1.0

@@ -1,4 +1,4 @@
-"""The look of a building: from its tags, or else at random."""
+"""The look of a building: from its tags, and otherwise at random."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -24,9 +24,11 @@ _USE_KEYS = (
 _LOOKS = yaml.safe_load(
     Path(__file__).with_name("styles.yaml").read_text(encoding="utf-8")
 )
-# A house is old if built before the first year, and new if after the second.
+# A house is old if it was built before the first year, and new if after the
+# second.
 _OLD, _NEW = 1930, 1965
-# Range of storey heights that a tag's levels may lead to [m].
+# Least and greatest storey height that a tag's number of levels may lead to
+# [m].
 _STOREYS = (2.3, 6.0)
 _LARGE_HOUSE, _HIGH_HOUSE = 260.0, 9.5  # [m^2], [m]
 _HIGH_BLOCK = 26.0  # [m]
@@ -35,12 +37,13 @@ _SMALL = 45.0  # [m^2]
 
 @dataclass(frozen=True)
 class Style:
-    """How a building with a use of the file is dressed; lengths in metres.
+    """How a building with a certain use is dressed; lengths in [m].
 
-    Windows have a pitch from middle to middle, a sill above their floor and the
-    depth of their recess. The ground floor may have shops on the street, and
-    every other window a balcony. A plinth or cornice without a height is none.
-    Fields that come from the file are listed in `by_tag`.
+    For windows, `pitch` is the distance from middle to middle, `sill` the
+    height above their floor, and `depth` that of their recess. `shops` says
+    whether the ground floor may have shops on the street, and `balconies`
+    whether every other window has one. A plinth or cornice of height 0 does not
+    exist. `by_tag` lists fields that come from the file.
     """
 
     use: str
@@ -67,10 +70,10 @@ class Style:
 def building_use(
     tags: Mapping[str, str], area: float, height: float
 ) -> tuple[str, bool]:
-    """Returns the use of a building, and whether its tags say so.
+    """Returns the use of a building, and whether it comes from its tags.
 
-    Without tags it follows from the area of the footprint and the height of the
-    walls [m^2, m].
+    Without such tags it follows from the area of the footprint and the height
+    of the walls [m^2, m].
     """
     words = [tags.get(key, "") for key in _USE_KEYS]
     words += [key for key in ("shop", "office") if key in tags]
@@ -110,14 +113,14 @@ def make_style(
     is_flat: bool,
     rng: np.random.Generator,
 ) -> Style:
-    """Returns a random style for a building; its tags take precedence.
+    """Returns a style for a building: from its tags, otherwise at random.
 
     The number of draws does not depend on the tags.
 
     Args:
         tags: tags of the building, as in OpenStreetMap.
         year: year of construction; None if unknown.
-        area: area of its footprint, about [m^2].
+        area: approximate area of its footprint [m^2].
         height: height of its walls [m].
         is_flat: whether its roof is flat.
         rng: draws everything that no tag says.
@@ -181,7 +184,7 @@ def _cornice(use: str, is_flat: bool, is_old: bool, chance: float) -> float:
     if use in ("shed", "industrial"):
         return 0.0
     if not is_flat:
-        return 0.12  # It is a gutter.
+        return 0.12  # That is a gutter.
     return round((0.35 if is_old else 0.18) + 0.2 * chance, 2)
 
 
@@ -191,7 +194,7 @@ def _tinted(rgb: Rgb, factor: float) -> Rgb:
 
 
 def _colour(rng: np.random.Generator, *palettes: str) -> Rgb:
-    """Draws one of the colours of palettes."""
+    """Returns a random colour of some palettes."""
     red, green, blue = pick(
         rng, [rgb for name in palettes for rgb in _LOOKS["palettes"][name]]
     )

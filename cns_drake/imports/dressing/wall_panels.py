@@ -15,28 +15,32 @@ from cns_drake.city.facades.details import WallFrame
 from cns_drake.city.geometry.upper_sides import long_normals, unit_normals
 from cns_drake.imports.faces import joined
 
-# A face is upright if the z of its unit normal is below this.
+# A face is vertical if the absolute z of its unit normal is below this.
 _UPRIGHT = 0.02
-# Triangles of one wall have normals whose product is at least this (1 deg).
+# Triangles of one wall have unit normals whose dot product is at least this (1
+# deg).
 _SAME_PLANE = float(np.cos(np.radians(1.0)))
-# A wall that bends is divided where normals differ by more (0.02 deg).
+# A wall that bends is divided where normals differ by more than this (0.02
+# deg).
 _STRAIGHT = float(np.cos(np.radians(0.02)))
 _MM = 1000.0
-# A wall is a rectangle if at most this much of its area is missing [m^2].
+# A wall is a rectangle if at most this much of the rectangle's area is missing
+# [m^2].
 _NO_AREA = 0.01
-# A wall that is farther from its plane bends, and so does a piece of one, which
-# must leave no gap to the next piece [m].
+# Greatest deviation of a wall from its plane. The second is that of a piece of
+# a bent wall, which must leave no gap to the next piece [m].
 _BENT, _PIECE_BENT = 0.05, 0.01
 
 
 @dataclass(frozen=True)
 class Panel:
-    """A plane, upright wall or a piece of one, seen from outside.
+    """A vertical plane wall, or a piece of one, seen from outside.
 
-    Its origin (3,) is where x = z = 0, and `along` (2,) a unit vector to the
-    right. The outline is a polygon in x and z, None if it fills the bounding
-    rectangle [m]. The original triangles (M, 3, 3) are those of a building with
-    a number.
+    Its origin (3,) is where x = z = 0, and `along` (2,) is a unit vector to the
+    right. The outline is a polygon in x and z; it is None if it fills the
+    bounding rectangle [m]. The triangles (M, 3, 3) are those in the file, and
+    `building` is the number of their building. A wall that bends is not
+    `is_plane`.
     """
 
     building: int
@@ -55,14 +59,14 @@ class Panel:
 
     @property
     def frame(self) -> WallFrame:
-        """Frame that places details of facades on the panel."""
+        """Wall frame that places details of facades on the panel."""
         start = self.origin[:2]
         return WallFrame([start, start + self.length * self.along], 0)
 
     def place(
         self, x: ArrayLike, z: ArrayLike, out: ArrayLike = 0.0
     ) -> np.ndarray:
-        """Returns points (..., 3) given by coordinates of the panel [m].
+        """Returns points (..., 3) in the world from panel coordinates [m].
 
         Args:
             x: distance along the panel from its origin.
@@ -80,7 +84,7 @@ class Panel:
 
 
 def is_upright(triangles: np.ndarray) -> np.ndarray:
-    """Returns which of the triangles (M, 3, 3) are walls."""
+    """Returns (M,) which of the triangles (M, 3, 3) are vertical."""
     normals = unit_normals(triangles)
     return normals.any(axis=1) & (np.abs(normals[:, 2]) < _UPRIGHT)
 
@@ -91,9 +95,10 @@ def find_panels(
 ) -> list[Panel]:
     """Returns the panels of the walls of buildings.
 
-    Walls of each building are upright triangles (M, 3, 3) that look outwards
-    [m]. If not all panels are wanted, `is_wanted` maps the least and greatest x
-    and y of N of them, (N, 2, 2) [m], to (N,) bool.
+    `walls` has the vertical triangles (M, 3, 3) of each building, which look
+    outwards [m]. `is_wanted` selects walls: it gets the least and greatest x
+    and y of N walls, (N, 2, 2) [m], and returns (N,) bool. Without it, all are
+    wanted.
     """
     triangles = joined(walls)
     building = np.repeat(np.arange(len(walls)), [len(w) for w in walls])
@@ -137,10 +142,10 @@ def _plane_pieces(
     normals: np.ndarray,
     areas: np.ndarray,
 ) -> list[Panel]:
-    """Divides a wall that bends into pieces, each as long as it is plane.
+    """Returns a wall that bends as plane pieces, as long as possible.
 
-    Facets (M,) number the plane piece of each triangle; for the others see
-    `_panel`.
+    `facets` (M,) are the numbers of the plane facets to which triangles belong.
+    The other arguments are as in `_panel`.
     """
     x = (triangles[..., :2] - wall.origin[:2]).mean(axis=1) @ wall.along
     starts = [x[facets == number].min() for number in range(facets.max() + 1)]
@@ -168,10 +173,11 @@ def _connected(
     building: np.ndarray,
     least: float,
 ) -> np.ndarray:
-    """Returns the number (M,) of the panel of each triangle (M, 3, 3) [m].
+    """Returns (M,) the number of the panel of each triangle (M, 3, 3) [m].
 
-    The product of the unit normals (M, 3) of neighbours in one panel has a
-    least value. A panel is part of one building, numbered (M,).
+    Two triangles that share an edge are in one panel if they belong to the same
+    building, numbered (M,), and if the dot product of their unit normals (M, 3)
+    is at least `least`.
     """
     corners = np.rint(triangles * _MM).astype(np.int64).reshape(-1, 3)
     keyed = np.column_stack([np.repeat(building, 3), corners])
@@ -200,17 +206,17 @@ def _panel(
 ) -> Panel:
     """Returns the panel of connected triangles (M, 3, 3) of a building [m].
 
-    Normals (M, 3) are as long as the areas (M,) [m^2]. The triangles of a plane
-    lie apart across it by no more than `bent` [m].
+    The lengths of the normals (M, 3) are the areas (M,) [m^2]. The panel is
+    plane if all corners lie between two planes `bent` apart [m].
     """
     corners = triangles.reshape(-1, 3)
-    # The mean over areas: small triangles have imprecise normals.
+    # Weighted by area, since the normals of small triangles are imprecise.
     outward = normals.sum(axis=0)[:2]
     outward /= np.hypot(*outward)
     along = np.array([-outward[1], outward[0]])
     x = (corners[:, :2] - corners[0, :2]) @ along
     start = corners[0, :2] + x.min() * along
-    # The plane is in the middle of triangles that are not quite plane.
+    # The plane is in the middle, since triangles may not be quite plane.
     aside = (corners[:, :2] - start) @ outward
     start = start + outward * float(aside.mean())
     origin = np.array([*start, corners[:, 2].min()])

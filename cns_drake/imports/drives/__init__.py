@@ -1,1 +1,1 @@
-"""The search for drives through imported cities."""
+"""Finds drives through imported cities."""

@@ -1,4 +1,4 @@
-"""The room for a car between the buildings of an imported city."""
+"""Finds the room for a car between the buildings of an imported city."""
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
@@ -21,29 +21,31 @@ _KERB = 0.3
 # [m].
 _FROM_WALL = 2.5
 _FROM_EDGE = 1.6
-# The part of it that a car following the path may lose [m].
+# Share of this distance that a car that follows the path may lose.
 _SLACK = 0.6
 # Least distance from the middle of the car to an obstacle [m].
 _HALF_CAR = 1.1
-# Half of the widest street; wider open ground is outside the city [m].
+# Half the width of the widest street; wider open ground is outside the city
+# [m].
 _HALF_STREET = 20.0
 _SAMPLE_SPACING = 0.5
-# Room is searched within this distance of a city's middle: no drive is longer
-# [m].
+# Room is searched within this distance of a city's middle, since no drive is
+# longer [m].
 _FARTHEST = 1500.0
 # Least and greatest x and y (2,) [m].
 _Window = tuple[np.ndarray, np.ndarray]
-# Roads are used if their connected room has at least this area [m^2].
+# Roads are used if their largest connected part has at least this area [m^2].
 _LEAST_ROAD = 800.0
 
 
 @dataclass(frozen=True)
 class FreeSpace:
-    """Room on a grid that begins at (2,), the corner of its first cell [m].
+    """The room for a car, on a grid that begins at the corner `low` (2,) [m].
 
-    The clearance (rows along y, columns along x) is the distance from the
-    middle of each cell to the nearest obstacle, and 0 where no car may be [m].
-    A path needs a least clearance. Walls are the obstacles, seen from above.
+    `clearance` (rows along y, columns along x) is the distance from the middle
+    of each cell to the nearest obstacle, and 0 where no car may be [m]. `least`
+    is the clearance that a path needs. `walls` are the obstacles, seen from
+    above.
     """
 
     low: np.ndarray
@@ -52,9 +54,9 @@ class FreeSpace:
     walls: STRtree
 
     def clearance_at(self, xy: np.ndarray) -> np.ndarray:
-        """Returns the distance to obstacles at places (N, 2) [m].
+        """Returns the distances (N,) to obstacles at places (N, 2) [m].
 
-        Places outside of the grid have that of the nearest cell.
+        Places outside of the grid have the distance of the nearest cell.
         """
         index = np.floor((xy - self.low) / CELL).astype(int)
         rows, columns = self.clearance.shape
@@ -63,7 +65,7 @@ class FreeSpace:
         return self.clearance[row, column]
 
     def obstacle(self, path: np.ndarray) -> np.ndarray | None:
-        """Returns the first place (2,) of a path without room for a car.
+        """Returns the first place (2,) of a path without room; None if none.
 
         The places (N, 2) of the path are close together [m].
         """
@@ -73,16 +75,16 @@ class FreeSpace:
         return path[narrow.argmax()] if narrow.any() else None
 
     def middle(self, row: np.ndarray, column: np.ndarray) -> np.ndarray:
-        """Returns the middles (N, 2) of cells [m]."""
+        """Returns the middles (N, 2) of cells given by row and column [m]."""
         return self.low + CELL * (np.c_[column, row] + 0.5)
 
 
 def find_free_space(
     structures: Sequence[Imported], ground: Ground
 ) -> FreeSpace:
-    """Returns where a car has room at all stages.
+    """Returns the room for a car that is there at all stages.
 
-    The room is on roads if there are any.
+    If the city has roads, the room is on roads only.
     """
     low, high = _window(structures)
     size = np.ceil((high - low) / CELL).astype(int) + 1
@@ -95,7 +97,7 @@ def find_free_space(
         ),
         (in_water, [o for o in structures if _is_water(o)]),
     ):
-        # All at once: thousands of small groups would take far longer.
+        # In one call: thousands of small groups would take far longer.
         surfaces = joined(one.triangles for one in some)
         for row, column in _cells(surfaces, window):
             covered[row, column] = True
@@ -130,7 +132,7 @@ def _cells(
 ) -> Iterator[np.ndarray]:
     """Yields rows and columns (2, N) that triangles (M, 3, 3) cover.
 
-    If there is a ground, only places that a car on it could hit count.
+    With a ground, only places that a car on this ground could hit count.
     """
     low, _ = window
     for points in surface_samples(triangles, _SAMPLE_SPACING, window):
@@ -143,7 +145,7 @@ def _cells(
 def _blocked_by(
     one: Imported, ground: Ground, window: _Window
 ) -> tuple[tuple[np.ndarray, np.ndarray], np.ndarray]:
-    """Returns the cells that a structure blocks, and with which triangles.
+    """Returns the cells that a structure blocks, and the triangles that do.
 
     The insides of buildings are blocked too.
     """
@@ -163,7 +165,7 @@ def _blocked_by(
 def _filled(
     row: np.ndarray, column: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Returns cells (N,), one or more, and the cells they enclose."""
+    """Returns cells (N,), at least one, together with those they enclose."""
     first = np.array([row.min(), column.min()])
     shape = np.array([row.max(), column.max()]) - first + 1
     walls = np.zeros(shape, dtype=bool)
@@ -173,8 +175,8 @@ def _filled(
 
 
 def _clearance(free: np.ndarray) -> np.ndarray:
-    """Returns the distance of each cell to one that is not free [m]."""
-    # No car can drive beyond the grid.
+    """Returns the distance of each cell to the nearest one not free [m]."""
+    # Padded, since no car can drive beyond the grid.
     return ndimage.distance_transform_edt(np.pad(free, 1))[1:-1, 1:-1] * CELL
 
 
@@ -188,13 +190,13 @@ def _between(blocked: np.ndarray) -> np.ndarray:
 
 
 def _largest(cells: np.ndarray) -> int:
-    """Returns the number of cells of the largest connected part."""
+    """Returns the size of the largest connected part, in cells."""
     parts, number = ndimage.label(cells, np.ones((3, 3)))
     return int(np.bincount(parts.ravel())[1:].max()) if number else 0
 
 
 def _window(structures: Sequence[Imported]) -> _Window:
-    """Returns the corners of the window in which room is searched."""
+    """Returns the corners of the area in which room is searched."""
     boxes = boxes_of(structures)[:, :, :2]
     middle = np.median(boxes.mean(axis=1), axis=0)
     low = np.maximum(boxes[:, 0].min(axis=0), middle - _FARTHEST)

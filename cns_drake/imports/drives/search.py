@@ -1,8 +1,10 @@
-"""Two drives through a city, which overlap in part.
+"""Searches two drives through a city that share a part of their way.
 
-The first drive is about the longest of the shortest ways. The second one shares
-its middle, and leaves it by an arm at either end. A `WayGraph` defines the
-pieces of a way: lanes of streets, or else cells of free space."""
+The first drive is approximately the longest of all shortest ways. The second
+one shares the middle of the first, and leaves it at both ends by an arm of its
+own. A `WayGraph` defines the pieces of which ways consist: lanes of streets, or
+cells of free space.
+"""
 
 from abc import ABC, abstractmethod
 from collections import defaultdict
@@ -30,38 +32,40 @@ from cns_drake.roads.lane_path import POINT_SPACING
 from cns_drake.roads.u_turn import TIGHTEST_RADIUS
 from cns_drake.roads.waypoints import make_waypoint_path
 
-# Paths of vehicles are quintic splines (`cns_drake.motion`), whose points are
-# their control points.
+# Paths of vehicles are quintic splines (`cns_drake.motion`). The points of a
+# path are their control points.
 _DEGREE = 5
-# A proposed drive may be on a slope, with rounded numbers: its bends are this
-# many times wider than the car's tightest.
+# The bends of a proposed drive are this many times wider than the car's
+# tightest one, because the drive may be on a slope and its numbers are rounded.
 _MARGIN = 1.01
-# Distance of the places where bends and room are checked [m].
+# Distance between the places where bends and room are checked [m].
 _STEP = 0.25
 # Greatest and least length of a proposed drive [m].
 LONGEST = 1500.0
 SHORTEST = 80.0
 
-# The place (2,) of an obstacle: a bend too tight, or no room [m].
+# The place (2,) of an obstacle: a bend that is too tight, or no room [m].
 Obstacle = np.ndarray
-# Takes places (N, 2) along a path [m] and returns the first (2,) where a car
-# has no room, or None.
+# Takes places (N, 2) along a path [m]. Returns the first place (2,) without
+# room for a car, or None.
 Room = Callable[[np.ndarray], np.ndarray | None]
 # Least and greatest length of the second drive's own arms [m].
 _SHORTEST_ARM = 40.0
 _LONGEST_ARM = LONGEST / 3
-# Parts of the first drive: where the second one may join it (from, to), and
-# where it must have left; the same for the second trial; the least part they
-# share.
+# Shares of the first drive's length. For each of two trials: between the first
+# and the second number, the second drive may join the first one; it leaves it
+# between 1 minus the second number and the third number. Then the least share
+# that both have in common.
 _SHARED = ((0.25, 0.5, 0.75), (0.0, 0.7, 1.0))
 _LEAST_SHARED = 0.15
-# Number of places to join and to leave that are tried, and their least distance
-# [m].
+# Greatest number of places to join and to leave that are tried, and least
+# distance between them [m].
 _MOST_PLACES = 12
 _APART = 10.0
-# Number of ways that are tried as first drive, and as second drive.
+# Greatest number of ways that are tried as first drive, and as second drive.
 _MOST_TRIES = 30
-# Number of ends of ways that are tried until a way meets no place twice.
+# Greatest number of ends that are tried to find a way that passes no place
+# twice.
 _MOST_ENDS = 20
 # Number of pieces from which ways are searched; fewer in large graphs.
 _MOST_STARTS = 200
@@ -70,7 +74,7 @@ _MOST_REACHED = 400_000
 
 @dataclass(frozen=True)
 class WaypointDrive:
-    """A drive: waypoints (N, 2) or (N, 3), the path (M, 2) between them [m].
+    """A drive: its waypoints (N, 2) or (N, 3), and the path (M, 2) [m].
 
     The limit is the lowest speed limit on the way [m/s]; None without one.
     """
@@ -88,10 +92,12 @@ class WaypointDrive:
 def steerable_drive(
     waypoints: np.ndarray, room: Room | None = None, margin: float = _MARGIN
 ) -> WaypointDrive | Obstacle:
-    """Returns the drive along waypoints, or the first obstacle [m].
+    """Returns the drive along waypoints, or the place of the first obstacle.
 
-    Waypoints are (N, 2) or (N, 3). The whole path needs room. The least radius
-    of bends is `margin` times the tightest radius of the car.
+    Waypoints are (N, 2) or (N, 3) [m]. `room` returns an obstacle on the path;
+    without it, there is room everywhere. A bend is an obstacle, too, if its
+    radius is less than `margin` times the tightest one of the car. So is the
+    middle of a path that is too short.
     """
     waypoints = np.round(waypoints, 3)
     xyz = np.zeros((len(waypoints), 3))
@@ -112,7 +118,7 @@ def steerable_drive(
 
 
 def evenly_spaced(line: np.ndarray, spacing: float) -> np.ndarray:
-    """Returns places (N, D) along a line (M, D), about a spacing apart [m]."""
+    """Returns places (N, D) along a line (M, D), about `spacing` apart [m]."""
     steps = np.linalg.norm(np.diff(line, axis=0), axis=1)
     along = np.concatenate([[0.0], np.cumsum(steps)])
     count = max(1, round(along[-1] / spacing))
@@ -121,7 +127,7 @@ def evenly_spaced(line: np.ndarray, spacing: float) -> np.ndarray:
 
 
 def driven_path(points: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Returns the places (M, 2) of a path, and the radii (M,) of its bends.
+    """Returns places (M, 2) of a path, and the radii (M,) of its bends [m].
 
     The control points (N, 2) of its spline are evenly spaced [m].
     """
@@ -143,9 +149,9 @@ def driven_path(points: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
 
 
 class WayGraph(ABC):
-    """Pieces of way with lengths (N,) [m], each with its successors.
+    """A graph of pieces with lengths (N,) [m], and of their successors.
 
-    A piece is open, (N,), if a car can drive along it as far as is known.
+    `is_open` (N,) says which pieces a car can drive along, as far as is known.
     """
 
     def __init__(
@@ -155,9 +161,11 @@ class WayGraph(ABC):
         after: np.ndarray,
         costs: np.ndarray | None = None,
     ):
-        """Links pieces of lengths (N,); `before` (L,) leads into `after` [m].
+        """Links pieces: each of `before` (L,) leads into one of `after` (L,).
 
-        Costs (L,) are from middle to middle, lengths if None [m].
+        `lengths` (N,) are those of the pieces [m]. `costs` (L,) are from the
+        middle of one piece to the middle of the next; if None, they are lengths
+        [m].
         """
         self.lengths = lengths
         if costs is None:
@@ -169,7 +177,8 @@ class WayGraph(ABC):
     def beside(self, pieces: np.ndarray, joint: int) -> np.ndarray:
         """Returns which pieces (N,) bool an arm must not use.
 
-        Drives use some pieces; the arm begins at one of them, the joint.
+        They are those that drives use (`pieces`) and those close to them. The
+        arm begins at one of these, the `joint`.
         """
 
     @abstractmethod
@@ -182,10 +191,10 @@ class WayGraph(ABC):
 
     @abstractmethod
     def blocked(self, way: Sequence[int], place: Obstacle) -> np.ndarray:
-        """Returns the pieces of a way that an obstacle blocks."""
+        """Returns the pieces of a way that an obstacle at a place blocks."""
 
     def along(self, way: Sequence[int]) -> np.ndarray:
-        """Returns (N,) how far the end of each piece lies on a way [m]."""
+        """Returns distances (N,) along a way to the end of each piece [m]."""
         return np.cumsum(self.lengths[list(way)])
 
     def length(self, way: Sequence[int]) -> float:
@@ -193,12 +202,15 @@ class WayGraph(ABC):
         return float(self.along(way)[-1]) if len(way) else 0.0
 
     def cut(self, way: list[int], longest: float) -> list[int]:
-        """Returns the start of a way, up to a length [m]."""
+        """Returns the beginning of a way, no longer than `longest` [m]."""
         kept = int(np.searchsorted(self.along(way), longest, "right"))
         return way[: max(1, kept)]
 
     def links(self, closed: np.ndarray | None = None) -> csr_array:
-        """Returns the costs from piece to piece, without closed pieces (N,)."""
+        """Returns the costs from piece to piece, as a sparse matrix.
+
+        Pieces that are `closed` (N,) are left out.
+        """
         is_open = self.is_open if closed is None else self.is_open & ~closed
         before, after, costs = self._links
         kept = is_open[before] & is_open[after]
@@ -208,7 +220,7 @@ class WayGraph(ABC):
 
 
 def find_drives(graph: WayGraph) -> list[WaypointDrive]:
-    """Returns two drives that share a part, or one, or none."""
+    """Returns two drives that share a part, or only one drive, or none."""
     for _ in range(_MOST_TRIES):
         way = _longest(graph)
         if graph.length(way) < SHORTEST:
@@ -227,7 +239,7 @@ def find_drives(graph: WayGraph) -> list[WaypointDrive]:
 
 
 def _longest(graph: WayGraph) -> list[int]:
-    """Returns about the longest of the shortest ways, [] if there is none."""
+    """Returns approximately the longest of all shortest ways; [] if none."""
     pieces = np.flatnonzero(graph.is_open)
     if len(pieces) == 0:
         return []
@@ -255,10 +267,11 @@ def _longest(graph: WayGraph) -> list[int]:
 def _farthest(
     graph: WayGraph, links: csr_array, start: int, longest: float = LONGEST
 ) -> list[int]:
-    """Returns the longest way from a piece that meets no place twice.
+    """Returns the longest of the shortest ways from a piece, up to a length.
 
-    It follows links between usable pieces, up to a length [m]. Transposed links
-    give the way to the piece, in reverse order.
+    Ways that pass a place twice do not count. Ways follow links between usable
+    pieces, up to the length `longest` [m]. With transposed links, the way leads
+    to the piece, in reverse order.
     """
     cost, before = dijkstra(links, indices=start, return_predecessors=True)
     cost = np.where(np.isfinite(cost), cost + graph.lengths / 2.0, -1.0)
@@ -278,7 +291,7 @@ def _farthest(
 
 
 def _seconds(graph: WayGraph, first: list[int]) -> Iterator[list[int]]:
-    """Yields ways that share the middle of another, best first."""
+    """Yields ways that share the middle of the first way, the best first."""
     along = np.concatenate([[0.0], graph.along(first)])
     part = along / along[-1]
     every = np.arange(len(first))
@@ -314,7 +327,10 @@ def _nearest(values: np.ndarray, wanted: float) -> int:
 
 
 def _some(places: np.ndarray, along: np.ndarray) -> list[int]:
-    """Returns at most as many places as are tried, apart from each other."""
+    """Returns some of the places, at least `_APART` from each other.
+
+    They are at most `_MOST_PLACES`.
+    """
     kept: list[int] = []
     for place in places.tolist():
         if not kept or abs(along[place] - along[kept[-1]]) >= _APART:
@@ -325,10 +341,10 @@ def _some(places: np.ndarray, along: np.ndarray) -> list[int]:
 def _arm(
     graph: WayGraph, used: Sequence[int], joint: int, backwards: bool = False
 ) -> list[int]:
-    """Returns the longest way from a piece in use by drives, its joint.
+    """Returns the longest way that leaves a drive at a piece, the joint.
 
-    Backwards it ends there, and is in reverse order. It is empty if it is too
-    short.
+    With `backwards`, the way ends at the joint and is in reverse order. It is
+    empty if it is too short.
     """
     links = graph.links(graph.beside(np.array(used), joint))
     if backwards:
@@ -337,29 +353,31 @@ def _arm(
     return way if graph.length(way[1:]) >= _SHORTEST_ARM else []
 
 
-# Paths prefer this distance from walls [m].
+# Paths prefer to be this far from walls [m].
 _COMFORT = 6.0
-# An arm keeps this distance from the drive it leaves, except at the joint [m].
+# Except near the joint, an arm keeps this distance from the drive that it
+# leaves [m].
 _ARM_APART = 10.0
 # Cells within this distance of an obstacle are closed [m].
 _OBSTRUCTED = 3.0
-# Greatest distance of waypoints, for their heights, and least distance from
-# corners [m].
+# Greatest distance between waypoints, so that heights are followed, and least
+# distance from corners [m].
 _WAYPOINT_SPACING = 15.0
-# Tolerances, tried in turn, of waypoints against the found path [m].
+# Tolerances of waypoints relative to the path that was found, tried in turn
+# [m].
 _SIMPLIFICATIONS = (1.5, 1.0, 0.7, 2.0, 3.0)
-# Cells in a running mean, chosen by trial.
+# Numbers of cells in a running mean; the values were found by trial.
 _STRAIGHTENED = (5, 11, 17)
 _LANE_SPACING = 1.0
-# Share of their lateral offset that cars keep in a turn: in narrow streets and
+# Share of their lateral offset that cars keep in a turn. In narrow streets and
 # sharp corners they have to swing out.
 _AT_TURNS = (1.0, 0.6, 0.2)
-# Distance of the start and end of a turn from its sharpest place [m].
+# A turn begins and ends this far from its sharpest place [m].
 _TURN = 12.0
 _SHARP_DEG_PER_M = 4.0
-# Tolerances, tried in turn, of waypoints against the lanes [m].
+# Tolerances of waypoints relative to the lanes, tried in turn [m].
 _TOLERANCES = (0.2, 0.4, 0.8, 1.2)
-# Lengths of the means that round corners, and lateral offsets [m].
+# Lengths of the running means that smooth corners, and lateral offsets [m].
 _ROUND, _SMOOTH_ASIDE = 7, 15
 
 
@@ -367,9 +385,9 @@ _ROUND, _SMOOTH_ASIDE = 7, 15
 class Lane:
     """A lane from one junction to the next.
 
-    Its line (N, 2) is the middle of its street, in driving direction, and the
-    lane lies aside to the right of it [m]. The other lane of a piece of street
-    has the same number of a way.
+    Its line (N, 2) is the middle of its street in driving direction, and the
+    lane lies `aside` to the right of it [m]. The lane of the opposite
+    direction, on the same piece of street, has the same number `way`.
     """
 
     line: np.ndarray
@@ -395,7 +413,7 @@ def make_lanes(streets: Sequence[Street]) -> list[Lane]:
 
 
 def lane_links(lanes: Sequence[Lane]) -> tuple[np.ndarray, np.ndarray]:
-    """Returns pairs of lane numbers; the first lane leads into the second."""
+    """Returns numbers of lanes in pairs; the first leads into the second."""
     starts: defaultdict[int, list[int]] = defaultdict(list)
     for number, lane in enumerate(lanes):
         starts[lane.begin].append(number)
@@ -420,7 +438,7 @@ def _leads_on(lane: Lane, after: Lane) -> bool:
 def lane_path(lanes: Sequence[Lane], spacing: float) -> np.ndarray:
     """Returns a line along lanes: x, y and lateral offset (N, 3) [m].
 
-    Each lane leads into the next; points are about a spacing apart [m].
+    Each lane leads into the next. The points are about `spacing` apart [m].
     """
     parts = []
     for lane in lanes:
@@ -432,7 +450,7 @@ def lane_path(lanes: Sequence[Lane], spacing: float) -> np.ndarray:
 
 
 class CellGraph(WayGraph):
-    """Cells with room, each linked to the eight beside it."""
+    """A graph of free cells, each linked to its eight neighbours."""
 
     def __init__(self, space: FreeSpace):
         self._space = space
@@ -487,8 +505,8 @@ def simplified_drive(
 ) -> WaypointDrive | Obstacle:
     """Returns a drive with as few waypoints as the room allows.
 
-    It passes places (N, 2), about 1 m apart, within tolerances [m], which are
-    tried in turn.
+    Otherwise it returns the obstacle. The drive passes places (N, 2), about 1 m
+    apart, within a tolerance [m]; the tolerances are tried in turn.
     """
     found: WaypointDrive | Obstacle = xy[len(xy) // 2]
     for straightened, tolerance in product(_STRAIGHTENED, tolerances):
@@ -508,13 +526,13 @@ def simplified_drive(
 
 
 def _densified(corners: np.ndarray) -> np.ndarray:
-    """Returns waypoints with others between those that lie far apart."""
+    """Returns waypoints with additional ones between those far apart."""
     points = [corners[:1]]
     for a, b in pairwise(corners):
         length = float(np.linalg.norm(b - a))
         number = int((length - _WAYPOINT_SPACING) // _WAYPOINT_SPACING)
         if number > 0:
-            # No waypoints are near the corners, whose arcs need room.
+            # Waypoints keep away from the corners, whose arcs need room.
             parts = np.linspace(0.0, 1.0, number + 2)[1:-1]
             points.append(a + parts[:, None] * (b - a))
         points.append(b[None])
@@ -522,17 +540,18 @@ def _densified(corners: np.ndarray) -> np.ndarray:
 
 
 class StreetGraph(WayGraph):
-    """Lanes of streets from junction to junction.
+    """A graph of lanes of streets, from junction to junction.
 
-    One-way streets are driven in their direction, all others in the outermost
-    lane.
+    One-way streets are driven in their direction, and all others in the
+    outermost lane.
     """
 
     def __init__(
         self, streets: Sequence[Street], space: FreeSpace, drive_on: DriveOn
     ):
-        """Makes the graph of streets that meet at common nodes."""
-        # A street with a wrong place on another continent would never end.
+        """Makes the graph of streets, which meet at common nodes."""
+        # Streets with a faulty place, for example on another continent, are
+        # left out: sampling them would never end.
         self.lanes = [
             one for one in make_lanes(streets) if one.length <= LONGEST
         ]

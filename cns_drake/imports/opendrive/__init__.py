@@ -1,1 +1,1 @@
-"""Road networks in OpenDRIVE 1.4 to 1.7, and towns built on them."""
+"""Reads road networks in OpenDRIVE 1.4 to 1.7, and builds towns on them."""

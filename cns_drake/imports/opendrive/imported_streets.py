@@ -1,8 +1,9 @@
-"""The areas of imported streets, as a city is built along them.
+"""The areas of imported streets, along which a city is built.
 
-The lanes of a junction often lack the shoulders of the roads that lead to it:
-in the file the kerb of the road then steps aside. Kerbs that are built swing
-over, along tapers."""
+In a junction, lanes often lack the shoulders of the roads that lead to it. In
+the file the kerb of the road then steps aside at the junction. Real kerbs have
+tapers there instead, and so have the streets of this module.
+"""
 
 from collections import defaultdict
 from collections.abc import Iterable, Iterator, Sequence
@@ -25,22 +26,24 @@ from cns_drake.imports.foreign_city import make_imported
 from cns_drake.imports.opendrive.lanes import LaneBand, is_raised, lane_class
 from cns_drake.roads.carriageway import Areas
 
-# Smallest and largest step, and least length of the kerb before it [m].
+# Least and greatest width of a step, and least length of the kerb before it
+# [m].
 _STEP = (0.02, 2.0)
 _BEFORE = 1.0
-# Kerbs on both sides of a step go on in the same direction, up to this; the
-# step itself turns aside by more [rad].
+# The kerbs on both sides of a step have the same direction within this angle;
+# the step itself turns by more [rad].
 _ASTRAY = np.radians(45.0)
-# Length of a taper over the width of its step, and its greatest one [m].
+# Length of a taper relative to the width of its step, and its greatest length
+# [m].
 _SLENDER, _LONGEST = 10.0, 6.0
-# Places where a taper may end are at most this far apart; corners this near to
-# a straight edge are none [m].
+# Places where a taper may end are at most this far apart. Corners this close to
+# a straight edge are dropped [m].
 _SPACING, _SIMPLE = 0.25, 0.005
-# Slits up to twice this width between lanes are closed [m].
+# Slits between lanes are closed up to twice this width [m].
 _SEAM = 0.05
 # Vertices closer to an outline than this are dropped [m].
 _SIMPLIFY = 0.005
-# Ground that lanes enclose beside a junction is part of it up to this size
+# Ground that lanes enclose beside a junction belongs to it up to this area
 # [m^2]; larger ground is an island.
 _LARGEST_GAP = 60.0
 _LEVEL = ("road", "parking", "sidewalk", "other-ground")
@@ -50,7 +53,7 @@ _ISLAND_RGB = (0.55, 0.53, 0.50)
 _PATH_RGB = (0.52, 0.42, 0.38)
 _DEPTH = np.array([0.0, 0.0, 0.8])  # [m]
 _LEAST_CROSS = 1e-6
-# Wider than a kerb [m].
+# How far the end of a bridge extends to both sides: wider than a kerb [m].
 _END = 0.2
 
 
@@ -63,16 +66,17 @@ def kerb_tapers(carriageway: BaseGeometry) -> list[Polygon]:
             simple = LinearRing(ring).simplify(_SIMPLE)
             xy = shapely.get_coordinates(simple)[:-1]
             found += map(Polygon, _tapers(xy))
-            # Backwards and mirrored, the carriageway is on the left again.
+            # Reversed and mirrored, the ring has the carriageway on its left
+            # again.
             mirror = np.array([-1.0, 1.0])
             found += (Polygon(a * mirror) for a in _tapers(xy[::-1] * mirror))
     return found
 
 
 def _tapers(xy: np.ndarray) -> Iterator[np.ndarray]:
-    """Yields the corners of areas where an edge steps to the left.
+    """Yields the corners of tapers, where an edge steps to the left.
 
-    A ring of corners (N, 2) has the carriageway on its left [m].
+    The edge is a ring of corners (N, 2) with the carriageway on its left [m].
     """
     steps = np.roll(xy, -1, axis=0) - xy
     lengths = np.hypot(*steps.T)
@@ -85,7 +89,8 @@ def _tapers(xy: np.ndarray) -> Iterator[np.ndarray]:
         & (np.roll(turns, -1) < -_ASTRAY)
     )
     for k in np.flatnonzero(is_step):
-        # The kerb before the step comes first, nearest to the step.
+        # The corners of the kerb before the step, the one nearest to the step
+        # first.
         before = np.roll(xy[::-1], k + 1 - len(xy), axis=0)
         behind = np.roll(xy, -k - 1, axis=0)
         ahead = np.array([np.cos(heading[k - 1]), np.sin(heading[k - 1])])
@@ -104,23 +109,27 @@ def _tapers(xy: np.ndarray) -> Iterator[np.ndarray]:
         reached = np.flatnonzero((along > _SPACING) & (along < within + 1e-6))
         if not len(reached):
             continue
-        # The taper touches the kerb where it is seen farthest to the right.
+        # The taper touches the kerb at the place that is farthest to the right
+        # in its view.
         last = int(reached[np.argmin(left[reached] / along[reached])])
         yield np.concatenate([xy[k : k + 1], dense[: last + 1]])
 
 
 def _straight_on(xy: np.ndarray, ahead: np.ndarray) -> int:
-    """Returns how many edges between corners (N, 2) go on in a direction."""
+    """Returns how many of the first edges continue in a direction.
+
+    The edges lie between corners (N, 2), and `ahead` (2,) is the direction.
+    """
     steps = np.diff(xy, axis=0)
     goes_on = steps @ ahead > np.cos(_ASTRAY) * np.hypot(*steps.T)
     return int(np.argmin(np.append(goes_on, False)))
 
 
 def _kerb(xy: np.ndarray, ahead: np.ndarray) -> np.ndarray:
-    """Returns the first corners (M, 2) of an edge that goes straight on.
+    """Returns the first corners (M, 2) of a kerb, as far as it runs straight.
 
-    A ring of corners (N, 2) has the carriageway on its left [m]. Where it soon
-    steps back, the corner behind that step is the last one.
+    The kerb is a ring of corners (N, 2) with the carriageway on its left [m].
+    If it soon steps back, the corner behind that step is the last one.
     """
     last = _straight_on(xy, ahead)
     if 0 < last < len(xy) - 2 and _straight_on(xy[last + 1 :], ahead):
@@ -134,17 +143,17 @@ def _kerb(xy: np.ndarray, ahead: np.ndarray) -> np.ndarray:
 class ImportedStreets:
     """Areas of lanes on the ground, by kind [m].
 
-    `areas` are those of the lanes at the height of the road, of the lanes that
-    are road, and of what has a kerb. Where two overlap, road comes before
-    parking, that before other ground, and sidewalks last. Coverings are parts
-    of the carriageway that are not road, and margins are lanes without a use,
-    which stay free.
+    `areas` has the area of the lanes at road level, of the lanes that are road,
+    and of raised ground with a kerb. Where lanes overlap, road takes precedence
+    over parking, parking over other ground, and all of these over sidewalks.
+    Coverings are parts of the carriageway that are not road. Margins are lanes
+    without a use, which stay free.
     """
 
     def __init__(
         self, bands: Sequence[LaneBand], kerbless: BaseGeometry = _NOWHERE
     ):
-        """Takes the lanes, and an area without kerbs [m]."""
+        """Finds the areas of lanes; `kerbless` is an area without kerbs [m]."""
         alike: dict[str, list[BaseGeometry]] = defaultdict(list)
         in_junctions: list[BaseGeometry] = []
         for band in bands:
@@ -185,8 +194,8 @@ class ImportedStreets:
         medians = _multi(medians.difference(carriageway))
         walks = _simple(shapely.union_all(alike["walk"]))
         taken = carriageway.union(medians)
-        # Where a carriageway has no sidewalk, as in junctions, its kerb takes
-        # ground as well.
+        # A carriageway without a sidewalk, as in junctions, has a kerb that
+        # takes ground, too.
         kerbs = kerb_area(carriageway.difference(medians))
         walks = walks.union(snap(kerbs.difference(kerbless)))
         sidewalks = _multi(snap(walks.difference(taken)))
@@ -203,12 +212,12 @@ class ImportedStreets:
 
 
 def lane_polygon(band: LaneBand) -> BaseGeometry:
-    """Returns the area of a lane [m]; empty for one without width."""
+    """Returns the area of a lane [m]; it is empty for a lane without width."""
     inner, outer = band.inner[:, :2], band.outer[:, :2]
     outline = Polygon(np.concatenate([inner, outer[::-1]]))
     if outline.is_valid:
         return outline if outline.area > _LEAST_AREA else Polygon()
-    # In a bend tighter than the lane is wide its edge folds over.
+    # In a bend tighter than the width of the lane, its edge folds over.
     corners = np.stack([inner[:-1], inner[1:], outer[1:], outer[:-1]], axis=1)
     pieces = [
         shapely.make_valid(Polygon(four), method="structure")
@@ -218,8 +227,8 @@ def lane_polygon(band: LaneBand) -> BaseGeometry:
 
 
 def _gaps(lanes: BaseGeometry) -> list[Polygon]:
-    """Returns the gaps that lanes enclose, without islands."""
-    # Lanes that only touch enclose ground as well.
+    """Returns the gaps that lanes enclose, without those large as islands."""
+    # GEOS divides by zero where lanes only touch; they enclose ground as well.
     with np.errstate(divide="ignore", invalid="ignore"):
         grown = lanes.buffer(_SEAM, join_style="mitre")
     return [
@@ -231,8 +240,8 @@ def _gaps(lanes: BaseGeometry) -> list[Polygon]:
 
 
 def _closed(parts: Iterable[BaseGeometry]) -> BaseGeometry:
-    """Returns a union without slits between neighbours."""
-    # GEOS divides by zero at edges that fold back; the result is right.
+    """Returns the union of areas, with slits between neighbours closed."""
+    # GEOS divides by zero at edges that fold back, but its result is right.
     with np.errstate(divide="ignore", invalid="ignore"):
         grown = shapely.union_all(
             [part.buffer(_SEAM, join_style="mitre") for part in parts]
@@ -247,8 +256,8 @@ def _simple(area: BaseGeometry) -> BaseGeometry:
 def _cut_at_tiles(area: MultiPolygon) -> MultiPolygon:
     """Returns an area with a corner wherever an edge leaves a tile.
 
-    Tiles of different slopes have meshes of different spacing. An edge across
-    two of them would get the wall of a kerb in part only.
+    Meshes of tiles with different slopes have different spacings. A kerb on an
+    edge across two such tiles would have a wall on a part of the edge only.
     """
 
     def cut(ring: LinearRing) -> np.ndarray:
@@ -275,10 +284,10 @@ def _multi(area: BaseGeometry) -> MultiPolygon:
 
 
 def bridge_decks(bands: Sequence[LaneBand]) -> Iterator[Structure]:
-    """Yields the upper sides of bridges by class, and their undersides."""
+    """Yields the upper sides of bridges, by class, and their undersides."""
     of_road: dict[tuple[str, str], list[np.ndarray]] = defaultdict(list)
     for band in bands:
-        # Parts without a lane are closed as well.
+        # The sides of parts without a lane are closed as well.
         kind = lane_class(band.kind) or "other-ground"
         left, right = band.inner, band.outer
         if band.lane.number > 0:
@@ -313,7 +322,10 @@ def bridge_ends(bands: Sequence[LaneBand]) -> BaseGeometry:
 
 
 def _strip(a: np.ndarray, b: np.ndarray) -> np.ndarray:
-    """Returns triangles between lines (N, 3), upward if the second is left."""
+    """Returns triangles between two lines (N, 3).
+
+    They look upwards if the second line is on the left.
+    """
     return np.concatenate(
         [
             np.stack([a[:-1], a[1:], b[1:]], axis=1),

@@ -1,4 +1,4 @@
-"""Drives and traffic in the lanes of an imported road network."""
+"""Finds drives, and lanes for traffic, in an imported road network."""
 
 from collections.abc import Sequence
 from dataclasses import replace
@@ -14,31 +14,32 @@ from cns_drake.traffic.lane_file import lane_text
 from cns_drake.traffic.lane_graph import Walkway, resampled
 from cns_drake.traffic.lane_joining import DirectedLane, join_lanes
 
-# A lane follows another if its start is this near to the other's end, and its
-# heading differs by less than this [m, rad].
+# A lane follows another one if its start is within the first distance of the
+# other's end, and their headings differ by less than the second number [m,
+# rad].
 _NEAR = 0.6
 _ASTRAY = np.radians(20.0)
-# A lane of this length may be a ring that follows itself [m].
+# A lane at least this long may be a ring that follows itself [m].
 _SHORTEST_RING = 10.0
-# Least width at the ends of a lane for a car [m].
+# A car needs this width at both ends of a lane [m].
 _LEAST_WIDTH = 1.8
 _LEAST_LENGTH = 0.05
-# Between waypoints [m].
+# Distance between waypoints [m].
 _SPACING = 2.0
-# Numbers of waypoints to both sides over which drives are smoothed, tried in
+# Numbers of waypoints to both sides in the running mean of a drive, tried in
 # turn.
 _SMOOTHING = (0, 1, 2, 3)
-# Speed limit of roads without one [m/s].
+# Speed limit of roads that have none in the file [m/s].
 _LIMIT = 13.9
 _SIDEWALKS = frozenset({"sidewalk", "walking"})
-# Walkers' least distance from the edges of a sidewalk, and greatest from its
-# middle [m].
+# Walkers' least distance from the edges of a sidewalk, and greatest distance
+# from its middle [m].
 _MARGIN, _MOST_HALF_WIDTH = 0.45, 1.05
 _LEAST_HALF_WIDTH, _SHORTEST = 0.3, 5.0
 
 
 class BandGraph(search.WayGraph):
-    """Lanes of sections in driving direction, each with its successors."""
+    """A graph of lanes of road sections in driving direction."""
 
     def __init__(self, bands: Sequence[LaneBand]):
         self.bands = [band for band in bands if _is_driven(band)]
@@ -47,10 +48,11 @@ class BandGraph(search.WayGraph):
             np.linalg.norm(np.diff(line, axis=0), axis=1).sum()
             for line in self.lines
         ]
-        # The key that a drive may use once: a road, or a lane of a junction.
+        # A drive may use each of these only once: a road, or a lane of a
+        # junction.
         self._roads = np.array([band.road.name for band in self.bands])
         before, after = self._link(lengths)
-        # The second lane of a pair follows the first.
+        # The second lane of a pair follows the first one.
         self.followers = list(zip(before.tolist(), after.tolist(), strict=True))
         others = before != after
         super().__init__(np.array(lengths), before[others], after[others])
@@ -116,8 +118,8 @@ class BandGraph(search.WayGraph):
 def find_lane_drives(bands: Sequence[LaneBand]) -> list[WaypointDrive]:
     """Returns two drives on lanes that share a part of their way.
 
-    It returns one, or none, if there are no two. The lanes are those of the
-    whole network, on bridges too.
+    It returns one drive, or none, if there are no two. The lanes are those of
+    the whole network, bridges included.
     """
     return search.find_drives(BandGraph(bands))
 
@@ -147,7 +149,10 @@ def _heading(two: np.ndarray) -> float:
 
 
 def _smoothed(points: np.ndarray, window: int) -> np.ndarray:
-    """Returns the means (N, 3) over points to both sides, fewer at the ends."""
+    """Returns a running mean (N, 3) of points, narrower at both ends.
+
+    It extends over `window` points to both sides.
+    """
     count = len(points)
     total = np.concatenate([np.zeros((1, 3)), np.cumsum(points, axis=0)])
     at = np.arange(count)
@@ -158,7 +163,7 @@ def _smoothed(points: np.ndarray, window: int) -> np.ndarray:
 
 
 def _forwards(line: np.ndarray) -> np.ndarray:
-    """Drops points that go backwards, as at rough joints."""
+    """Returns a line without points that go backwards, as at rough joints."""
     kept = [line[0], line[1]]
     for point in line[2:]:
         step, last = (point - kept[-1])[:2], (kept[-1] - kept[-2])[:2]
@@ -171,7 +176,7 @@ def _forwards(line: np.ndarray) -> np.ndarray:
 def lanes_for_traffic(
     bands: Sequence[LaneBand], kerbs: KerbHeights
 ) -> str | None:
-    """Returns the text of a lane file; None if no vehicle can drive on."""
+    """Returns the text of a lane file; None if there is no lane to drive on."""
     graph = BandGraph(bands)
     lanes = [
         DirectedLane(
@@ -189,7 +194,7 @@ def lanes_for_traffic(
 
 
 def _walkways(bands: Sequence[LaneBand], kerbs: KerbHeights) -> list[Walkway]:
-    """Returns a strip for each sidewalk, on which walkers turn round."""
+    """Returns a walkway for each sidewalk, at whose ends walkers turn round."""
     found: list[Walkway] = []
     for band in bands:
         half = min(float(band.width.min()) / 2 - _MARGIN, _MOST_HALF_WIDTH)

@@ -1,6 +1,7 @@
-"""The lanes of roads: kinds, borders, levels and heights.
+"""The lanes of roads: their kinds, edges, levels and heights.
 
-Borders are sampled closely enough for LiDAR."""
+Edges are sampled closely enough for LiDAR.
+"""
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
@@ -20,41 +21,41 @@ from cns_drake.imports.opendrive.road_model import (
     LaneSection,
 )
 
-# Types of lanes and objects.
+# Types of lanes and objects, from `types.yaml`.
 TYPES = parse_yaml(Path(__file__).with_name("types.yaml").read_bytes())
-# Cars drive on them, each in one direction.
+# Types of lanes on which cars drive, each in one direction.
 DRIVEN = frozenset(TYPES["driven lanes"])
 _RAISED = frozenset({"sidewalk", "walking", "curb"})
-# From this height on a lane has a kerb [m].
+# A lane at least this high has a kerb [m].
 _LEAST_KERB = 0.03
-# Greatest distance of two places on a border, and greatest error of chords of
-# the reference line, of widths and of heights: borders are then true to 5 mm
+# Greatest distance between two places on an edge, and greatest error of chords
+# of the reference line, of widths and of heights: edges are then exact to 5 mm
 # [m].
 _SPACING = 2.0
 _SAG = 0.002
 _MOST_STATIONS = 200_000
-# No lane is farther from the reference line, or higher [m].
+# No lane is farther from the reference line than this, or higher [m].
 _FARTHEST, _HIGHEST = 50_000.0, 10_000.0
-# Places nearer to each other than this, counted from the joints, are one [m].
+# Distances along the road that differ by less than this are the same [m].
 _INWARDS = 1e-6
-# A road at least this much above another one is a bridge [m].
+# A road at least this far above another one is a bridge [m].
 _HEADROOM = 3.0
-# Cell size for finding places above one another, and length of a bridge beyond
-# the crossed road [m].
+# Cell size for finding places above one another, and length of a bridge to both
+# sides of the road that it crosses [m].
 _NEAR, _BEYOND = 2.5, 8.0
 _LEAST_WIDTH = 0.1
-# Number of nearby places whose planes give a height, as their mean.
+# Number of nearby places whose planes are averaged.
 _NEIGHBOURS = 8
-# Distance of the places of a lane [m].
+# Distance between the places of a lane [m].
 _PLACE_SPACING = 0.5
-# A kerb this near to a sidewalk has its height [m].
+# A kerb within this distance of a sidewalk has the sidewalk's height [m].
 _BESIDE = 1.0
-# Nearer places count more; this distance bounds their weight [m].
+# Nearer places have more weight; this distance limits their weight [m].
 _CORE = 0.05
-# Places at a time.
+# Number of places that are processed at a time.
 _BLOCK = 200_000
 _LEVEL = 1e-9
-# What a band has at each place along the road.
+# The arrays of a band, with one row for each place along the road.
 _ARRAYS = (
     "inner", "outer", "middle", "heading", "roll", "grade", "rise", "s",
 )  # fmt: skip
@@ -67,9 +68,10 @@ def lane_class(kind: str) -> str | None:
 
 
 def is_raised(kind: str, height: float) -> bool:
-    """Returns whether a lane is a kerb above the road, not part of it.
+    """Returns whether a lane lies above a kerb, not at road level.
 
-    The height of its inner edge above the road is that in the file [m].
+    The height is that of the lane's inner edge above the road, as in the file
+    [m].
     """
     has_kerb = height >= _LEAST_KERB
     return kind in _RAISED or (
@@ -79,16 +81,16 @@ def is_raised(kind: str, height: float) -> bool:
 
 @dataclass(frozen=True)
 class LaneBand:
-    """A lane of a section, from end to end.
+    """A lane of a road section, sampled from end to end.
 
     Attributes:
-        road, section, lane: its road, the number of its section there, its
+        road, section, lane: its road, the number of its section there, and its
             lane.
-        kind: type of the lane; "enclosed" for a lane of type none with others
-            farther outside, as on a road that is closed to traffic.
-        inner, outer: (N, 3) places on its edges, in the order of the road; two
-            are the same at a step in its width [m]. Those of a lane above a
-            kerb are at the height of the road.
+        kind: type of the lane; "enclosed" for a lane of type none that has
+            others farther outside, as on a road that is closed to traffic.
+        inner, outer: (N, 3) places on its edges, in the order of the road [m].
+            Where the width of the lane steps, a place on one edge is repeated.
+            A lane above a kerb has the height of the road here.
         middle: (N, 3) places in the middle between both edges [m].
         heading, roll, grade: (N,) heading, roll and grade of the road at these
             places [rad, rad, 1]. The roll is 0 for a level lane.
@@ -111,7 +113,7 @@ class LaneBand:
 
     @property
     def width(self) -> np.ndarray:
-        """Width of the lane (N,) [m]."""
+        """Width (N,) of the lane [m]."""
         return np.linalg.norm(self.outer - self.inner, axis=1)
 
 
@@ -119,8 +121,8 @@ def lane_bands(road: ImportedRoad) -> Iterator[LaneBand]:
     """Yields all lanes of a road, section by section, from the middle.
 
     Raises:
-        ValueError: naming road and fault, if it has too many bends to be
-            followed, or a lane leads out of the world.
+        ValueError: naming the road and the fault, if it has too many bends to
+            be followed, or a lane leads out of the world.
     """
     for k, section in enumerate(road.sections):
         s, inside = _stations(road, section)
@@ -130,7 +132,7 @@ def lane_bands(road: ImportedRoad) -> Iterator[LaneBand]:
         middle_line = road.points(s, inside, offset)
         for side in (1, -1):
             t, inner = offset, middle_line
-            # Beyond a level lane all edges are lower or higher.
+            # Beyond a level lane, all edges are lower or higher.
             beside_level = False
             numbers = sorted(
                 (n for n in section.lanes if n * side > 0), key=abs
@@ -138,7 +140,7 @@ def lane_bands(road: ImportedRoad) -> Iterator[LaneBand]:
             for number in numbers:
                 lane = section.lanes[number]
                 if lane.width or not lane.border:
-                    # A width below zero is a slip.
+                    # A negative width is a slip in the file.
                     width = np.maximum(lane.width.at(s, inside), 0.0)
                     beyond = t + side * width
                 else:
@@ -176,7 +178,7 @@ def lane_bands(road: ImportedRoad) -> Iterator[LaneBand]:
 def _across(
     heading: np.ndarray, roll: np.ndarray, width: np.ndarray
 ) -> np.ndarray:
-    """Returns the (N, 3) steps to the left over widths (N,) [m]."""
+    """Returns the steps (N, 3) across the road to the left, of a width (N,)."""
     left = np.stack([-np.sin(heading), np.cos(heading)], axis=1)
     flat = left * (width * np.cos(roll))[:, None]
     return np.column_stack([flat, width * np.sin(roll)])
@@ -190,7 +192,7 @@ def _rise(lane: Lane, s: np.ndarray, inside: np.ndarray) -> np.ndarray:
 
 
 def _band(band: LaneBand) -> LaneBand:
-    """Returns a lane that is part of the road at its own height."""
+    """Returns a lane with its own height, if it is at road level."""
     if not band.lane.inner_height or is_raised(band.kind, band.lane.height):
         return band
     up = np.array([0.0, 0.0, 1.0])
@@ -225,7 +227,7 @@ def _kind(road: ImportedRoad, section: LaneSection, lane: Lane) -> str:
 def _stations(
     road: ImportedRoad, section: LaneSection
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Returns places along a section, and the starts of their pieces.
+    """Returns distances along a section, and where cubic pieces begin there.
 
     A joint is there twice, once for each side.
     """
@@ -273,7 +275,7 @@ def _stations(
 def split_levels(
     bands: Sequence[LaneBand],
 ) -> tuple[list[LaneBand], list[LaneBand]]:
-    """Returns the lanes on the ground, and those on bridges, cut up."""
+    """Returns lanes on the ground and lanes on bridges; lanes are cut there."""
     raised = _raised_places(bands)
     ground: list[LaneBand] = []
     bridges: list[LaneBand] = []
@@ -291,7 +293,10 @@ def split_levels(
 
 
 def _raised_places(bands: Sequence[LaneBand]) -> dict[str, np.ndarray]:
-    """Returns road -> places where it passes over another, increasing [m]."""
+    """Returns road -> distances at which it passes over another road [m].
+
+    The distances are increasing.
+    """
     names = {band.road.name: k for k, band in enumerate(bands)}
     rows = []
     for band in bands:
@@ -302,7 +307,7 @@ def _raised_places(bands: Sequence[LaneBand]) -> dict[str, np.ndarray]:
     places = np.concatenate(rows) if rows else np.zeros((0, 5))
     if len(places) == 0 or np.ptp(places[:, 2]) < _HEADROOM:
         return {}
-    # One place for each square metre is enough: the highest and the lowest.
+    # The highest and the lowest place of each square metre are enough.
     tree = cKDTree(places[:, :2])
     found: dict[str, list[float]] = {}
     high = np.flatnonzero(places[:, 2] > places[:, 2].min() + _HEADROOM)
@@ -318,7 +323,7 @@ def _raised_places(bands: Sequence[LaneBand]) -> dict[str, np.ndarray]:
 
 
 def _runs(is_bridge: np.ndarray) -> Iterator[tuple[slice, bool]]:
-    """Yields stretches of the same level; neighbours share a place."""
+    """Yields stretches of one level; neighbouring stretches share a place."""
     starts = np.flatnonzero(np.diff(is_bridge.astype(int), prepend=-1))
     for a, b in zip(starts, [*starts[1:], len(is_bridge)], strict=True):
         last = min(b + 1, len(is_bridge))
@@ -327,16 +332,16 @@ def _runs(is_bridge: np.ndarray) -> Iterator[tuple[slice, bool]]:
 
 
 class RoadHeights:
-    """The height of imported carriageways, continued to both sides.
+    """The height of imported carriageways, also beyond their edges.
 
-    Each place in the middle of a lane has a plane, from the grade and the roll
-    of its road. The height is the mean of those nearby (Shepard's
-    interpolation): exact on one road, and without a step where roads that
-    overlap in a junction differ.
+    Each place in the middle of a lane has a plane, from the grade and roll of
+    its road. The height is a weighted mean of the planes nearby (Shepard's
+    interpolation). It is exact on a single road, and has no step where roads
+    that overlap in a junction have different heights.
     """
 
     def __init__(self, bands: Sequence[LaneBand]):
-        """Takes all lanes that lie on the ground, at least one."""
+        """Takes all lanes on the ground, at least one."""
         places = np.concatenate([_places(band) for band in bands])
         self._p = places[:, :3]
         heading, roll, grade = places[:, 3:].T
@@ -352,14 +357,14 @@ class RoadHeights:
 
     @property
     def is_level(self) -> bool:
-        """Whether all roads lie at z = 0 throughout."""
+        """Whether all roads lie at z = 0."""
         return bool(
             np.abs(self._p[:, 2]).max() < _LEVEL
             and np.abs(self._slope).max() < _LEVEL
         )
 
     def heights(self, xy: ArrayLike) -> np.ndarray:
-        """Returns the (N,) heights at (N, 2) places [m]."""
+        """Returns the heights (N,) at places (N, 2) [m]."""
         xy = np.asarray(xy, dtype=float).reshape(-1, 2)
         blocks = [
             self._block(xy[k : k + _BLOCK]) for k in range(0, len(xy), _BLOCK)
@@ -377,12 +382,13 @@ class RoadHeights:
 
 
 class KerbHeights:
-    """The heights of imported sidewalks above the road, by place."""
+    """The height of imported sidewalks above the road, by place."""
 
     def __init__(self, bands: Sequence[LaneBand], usual: float):
-        """Takes the lanes on the ground, and the usual height [m].
+        """Takes the lanes on the ground, and the usual height of a kerb [m].
 
-        Kerbs without a height, or away from sidewalks, have the usual one.
+        Kerbs without a height in the file, or away from sidewalks, have the
+        usual one.
         """
         self._usual = usual
         rows = [np.zeros((0, 6))]
@@ -399,7 +405,7 @@ class KerbHeights:
         self.differ = bool((np.abs(self._rise - usual) > _SAG).any())
 
     def __call__(self, xy: np.ndarray) -> np.ndarray:
-        """Returns the (N,) heights at (N, 2) places [m]."""
+        """Returns the heights (N,) at places (N, 2) [m]."""
         distance, k = self._tree.query(xy)
         across = self._outer[k] - self._inner[k]
         width2 = (across**2).sum(axis=1)
@@ -411,7 +417,7 @@ class KerbHeights:
 
 
 def _places(band: LaneBand) -> np.ndarray:
-    """Returns (N, 6) places in the middle, heading, roll and grade there."""
+    """Returns (N, 6): places in the middle, and heading, roll and grade."""
     return _dense(
         band,
         np.column_stack([band.middle, band.heading, band.roll, band.grade]),
@@ -419,8 +425,8 @@ def _places(band: LaneBand) -> np.ndarray:
 
 
 def _dense(band: LaneBand, rows: np.ndarray) -> np.ndarray:
-    """Returns values (N, K) at a lane's stations, and between them."""
-    # Both sides of a joint stay: the stretch between them has no length.
+    """Returns values (N, K) of a lane, interpolated between its stations."""
+    # Both sides of a joint stay, with a stretch of no length between them.
     steps = np.diff(band.s)
     counts = np.maximum(np.ceil(steps / _PLACE_SPACING).astype(int), 1)
     first = np.repeat(np.arange(len(steps)), counts)

@@ -1,7 +1,8 @@
 """Roads of a network: course, heights and lanes.
 
-The course is made of lines, arcs, spirals and cubic curves: ASAM OpenDRIVE 1.7,
-chapter 8, https://www.asam.net/standards/detail/opendrive"""
+The course consists of lines, arcs, spirals and cubic curves: ASAM OpenDRIVE
+1.7, chapter 8, https://www.asam.net/standards/detail/opendrive
+"""
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
@@ -10,11 +11,11 @@ from typing import NamedTuple
 
 import numpy as np
 
-# Number of nodes of Gauss and Legendre's rule; exact on a panel to 1e-14 m.
+# Nodes of the Gauss-Legendre rule; it is exact on a panel to 1e-14 m.
 _NODES, _WEIGHTS = np.polynomial.legendre.leggauss(12)
-# Greatest turn of a spiral's heading on a panel [rad].
+# Greatest change of a spiral's heading on a panel [rad].
 _TURN = 0.5
-# A road that turns more is a fault of the file [rad].
+# If a road turns by more than this, the file is at fault [rad].
 _MOST_TURN = 10_000.0
 _PANELS = 64
 _NEWTON_STEPS = 8
@@ -25,14 +26,14 @@ def _integral(
     begin: np.ndarray,
     size: np.ndarray,
 ) -> np.ndarray:
-    """Returns the integrals (N,) of a rate over panels."""
+    """Returns the integrals (N,) of a rate from `begin` over `size` (N,)."""
     nodes = begin[:, None] + size[:, None] * (_NODES + 1.0) / 2.0
     return size / 2.0 * (rate(nodes) @ _WEIGHTS)
 
 
-# A curve has `evaluate`, which returns (N, 3) u, v [m] and heading [rad] in the
-# frame of its first point at distances (N,) [m], and `sharpest`, its greatest
-# curvature, about [1/m].
+# The type of a curve. Its `evaluate` returns (N, 3) u, v [m] and heading [rad]
+# at distances (N,) [m], in the frame of its first point. Its `sharpest` is
+# approximately its greatest curvature [1/m].
 
 
 @dataclass(frozen=True)
@@ -43,7 +44,7 @@ class Arc:
 
     def evaluate(self, ds: np.ndarray) -> np.ndarray:
         half = self.curvature * ds / 2.0
-        # The chord, which is straight ahead for a line.
+        # The chord, which for a line points straight ahead.
         chord = ds * np.sinc(half / np.pi)
         return np.stack(
             [chord * np.cos(half), chord * np.sin(half), 2.0 * half], axis=1
@@ -55,7 +56,7 @@ class Arc:
 
 
 class Spiral:
-    """A clothoid, whose curvature grows evenly."""
+    """A clothoid: its curvature changes linearly with the distance."""
 
     def __init__(self, start: float, end: float, length: float):
         """Takes the curvature at both ends [1/m], and the length [m]."""
@@ -83,14 +84,14 @@ class Spiral:
         return self._start * s + self._growth * s**2 / 2.0
 
     def _steps(self, begin: np.ndarray, length: np.ndarray) -> np.ndarray:
-        """Returns (N, 2) from s = begin (N,) on, over lengths (N,) [m]."""
+        """Returns displacements (N, 2) from `begin` over lengths (N,) [m]."""
         u = _integral(lambda s: np.cos(self._heading(s)), begin, length)
         v = _integral(lambda s: np.sin(self._heading(s)), begin, length)
         return np.stack([u, v], axis=1)
 
 
 class Cubic:
-    """A curve of two cubic polynomials of a parameter p."""
+    """A curve given by two cubic polynomials u(p) and v(p)."""
 
     def __init__(
         self,
@@ -104,12 +105,12 @@ class Cubic:
         """Prepares the arc length.
 
         Args:
-            u, v: four coefficients of each coordinate, of p^0 first [m].
+            u, v: four coefficients of each coordinate, that of p^0 first [m].
             last: p at the end.
             length: length of the curve in the file [m].
-            by_parameter: whether p is the distance itself.
-            stretched: whether the whole curve is stretched to that length; else
-                it ends where the length is reached.
+            by_parameter: whether p is the distance along the curve.
+            stretched: whether the whole curve is stretched to `length`;
+                otherwise it ends where `length` is reached.
         """
         self._u, self._v = (np.polynomial.Polynomial(one) for one in (u, v))
         self._du, self._dv = self._u.deriv(), self._v.deriv()
@@ -140,7 +141,7 @@ class Cubic:
         return _integral(self._speed, begin, size)
 
     def _parameter(self, arc: np.ndarray) -> np.ndarray:
-        """Returns the parameter at an arc length, by Newton's rule."""
+        """Returns the parameter at an arc length, by Newton's method."""
         index = np.clip(
             np.searchsorted(self._reached, arc, side="right") - 1,
             0,
@@ -161,9 +162,10 @@ Shape = Arc | Spiral | Cubic
 
 @dataclass(frozen=True)
 class Piece:
-    """One element of a plan view, from s on along the road [m].
+    """One element of a road's plan view, beginning at s [m].
 
-    Its shape is in the frame of its first point in the world [m, rad].
+    x, y and heading are those of its first point in the world [m, rad]. Its
+    shape is in the frame of this point.
     """
 
     s: float
@@ -174,7 +176,7 @@ class Piece:
     shape: Shape
 
     def evaluate(self, s: np.ndarray) -> np.ndarray:
-        """Returns (N, 3) x, y [m] and heading [rad] along the road."""
+        """Returns (N, 3) x, y [m] and heading [rad] at distances (N,) [m]."""
         u, v, turn = self.shape.evaluate(s - self.s).T
         c, sine = math.cos(self.heading), math.sin(self.heading)
         return np.stack(
@@ -188,10 +190,10 @@ class Piece:
 
 
 class Cubics:
-    """A function of the distance, piece by piece a cubic polynomial."""
+    """A piecewise cubic function of the distance along the road."""
 
     def __init__(self, rows: Sequence[Sequence[float]] = ()):
-        """Takes rows of a start and four coefficients, of ds^0 first."""
+        """Takes rows: a piece's start and four coefficients, of ds^0 first."""
         table = np.array(sorted(rows, key=lambda row: row[0]), dtype=float)
         self._table = table.reshape(-1, 5)
 
@@ -206,10 +208,10 @@ class Cubics:
     def at(
         self, s: np.ndarray, inside: np.ndarray, is_slope: bool = False
     ) -> np.ndarray:
-        """Returns the values (N,) at distances (N,), or the slopes there.
+        """Returns the values (N,), or the slopes, at distances (N,) [m].
 
-        `inside` selects the piece of each place: it differs from `s` [m] on
-        both sides of a joint.
+        `inside` (N,) selects the piece for each distance. At a joint it lies
+        slightly on one side, where `s` is the joint itself.
         """
         if not self:
             return np.zeros(len(s))
@@ -220,7 +222,7 @@ class Cubics:
         for power in range(is_slope, 4):
             factor = power if is_slope else 1
             value += factor * rows[:, 1 + power] * ds ** (power - is_slope)
-        # Before the first piece there is no value.
+        # Before the first piece, the value is 0.
         return np.where(index < 0, 0.0, value)
 
     def bend(self, start: float, end: float) -> float:
@@ -235,13 +237,13 @@ class Cubics:
         )
 
 
-# A function without a value anywhere.
+# A function that is 0 everywhere.
 NOWHERE = Cubics()
 
 
 @dataclass(frozen=True)
 class MarkLine:
-    """One line of a mark whose measures the file has.
+    """One line of a road mark, with its measures from the file.
 
     Attributes:
         aside: distance from the border of the lane, positive to the left [m].
@@ -260,10 +262,11 @@ class MarkLine:
 
 @dataclass(frozen=True)
 class RoadMark:
-    """A line painted on the border of a lane, in a colour of the file.
+    """A mark painted on the border of a lane.
 
-    It begins at `start` along the road [m]. A kind is such as `solid broken`;
-    without lines, those usual for it are meant, each with the width [m].
+    It begins at `start` along the road [m]. The kind is a text such as `solid
+    broken`, and the colour that in the file. Without `lines`, the mark has the
+    lines that are usual for its kind, each with the width `width` [m].
     """
 
     start: float
@@ -275,14 +278,16 @@ class RoadMark:
 
 @dataclass(frozen=True)
 class Lane:
-    """A lane of a section, of a type such as driving.
+    """A lane of a road section, of a type such as driving.
 
-    Numbers count from the middle outwards, positive on the left. A lane has a
-    width over the distance along the road, or a border: the distance of its
-    outer edge from the middle. Its edges stand at heights above the road, where
-    the file has any; `height` is the greatest one of its inner edge [m]. It may
-    be level across where the road is banked, and its traffic may be reversed.
-    Marks are on its outer border, one after the other.
+    Numbers count from the middle of the road outwards, positive on the left. A
+    lane has either a width or a border, as functions of the distance along the
+    road; the border is the distance of its outer edge from the middle.
+    `inner_height` and `outer_height` are heights of its edges above the road,
+    if the file has any, and `height` is the greatest `inner_height` [m]. A lane
+    may be level across where the road is banked (`is_level`), and its traffic
+    may be reversed (`is_reversed`). Marks are on its outer border, one after
+    the other.
     """
 
     number: int
@@ -299,9 +304,9 @@ class Lane:
 
 @dataclass(frozen=True)
 class LaneSection:
-    """A stretch of road with the same lanes, from start to end [m].
+    """A stretch of road with the same lanes, from `start` to `end` [m].
 
-    The middle one is not among its lanes by number, but has marks.
+    `lanes` are by number, without the middle lane 0, which has only marks.
     """
 
     start: float
@@ -315,16 +320,18 @@ class Thing(NamedTuple):
 
     Attributes:
         name: unique in the network.
-        is_signal: whether it is a signal, and not an object.
-        kind: type of the thing, in small letters.
+        is_signal: whether it is a signal; otherwise it is an object.
+        kind: type of the thing, in lower case.
         s, t: place along and across the road [m].
         z: height above the road [m].
         heading: heading relative to that of the road [rad].
-        size: length, width, height; 0 where unknown [m].
-        outline: (N, 3) corners about the place, or none: u, v, height; or
-        road_outline: (N, 3) corners s, t, height; or none [m].
+        size: length, width and height; 0 where unknown [m].
+        outline: (N, 3) corners u, v and height, relative to the place [m]; None
+            without.
+        road_outline: (N, 3) corners s, t and height [m]; None without.
         is_dynamic: whether it has changing states, as lights have.
-        faces_back: whether it is for the traffic against the road.
+        faces_back: whether it is for traffic in the opposite direction of the
+            road.
     """
 
     name: str
@@ -343,13 +350,22 @@ class Thing(NamedTuple):
 
 @dataclass(frozen=True)
 class ImportedRoad:
-    """A road; its name is its id in letters, digits, dots and dashes, unique.
+    """A road of a network.
 
-    Pieces of its course follow one another, as do sections, stretches with the
-    same lanes. The middle of the lanes lies `lane_offset` [m] to the left of
-    the reference line, which has a height [m] and a roll [rad]. Limits are
-    pairs of start and value of a speed limit [m, m/s]; spans are `bridge` or
-    `tunnel` for each of them that the file has on it.
+    Attributes:
+        name: its id, in letters, digits, dots and dashes, and unique.
+        junction: name of its junction; None for none.
+        length: its length [m].
+        pieces: pieces of its course, one after the other.
+        elevation, superelevation: height [m] and roll [rad] of the reference
+            line.
+        lane_offset: distance from the reference line to the left to the middle
+            of the lanes [m].
+        sections: stretches with the same lanes, one after the other.
+        keeps_left: whether traffic keeps left.
+        limits: start and value of each speed limit [m, m/s].
+        things: signals and objects.
+        spans: `bridge` or `tunnel`, for each of them on the road in the file.
     """
 
     name: str
@@ -368,7 +384,8 @@ class ImportedRoad:
     def reference(self, s: np.ndarray, inside: np.ndarray) -> np.ndarray:
         """Returns (N, 5) x, y, z, heading and roll of the reference line.
 
-        For distances (N,) along the road [m], see `Cubics.at`.
+        `s` (N,) are distances along the road [m]; for `inside`, see
+        `Cubics.at`.
         """
         starts = np.array([piece.s for piece in self.pieces])
         index = np.searchsorted(starts, inside, side="right") - 1
@@ -385,9 +402,10 @@ class ImportedRoad:
     def points(
         self, s: np.ndarray, inside: np.ndarray, t: np.ndarray
     ) -> np.ndarray:
-        """Returns (N, 3) places t (N,) to the left of the reference line [m].
+        """Returns places (N, 3) that lie t (N,) left of the reference line [m].
 
-        For distances (N,) along the road [m], see `Cubics.at`.
+        `s` (N,) are distances along the road [m]; for `inside`, see
+        `Cubics.at`.
         """
         x, y, z, heading, roll = self.reference(s, inside).T
         across = t * np.cos(roll)
@@ -405,8 +423,8 @@ class ImportedRoad:
 class RoadMap:
     """All roads of a file, in its order.
 
-    The reference system has the name that the file gives it. The origin is that
-    of the world, in coordinates of this system [m].
+    The reference system has the name that is in the file. The origin is that of
+    the world, in coordinates of the reference system [m].
     """
 
     roads: tuple[ImportedRoad, ...]

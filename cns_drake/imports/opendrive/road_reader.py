@@ -1,8 +1,9 @@
 """Reads roads from an OpenDRIVE file.
 
-The import joins lanes where they meet and does not use the links of roads,
-lanes and junctions. A link to something that is not in the file is still
-reported as a fault."""
+The import joins lanes at their ends, and does not use the links of roads, lanes
+and junctions. Yet a link to something that is not in the file is reported as a
+fault.
+"""
 
 from collections.abc import Iterable, Iterator, Mapping
 import contextlib
@@ -20,29 +21,30 @@ from cns_drake.imports.opendrive import road_model
 from cns_drake.imports.opendrive.things import read_things
 from cns_drake.imports.options import ImportFaults
 
-# Width of a painted line without a plausible one [m].
+# Width of a painted line without a plausible width, and greatest plausible one
+# [m].
 _MARK_WIDTH, _WIDEST_MARK = 0.12, 1.0
-# Shortest distance between the starts of two dashes [m].
+# Least distance between the starts of two dashes [m].
 _CLOSEST_DASHES = 0.1
 _ENDS = ("predecessor", "successor")
 _UNITS = {"m/s": 1.0, "km/h": 1 / 3.6, "mph": 0.44704}
-# Longer networks, such as whole countries, are refused [m].
+# Larger networks, such as whole countries, are refused [m].
 _LARGEST = 20_000.0
 _LONGEST_ROAD = 100_000.0
 _LONGEST_TOGETHER = 2_000_000.0
-# Roads farther from the origin are moved to it [m].
+# Roads farther from the origin than this are moved to it [m].
 _FAR = 10_000.0
-# Lengths that differ by less are equal [m].
+# Lengths that differ by less than this are equal [m].
 _ROUNDING = 0.01
-# Greatest width of a lane, and curvature of a curve [m, 1/m].
+# Greatest width of a lane, and greatest curvature of a curve [m, 1/m].
 _WIDEST = 100.0
 _SHARPEST = 100.0
 _SHORTEST = 1e-5
-# No kerb is higher [m].
+# Greatest height of a kerb [m].
 _HIGHEST_LANE = 1.0
-# Banked test tracks have up to 49 deg [rad].
+# Greatest roll of a road; banked test tracks have up to 49 deg [rad].
 _MOST_BANKED = math.radians(50.0)
-# Longest part of a name that is used in other names.
+# Names are cut to this length where they become part of other names.
 _LONGEST_NAME = 60
 
 
@@ -51,8 +53,8 @@ def read_marks(
 ) -> list[road_model.RoadMark]:
     """Returns the marks of a lane, in their order along the road.
 
-    Its section begins at a start [m]. Marks whose lines are not usable are
-    counted.
+    Its section begins at `start` [m], and `road` names the road for the faults.
+    Marks whose lines are not usable are counted.
 
     Raises:
         ValueError: naming line and fault, if a text is not a number.
@@ -83,13 +85,13 @@ def _mark_lines(
 ) -> list[road_model.MarkLine] | None:
     """Returns the lines of a mark (ASAM OpenDRIVE 1.7, 11.9.3).
 
-    A line without a plausible width has the usual one [m]. There are none if
-    one has lengths that cannot be.
+    A line without a plausible width has the usual one [m]. The result is None
+    if a line has impossible lengths.
     """
     found = []
     for one in mark.all("type", "line"):
         dash, gap = one.number("length", 0.0), one.number("space", 0.0)
-        # Programs write both as 0 for a line without gaps.
+        # Programs write 0 for both in a line without gaps.
         if min(dash, gap) < 0.0 or (gap > 0.0 and dash == 0.0):
             return None
         if gap > 0.0 and dash + gap < _CLOSEST_DASHES:
@@ -102,7 +104,7 @@ def _mark_lines(
 
 
 def count_dangling_links(top: Element, faults: ImportFaults) -> None:
-    """Counts a file's links to objects that it does not contain."""
+    """Counts links in a file to objects that the file does not contain."""
     roads = {one.attrib.get("id", ""): one for one in top.all("road")}
     junctions = {one.attrib.get("id", "") for one in top.all("junction")}
     for name, road in roads.items():
@@ -135,7 +137,7 @@ _KNOWN = parse_yaml(Path(__file__).with_name("unread.yaml").read_bytes())
 def count_unread(element: Element, faults: ImportFaults, name: str) -> None:
     """Counts what is not read although it would change the road map.
 
-    The name is that of the road or junction around an element.
+    `name` is that of the road or junction that contains the element.
     """
     known = _KNOWN["elements"].get(element.tag)
     for key, usual in _KNOWN["attributes"].get(element.tag, {}).items():
@@ -157,7 +159,7 @@ def count_unread(element: Element, faults: ImportFaults, name: str) -> None:
 
 
 def _linked(road: Element, end: str) -> tuple[str, str | None]:
-    """Returns kind and id of the link at an end of a road, if any."""
+    """Returns kind and id of the link at an end of a road; None if none."""
     link = road.first("link", end)
     if link is None:
         return "road", None
@@ -168,7 +170,7 @@ def _linked(road: Element, end: str) -> tuple[str, str | None]:
 def _dangling_lanes(
     road: Element, roads: Mapping[str, Element]
 ) -> Iterator[Element]:
-    """Yields the links of a road's lanes to lanes that are not there."""
+    """Yields the links of a road's lanes to lanes that do not exist."""
 
     def sections(one: Element) -> list[Element]:
         found = list(one.all("lanes", "laneSection"))
@@ -183,7 +185,7 @@ def _dangling_lanes(
         for end, at in zip(_ENDS, (k - 1, k + 1), strict=True):
             if 0 <= at < len(own):
                 beside = [own[at]]
-                # One side of the road may go on through others.
+                # One side of a road may continue through others.
                 while _is_single_sided(own[at]) and 0 < at < len(own) - 1:
                     at += 1 if end == "successor" else -1
                     beside.append(own[at])
@@ -191,8 +193,7 @@ def _dangling_lanes(
                 kind, linked = _linked(road, end)
                 if kind != "road" or linked is None or linked not in roads:
                     continue
-                # The link names the end of the other road, which some files
-                # omit.
+                # The link names the end of the other road; some files omit it.
                 others = sections(roads[linked])
                 beside = others[:1] + others[-1:]
             there = {
@@ -205,7 +206,7 @@ def _dangling_lanes(
 
 
 def read_roads(path: Path, faults: ImportFaults) -> road_model.RoadMap:
-    """Reads all roads of a file.
+    """Returns all roads of a file.
 
     Raises:
         InputError: naming file, road, line and fault, if the file cannot be
@@ -257,10 +258,10 @@ def read_roads(path: Path, faults: ImportFaults) -> road_model.RoadMap:
 
 
 def _check_ids(elements: Iterable[Element]) -> None:
-    """Checks that elements of a kind have different ids.
+    """Checks that all elements of a kind have different ids.
 
     Raises:
-        ValueError: naming id and lines, if two have the same.
+        ValueError: naming id and lines, if two are the same.
     """
     lines: dict[str, int] = {}
     for one in elements:
@@ -274,7 +275,7 @@ def _check_ids(elements: Iterable[Element]) -> None:
 
 
 def _plain(own: str, taken: set[str]) -> str:
-    """Returns a new name of letters, digits, dots and dashes."""
+    """Returns a new, unique name of letters, digits, dots and dashes."""
     stem = _stem(own)
     name, number = stem, 1
     while name in taken:
@@ -284,7 +285,7 @@ def _plain(own: str, taken: set[str]) -> str:
 
 
 def _stem(own: str) -> str:
-    """Returns an id in letters, digits, dots and dashes."""
+    """Returns an id reduced to letters, digits, dots and dashes."""
     return re.sub(r"[^0-9A-Za-z.-]+", "-", own)[:_LONGEST_NAME] or "unnamed"
 
 
@@ -372,7 +373,7 @@ def _pieces(
 
 
 def _shape(geometry: Element, length: float) -> road_model.Shape:
-    """Returns the curve of a geometry.
+    """Returns the curve of a `geometry` element.
 
     Raises:
         ValueError: if it has no curve, or one that is too sharp.
@@ -390,7 +391,8 @@ def _shape(geometry: Element, length: float) -> road_model.Shape:
             shape = road_model.Spiral(*ends, length)
         elif one.tag == "poly3":
             v = [one.number(k) for k in "abcd"]
-            # Where the curve has the file's length, u is not beyond it.
+            # At the curve's length in the file, u is not greater than that
+            # length.
             shape = road_model.Cubic(
                 (0, 1, 0, 0), v, length, length, stretched=False
             )
@@ -421,7 +423,7 @@ def _cubics(
 
 
 def _steps(rows: Iterable[tuple[float, float]]) -> road_model.Cubics:
-    """Returns values that hold from their starts on."""
+    """Returns a step function; each row is a start and the value from there."""
     return road_model.Cubics([(*row, 0.0, 0.0, 0.0) for row in rows])
 
 
@@ -456,7 +458,7 @@ def _sections(
             for mark in read_marks(element, start, name, faults)
         ]
         if _is_single_sided(one):
-            # The lanes of the other side go on.
+            # The lanes of the other side continue.
             sides = {number > 0 for number in lanes}
             lanes |= {k: v for k, v in before.items() if (k > 0) not in sides}
         before = lanes
@@ -514,7 +516,7 @@ def _lane(
 
 
 def _limits(road: Element) -> Iterator[tuple[float, float]]:
-    """Yields start [m] and value [m/s] of speed limits."""
+    """Yields the start [m] and the value [m/s] of each speed limit."""
     for one in road.all("type"):
         speed = one.first("speed")
         if speed is None:

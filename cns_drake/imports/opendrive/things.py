@@ -1,4 +1,4 @@
-"""Signals and objects beside the roads of OpenDRIVE, and their structures."""
+"""Signals and objects beside OpenDRIVE roads, as structures."""
 
 from collections.abc import Iterator
 import math
@@ -20,10 +20,11 @@ from cns_drake.imports.opendrive.road_model import ImportedRoad, Thing
 from cns_drake.imports.options import ImportFaults
 
 _MOST_REPEATS = 10_000
-# An object repeated without a distance is cut into pieces of this length [m].
+# An object that is repeated without a distance is divided into pieces of this
+# length [m].
 _PIECE = 4.0
 _LARGEST = 1000.0  # [m]
-# These are painted, or flat on the ground.
+# Things of these types are painted, or flat on the ground.
 _FLAT = ("crosswalk", "roadmark", "patch", "parkingspace", "none.flat")
 _LEAST_HEIGHT = 0.05
 _LEAST_SIDE = 0.05
@@ -120,7 +121,7 @@ def _repeated(
         )
         return
     for k in range(max(count, 1)):
-        # A wall becomes pieces, each centred on its own middle.
+        # A wall becomes pieces, each with the origin in its middle.
         at = k * step if distance > 0.0 else (k + 0.5) * length / max(count, 1)
         part = min(1.0, at / length) if length > 0.0 else 0.0
 
@@ -148,7 +149,8 @@ def thing_structures(
 ) -> Iterator[Structure]:
     """Yields structures of the signals and objects beside a road.
 
-    No sign stands in the area of all lanes. Things left out are counted.
+    `lanes` is the area of all lanes, in which no sign stands. Things that are
+    left out are counted.
     """
     for thing in road.things:
         if not 0.0 <= thing.s <= road.length + 1.0:
@@ -166,7 +168,8 @@ def thing_structures(
             facing = heading + thing.heading
             facing += 0.0 if thing.faces_back else _HALF_TURN
             if thing.is_dynamic:
-                # The front of traffic lights is their left side.
+                # The front of traffic lights in the file is their left side
+                # here.
                 facing -= _HALF_TURN / 2.0
             one = Structure(
                 name,
@@ -198,7 +201,7 @@ def thing_structures(
 def _place(
     road: ImportedRoad, thing: Thing
 ) -> tuple[float, float, float, float]:
-    """Returns x, y, z [m] of a thing's foot, and the road's heading there."""
+    """Returns x, y, z [m] of a thing's foot, and the heading of the road."""
     s = np.array([min(thing.s, road.length)])
     inside = np.clip(s, 1e-6, road.length - 1e-6)
     x, y, z = road.points(s, inside, np.array([thing.t]))[0].tolist()
@@ -208,7 +211,7 @@ def _place(
 
 
 def _by_type(kind: str, table: str, otherwise: str) -> str:
-    """Returns the name in a table for the beginning of a type."""
+    """Returns the name in a table whose beginnings match a type."""
     for name, beginnings in TYPES[table].items():
         if kind.startswith(tuple(beginnings)):
             return str(name)
@@ -222,7 +225,7 @@ def _solid(
     place: tuple[float, float, float, float],
     faults: ImportFaults,
 ) -> Structure | None:
-    """Returns an object raised from its outline; None without an outline."""
+    """Returns an object extruded from its outline; None without an outline."""
     x, y, z, heading = place
     length, width, high = thing.size
     if thing.road_outline is not None:

@@ -1,10 +1,11 @@
-"""A town on an imported road network, with its marks, and its files.
+"""Builds a town on an imported road network, and writes its files.
 
-ASAM OpenDRIVE 1.7, 11.9: a mark lies on the outer border of its lane, that of
-lane 0 on the middle; double lines are listed from the inside out, those of the
-middle from left to right. A line on the border of two lanes lies half on each
-of them. Where one of them is no carriageway, the import moves the line off the
-stones of the kerb, below which half of it would lie.
+Road marks follow ASAM OpenDRIVE 1.7, 11.9. The mark of a lane lies on the
+lane's outer border, and the mark of lane 0 in the middle of the road. Double
+lines are listed from the inside outwards; those of the middle are listed from
+left to right. A line on the border of two lanes lies half on each of them. If
+one of these lanes is no carriageway, half of the line would be hidden below the
+kerb stones, so the import moves the line off them.
 """
 
 from collections import Counter, defaultdict
@@ -47,16 +48,16 @@ from cns_drake.imports.opendrive.road_reader import read_roads
 from cns_drake.imports.opendrive.things import thing_structures
 from cns_drake.imports.options import ImportFaults, ImportReport
 
-# Edges of carriageways and of lanes differ by less than this, which is also
+# The edges of carriageways and of lanes differ by less than this, which is also
 # the distance of lines from a kerb [m].
 _SLACK = 0.02
-# Beside its very end a border is looked at this far from it [m].
+# The end of a border is tested this far inwards [m].
 _INWARDS = 0.05
-# Lines are cut with the carriageway of one such square at a time [m].
+# Lines are cut with one such square of the carriageway at a time [m].
 _SQUARE = 64.0
 _MM = 0.001
-# Default length of a dash and its gap; distance from the middle of a double
-# line to its lines; height above the road [m].
+# Default length of a dash and of its gap; distance of the lines of a double
+# line from its middle; height above the road [m].
 _DASH, _GAP = 3.0, 6.0
 _ASIDE = 0.12
 _ABOVE = 0.015
@@ -81,13 +82,13 @@ def moved_off_kerbs(
 ) -> np.ndarray:
     """Returns how far (N,) lines are moved to the left to leave a kerb [m].
 
-    Where only one side of a border of lanes, places (N, 3), is carriageway,
-    they lie on that side. Unit vectors (N, 2) lead to its left, and `reach` is
-    how far the lines extend to its left and right [m]. The carriageway is
-    prepared.
+    Where only one side of a border, places (N, 3), is carriageway, the lines
+    are moved to that side. Unit vectors `left` (N, 2) lead to its left. `reach`
+    is how far the lines extend to its left and right [m]. The carriageway must
+    be prepared (Shapely).
     """
     xy = border[:, :2].copy()
-    # A kerb may cross the very end.
+    # A kerb may cross the border right at its end.
     for end, beside in ((0, 1), (-1, -2)):
         step = xy[beside] - xy[end]
         xy[end] += step * min(0.5, _INWARDS / max(np.hypot(*step), _INWARDS))
@@ -98,20 +99,21 @@ def moved_off_kerbs(
     moved = np.zeros(len(border))
     moved[on_left & ~on_right] = reach[1] + _SLACK
     moved[on_right & ~on_left] = -reach[0] - _SLACK
-    # Lines come back to their border only behind the end of a kerb.
+    # Lines return to their border only behind the end of a kerb.
     near = np.append(0.0, moved[:-1]) + np.append(moved[1:], 0.0)
     return np.where(moved == 0.0, near, moved)
 
 
 def as_triangles(quads: np.ndarray) -> np.ndarray:
-    """Returns quads (K, 4, 3) as triangles (2 K, 3, 3)."""
+    """Returns quadrilaterals (K, 4, 3) as triangles (2 K, 3, 3)."""
     return quads[:, [0, 1, 2, 0, 2, 3]].reshape(-1, 3, 3)
 
 
 def on_carriageway(quads: np.ndarray, carriageway: BaseGeometry) -> np.ndarray:
-    """Returns the parts of quads (K, 4, 3) on a prepared carriageway [m].
+    """Returns the parts of quadrilaterals (K, 4, 3) on a carriageway [m].
 
-    They are triangles (M, 3, 3), cut as seen from above.
+    They are triangles (M, 3, 3), cut as seen from above. The carriageway must
+    be prepared (Shapely).
     """
     outlines = np.asarray(shapely.polygons(quads[..., :2]))
     inside = shapely.contains_properly(carriageway, outlines)
@@ -132,7 +134,10 @@ def on_carriageway(quads: np.ndarray, carriageway: BaseGeometry) -> np.ndarray:
 
 
 def _raised(flat: np.ndarray, quad: np.ndarray) -> np.ndarray:
-    """Returns triangles (M, 3, 2) at the heights of a quad (4, 3) [m]."""
+    """Returns triangles (M, 3, 3): flat ones at the heights of a quad [m].
+
+    `flat` is (M, 3, 2), and `quad` (4, 3).
+    """
     middle = quad.mean(axis=0)
     slope = np.linalg.lstsq(
         (quad - middle)[:, :2], quad[:, 2] - middle[2], rcond=None
@@ -147,11 +152,15 @@ def road_marks(
     heights: Callable[[np.ndarray], np.ndarray] | None = None,
     carriageway: BaseGeometry | None = None,
 ) -> Iterator[Structure]:
-    """Yields the marks of each road, whose names begin with a prefix.
+    """Yields the marks of each road as a structure.
 
-    Heights give the ground's at (N, 2) places [m]; marks lie on the borders of
-    lanes without them. They do not leave a carriageway with kerbs all around,
-    if there is one.
+    Args:
+        prefix: beginning of the structures' names.
+        bands: the lanes of the roads.
+        heights: returns the heights of the ground at (N, 2) places [m]; without
+            it, marks have the heights of the lanes' borders.
+        carriageway: area with kerbs all around, which marks do not leave; None
+            for none.
     """
     if carriageway is not None:
         shapely.prepare(carriageway)
@@ -162,7 +171,7 @@ def road_marks(
         section = band.road.sections[band.section]
         lines = [(band.outer, band.lane.marks, float(band.lane.number))]
         if band.lane.number == (-1 if -1 in section.lanes else 1):
-            # On the middle, the second line is on the right.
+            # In the middle, the second line is on the right.
             lines.append((band.inner, section.middle_marks, -1.0))
         for border, marks, side in lines:
             for colour, quads in _painted(
@@ -210,10 +219,15 @@ def _painted(
     end: float,
     carriageway: BaseGeometry | None,
 ) -> Iterator[tuple[str, np.ndarray]]:
-    """Yields colours, and the quads (K, 4, 3) on a border (N, 3) [m].
+    """Yields the colour of marks on a border, and their quads (K, 4, 3) [m].
 
-    The road has headings (N,) at distances s (N,) along it [rad, m]; its last
-    mark ends at `end`. The side is positive if outwards is to the left.
+    Args:
+        border: (N, 3) places on the border [m].
+        s, heading: (N,) distance along the road, and heading there [m, rad].
+        marks: marks on the border, one after the other.
+        side: positive if the left of the border is outwards.
+        end: where the last mark ends [m].
+        carriageway: area that marks do not leave; None for none.
     """
     left = np.stack([-np.sin(heading), np.cos(heading)], axis=1)
     ends = [*(mark.start for mark in marks[1:]), end][: len(marks)]
@@ -236,9 +250,9 @@ def _painted(
 
 
 def _lines(mark: RoadMark, side: float) -> Sequence[MarkLine]:
-    """Returns the lines of a mark, as the file has them or usual ones.
+    """Returns the lines of a mark, from the file or else the usual ones.
 
-    The side is positive if outwards is to the left.
+    `side` is positive if the left of the border is outwards.
     """
     styles = [word for word in mark.kind.split() if word in _STYLES]
     if mark.lines and (styles or mark.kind == "custom"):
@@ -275,7 +289,7 @@ def _stripe(
     limits: tuple[float, float],
     width: float,
 ) -> np.ndarray:
-    """Returns a stretch of a line as (K, 4, 3), seen from above [m]."""
+    """Returns a stretch of a line as quads (K, 4, 3), seen from above [m]."""
     a, b = max(limits[0], s[0]), min(limits[1], s[-1])
     if b - a < _SHORTEST:
         return np.zeros((0, 4, 3))
@@ -293,21 +307,21 @@ def _stripe(
     )
 
 
-# Height of sidewalks by default [m].
+# Default height of sidewalks [m].
 _KERB = 0.1
 _KERBS = (0.03, 0.3)
-# Largest ground that the generator fills [m^2, m].
+# Greatest area that the generator fills with ground [m^2, m].
 _LARGEST_AREA = 8e6
 _LONGEST_SIDE = 9000.0
-# Cars in parking lanes: length of a bay, share of taken bays, and least width
-# of a lane [m].
+# Parking lanes: least and greatest length of a bay, share of the bays that are
+# taken, and least width of the lane [m].
 _BAY = (5.8, 7.4)
 _FILL = 0.6
 _BAY_WIDTH = 1.9
 _CROWN = 1.5  # [m]
-# Limits of the speed of a drive [m/s].
+# Least and greatest speed of a drive [m/s].
 _SPEEDS = (3.0, 12.0)
-# Classes in the picture from above; small things would not show.
+# Classes that the picture from above shows; small things could not be seen.
 _SHOWN = (
     "road",
     "parking",
@@ -320,10 +334,10 @@ _SHOWN = (
 
 @dataclass(frozen=True)
 class Town:
-    """A town in all its stages, and the counts of its import.
+    """A town at all its stages, and the counts of its import.
 
-    Streets are on the ground, and there are at most two drives. The text of the
-    file of lanes is None without lanes for traffic.
+    `streets` are those on the ground. There are at most two drives. `lanes` is
+    the text of the lane file; None if there are no lanes for traffic.
     """
 
     roads: RoadMap
@@ -343,9 +357,9 @@ def build_town(
     progress: Callable[[str], None] = lambda line: None,
     dressed: bool = False,
 ) -> Town:
-    """Returns a town that is built along the roads of a file.
+    """Returns a town built along the roads of a file.
 
-    The road marks of the file are painted only in a dressed town.
+    Road marks of the file are painted only if the town is dressed.
 
     Raises:
         InputError: if the file cannot be used.
@@ -464,9 +478,9 @@ def _build(
 def _count_spans(
     roads: RoadMap, raised: Set[str], faults: ImportFaults
 ) -> None:
-    """Counts the bridges and tunnels of a file that are not built.
+    """Counts bridges and tunnels in a file that are not built.
 
-    Raised roads pass over others on decks.
+    `raised` are roads that pass over others, on decks that are built.
     """
     for road in roads.roads:
         for span in road.spans:
@@ -490,7 +504,7 @@ def _kerb(bands: Sequence[LaneBand]) -> float:
 def _park(
     draft: Draft, bands: Sequence[LaneBand], cars: dict[str, float]
 ) -> None:
-    """Parks cars in parking lanes, facing with the traffic."""
+    """Parks cars in parking lanes, facing in the direction of traffic."""
     for band in bands:
         if band.kind != "parking" or band.width.min() < _BAY_WIDTH:
             continue
@@ -542,7 +556,7 @@ def write_town(
     """Writes all files of a town to its folder, which has the map's name.
 
     Returns:
-        What was imported; stage -> its numbers of structures and triangles.
+        What was imported, and stage -> its numbers of structures and triangles.
 
     Raises:
         InputError: if it has more structures than instance ids can count.
@@ -615,13 +629,13 @@ def write_town(
 
 
 def _seen_from_above(structures: Iterable[Structure]) -> Iterable[Imported]:
-    """Yields footprints as triangles."""
+    """Yields the footprints of structures as flat triangles."""
     for one in structures:
         if one.semantic_class not in _SHOWN:
             continue
         area = one.footprint_W
         if one.semantic_class == "vegetation":
-            # About the size of the crown.
+            # About the radius of the crown.
             area = area.buffer(_CROWN)
         pieces = polygons_of(area)
         cut = shapely.constrained_delaunay_triangles(

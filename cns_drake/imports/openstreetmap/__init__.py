@@ -1,1 +1,1 @@
-"""OpenStreetMap: a file's buildings, streets and land as a city."""
+"""Makes a city of the buildings, streets and land in OpenStreetMap files."""

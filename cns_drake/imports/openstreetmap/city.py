@@ -1,6 +1,6 @@
 """OpenStreetMap: buildings, streets, trees and land as structures.
 
-OpenStreetMap has no heights above sea level: the ground is level.
+OpenStreetMap has no heights above sea level, so the ground is level.
 https://wiki.openstreetmap.org/wiki/Simple_3D_Buildings
 """
 
@@ -46,19 +46,19 @@ from cns_drake.imports.openstreetmap.tags import (
 )
 from cns_drake.imports.options import ImportFaults
 
-# From north, clockwise.
+# Names of directions, clockwise from north.
 _COMPASS = (
     "N", "NNE", "NE", "ENE", "E", "ESE", "SE", "SSE",
     "S", "SSW", "SW", "WSW", "W", "WNW", "NW", "NNW",
 )  # fmt: skip
-# What carries a lamp that is a thing of its own.
+# Objects that carry a lamp which is an object of its own.
 _POSTS = ("pole", "straight_mast", "bent_mast", "mast")
 _TREE_DISTANCE = 8.0  # [m]
-# Sizes of barriers and trees [m].
+# Greatest sizes of barriers and trees [m].
 _TALLEST = 150.0
 _HEDGE = (0.8, 1.2)
 _WALL = (0.2, 1.6)
-# How far the sea reaches beyond the buildings [m].
+# How far the sea extends beyond the buildings [m].
 _SEA = 60.0
 # Larger areas, such as whole countries, are refused.
 _LARGEST = 20_000.0  # [m]
@@ -107,7 +107,7 @@ def make_things(features: reading.OsmFeatures, local: Local) -> Iterator[Thing]:
 
 
 def _direction(tags: reading.Tags) -> float | None:
-    """Returns the heading of a thing, if its tags have one [rad]."""
+    """Returns the heading in a thing's tags [rad]; None if they have none."""
     text = tags.get("direction", "")
     if text.upper() in _COMPASS:
         text = str(22.5 * _COMPASS.index(text.upper()))
@@ -119,15 +119,16 @@ def _direction(tags: reading.Tags) -> float | None:
 def import_openstreetmap(
     path: Path, year_attribute: str | None, dressed: bool = False
 ) -> ForeignCity:
-    """Reads a file; its origin is the middle of its buildings.
+    """Returns the city in a file; its origin is the middle of its buildings.
 
     Some things are made only for a dressed city: the sea, grounds by their
-    material, and demolished buildings without a date. Only there, bridges have
-    parapets or are left out.
+    material, and buildings demolished at an unknown date. In a dressed city,
+    bridges at ground level get parapets, and bridges over streets are left out,
+    like tunnels; otherwise all of them are streets on the ground.
 
     Raises:
-        InputError: if it cannot be read, has no building, or is larger than
-            20 km.
+        InputError: if the file cannot be read, has no building, or is larger
+            than 20 km.
     """
     features = reading.read_openstreetmap(path)
     faults = features.faults
@@ -188,10 +189,10 @@ def import_openstreetmap(
 def _without_outers(
     buildings: Iterable[reading.OsmArea], features: reading.OsmFeatures
 ) -> Iterator[reading.OsmArea]:
-    """Yields buildings without the outlines of multipolygons.
+    """Yields buildings without ways that are the outlines of multipolygons.
 
-    A way that is tagged like the multipolygon whose outline it is would fill
-    its courts.
+    If such a way has the same tags as its multipolygon, it would fill its
+    courtyards.
     """
     buildings = list(buildings)
     names = {one.name for one in buildings}
@@ -204,7 +205,7 @@ def _without_outers(
 
 
 def _no_buildings(faults: ImportFaults) -> str:
-    """Returns why a file gives no buildings."""
+    """Returns why a file has no buildings to use."""
     unfit = [
         f"{kind}: {number}, such as {example}"
         for kind, number, example in faults.rows()
@@ -220,7 +221,7 @@ def _bounds(
 ) -> tuple[np.ndarray, np.ndarray]:
     """Returns the least and the greatest longitude and latitude (2,) [deg].
 
-    Across the 180th meridian longitudes go on beyond 180.
+    If the area crosses the 180th meridian, longitudes continue beyond 180.
     """
     places = shapely.get_coordinates(
         [polygon for one in buildings for polygon in one.polygons]
@@ -235,7 +236,7 @@ def _count_unused(
     found: Iterable[Imported],
     also: AbstractSet[str],
 ) -> None:
-    """Counts things in the file without a place in the city, by kind.
+    """Counts, by kind, what in the file has no place in the city.
 
     Buildings that are left out, and the ids in `also`, are counted elsewhere.
     """
@@ -288,7 +289,7 @@ def _trees(features: reading.OsmFeatures, local: Local) -> Iterator[Imported]:
         x, y = local(np.array([place]))[0].tolist()
         needles = tags.get("leaf_type") == "needleleaved"
         model = tree(
-            # Editors give negative numbers to new things.
+            # Editors give negative numbers to new objects.
             np.random.default_rng([abs(int(name[1:]))]),
             species="spruce" if needles else "lime_tree",
             height=tag_value(
@@ -303,20 +304,20 @@ def _trees(features: reading.OsmFeatures, local: Local) -> Iterator[Imported]:
         yield Imported(structure, "Tree", None, walls)
 
 
-# What the report says about buildings that are not made as the file has them.
+# How the report counts buildings that are not made as in the file.
 TWICE = "building drawn twice, taken once"
 _NESTED = "building inside another one, taken as its part"
-# An outline lies in another one if so much of it does.
+# An outline lies in another one if this share of its area does.
 _INSIDE = 0.9
-# If parts leave less of an outline than this, they are the whole building.
+# Parts are the whole building if they cover at least this share of an outline.
 _ALL_OF_IT = 0.9
-# Remainders of an outline narrower than this are dropped [m].
+# Remainders of an outline that are narrower than this are dropped [m].
 _SLIVER = 0.25
 
 
 @dataclass(frozen=True)
 class _Block:
-    """A solid of a building: footprint, lowest and highest point, roof."""
+    """A solid of a building: footprint, lowest and highest point, roof [m]."""
 
     name: str
     tags: Tags
@@ -326,7 +327,7 @@ class _Block:
     roof: float
 
     def replaced(self, polygon: Polygon, low: float, high: float) -> _Block:
-        """Returns the remainder of this block, with a flat roof."""
+        """Returns what remains of this block, with a flat roof."""
         plain = {k: v for k, v in self.tags.items() if k != "roof:shape"}
         return _Block(self.name, plain, polygon, low, high, 0.0)
 
@@ -336,8 +337,8 @@ def standing_buildings(
 ) -> Iterator[OsmArea]:
     """Yields buildings and parts that stand, or once stood, above ground.
 
-    Demolished ones without a date are included on demand only. Others are
-    counted as faults.
+    Buildings demolished at an unknown date are included only with `with_gone`.
+    Buildings that are left out are counted as faults.
     """
     for one in areas:
         absent = why_absent(one.tags)
@@ -357,11 +358,11 @@ def make_buildings(
     faults: ImportFaults,
     once: bool = False,
 ) -> Iterator[Imported]:
-    """Yields buildings; parts replace the area that they cover.
+    """Yields buildings; their parts replace the area that they cover.
 
     Args:
         areas: outlines and parts.
-        local: turns degrees into metres.
+        local: converts degrees to metres.
         year_attribute: tag that has the year of construction; None for the
             usual ones.
         faults: counts what was repaired or omitted.
@@ -379,7 +380,7 @@ def make_buildings(
         outlines, nested = _taken_once(outlines, faults)
         parts += nested
     of_outline: dict[int, list[_Block]] = {}
-    # Parts are not of what has stood in their place.
+    # Parts do not belong to what once stood in their place.
     outlines.sort(key=lambda one: _is_gone(one.tags))
     tree_of_outlines = STRtree(
         [one.polygon for one in outlines if not _is_gone(one.tags)]
@@ -424,7 +425,7 @@ def make_buildings(
             {"roof": RED_ROOF},
             construction_year(whole.tags, year_attribute, whole.name, faults),
             year_of_date(whole.tags.get("end_date", "")),
-            # If parts look different, the first one's look counts.
+            # If parts look different, the look of the first one counts.
             tags={**blocks[0].tags, **whole.tags},
             lod=1.0,
         )
@@ -434,9 +435,9 @@ def make_buildings(
 def _taken_once(
     outlines: Sequence[_Block], faults: ImportFaults
 ) -> tuple[list[_Block], list[_Block]]:
-    """Returns the outlines of buildings, each once, and those in another's.
+    """Returns the outlines of buildings, each once, and those inside others.
 
-    Walls of both would stand in the same place, each before the other's
+    Otherwise walls of both would stand in the same place, and hide each other's
     windows.
     """
     tree = STRtree([one.polygon for one in outlines])
@@ -470,11 +471,11 @@ def _taken_once(
 
 
 def _lies_in(one: _Block, other: _Block) -> bool:
-    """Returns whether an outline lies in another one that may stand with it."""
+    """Returns whether an outline lies in another one of the same time."""
     if _is_gone(one.tags) or _is_gone(other.tags):
         return False
     dates, others = _dates(one.tags), _dates(other.tags)
-    # What has ended may have made room for the other one.
+    # One that has ended may have made room for the other.
     if dates.get("end_date") != others.get("end_date"):
         return False
     starts = {
@@ -501,9 +502,9 @@ def _is_gone(tags: Tags) -> bool:
 def _with_parts(outline: _Block, parts: list[_Block]) -> list[_Block]:
     """Returns the blocks of a building.
 
-    If parts cover an outline, they are the building. Otherwise the outline's
-    own solid fills the rest, and the parts are additions to it. That solid also
-    stands below parts that begin above the ground.
+    If the parts cover the outline, they are the building. Otherwise the
+    outline's own solid fills the rest, also below parts that begin above the
+    ground, and the parts are additions to it.
     """
     if not parts:
         return [outline]

@@ -1,9 +1,9 @@
-"""Reads the parts of an OpenStreetMap file that make a city.
+"""Reads from an OpenStreetMap file what makes a city.
 
-The reader wants nodes before ways before relations, each once, by ascending
-positive numbers. Overpass writes nodes last, or the places of ways in these,
-editors give negative numbers to new things and mark deleted ones, and files
-with a history have each version of a thing. Such a file is sorted first.
+The reader needs nodes before ways before relations, by ascending positive ids,
+and each only once. Other files are sorted first: Overpass writes nodes last, or
+the places of ways inside these; editors give negative ids to new objects and
+mark deleted ones; files with a history have each version of an object.
 """
 
 from collections.abc import Iterable, Iterator, Mapping
@@ -26,7 +26,7 @@ from cns_drake.city.geometry.polygons import hull_of
 from cns_drake.imports.openstreetmap.tags import TABLES
 from cns_drake.imports.options import ImportFaults
 
-# A negative number of a file becomes this less that number.
+# A negative id of a file becomes this number minus the id.
 _FIRST_NEW = 10**12
 _KINDS = ("Node", "Way", "Relation")
 _CHUNK = 1 << 24
@@ -38,7 +38,11 @@ def number_in_file(number: int) -> int:
 
 
 class _Thing(NamedTuple):
-    """One version of a thing; nodes have a place, others what they refer to."""
+    """One version of an object.
+
+    Its content is its place for a node, and otherwise the ids to which it
+    refers.
+    """
 
     version: int
     is_there: bool
@@ -47,12 +51,12 @@ class _Thing(NamedTuple):
 
 
 def sorted_file(path: Path, folder: Path, faults: ImportFaults) -> Path:
-    """Returns a file that can be read: the given one or a sorted copy.
+    """Returns a file that the reader can read: this one or a sorted copy.
 
     A copy is made in `folder`. Objects that are left out are counted.
 
     Raises:
-        RuntimeError, ValueError: it is no such file.
+        RuntimeError, ValueError: it is no OpenStreetMap file.
     """
     import osmium
 
@@ -130,7 +134,7 @@ def _content(one: Any) -> Any:
 
 
 def _is_sorted(path: Path) -> bool:
-    """Returns whether things have an order, and ways only numbers of nodes."""
+    """Returns whether objects are in order, and ways have only node ids."""
     last = 0, 0
     for one in _read(path):
         key = _KINDS.index(type(one).__name__), one.id
@@ -145,9 +149,10 @@ def _is_sorted(path: Path) -> bool:
 def _marked_as_deleted(
     path: Path, faults: ImportFaults
 ) -> set[tuple[int, int]]:
-    """Returns the things that an editor marks as deleted, in XML alone.
+    """Returns the objects that an editor has marked as deleted (XML only).
 
-    A remark of Overpass, such as that its time was over, is counted.
+    A remark by Overpass, such as that it ran out of time, is counted as a
+    fault.
     """
     found: set[tuple[int, int]] = set()
     remark: list[str] = []
@@ -176,7 +181,7 @@ def _marked_as_deleted(
             with path.open("rb") as stream:
                 parser.ParseFile(stream)
         except expat.ExpatError:
-            # The reader says what is wrong.
+            # Reading the file reports what is wrong.
             return set()
     if remark:
         words = " ".join("".join(remark).split())
@@ -185,7 +190,7 @@ def _marked_as_deleted(
 
 
 def _holds(path: Path, *words: bytes) -> bool:
-    """Returns whether a file holds one of the words, each of at most 8."""
+    """Returns whether a file contains any of some words of at most 8 bytes."""
     rest = b""
     with path.open("rb") as stream:
         while chunk := stream.read(_CHUNK):
@@ -197,10 +202,10 @@ def _holds(path: Path, *words: bytes) -> bool:
 
 Tags = Mapping[str, str]
 
-# The Earth's axes, WGS 84 [m].
+# Semi-axes of the Earth, WGS 84 [m].
 _SEMI_MAJOR = 6378137.0
 _FLATTENING = 1.0 / 298.257223563
-# Less than the area of a point and its rounding, some 0.01 m^2 [deg^2].
+# Smaller areas are points with rounding errors; it is about 0.01 m^2 [deg^2].
 _NO_AREA = 1e-12
 _OPEN = "whose outline does not close"
 _LETTERS = {"Node": "n", "Way": "w", "Relation": "r"}
@@ -210,10 +215,10 @@ _KIND_KEYS, _GONE, _LIFECYCLE = (
 
 
 class Local:
-    """Places in metres east and north of an origin.
+    """Converts degrees to metres east and north of an origin.
 
-    By the Earth's radii of curvature there: right to 1 in 10,000 within
-    10 km.
+    It uses the Earth's radii of curvature at the origin, which is exact to 1 in
+    10,000 within 10 km.
     """
 
     def __init__(self, longitude: float, latitude: float):
@@ -227,12 +232,12 @@ class Local:
 
     def __call__(self, places: np.ndarray) -> np.ndarray:
         offset = places - self._origin
-        # The shorter way round, also across the 180th meridian.
+        # The shorter way around the Earth, also across the 180th meridian.
         offset[..., 0] -= 360.0 * np.rint(offset[..., 0] / 360.0)
         return self.metres(offset)
 
     def metres(self, offset: np.ndarray) -> np.ndarray:
-        """Returns an offset (..., 2) in degrees as one in metres."""
+        """Returns offsets (..., 2) in degrees converted to metres."""
         return np.asarray(offset * self._metres)
 
     def polygon(self, polygon: Polygon) -> Polygon:
@@ -244,7 +249,7 @@ OsmNode = tuple[str, Tags, tuple[float, float]]
 
 
 class OsmWay(NamedTuple):
-    """A way: its id, tags, places [deg] and the numbers of its nodes."""
+    """A way: its id, tags, places (N, 2) [deg] and the ids of its nodes."""
 
     name: str
     tags: Tags
@@ -264,12 +269,17 @@ class OsmArea(NamedTuple):
 class OsmFeatures:
     """The content of a file; places are longitude and latitude [deg].
 
-    Areas are closed ways and multipolygons. A way has only those of its places
-    that are in the file. A crossing is the number of its node, with the tags;
-    `nodes` are all other nodes with tags. `outers` maps a way that is an
-    outline of a building's multipolygon to this multipolygon. All things with
-    tags have a kind. Their ids are numbers with the prefix `n` for a node, `w`
-    for a way and `r` for a relation.
+    Attributes:
+        areas: closed ways and multipolygons.
+        ways: ways, with those of their places that are in the file.
+        trees: nodes that are trees.
+        crossings: the node id of each crossing, and its tags.
+        nodes: all other nodes with tags.
+        outers: id of a way that is the outline of a building's multipolygon ->
+            id of this multipolygon.
+        kinds: id -> kind, for all objects with tags. An id is a number with the
+            prefix `n` for a node, `w` for a way and `r` for a relation.
+        faults: counts of faulty parts.
     """
 
     areas: list[OsmArea] = field(default_factory=list)
@@ -283,7 +293,7 @@ class OsmFeatures:
 
 
 def read_openstreetmap(path: Path) -> OsmFeatures:
-    """Reads a file.
+    """Returns the content of a file.
 
     Raises:
         InputError: if it cannot be read.
@@ -349,7 +359,7 @@ def read_openstreetmap(path: Path) -> OsmFeatures:
     closed = {name for name, _, _ in features.areas}
     shapeless = [name for name in wanted if name not in closed]
     if shapeless:
-        # From these closed ways the reader makes no area.
+        # Closed ways of which the reader makes no area.
         flat |= {
             way.name
             for way in features.ways
@@ -363,7 +373,7 @@ def read_openstreetmap(path: Path) -> OsmFeatures:
 
 @contextlib.contextmanager
 def _reader_errors(path: Path) -> Iterator[None]:
-    """Raises what osmium says of a file as an InputError."""
+    """Raises errors of osmium as an InputError that names the file."""
     import osmium
 
     try:
@@ -394,7 +404,7 @@ def _is_flat(outlines: Iterable[BaseGeometry]) -> bool:
 
 
 def thing_kind(tags: Tags) -> str:
-    """Returns the kind of object that the first known tag gives."""
+    """Returns the kind of object, given by the first tag that is known."""
     for key in _KIND_KEYS:
         if has_tag(tags, key):
             return f"{key}={tags[key]}"
@@ -413,7 +423,7 @@ def has_tag(tags: Tags, name: str) -> bool:
 
 
 def is_building(tags: Tags) -> bool:
-    """Returns whether tags mean a building or a part of one.
+    """Returns whether tags describe a building or a part of one.
 
     A former building with the date of its end counts, too.
     """

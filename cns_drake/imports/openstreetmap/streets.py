@@ -1,4 +1,4 @@
-"""What lies on the ground of OpenStreetMap: streets, parks, water, the sea.
+"""The ground in OpenStreetMap: streets, parks, water and the sea.
 
 https://wiki.openstreetmap.org/wiki/Map_features
 """
@@ -44,16 +44,18 @@ _BESIDE_BRIDGE = 2.0
 _SIDEWALK = 2.0
 _KERB = 0.12
 _WHITE = (0.86, 0.86, 0.84)
-# Width of the stripes of a zebra crossing, and of the gaps [m].
+# Width of the stripes of a zebra crossing and of the gaps between them; length
+# of a stripe; height above the street [m].
 _STRIPE, _STRIPE_LENGTH, _STRIPE_HEIGHT = 0.5, 3.0, 0.01
 
 
 @dataclass(frozen=True)
 class Bridges:
-    """Ids of ways for cars and people above or below the ground.
+    """Ids of ways for cars and people that are above or below the ground.
 
-    There are three kinds: bridges over another street or a railway; all other
-    bridges, which are at the level of the ground beside them; and tunnels.
+    `over_streets` are bridges over another street or a railway. `level` are all
+    other bridges, which have the height of the ground beside them. `tunnels`
+    are tunnels.
     """
 
     over_streets: AbstractSet[str] = frozenset()
@@ -66,7 +68,7 @@ class Bridges:
 
 
 def bridges_of(ways: Iterable[OsmWay], local: Local) -> Bridges:
-    """Returns the ways that are bridges and tunnels."""
+    """Returns which ways are bridges and tunnels."""
     used = [
         way
         for way in ways
@@ -94,7 +96,7 @@ def bridges_of(ways: Iterable[OsmWay], local: Local) -> Bridges:
 
 
 class Look(NamedTuple):
-    """Kind, class, colour and height [m] of what is on the ground."""
+    """Kind, class, colour and height [m] of an area on the ground."""
 
     kind: str
     semantic_class: str
@@ -110,7 +112,7 @@ _PARAPET = Look("Parapet", "fence", (0.62, 0.60, 0.57), _HIGH)
 def laid(
     name: str, look: Look, areas: Iterable[Polygon], faults: ImportFaults
 ) -> Iterator[Imported]:
-    """Yields a level surface, if the areas have any.
+    """Yields one level surface that fills areas; none if these are empty.
 
     Its name ends with that of its element in the file, for the faults.
     """
@@ -130,9 +132,9 @@ def raised(
     areas: Iterable[BaseGeometry],
     source: tuple[str, ImportFaults],
 ) -> Iterator[Imported]:
-    """Yields a solid on the ground, if the areas have any.
+    """Yields one solid on the ground that fills areas; none if these are empty.
 
-    The source is the name of its element in the file, and the faults.
+    `source` is the name of its element in the file, and the faults.
     """
     solids = [
         np.concatenate(faces.extruded(polygon, 0.0, look.z, *source))
@@ -175,7 +177,7 @@ def parapets(
 def street_surfaces(
     features: reading.OsmFeatures, local: Local, bridges: Bridges
 ) -> Iterator[Imported]:
-    """Yields carriageways, and the sidewalks and paths beside them."""
+    """Yields carriageways, sidewalks beside them, and paths."""
     faults = features.faults
     for kind, ids in (
         ("bridge over a street or railway, left out", bridges.over_streets),
@@ -221,7 +223,7 @@ def _is_elsewhere(name: str, tags: reading.Tags, bridges: Bridges) -> bool:
 def drivable_streets(
     ways: Iterable[OsmWay], local: Local, bridges: Bridges
 ) -> list[Street]:
-    """Returns the streets for cars, with the nodes where they meet."""
+    """Returns the streets for cars, with the nodes at which they meet."""
     streets = []
     for name, tags, line, nodes in ways:
         width = street_width(tags)
@@ -238,7 +240,7 @@ def drivable_streets(
 
 
 def street_places(features: reading.OsmFeatures, local: Local) -> StreetPlaces:
-    """Returns where people cross and signals stand, and ways for people."""
+    """Returns crossings, traffic signals and ways for people."""
     signals = [
         place
         for _, tags, place in features.nodes
@@ -267,7 +269,7 @@ def street_places(features: reading.OsmFeatures, local: Local) -> StreetPlaces:
 def crossing_stripes(
     features: reading.OsmFeatures, local: Local
 ) -> Iterator[Imported]:
-    """Yields the stripes of zebra crossings, a little above their street."""
+    """Yields the stripes of zebra crossings, slightly above their street."""
     marked = {number for number, tags in features.crossings if is_marked(tags)}
     for _, tags, line, nodes in features.ways:
         width = street_width(tags)
@@ -299,7 +301,7 @@ def crossing_stripes(
 def _stripes(
     place: np.ndarray, along: np.ndarray, width: float
 ) -> list[Polygon]:
-    """Returns the stripes across a street about a place."""
+    """Returns the stripes across a street, around a place."""
     left = np.array([-along[1], along[0]])
     count = max(1, int((width - _STRIPE) / (2 * _STRIPE)))
     middles = (np.arange(count) - (count - 1) / 2) * 2 * _STRIPE
@@ -331,17 +333,17 @@ _PITCH = Look("Pitch", "other-ground", _TARTAN, -0.035)
 _OF_GRASS = ("grass", "artificial_turf", "natural_grass")
 _SPORTS_ON_GRASS = ("soccer", "rugby", "american_football", "cricket")
 _SURFACES = {"sand": _SAND, "gravel": _GRAVEL, "fine_gravel": _GRAVEL}
-# Cars there are below the ground, or in a building.
+# Car parks of these kinds are below the ground or in a building.
 _NO_GROUND = ("underground", "multi-storey", "rooftop")
-# Length by which a coast that ends within the city is extended [m], and
-# distance of the probes beside it that find the sea's side.
+# A coastline that ends within the city is extended by this length. Probes
+# beside it, at this distance, find the side of the sea [m].
 _BEYOND, _BESIDE = 3000.0, 0.1
 
 
 def ground_areas(
     features: reading.OsmFeatures, local: Local, dressed: bool
 ) -> Iterator[Imported]:
-    """Yields the areas that are ground; dressed, by their material."""
+    """Yields areas on the ground; if `dressed`, by their material."""
     for name, tags, polygons in features.areas:
         look = _look(tags) if dressed else _plain_look(tags)
         if look is None or has_tag(tags, "building"):
@@ -393,7 +395,7 @@ def _pitch(tags: reading.Tags) -> Look:
 
 
 def coasts_of(ways: Iterable[OsmWay]) -> list[OsmWay]:
-    """Returns the coastlines; the land is on their left."""
+    """Returns the coastlines; land is on their left."""
     return [way for way in ways if way.tags.get("natural") == "coastline"]
 
 
@@ -403,9 +405,9 @@ def sea(
     limits: np.ndarray,
     faults: ImportFaults,
 ) -> Iterator[Imported]:
-    """Yields the sea on the right of coasts, if there is any.
+    """Yields the sea on the right of coastlines, if there is any.
 
-    Limits (2, 2) are the least and the greatest x and y of the city [m].
+    `limits` (2, 2) are the least and the greatest x and y of the city [m].
     """
     if not coasts:
         return
@@ -423,7 +425,7 @@ def sea(
 
 
 def _prolonged(line: LineString, whole: BaseGeometry) -> LineString:
-    """Returns a line with its ends within an area extended straight on."""
+    """Returns a line whose ends within an area are extended straight on."""
     points = np.array(line.coords)
     if line.is_closed:
         return line
@@ -442,7 +444,7 @@ def _prolonged(line: LineString, whole: BaseGeometry) -> LineString:
 
 
 def _is_sea(area: BaseGeometry, coasts: Sequence[LineString]) -> bool:
-    """Returns whether an area is on the right of most of its coast."""
+    """Returns whether an area is on the right of most of its coastline."""
     shapely.prepare(area)
     right = 0.0
     for coast in coasts:

@@ -21,31 +21,31 @@ _COUNT = re.compile(_NUMBER)
 _FEET_AND_INCHES = re.compile(
     rf"{_NUMBER}\s*(?:'|ft|feet|foot)\s*{_NUMBER}\s*(?:\"|in|'')?"
 )
-# Separators of lists and of ranges.
+# Separators in lists and in ranges.
 _BETWEEN = re.compile(r"\s*;\s*|(?<=[^\s;])\s*(?:-|–|\bto\b)\s*(?=[\d.,])")
 _ABOUT = re.compile(r"^\s*(?:~|≈|ca\.?|about|approx\.?)\s*")
 _QUOTES = str.maketrans({"’": "'", "′": "'", "”": '"', "″": '"'})
 STOREY = 3.0  # [m]
 LANE = 3.0  # [m]
-# Least width for two cars to pass each other [m].
+# Least width on which two cars can pass each other [m].
 _TWO_CARS = 5.0
-# Levels of a building of no known kind.
+# Number of levels of a building of unknown kind.
 _LEVELS = 3
-# Larger than any building or street: the tallest tower has 828 m.
+# Larger than any building or street: the tallest tower is 828 m high.
 _TALLEST = 850.0  # [m]
 _LOWEST = 0.1  # [m]
 _MOST_LEVELS = 170
 _WIDEST = 60.0  # [m]
 _LANES_OF_STREET = 16
-# Least width of a lane that carries any vehicle, the width that drivers use,
-# and the width of street for each lane where the file gives no number [m].
+# Least width of a lane that carries vehicles, the width that drivers use, and
+# the width of street per lane if the file gives no number of lanes [m].
 _LEAST, _USED, _USUAL = 2.75, 3.25, 3.5
 _MOST_LANES = 8
 _KM_H = 1.0 / 3.6
 _MILES_H = 0.44704
 _FASTEST = 60.0  # [m/s]
 _WALKING_PACE = 7.0 * _KM_H
-# Limit of links, such as ramps [km/h].
+# Speed limit of links, such as ramps [km/h].
 _LINKS = 50.0
 _SPEED = re.compile(r"(\d{1,3})(?:\s*(km/h|kmh|kph|mph))?")
 
@@ -53,7 +53,7 @@ _SPEED = re.compile(r"(\d{1,3})(?:\s*(km/h|kmh|kph|mph))?")
 def length(text: str | None) -> float | None:
     """Returns the length that a text states [m]; None if it states none.
 
-    If the text is a list or a range, it is the greatest length.
+    For a list or a range, it is the greatest length.
     """
     return _greatest(text, _length)
 
@@ -61,8 +61,8 @@ def length(text: str | None) -> float | None:
 def count(text: str | None) -> float | None:
     """Returns the number that a text states, such as a number of levels.
 
-    If the text is a list or a range, it is the greatest number. None if the
-    text states no number.
+    For a list or a range, it is the greatest number. It is None if the text
+    states none.
     """
     return _greatest(
         text, lambda part: _decimal(part) if _COUNT.fullmatch(part) else None
@@ -72,7 +72,7 @@ def count(text: str | None) -> float | None:
 def _greatest(
     text: str | None, read: Callable[[str], float | None]
 ) -> float | None:
-    """Returns the greatest value; None without any, or if one is None."""
+    """Returns the greatest value in a text; None unless all can be read."""
     if text is None or len(text) > 255:  # OpenStreetMap allows no more.
         return None
     plain = _ABOUT.sub("", text.translate(_QUOTES).lower())
@@ -105,16 +105,16 @@ def tag_value(
     where: tuple[str, ImportFaults] | None,
     least: float = 0.0,
 ) -> float | None:
-    """Returns the parsed value of a tag; None if it has no valid one.
+    """Returns the value of a tag; None if the tag has no valid one.
 
     Args:
         tags: tags of a map element.
         key: key of the tag.
         read: parses the text; returns None for a text that it cannot parse.
-        most, least: limits of a plausible value. Any other value is counted
-            as a fault.
-        where: name of the element, and the faults to add to; None if faults
-            are not counted.
+        most, least: limits of a plausible value. Any other value is counted as
+            a fault.
+        where: name of the element, and the faults to add to; None if faults are
+            not counted.
     """
     text = tags.get(key)
     if text is None:
@@ -132,9 +132,9 @@ def tag_value(
 def heights(
     tags: Mapping[str, str], where: tuple[str, ImportFaults] | None = None
 ) -> tuple[float, float, float]:
-    """Returns a building's lowest and highest point and its roof's height.
+    """Returns a building's lowest and highest point, and roof height [m].
 
-    All three are measured from the ground [m].
+    The first two are measured from the ground.
     """
 
     def metres(key: str, least: float = 0.0) -> float | None:
@@ -144,7 +144,7 @@ def heights(
         return tag_value(tags, key, count, _MOST_LEVELS, where, least)
 
     roof_levels = number("roof:levels")
-    # A building may have no levels if its roof has some.
+    # A building may have no levels of its own if its roof has some.
     levels = number("building:levels", 0.0 if roof_levels else 0.5)
     roof = metres("roof:height")
     if roof is None:
@@ -197,7 +197,7 @@ def why_absent(tags: Mapping[str, str]) -> str | None:
 
 
 def is_inside(tags: Mapping[str, str]) -> bool:
-    """Returns whether a small thing is in a building or underground."""
+    """Returns whether an object is in a building or below the ground."""
     below = [tags.get(key, "").startswith("-") for key in ("layer", "level")]
     return (
         any(below)
@@ -225,7 +225,7 @@ def street_width(
 
 
 def driven_ways(tags: Mapping[str, str]) -> tuple[bool, bool]:
-    """Returns whether cars may drive along and against a street's line."""
+    """Returns whether cars may drive along a street's line, and against it."""
     if any(
         tags.get(key) in ("no", "private", "bus", "agricultural")
         for key in ("motor_vehicle", "motorcar", "vehicle")
@@ -245,19 +245,19 @@ def driven_ways(tags: Mapping[str, str]) -> tuple[bool, bool]:
 def lanes_beside(tags: Mapping[str, str], width: float) -> float:
     """Returns the distance of the outermost lane from a street's middle [m].
 
-    The width is that of its carriageway [m].
+    `width` is that of the carriageway [m].
     """
     lanes = tag_value(tags, "lanes", count, _LANES_OF_STREET, None)
     if not lanes:
         lanes = 2.0 if all(driven_ways(tags)) else 1.0
-    # If two cars cannot pass, both keep to the middle.
+    # If two cars cannot pass each other, both directions keep to the middle.
     if width < _TWO_CARS and all(driven_ways(tags)):
         return 0.0
     return width / 2.0 * (1.0 - 1.0 / max(lanes, 1.0))
 
 
 def is_marked(tags: Mapping[str, str]) -> bool:
-    """Returns whether a crossing has stripes."""
+    """Returns whether a crossing is marked by stripes."""
     markings = tags.get("crossing:markings")
     if markings is not None:
         return markings.startswith("zebra") or markings == "yes"
@@ -268,7 +268,7 @@ def is_marked(tags: Mapping[str, str]) -> bool:
 
 
 def path_width(tags: Mapping[str, str]) -> float | None:
-    """Returns the width of a way for people [m]; None for other ways."""
+    """Returns the width of a path for people [m]; None for other ways."""
     usual: float | None = TABLES["paths"].get(tags.get("highway", ""))
     if usual is None:
         return None
@@ -288,7 +288,7 @@ def sidewalk_sides(tags: Mapping[str, str]) -> tuple[bool, bool]:
 
 
 def area_kind(tags: Mapping[str, str]) -> tuple[str, str] | None:
-    """Returns kind and class of an area on the ground; None for others."""
+    """Returns the kind and class of an area on the ground; None for others."""
     if tags.get("natural") == "water" or tags.get("waterway") in (
         "riverbank",
         "dock",
@@ -320,10 +320,10 @@ class LaneLayout(NamedTuple):
     width: float
 
     def offset(self, is_forward: bool, number: int) -> float:
-        """Returns the offset of a lane from the middle of the street [m].
+        """Returns the distance of a lane from the middle of the street [m].
 
-        It is to the side on which traffic keeps, in the direction of the lane.
-        Number 0 is the innermost one.
+        It is positive towards the side on which traffic keeps, in driving
+        direction. Number 0 is the innermost lane.
         """
         same, other = self.forward, self.backward
         if not is_forward:
@@ -332,9 +332,9 @@ class LaneLayout(NamedTuple):
 
 
 def lane_layout(tags: Mapping[str, str], width: float) -> LaneLayout:
-    """Returns the lanes of a street; none where vehicles cannot pass.
+    """Returns the lanes of a street; no lanes if vehicles cannot pass.
 
-    The width is that of its carriageway [m].
+    `width` is that of the carriageway [m].
     """
     is_along, is_against = driven_ways(tags)
     directions = is_along + is_against
@@ -353,7 +353,7 @@ def lane_layout(tags: Mapping[str, str], width: float) -> LaneLayout:
         forward = min(total, most) * is_along
         backward = min(total, most) * is_against
     else:
-        # A middle lane of both directions stays empty.
+        # A middle lane for both directions stays empty.
         there, back = number("lanes:forward"), number("lanes:backward")
         forward = there or max(1, total - back if back else total // 2)
         backward = back or max(1, total - there if there else total // 2)
@@ -379,7 +379,7 @@ def speed_limit(tags: Mapping[str, str], is_forward: bool = True) -> float:
 
 
 def _speed(text: str) -> float | None:
-    """Returns the lowest speed of a value [m/s]; None if it has none."""
+    """Returns the lowest speed in a tag's value [m/s]; None if it has none."""
     speeds = []
     for part in text.lower().split(";"):
         found = _SPEED.fullmatch(part.strip())

@@ -1,4 +1,4 @@
-"""Lanes and walkways of OpenStreetMap's streets, for traffic."""
+"""Makes lanes and walkways for traffic from OpenStreetMap's streets."""
 
 from collections import defaultdict
 from collections.abc import Iterable, Iterator, Mapping, Sequence
@@ -31,23 +31,24 @@ from cns_drake.traffic.lane_file import lane_text
 from cns_drake.traffic.lane_graph import SPACING
 from cns_drake.traffic.lane_joining import DirectedLane, join_lanes
 
-# From the kerb to the middle of a walked strip, half its width, and its least
-# distance from the edges of a sidewalk [m].
+# Distance from the kerb to the middle of a walked strip, half the strip's
+# width, and its least distance from the edges of a sidewalk [m].
 _FROM_KERB, _HALF_STRIP, _FROM_EDGE = 1.3, 0.3, 0.55
 _LEAST_STRIP = 4.0
-# A crossing or another strip begins within this distance of a strip [m].
+# A crossing begins within the first distance of a strip, and another strip
+# within the second [m].
 _NEAR, _NEAR_END = 1.5, 4.0
 _CROSSING_WIDTH, _CROSSING_HALF_WIDTH = 2.4, 0.8
 
 
-# A place on a strip: the number of the strip, and how far along it [m].
+# A place on a strip: the number of the strip, and the distance along it [m].
 _Place = tuple[int, float]
 
 
 class StreetWalkways:
     """Strips of sidewalks and paths, and the crossings that join them.
 
-    A crossing has the number of the node of a street.
+    A crossing is named by the id of its node in a street.
     """
 
     def __init__(
@@ -59,8 +60,9 @@ class StreetWalkways:
     ):
         """Finds the walkways.
 
-        Paths (N, 2) are middles of ways for people [m], who cross at some nodes
-        of streets. Sidewalks and paths have an area.
+        `paths` are middle lines (N, 2) of ways for people [m], and `crossed`
+        the nodes of streets at which people cross. `sidewalks` is the area of
+        sidewalks and paths.
         """
         walked = sidewalks.buffer(-_FROM_EDGE, quad_segs=2)
         shapely.prepare(walked)
@@ -96,7 +98,7 @@ class StreetWalkways:
     def _crossing(
         self, street: Street, k: int
     ) -> tuple[lane_graph.Crossing, tuple[_Place, _Place]] | None:
-        """Returns a crossing and its places on strips; None without strips."""
+        """Returns a crossing and its ends on strips; None without strips."""
         line = street.line
         along = line[min(k + 1, len(line) - 1)] - line[max(k - 1, 0)]
         if not along.any():
@@ -127,7 +129,7 @@ class StreetWalkways:
         return self._nodes.setdefault(place, len(self._nodes))
 
     def _links(self) -> Iterator[tuple[_Place, _Place]]:
-        """Yields pairs of ends of strips between which people can walk."""
+        """Yields pairs of strips' ends between which people can walk."""
         ends = [
             (k, s)
             for k, strip in enumerate(self._strips)
@@ -151,14 +153,14 @@ class StreetWalkways:
                 yield ends[a], ends[b]
 
     def _walkways(self) -> Iterator[lane_graph.Walkway]:
-        """Yields the strips, cut where others begin."""
+        """Yields the strips, divided where others begin."""
         cuts: defaultdict[int, set[float]] = defaultdict(set)
         for k, s in self._nodes:
             cuts[k].add(s)
         for k, strip in enumerate(self._strips):
             for a, b in pairwise(sorted(cuts[k] | {0.0, float(strip.length)})):
                 if b - a < 0.5:
-                    # Walkers of both places take the same piece.
+                    # Walkers between the same two places use the same piece.
                     self._nodes[k, b] = self._node((k, a))
                     continue
                 part = substring(strip, a, b)
@@ -192,50 +194,52 @@ def _pieces(
     parts = shapely.get_parts(area)
     tree = shapely.STRtree(parts)
     for line in lines:
-        # With the whole area, each intersection would look at all its edges.
+        # Intersecting with the whole area would test all its edges each time.
         near = np.sort(tree.query(line, "intersects"))
         yield line.intersection(shapely.MultiPolygon(list(parts[near])))
 
 
 def _sidewalk_lines(streets: Iterable[Street]) -> Iterator[BaseGeometry]:
-    """Yields lines in the middle of the sidewalks of streets."""
+    """Yields the middle lines of sidewalks along streets."""
     for street, side in product(streets, (1.0, -1.0)):
         offset = side * (street.width / 2.0 + _FROM_KERB)
         course = shapely.LineString(street.line)
         yield from shapely.get_parts(course.offset_curve(offset))
 
 
-# Beyond this change of heading a way through a junction is a turn.
+# A way through a junction is a turn if its heading changes by more than this.
 _STRAIGHT_DEG = 35.0
-# Length of the means that round a street's corners [m].
+# Length of the running mean that rounds the corners of a street [m].
 _ROUND = 7.0
-# Distance of lanes from the corner of two streets, and from the place where
-# just one street goes on, and greatest distance from a junction [m].
+# Lanes end at this distance from the corner of two streets, and from a place
+# where just one street continues. The third is the greatest distance from a
+# junction [m].
 _BEFORE_CORNER, _JOINT, _FARTHEST_STOP = 1.0, 3.0, 25.0
-# Least length of a lane between its junctions [m].
+# Least length of a lane between two junctions [m].
 _SHORTEST = 1.0
-# A street's direction at its end is that of its last piece of this length [m].
+# The direction of a street's end is that of its last piece of this length [m].
 _ARM = 6.0
-# An end of a stretch: its number, and 0 for the first end or -1 for the last.
+# An end of a stretch: the number of the stretch, and 0 for its start or -1 for
+# its end.
 _Arm = tuple[int, int]
-# Traffic keeps to the streets near drives [m].
+# Traffic stays within this distance of drives [m].
 _WITHIN = 300.0
-# Half of the room of a vehicle beside the middle of its lane [m].
+# Half the width that a vehicle needs around the middle of its lane [m].
 _HALF_WIDTH = 1.3
-# A signal stands within this distance of its junction, and a way of the
-# junction passes it within this distance [m].
+# A signal belongs to a junction within the first distance, and to the
+# junction's ways that pass within the second [m].
 _SIGNAL_NEAR, _WAY_NEAR = 25.0, 6.0
 _KERB = 0.12
-# A height above which things do not stop a vehicle, and below [m].
+# Only objects between these two heights stop a vehicle [m].
 _ABOVE, _BELOW = 0.3, 3.5
 
 
 @dataclass(frozen=True)
 class Stretch:
-    """A street between two junctions, with its middle (N, 2) and lanes.
+    """A street between two junctions, with its lanes.
 
-    That line has rounded corners and is evenly spaced [m]; the nodes are those
-    of its first and last place.
+    Its line (N, 2), the middle, has rounded corners and even spacing [m]. The
+    nodes are those of its first and last place.
     """
 
     street: Street
@@ -248,7 +252,7 @@ class Stretch:
         return float(np.linalg.norm(np.diff(self.line, axis=0), axis=1).sum())
 
     def heading(self, end: int) -> float:
-        """Returns the direction away from an end, 0 or -1 [rad]."""
+        """Returns the direction away from an end (0 or -1) [rad]."""
         line = self.line if end == 0 else self.line[::-1]
         reach = min(len(line) - 1, max(1, round(_ARM / SPACING)))
         return float(np.arctan2(*(line[reach] - line[0])[::-1]))
@@ -258,7 +262,7 @@ class Stretch:
 class _Lane:
     """A lane of a stretch, with points (N, 2) in driving direction [m].
 
-    Its number is 0 for the innermost one of its direction.
+    Number 0 is the innermost lane of its direction.
     """
 
     stretch: int
@@ -276,11 +280,12 @@ class _Lane:
 
 
 class StreetTraffic:
-    """The lanes of streets, and what follows what.
+    """The lanes of streets and their links, for traffic.
 
-    Lanes of stretches, streets cut at their junctions, come before the ways
-    between them. The second lane of a link follows the first. A lane may have
-    another one beside it, on its outer side and in the same direction.
+    Streets are cut at junctions into stretches. The lanes of the stretches come
+    first, then the ways through junctions between them. In a link, the second
+    lane follows the first. A lane may have another one beside it, on its outer
+    side and in the same direction.
     """
 
     def __init__(
@@ -292,8 +297,9 @@ class StreetTraffic:
     ):
         """Makes the lanes of streets that meet at common nodes.
 
-        People cross at some nodes. Ways that leave the surface of all streets
-        are left out. The side is 1 if traffic keeps right, -1 if left.
+        `crossed` are the nodes at which people cross. Ways through junctions
+        that leave the surface of all streets are left out. The side is 1 if
+        traffic keeps right, and -1 if it keeps left.
         """
         self.stretches = list(_stretches(streets, crossed))
         self._side, self._crossed = side, crossed
@@ -323,7 +329,7 @@ class StreetTraffic:
             self.lanes.append(DirectedLane(_level(line), limit, is_junction))
 
     def junctions(self) -> list[int]:
-        """Returns the nodes where three or more streets meet."""
+        """Returns the nodes at which three or more streets meet."""
         return [node for node, arms in self._arms.items() if len(arms) > 2]
 
     def setback(self, arm: _Arm) -> float:
@@ -347,7 +353,7 @@ class StreetTraffic:
             angle = abs(
                 wrapped(crossed.heading(other[1]) - stretch.heading(arm[1]))
             )
-            # Where the edges of both streets meet.
+            # The corner where the edges of both streets meet.
             corner = crossed.street.width / 2.0 + half * np.cos(angle)
             farthest = max(farthest, corner / max(np.sin(angle), 0.1))
         return float(min(farthest + _BEFORE_CORNER, _FARTHEST_STOP))
@@ -387,14 +393,14 @@ class StreetTraffic:
     def _ways(
         self, lanes: Sequence[_Lane]
     ) -> Iterator[tuple[int, int, bool, np.ndarray]]:
-        """Yields lane, next lane, whether at a junction, and the way."""
+        """Yields ways: lane, next lane, whether it is in a junction, line."""
         leaving: defaultdict[_Arm, list[int]] = defaultdict(list)
         entering: defaultdict[_Arm, list[int]] = defaultdict(list)
         for k, lane in enumerate(lanes):
             leaving[lane.entry_arm].append(k)
             entering[lane.exit_arm].append(k)
         for node, arms in self._arms.items():
-            # Vehicles enter a crossing as they enter a junction.
+            # Vehicles enter a crossing as they would enter a junction.
             is_junction = len(arms) > 2 or node in self._crossed
             for a, b in product(arms, arms):
                 if a == b:
@@ -417,9 +423,10 @@ class StreetTraffic:
     ) -> bool:
         """Returns whether traffic may go from one lane to another.
 
-        A turn across the other direction leads from the innermost lane to the
-        innermost, the other turn from the outermost to the outermost. Straight
-        on, and between one-way streets, lanes keep their number.
+        A turn across the opposite direction leads from the innermost lane to
+        the innermost one, and a turn to the other side from the outermost to
+        the outermost. Straight on, lanes keep their number, counted from the
+        inside. Between one-way streets, they keep it counted from the outside.
         """
         layouts = [self.stretches[one.stretch].layout for one in (first, last)]
         here, there = (
@@ -452,7 +459,7 @@ def _stretches(
 
 
 def _rounded(line: np.ndarray) -> np.ndarray:
-    """Returns evenly spaced points (N, 2) along a line, without corners."""
+    """Returns evenly spaced points (N, 2) along a line with smooth corners."""
     whole = shapely.LineString(line)
     count = max(3, round(whole.length / SPACING) + 1)
     places = np.linspace(0.0, 1.0, count)
@@ -461,7 +468,7 @@ def _rounded(line: np.ndarray) -> np.ndarray:
     )
     window = min(int(_ROUND / SPACING), count // 3) // 2 * 2 + 1
     reach = window // 2
-    # Mirrored at both ends, which stay where they are.
+    # Mirrored at both ends, so that these stay in place.
     longer = np.concatenate(
         [
             2 * points[0] - points[reach:0:-1],
@@ -474,7 +481,7 @@ def _rounded(line: np.ndarray) -> np.ndarray:
 
 
 def _beside(lanes: Sequence[_Lane]) -> Mapping[int, int]:
-    # The lanes of a direction follow each other, from the inside out.
+    # Lanes of one direction, in order from the inside outwards.
     return {
         k: k + 1
         for k, (one, other) in enumerate(pairwise(lanes))
@@ -499,19 +506,18 @@ def lanes_of_streets(
     drives: Sequence[WaypointDrive],
     drive_on: DriveOn,
 ) -> str | None:
-    """Returns the text of a lane file; None if no vehicle can drive on.
+    """Returns the text of a lane file; None if there is no lane to drive on.
 
-    Traffic keeps to the streets near drives. Parked cars and other objects that
+    Traffic stays on the streets near drives. Parked cars and other objects that
     were added beside the streets are named in the file if they stand in a lane.
 
     Args:
         streets: streets of the file.
-        places: where the streets, sidewalks and crossings lie.
-        structures: what stands beside them, from the file.
-        added: things that were added, which the text names if they stand in a
-            lane.
+        places: where people cross and signals stand, and the paths for people.
+        structures: structures of the file.
+        added: objects that were added, which are named if they stand in a lane.
         drives: the drives, near which there is traffic.
-        drive_on: side of the road; None for that of each street.
+        drive_on: side of the road on which traffic keeps.
     """
     if not drives:
         return None
@@ -566,7 +572,7 @@ def _sidewalks(
 
 
 def _free(traffic: StreetTraffic, structures: Iterable[Imported]) -> np.ndarray:
-    """Returns which lanes nothing of the file stands in, (L,) bool."""
+    """Returns (L,) which lanes are free of everything in the file."""
     solid = [
         one.triangles
         for one in structures
@@ -595,7 +601,7 @@ def _strip(points: np.ndarray) -> BaseGeometry:
 def _in_the_way(
     graph: lane_graph.LaneGraph, added: Sequence[Imported]
 ) -> list[str]:
-    """Returns the names of things that stand where vehicles drive."""
+    """Returns the names of objects that stand where vehicles drive."""
     if not added:
         return []
     tree = shapely.STRtree([_strip(piece.points) for piece in graph.pieces])
@@ -607,7 +613,7 @@ def _in_the_way(
 def _signals(
     traffic: StreetTraffic, streets: Iterable[Street], signals: np.ndarray
 ) -> list[BaseGeometry]:
-    """Returns the places (2,) of junctions with signals."""
+    """Returns the places of junctions that have signals."""
     if not len(signals):
         return []
     places = {
@@ -627,17 +633,18 @@ def _signals(
 def _with_signals(
     graph: lane_graph.LaneGraph, signals: Sequence[BaseGeometry]
 ) -> lane_graph.LaneGraph:
-    """Returns lanes with signals of two phases at some junctions.
+    """Returns the lanes, with signals of two phases at some junctions.
 
-    One phase is along the way on which a junction is entered first, the other
-    across it.
+    The first phase is for the direction from which the junction is first
+    entered, the second for the direction across it.
     """
     ways = [k for k, piece in enumerate(graph.pieces) if piece.is_way]
     if not signals or not ways:
         return graph
     lines = [shapely.LineString(graph.pieces[k].points[:, :2]) for k in ways]
     near = shapely.STRtree(signals).query(lines, "dwithin", _WAY_NEAR)
-    # Lanes that never cross have junctions of their own; signals join them.
+    # Lanes that never cross have different junctions, which a common signal
+    # joins.
     group = {piece.junction: piece.junction for piece in graph.pieces}
     controlled: dict[int, int] = {}
     for k, signal in near.T.tolist():

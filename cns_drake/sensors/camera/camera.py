@@ -1,4 +1,4 @@
-"""Cameras on a vehicle, and what is recorded of them."""
+"""Cameras on a vehicle, and the messages that are recorded from them."""
 
 from collections.abc import Callable, Mapping
 import logging
@@ -36,9 +36,9 @@ from cns_drake.sensors.camera.camera_scene import RENDERER, CameraScene
 from cns_drake.sensors.camera.config import CameraSection
 from cns_drake.sensors.camera.looks import HORIZON_RGB, sky
 
-# What is nearer or farther is not drawn; depths end before that [m].
+# Clipping distances, near and far, and the greatest measured depth [m].
 _NEAREST, _FARTHEST, _DEEPEST = 0.05, 2000.0, 250.0
-# Labels from here on are Drake's own: empty, or not to be told.
+# Drake reserves labels from here on, for pixels without a label.
 _RESERVED = 2**15 - 4
 # The optical frame looks along z, with x to the right.
 _OPTICAL = RigidTransform(
@@ -66,11 +66,12 @@ def add_cameras(
         cameras: name -> description.
 
     Returns:
-        Name of a port of the recorder -> what measures, and how it is recorded.
+        Name of the recorder's input port -> output port that measures, and a
+        description of how it is recorded.
     """
     found = {}
-    # It warns that images of depths in 16 bits, of which there are none, end at
-    # 65 m.
+    # Drake warns that 16-bit depth images end at 65 m; no such images are
+    # recorded.
     logging.getLogger("drake").addFilter(_is_told)
     for name, config in cameras.items():
         info = CameraInfo(config.width, config.height, config.fov_y)
@@ -79,7 +80,7 @@ def add_cameras(
         X_BC = optical_pose(config)
         eyes = {}
         for kind, scene_graph in scene.scene_graphs.items():
-            # No name of a scenario has a minus sign.
+            # The names cannot clash: no name in a scenario has a minus sign.
             eyes[kind] = builder.AddNamedSystem(
                 f"{name}-{kind}",
                 RgbdSensor(
@@ -116,7 +117,7 @@ def add_cameras(
 
 
 class _Sky(LeafSystem):
-    """Draws a sky where an image has none of the scene.
+    """Draws the sky in those pixels of an image that show no geometry.
 
     .. pydrake_system::
 
@@ -160,7 +161,7 @@ def _is_told(record: logging.LogRecord) -> bool:
 
 
 def _message_makers(info: CameraInfo) -> dict[str, Callable[..., Any]]:
-    """Returns what makes the messages of images of each kind."""
+    """Returns kind of image -> function that makes its message."""
 
     def label(image: Any, frame_id: str, stamp_ns: int) -> Any:
         classes = image.data.astype(np.uint16)

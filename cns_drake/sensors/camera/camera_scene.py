@@ -1,9 +1,10 @@
 """The scene that cameras see: the LiDARs' geometry, as meshes for rendering.
 
-Drake's renderer wants normals, which meshes of worlds need not have, and is
-slow with thousands of geometries. All that stays is merged: by look for images
-of colours, and by class for those of depths and classes, in which colours of
-vertices would be seen.
+Drake's renderer needs normals, which the meshes of a world may lack, and is
+slow with thousands of geometries. All geometry that never moves is therefore
+merged into a few meshes: one per look for colour images, and one per class for
+images of depths and classes. Meshes of classes have no vertex colours, which
+would show in label images.
 """
 
 from collections.abc import Callable, Collection
@@ -64,8 +65,8 @@ _SIDES = 64
 _GREY = (0.5, 0.5, 0.5)
 # Pixels of a side of the map of the sun's shadows, over the whole scene.
 _SHADOW_PIXELS = 4096
-# A sun, and far lamps in place of a sky, which cast no shadows: where light
-# comes from, its strength and colour.
+# The sun, and far lamps without shadows in place of the sky: direction that the
+# light comes from, strength and colour.
 _LIGHTS = [
     LightParameter(
         type="directional",
@@ -90,7 +91,7 @@ _LIGHTS = [
         )
     ),
 ]
-# Numbers of glTF 2.0: float, unsigned int; what buffers are for.
+# Constants of glTF 2.0: float, unsigned int; uses of buffers.
 _FLOAT, _UINT, _VERTICES, _CORNERS = 5126, 5125, 34962, 34963
 # Pose, colour and surface of a geometry.
 _Member = tuple[RigidTransform, tuple[float, float, float], TriangleSurface]
@@ -131,12 +132,12 @@ class CameraScene(LeafSystem):
 
         Args:
             scene_graph: SceneGraph with geometry of the perception role.
-            structures: gives classes to it.
-            calc_X_WF: gives the poses of anchored frames.
+            structures: table of the structures' classes.
+            calc_X_WF: function that returns the pose of an anchored frame.
             anchored: frames that never move, the world's included.
-            vehicle: frames with what cameras do not see.
-            base: the frame that carries cameras.
-            classes: whether a camera has images of depths or classes.
+            vehicle: frames whose geometry the cameras do not see.
+            base: the frame that carries the cameras.
+            classes: whether any camera records depths or classes.
 
         Raises:
             InputError: Drake cannot render here.
@@ -204,7 +205,7 @@ class CameraScene(LeafSystem):
         group: str | int,
         members: list[_Member],
     ) -> None:
-        """Registers one mesh; without a frame it stays."""
+        """Registers merged geometry; it is anchored if `frame` is None."""
         merged, owners = merge_triangles(
             [(k, X, surface) for k, (X, _, surface) in enumerate(members)]
         )
@@ -249,10 +250,11 @@ class CameraScene(LeafSystem):
 def check_renderer() -> None:
     """Checks that Drake can render images on this machine.
 
-    A second process tries it, since without EGL rendering kills the process.
+    The check renders in a second process, because rendering without EGL kills
+    the process.
 
     Raises:
-        InputError: it cannot.
+        InputError: Drake cannot render here.
     """
     words = [sys.executable, "-m", __name__]
     done = subprocess.run(words, capture_output=True, check=False)
@@ -271,13 +273,17 @@ def _as_mesh(
     owners: np.ndarray,
     fronts: np.ndarray,
 ) -> Mesh:
-    """Returns a glTF mesh of (N, 3, 3) corners of triangles, flat, of a look.
+    """Returns a glTF mesh of N flat-shaded triangles.
 
-    The (N, 3) colours are of screens; a class in place of a look has none. The
-    (N,) owners are geometries, which look along (M, 3) `fronts`.
+    glTF's axes are right, up and backwards.
 
-    The mesh is about `middle`. The axes of glTF are right, up and backwards: y
-    up.
+    Args:
+        corners: (N, 3, 3) corners of the triangles.
+        middle: (3,) origin of the mesh.
+        rgb: (N, 3) sRGB colours; not used for a class.
+        look: name of a look, or the number of a class.
+        owners: (N,) index of the geometry that a triangle belongs to.
+        fronts: (M, 3) direction in which each geometry faces.
     """
     first, second, third = np.moveaxis(corners, 1, 0)
     normals = np.cross(second - first, third - first)

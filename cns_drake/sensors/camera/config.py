@@ -12,19 +12,19 @@ _Angle = Annotated[float, Field(ge=-7.0, le=7.0)]
 
 
 class CameraSection(Section):
-    """A pinhole camera without distortion. It does not see its own vehicle.
+    """A pinhole camera without distortion. It does not see its own car.
 
     Attributes:
-        width: number of pixels in a row.
-        height: number of rows of pixels.
-        rate: images per second. It divides the scan rate of the first LiDAR,
-            and images have the stamps of its scans.
+        width: width of the image in pixels.
+        height: height of the image in pixels.
+        rate: images per second [Hz]. The scan rate of the first LiDAR must be a
+            multiple of it, because each image has the stamp of a scan.
         fov_y: vertical field of view [rad].
         xyz: position in `base_link` [m].
-        rpy: roll, pitch, yaw in `base_link` [rad]; at zero the camera looks
-            ahead.
-        depth: whether to record images of the depth, too.
-        label: whether to record images of the classes, too.
+        rpy: roll, pitch, yaw in `base_link` [rad]; with zeros the camera looks
+            straight ahead.
+        depth: whether to record depth images as well.
+        label: whether to record images of the semantic classes as well.
     """
 
     width: _Pixels = 640

@@ -1,7 +1,8 @@
 """What surfaces look like to a camera: textures that code makes from seeds.
 
-A texture says how light a place is beside the colour of its surface, whose mean
-stays. It repeats in the world; a wall has its height in the rows.
+A texture is a brightness by which the colour of a surface is multiplied; its
+mean is 1, so that the mean colour of the surface stays the same. Textures
+repeat in the world. On a wall, their rows are horizontal.
 """
 
 from collections.abc import Callable, Sequence
@@ -13,7 +14,7 @@ import numpy as np
 
 # Pixels of a side of a texture.
 _SIDE = 512
-# A colour of a screen is about this root of its light (IEC 61966-2-1).
+# Gamma: an sRGB value is about this root of the light (IEC 61966-2-1).
 GAMMA = 2.2
 # Where the sun is, and the colour of the sky at the horizon.
 SUN_W = np.array([-0.5, 0.55, 0.75]) / np.linalg.norm([-0.5, 0.55, 0.75])
@@ -22,7 +23,7 @@ HORIZON_RGB = np.array([204.0, 221.0, 237.0]) / 255.0
 
 @dataclass(frozen=True)
 class Look:
-    """A repeated texture, and how a surface with it returns light.
+    """The look of a surface: a repeated texture, and its roughness.
 
     Attributes:
         size: side of the repeated square in the world [m].
@@ -42,7 +43,8 @@ class Look:
 def _noise(rng: np.random.Generator, slope: float) -> np.ndarray:
     """Returns (N, N, 1) noise that repeats, of mean 0 and deviation 1.
 
-    The amplitude of a wave falls with the power `slope` of its number.
+    The amplitude of a wave is proportional to its wave number to the power of
+    -`slope`.
     """
     number = np.hypot(*np.meshgrid(*[np.fft.fftfreq(_SIDE, 1 / _SIDE)] * 2))
     number[0, 0] = np.inf
@@ -66,9 +68,11 @@ def _cells(
     lag: float = 0.0,
     spread: float = 0.1,
 ) -> np.ndarray:
-    """Returns stones of random lightness; `joint` is its width and lightness.
+    """Returns rows of stones of random brightness, (N, N, 1).
 
-    Every other row lags behind by a share of a stone.
+    `across` and `rows` count the stones, `joint` is width and brightness of the
+    joints between them. Every other row is shifted by `lag` stones. The
+    standard deviation of the stones' brightness is `spread`.
     """
     y, x = np.indices((_SIDE, _SIDE)) / _SIDE
     row = (y * rows).astype(int)
@@ -103,7 +107,7 @@ def _bark(rng: np.random.Generator) -> np.ndarray:
 
 
 def _panes(rng: np.random.Generator) -> np.ndarray:
-    """Returns what panes mirror: sky, clouds and what is opposite."""
+    """Returns the image that panes mirror: sky, clouds, opposite houses."""
     sky = np.clip(0.4 + 1.2 * _noise(rng, 1.8), 0.0, 4.0)
     return (0.5 + sky * (0.85, 0.95, 1.05)) * (1.0 + 0.1 * _noise(rng, 0.8))
 
@@ -133,7 +137,7 @@ def _face(
     colour: str = "white",
     text: str = "",
 ) -> Callable[[np.random.Generator], np.ndarray]:
-    """Returns what paints the face of a sign: a polygon, and white text."""
+    """Returns a function that paints a sign: a polygon and white text."""
     from PIL import Image, ImageDraw, ImageFont
 
     def paint(_rng: np.random.Generator) -> np.ndarray:
@@ -233,7 +237,8 @@ def look_of(
 ) -> str:
     """Returns the name of the look of a geometry.
 
-    It depends on name, class, colour, and the number of corners.
+    The look depends on the geometry's name, class, colour and number of
+    corners.
     """
     red, green, blue = rgb
     part = name.rpartition("/")[2]
@@ -263,7 +268,7 @@ def look_of(
 def texture(name: str) -> tuple[bytes, float]:
     """Returns a look's texture as PNG, and the brightness of its white.
 
-    The product of texture and brightness has the mean 1.
+    The texture as light, times this brightness, has the mean 1.
     """
     from PIL import Image
 
@@ -286,7 +291,7 @@ def texture(name: str) -> tuple[bytes, float]:
 
 @functools.cache
 def _clouds() -> np.ndarray:
-    """Returns (N, N) shares of a sky that clouds cover; it repeats."""
+    """Returns the (N, N) cloud cover of a sky, 0 to 1; it repeats."""
     noise = _noise(np.random.default_rng(0), 1.6)[:, :, 0]
     return np.clip(0.9 * noise - 0.1, 0.0, 1.0)
 
@@ -295,7 +300,7 @@ def sky(d_W: np.ndarray) -> np.ndarray:
     """Returns (N, 3) uint8 colours of the sky in directions (N, 3), unit."""
     height = np.maximum(d_W[:, 2:], 0.0)
     blue = HORIZON_RGB + height**0.45 * ((0.23, 0.43, 0.78) - HORIZON_RGB)
-    # Clouds are on a plane; a unit of height is a third of their repetition.
+    # Clouds lie in a plane; their pattern repeats after three times its height.
     column, row = (d_W[:, :2] / (height + 0.08)).T * _SIDE / 3.0
     clouds = _clouds()[row.astype(int) % _SIDE, column.astype(int) % _SIDE]
     clouds = clouds[:, None] * np.clip(4.0 * height, 0.0, 0.9)
@@ -323,9 +328,11 @@ def texture_places(corners: np.ndarray, normals: np.ndarray) -> np.ndarray:
 def face_places(
     corners: np.ndarray, normals: np.ndarray, owners: np.ndarray
 ) -> np.ndarray:
-    """Returns (N, 3, 2) places from 0 to 1 in the faces of owners (N,).
+    """Returns texture coordinates (N, 3, 2) that cover each geometry once.
 
-    The (N, 3, 3) corners and (N, 3) normals are as in `texture_places`.
+    They run from 0 to 1 over the face of a geometry. The (N,) owners are
+    indices of the triangles' geometries; corners (N, 3, 3) and normals (N, 3)
+    are as in `texture_places`.
     """
     low = np.full((owners.max() + 1, 3), np.inf)
     high = -low

@@ -23,22 +23,25 @@ KALIBR_FILE = "imu.yaml"
 
 
 class ImuSection(Mount):
-    """An IMU; by default ideal, with one sample per scan.
+    """An IMU. By default it is ideal, with one sample per scan.
 
     Attributes:
         xyz: position in `base_link` [m].
         rpy_deg: roll, pitch, yaw in `base_link` [deg].
-        rate: samples per second, at least as many as scans and at most 1000. It
-            divides 1,000,000,000 ns, as 100, 200, 250, 400 and 500 do.
-        kalibr: file in the format of Kalibr with the four noise densities.
-        accelerometer_turn_on_bias: standard deviation of the initial bias of
-            each axis of the accelerometer [m/s^2].
-        gyroscope_turn_on_bias: standard deviation of the initial bias of each
-            axis of the gyroscope [rad/s].
-        accelerometer_range: largest specific force that an axis measures,
-            either way [m/s^2].
-        gyroscope_range: largest angular velocity that an axis measures, either
-            way [rad/s].
+        rate: samples per second [Hz], such as 100, 200, 250, 400 or 500: at
+            most 1000, at least as many as scans, and with a whole number of
+            nanoseconds between two samples. By default the rate in the file
+            `kalibr`, or else one sample per scan.
+        kalibr: file in Kalibr's format with the four noise densities of the
+            IMU. By default there is no noise.
+        accelerometer_turn_on_bias: standard deviation of the constant bias that
+            each axis of the accelerometer has from the start [m/s^2].
+        gyroscope_turn_on_bias: standard deviation of the constant bias that
+            each axis of the gyroscope has from the start [rad/s].
+        accelerometer_range: largest specific force that an axis can measure, in
+            either direction [m/s^2]. By default no limit.
+        gyroscope_range: largest angular velocity that an axis can measure, in
+            either direction [rad/s]. By default no limit.
     """
 
     xyz: Triple = (-1.0, 0.0, 1.6)

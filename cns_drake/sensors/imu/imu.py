@@ -28,7 +28,7 @@ from cns_drake.sensors import carriers
 from cns_drake.sensors.imu.config import ImuSection
 from cns_drake.sensors.imu.noise import ImuErrors, ImuNoise
 
-# Rounding error of a sample's time, in periods.
+# Tolerance for the rounding of a sample's time, in periods.
 _TOLERANCE = 1e-6
 # Samples that `VehicleImu` computes at a time.
 _BLOCK = 512
@@ -223,7 +223,7 @@ class NoisyImu(LeafSystem):
             )
 
     def _measure(self, context: Context) -> np.ndarray:
-        """Returns the present sample; the last block of errors is kept."""
+        """Returns the present sample; the latest block of errors is cached."""
         sample = math.floor(context.get_time() * self._rate + _TOLERANCE)
         exact = [
             port.Eval(context) if port.HasValue(context) else np.zeros(3)
@@ -315,7 +315,7 @@ class VehicleImu(LeafSystem):
         return math.floor(time * self._rate + _TOLERANCE)
 
     def _some(self, first: int, end: int) -> ImuSamples:
-        """Returns the samples of numbers from `first` to before `end`."""
+        """Returns the samples with numbers `first` to `end` - 1."""
         parts = []
         for number in range(first // _BLOCK, (end - 1) // _BLOCK + 1):
             start = number * _BLOCK
@@ -329,7 +329,7 @@ class VehicleImu(LeafSystem):
         return ImuSamples(first, *map(np.concatenate, zip(*parts, strict=True)))
 
     def _measure(self, first: int, times: np.ndarray) -> ImuSamples:
-        """Returns samples at (N,) times with the errors from `first` on."""
+        """Returns samples number `first` onwards, taken at (N,) times [s]."""
         # Before the start the vehicle rests, as after the end.
         motion = self._trajectory.body_motion(np.maximum(times, 0.0))
         R_WI = product(motion.R, self._X_BI.rotation().matrix())

@@ -60,7 +60,7 @@ class ImuNoise:
     sensor_name: str = "imu"
 
     def variances(self, rate: float) -> tuple[float, float]:
-        """Returns the variances of white noise in samples.
+        """Returns the variances of the white noise at a sample rate.
 
         Args:
             rate: samples per second [1/s].
@@ -114,7 +114,7 @@ class ImuErrors:
         return self._of_samples(sample, 1)[0]
 
     def _of_samples(self, first: int, count: int) -> np.ndarray:
-        """Returns the (count, 6) errors of samples that follow each other."""
+        """Returns the (count, 6) errors of consecutive samples."""
         parts = []
         for number in range(first // _BLOCK, (first + count - 1) // _BLOCK + 1):
             if number != self._block_number:
@@ -125,7 +125,7 @@ class ImuErrors:
         return np.concatenate(parts)
 
     def of_block(self, number: int) -> np.ndarray:
-        """Returns the (1024, 6) errors from sample 1024 * number on."""
+        """Returns the (1024, 6) errors of samples 1024 * number onwards."""
         errors = np.tile(self._turn_on, (_BLOCK, 1))
         if self._walk.any():
             errors += self._walk * self._walk_in_block(number)
@@ -134,13 +134,13 @@ class ImuErrors:
         return errors
 
     def _walk_in_block(self, number: int) -> np.ndarray:
-        """Returns (1024, 6) of a walk of standard normal steps."""
+        """Returns a block (1024, 6) of a walk with standard normal steps."""
         start = self._walk_at_block(number)
         end = self._walk_at_block(number + 1)
         steps = self._draw(_WALK_STEPS, number, _BLOCK)
         free = np.vstack([np.zeros(6), np.cumsum(steps, axis=0)])
-        # The walk is fixed at both ends: a straight line removes the error of a
-        # free walk at its end.
+        # The walk has given values at both ends of the block: a straight line
+        # is added to a free walk so that it ends at the right value.
         part = np.arange(_BLOCK)[:, None] / _BLOCK
         return start + free[:-1] + part * (end - start - free[-1])
 

@@ -1,4 +1,4 @@
-"""The description of a LiDAR and of the weather, and the models it gives."""
+"""Descriptions of a LiDAR and of the weather, and the models made from them."""
 
 from __future__ import annotations
 
@@ -27,12 +27,13 @@ if TYPE_CHECKING:
 
 
 class WeatherConfig(Section):
-    """The weather. It affects all LiDARs with calibrated returns.
+    """The weather. It affects only LiDARs with calibrated returns.
 
     Attributes:
-        visibility: meteorological visibility in fog [m]; no fog by default.
-        rain: rate of rain [mm/h].
-        snowfall: rate of snowfall, as melted water [mm/h].
+        visibility: meteorological visibility in fog [m]; the smaller, the
+            denser the fog. By default there is no fog.
+        rain: rain rate [mm/h].
+        snowfall: snowfall rate, as melted water [mm/h].
     """
 
     visibility: float | None = Field(default=None, ge=5.0, le=1e6)
@@ -44,33 +45,39 @@ class LidarSection(Mount):
     """A LiDAR on the vehicle.
 
     Attributes:
-        preset: name of the unit, from the table of presets.
+        preset: name of the LiDAR model, from the table of presets in the
+            documentation.
         xyz: position in `base_link` [m].
         rpy_deg: roll, pitch, yaw in `base_link` [deg].
-        columns: number of columns in a turn; by default the preset's.
-        min_range: nearest range that is measured [m]; by default the preset's.
-        max_range: farthest range that is measured [m]; by default the preset's.
-        resolution: step to which coordinates are rounded [m], by default 2^-10
-            m; 0 records exact values.
-        range_noise: standard deviation of a Gaussian error along the beam [m].
-            The range limits apply to the measured range.
-        dropout: probability that a return is lost.
-        faint_dropout: factor of a further loss: a return of intensity I is also
-            lost with this probability times (1 - I).
-        motion_distortion: whether each column is measured from the pose of the
-            LiDAR at its own firing time, `stamp + t`, and expressed in its
-            frame at that time, as real units report it. Otherwise the whole
+        columns: number of columns (azimuths) per turn; by default the preset's.
+        min_range: smallest range that is measured [m]; by default the preset's.
+        max_range: largest range that is measured [m]; by default the preset's.
+        resolution: step to which recorded coordinates are rounded [m]; the
+            default is 2^-10 m, about 1 mm. 0 records exact values.
+        range_noise: standard deviation of a Gaussian error of the range [m].
+            The limits `min_range` and `max_range` apply to the range with this
+            error. Only with ideal returns.
+        dropout: probability that a return is lost. Only with ideal returns.
+        faint_dropout: additional loss of faint returns: a return of intensity I
+            (from 0 to 1) is lost with a probability of this value times (1 -
+            I). Only with ideal returns.
+        motion_distortion: whether the motion of the LiDAR during a turn
+            distorts the scan, as in real units. Each column is then measured
+            from the pose of the LiDAR at its own firing time, `stamp + t`, and
+            expressed in the LiDAR's frame at that time. Otherwise the whole
             scan is measured from one pose.
-        returns: `ideal`, or `calibrated` with the losses, errors and
-            intensities of the unit's data sheet.
-        echoes: which echoes of a beam calibrated returns report; `dual` reports
-            the strongest and the last.
-        unit_seed: seed of the errors that this individual unit has in the
-            ranges, angles and gains of its lasers, with calibrated returns.
-            Give drives with the same unit the same seed.
-        rate: turns per second. It divides the rate of the fastest LiDAR. A unit
-            whose lasers fire at a fixed rate has more columns in a slower turn.
-        layout: which fields a point has in the recording.
+        returns: model of the returns: `ideal`, or `calibrated` with the losses,
+            errors and intensities of the unit's data sheet.
+        echoes: which echoes of a beam are reported, with calibrated returns.
+            `dual` reports the strongest and the last one.
+        unit_seed: seed of the individual unit, with calibrated returns. It
+            decides the errors in the ranges, angles and gains of the unit's
+            lasers. Use the same seed in all drives with the same unit.
+        rate: turns per second [Hz]. The rate of the fastest LiDAR of the drive
+            must be a multiple of it. If the lasers of a unit fire at a fixed
+            rate, a slower turn has more columns.
+        layout: fields of each recorded point, after one of these drivers or
+            programs.
     """
 
     xyz: Triple = (0.0, 0.0, 1.6)
@@ -163,8 +170,9 @@ def make_pattern(
 ) -> UnitPattern:
     """Returns the beam pattern of a LiDAR.
 
-    A turn takes another period [s] if it is given. Calibrated returns have the
-    elevations of a real unit, if they are known.
+    A turn takes `period` [s] if it is given, or else the period that follows
+    from the rate. With calibrated returns, the elevations are those of a real
+    unit, where they are known.
     """
     pattern = make_beam_pattern(
         config.preset,
@@ -182,9 +190,10 @@ def make_pattern(
 
 
 def describe_unit(config: LidarSection) -> dict[str, Any]:
-    """Returns the data of a calibrated unit that a user would know.
+    """Returns what a user of a calibrated unit would know about it.
 
-    The true angles of its lasers differ from these by the errors of the unit.
+    These are its preset, unit seed and nominal elevations. The true angles of
+    the lasers differ by the unit's errors.
     """
     nominal = getattr(make_pattern(config), "elevations_rad", ())
     return {

@@ -92,14 +92,15 @@ class Lidar(LeafSystem):
         - positions_W
         - X_WS
 
-    Frames: W is the world, P the parent frame, S the sensor frame (x
-    forward, y left, z up). `scan` is a structured array of `POINT_DTYPE`,
-    one record per return in firing order; beams whose nearest surface is
-    closer than the minimum range or farther than the maximum range return
-    nothing. `point_cloud_S` holds the same positions as a Drake point cloud,
-    whose colours are greys: 255 for an intensity of 1 (calibrated returns: for
-    one of 255). `point_cloud_W` has them in the world, `positions_W` without
-    colours, and `X_WS` is the pose of S at the time of the output.
+    Frames: W is the world, P the parent frame, S the sensor frame (x forward, y
+    left, z up). `scan` is a structured array of `POINT_DTYPE`, one record per
+    return in firing order; beams whose nearest surface is closer than the
+    minimum range or farther than the maximum range return nothing.
+    `point_cloud_S` holds the same positions as a Drake point cloud, whose
+    colours are the intensities as greys. Grey 255 stands for an intensity of 1,
+    or of 255 with calibrated returns. `point_cloud_W` has the points in the
+    world, and `positions_W` too, but without colours. `X_WS` is the pose of S
+    at the time of the output.
 
     The turn starts at the time of the output. The turn of a causal LiDAR ends
     at that time instead, so that a controller may use the scan at once. By
@@ -110,15 +111,15 @@ class Lidar(LeafSystem):
     whole turn; or, with motion distortion, one for each column at its firing
     time. A point is then expressed in S at its firing time t, as a real unit
     reports it: X_WS(start of the turn + t) takes it to its place in the world.
-    During the turn, all other moving geometry stays where it is at the time of
+    All other moving geometry stays, during the turn, where it is at the time of
     the output.
 
     `moving_bodies` and the port `body_spatial_velocities` (a list over a
     plant's bodies of V_WB, expressed in the world, as a MultibodyPlant gives
     it) make P and all other bodies of that plant move during the turn, with the
     velocities that they have at the time of the output. Each beam is cast at
-    its own firing time: from the place that S has then, on the geometry at the
-    place that it has then. Points are expressed in S at that time, too.
+    its own firing time: both S and the geometry have the poses of that time.
+    Points, too, are expressed in S at that time.
 
     The field `instance` of a point is the number of its structure: a model, or
     the part of a name before a slash. `EvalInstances` maps the number to
@@ -171,22 +172,23 @@ class Lidar(LeafSystem):
             X_PS: pose of the sensor in P.
             pattern: the beams.
             measurement: the model of noise, losses and rounding.
-            returns: the model of a real unit; then `measurement` gives only the
-                resolution. None for ideal returns.
+            returns: the model of a real unit; None for ideal returns. With a
+                model, only the resolution is taken from `measurement`.
             moving_bodies: frame -> index of its body in the port
                 `body_spatial_velocities`, which only a LiDAR with this has.
             role: role of the geometry that it sees.
             unseen: frames and geometries that it does not see; by default
                 P, unless that is the world's frame.
-            structures: gives labels and instance ids to returns; by default
-                structures have no class, and ids in alphabetical order.
+            structures: table of the structures' labels and instance ids. By
+                default, structures have no class, and ids in alphabetical
+                order.
             anchored_frames: frames that never move, besides the world's; their
-                geometry is cheaper to cast on. If one moves after all, all
-                static geometry is built anew.
+                geometry is cheaper to cast on. If such a frame moves after all,
+                all static geometry is rebuilt.
             num_threads: number of threads that share its rays; the measurement
                 does not depend on it.
             causal: whether a scan is the turn that ends at the time of the
-                output; by default that which starts then.
+                output; by default the turn starts at that time.
 
         Raises:
             TypeError: the role is no role of geometry.
@@ -212,7 +214,7 @@ class Lidar(LeafSystem):
         self.anchored_frames = frozenset(anchored_frames)
         self.num_threads = num_threads
         self._first = _ready(pattern.beams(0), returns)
-        # When each column fires, as a part of a turn.
+        # When each column fires, as a fraction of the turn.
         self._times = self._first.beams.column_t_ns / (pattern.period * 1e9)
 
         declare = self.DeclareAbstractInputPort
@@ -300,8 +302,9 @@ class Lidar(LeafSystem):
     def EvalGeometryIds(self, context: Context) -> list[GeometryId | None]:
         """Returns the geometry of each point of `scan` in a Context.
 
-        It is None for a point without a surface, such as rain. A SceneGraph's
-        inspector gives the frame of a geometry, and a plant its body.
+        The geometry is None for a point without a surface, such as rain. To
+        find the body of a geometry, ask the SceneGraph's inspector for its
+        frame and the plant for the frame's body.
         """
         _, met, geometries = self._measured.Eval(context)
         return _ids_of(geometries, met)
@@ -412,7 +415,7 @@ class Lidar(LeafSystem):
         return moving_groups.Ball(middle, float(reach + way) + 1.0)
 
     def _calc_motions(self, context: Context) -> dict[FrameId, Motion]:
-        """Returns the motion of each frame that does not stay."""
+        """Returns moving frame -> its motion during the turn."""
         if self._velocities is None:
             return {}
         V_WBs = self._velocities.Eval(context)
@@ -492,7 +495,7 @@ class Lidar(LeafSystem):
         return hits.geometry.take(turn.table.place.take(returns.beams)), returns
 
     def _turn_at(self, time: float) -> tuple[int, _Turn]:
-        """Returns number and beams of the turn of a time [s]."""
+        """Returns number and beams of the turn at a time [s]."""
         frame = round(time / self.pattern.period) - self.causal
         if self.pattern.repeats:
             return frame, self._first
@@ -514,7 +517,10 @@ class Lidar(LeafSystem):
         )
 
     def _calc_poses(self, context: Context) -> tuple[np.ndarray, np.ndarray]:
-        """Returns positions and orientations of S: one, or each column's."""
+        """Returns positions (K, 3) and rotations (K, 3, 3) of S in a turn.
+
+        K is the number of columns with motion distortion, otherwise 1.
+        """
         sweep = _value(self._sweep, context)
         if sweep is not None:
             sweep = sweep.of_frame(self.X_PS)
@@ -529,8 +535,8 @@ class Lidar(LeafSystem):
                 X_WP.translation() + way_P + rotated(R_WW0, p_PS_W),
                 product(R_WW0, X_WS.rotation().matrix()),
             )
-        # Copies are laid out like many poses: for Drake's views of its own
-        # memory, numba would compile all that takes poses once more.
+        # Copies have the same memory layout as several poses. For Drake's views
+        # of its own memory, numba would compile every function of poses again.
         p_WS, R_WS = X_WS.translation(), X_WS.rotation().matrix()
         return np.array([p_WS]), np.array([R_WS])
 
@@ -589,16 +595,16 @@ class _Measured(NamedTuple):
     geometries: tuple[PerceptionGeometry, ...]
 
     def __deepcopy__(self, memo: dict) -> _Measured:
-        # A Context is cloned with it. It never changes, and ids cannot be
-        # copied.
+        # A Context is cloned together with this value. It never changes, and
+        # geometry ids cannot be copied.
         return self
 
 
 class SeenGeometry:
     """The geometry that a LiDAR sees in a Context, kept until it changes.
 
-    In a cloned Context it is empty at first: a scene with moving geometry
-    cannot be shared.
+    A clone of a Context starts with an empty scene, because a scene with moving
+    geometry cannot be shared.
 
     Attributes:
         scene: scene on which rays are cast; None before the first update. Its
@@ -669,7 +675,7 @@ class SeenGeometry:
         return np.where(moves[self.instance], self.moving_label, self.label)
 
     def materials(self, returns: CalibratedReturns) -> Materials:
-        """Returns how each geometry of `scene` reflects."""
+        """Returns the material of each geometry of `scene`."""
         if self._materials is None:
             self._materials = returns.materials(
                 self.built, self._lidar.structures
@@ -733,7 +739,7 @@ class SeenGeometry:
 
 
 class BeamTable(NamedTuple):
-    """Constants of all scans, for all beams in firing order.
+    """Properties of the beams that are the same in every scan.
 
     Attributes:
         d_Sset: (num_beams, 3) float32 unit directions, expressed in S.
@@ -754,9 +760,12 @@ class BeamTable(NamedTuple):
 class _Turn:
     """The beams of a turn, ready for casting and assembling.
 
-    `d_Sset_cast` has (N, 3) directions in the order of casting, `table` what
-    beams add to points, and `calibrated` the same for calibrated returns, None
-    for ideal ones. `beams` are in firing order.
+    Attributes:
+        beams: the beams in firing order.
+        d_Sset_cast: (N, 3) directions in the order of casting.
+        calibrated: the turn of a unit with calibrated returns; None for ideal
+            returns.
+        table: constants for assembling points.
     """
 
     def __init__(self, beams: Beams, returns: CalibratedReturns | None):
@@ -778,9 +787,10 @@ class _Turn:
 
 @lru_cache(maxsize=4)
 def _ready(beams: Beams, returns: CalibratedReturns | None) -> _Turn:
-    """Returns a turn, the same for all LiDARs that are alike.
+    """Returns a turn; LiDARs with equal beams and returns share it.
 
-    Drake's bindings may keep a dropped Diagram, and with it its LiDARs.
+    Sharing saves memory, because Drake's bindings may keep a dropped Diagram
+    with its LiDARs.
     """
     return _Turn(beams, returns)
 
@@ -802,12 +812,12 @@ def assemble_points(
     Args:
         scan: (N,) points, filled here.
         table: beams of the pattern.
-        returns: what the beams met.
-        met: (N,) int32 index of the hit geometry in labels and instances;
+        returns: the returns of the beams.
+        met: (N,) int32 index of the hit geometry in `label` and `instance`;
             negative for the weather.
         label, instance: uint16 of each geometry.
-        step: coordinates are rounded to its multiples [m]; not rounded if it is
-            0.
+        step: coordinates are rounded to multiples of this [m]; 0 to keep them
+            exact.
     """
     # As names of their own, fields are fast.
     beams, ranges, intensity = returns.beams, returns.ranges, returns.intensity

@@ -1,9 +1,9 @@
 """The beams of a LiDAR: directions and firing times.
 
-Livox gives fields of view, rates and numbers of lines of its units, whose
-patterns do not repeat. The exact motion of a beam is not published as a
-formula; each class states its assumptions. Directions depend only on the time,
-so that a frame is always the same.
+The patterns of Livox's units do not repeat. Livox publishes their fields of
+view, rates and numbers of lines, but no formula for the motion of a beam; each
+class states its assumptions. Directions depend only on time, so that a given
+frame is always the same.
 """
 
 from __future__ import annotations
@@ -37,7 +37,7 @@ POINT_DTYPE = np.dtype(
 )
 
 
-# Height of the bands in which beams without an order of their own are cast.
+# Height of the elevation bands in which beams of irregular patterns are cast.
 _BAND_RAD = 0.03
 # What the fields `ring` and `t` of a point can hold.
 _MOST_RING, _LATEST_NS = 2**16 - 1, 2**32 - 1
@@ -102,7 +102,7 @@ class Beams:
     def cast_columns(self) -> np.ndarray | None:
         """(N,) column of each beam in packet order.
 
-        None if the beams pass through all columns in turn, again and again.
+        None if the beams in packet order cycle through all columns.
         """
         columns = self.column[self.packet_order]
         turns, rest = divmod(len(columns), max(len(self.column_t_ns), 1))
@@ -113,7 +113,7 @@ class Beams:
 
 
 def make_beams(d_Sset: np.ndarray, ring: np.ndarray, t_ns: np.ndarray) -> Beams:
-    """Returns beams that may point anywhere, in the order of firing.
+    """Returns beams with arbitrary directions, in firing order.
 
     They have (N, 3) unit directions, (N,) rings and (N,) firing times, which do
     not decrease.
@@ -234,7 +234,7 @@ def _limit(
     azimuths_deg: tuple[float, ...],
     elevations_deg: tuple[float, ...],
 ) -> Beams:
-    """Returns the beams within limits, the same for all that are equal."""
+    """Returns the beams within limits; equal arguments share one result."""
     x, y, z = beams.d_Sset.T
     azimuth = np.rad2deg(np.arctan2(y, x))
     elevation = np.rad2deg(np.arcsin(np.clip(z, -1.0, 1.0)))
@@ -265,9 +265,9 @@ class SpinningPattern(BeamPattern):
     In the sensor frame S (x forward, y left, z up) the turn starts at the rear
     and goes clockwise seen from above, as Ouster's and Velodyne's units turn:
     column k of n points at azimuth pi - 2 pi k / n. With azimuth limits it goes
-    from the first to the last one, both included, and fires only in that part
-    of the turn. Ring 0 is the highest beam. Beams are ordered as they fire:
-    column by column, and from ring 0 downwards in each.
+    from the first limit to the last, including both, and fires only in that
+    part of the turn. Ring 0 is the highest beam. Beams are ordered as they
+    fire: column by column, and from ring 0 downwards in each.
 
     Attributes:
         elevations_rad: elevation of each ring, descending [rad].
@@ -334,9 +334,10 @@ class SpinningPattern(BeamPattern):
 
 @lru_cache(maxsize=8)
 def _spin(pattern: SpinningPattern) -> Beams:
-    """Returns the beams of a pattern, the same for all that are equal.
+    """Returns the beams of a pattern; equal patterns share one result.
 
-    Drake's bindings may keep a dropped Diagram, and with it its patterns.
+    Sharing saves memory, because Drake's bindings may keep a dropped Diagram
+    with its patterns.
     """
     num_columns, num_rings = int(pattern.num_columns), pattern.num_rings
     columns, rings = np.arange(num_columns), np.arange(num_rings)
@@ -364,8 +365,8 @@ def _spin(pattern: SpinningPattern) -> Beams:
         ring=np.tile(rings, num_columns),
         column=np.repeat(columns, num_rings),
         column_t_ns=np.round(columns * column_ns),
-        # Ring by ring, which is faster than in the order of firing, by 1.6 in
-        # Metropolis.
+        # Casting ring by ring is faster than in firing order, by a factor of
+        # 1.6 in Metropolis.
         packet_order=beams.reshape(num_columns, -1).T.ravel(),
     )
 
@@ -400,9 +401,10 @@ class DirectionPattern(BeamPattern):
             min_range: nearest range that is measured [m].
             max_range: farthest range that is measured [m].
             period: duration of one turn [s].
-            times: (N,) when each beam fires, from the start of the turn [s];
-                by default all at once.
-            rings: (N,) number of each beam's emitter; by default there is one.
+            times: (N,) firing time of each beam since the start of the turn
+                [s]; by default all fire at once.
+            rings: (N,) number of each beam's emitter; by default there is one
+                emitter.
 
         Raises:
             ValueError: there is no beam, a direction is zero or not a number, a
@@ -494,8 +496,8 @@ def make_flash_pattern(
 # Width of a cell in elevation and in azimuth [deg], and numbers of cells.
 _CELL_DEG = 0.25
 _ROWS, _COLUMNS = round(180 / _CELL_DEG), round(360 / _CELL_DEG)
-# Cells around one with a beam that are covered, and half of the widest gap
-# between beams within the field of view: 1.5 and 12 deg.
+# In cells: how far a beam covers its surroundings (1.5 deg), and half of the
+# widest gap between beams that still counts as field of view (12 deg).
 _NEAR_CELLS, _GAP_CELLS = 6, 48
 
 
@@ -511,7 +513,7 @@ class BeamCoverage:
     """
 
     def __init__(self, d_Sset: np.ndarray):
-        """Covers the directions about beams (N, 3), unit vectors in S."""
+        """Takes the directions of the beams, (N, 3) unit vectors in S."""
         # Imported here: the rest of the module needs no library that is slow
         # to load.
         from scipy.ndimage import maximum_filter1d, minimum_filter1d
@@ -532,7 +534,7 @@ class BeamCoverage:
 def _grown(
     cells: np.ndarray, reach: int, grow: Callable, beyond: int
 ) -> np.ndarray:
-    """Returns cells after a filter over so many neighbours on each side."""
+    """Returns cells after a filter over `reach` neighbours on each side."""
     size = 2 * reach + 1
     rows = grow(cells, size, axis=0, mode="constant", cval=beyond)
     return grow(rows, size, axis=1, mode="wrap")
@@ -550,10 +552,10 @@ def _cells(d_Sset: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
 
 @dataclass(frozen=True)
 class _TimedPattern(BeamPattern):
-    """Lines of beams that fire together, at a constant rate of all points.
+    """A pattern of `num_lines` beams that fire together at a constant rate.
 
-    Ranges are measured within limits [m]; a frame takes a period [s]. Line 0 of
-    the lasers is the highest.
+    Line 0 is the highest. The limits of the range are in m, the period of a
+    frame in s.
     """
 
     _: KW_ONLY
@@ -601,9 +603,10 @@ class _TimedPattern(BeamPattern):
 
 @lru_cache(maxsize=4)
 def _fire(pattern: _TimedPattern, frame: int) -> Beams:
-    """Returns the beams of a frame, the same for all patterns that are equal.
+    """Returns the beams of a frame; equal patterns share one result.
 
-    Drake's bindings may keep a dropped Diagram, and with it its patterns.
+    Sharing saves memory, because Drake's bindings may keep a dropped Diagram
+    with its patterns.
     """
     firing = np.arange(pattern.num_firings)
     step = pattern.period / pattern.num_firings
@@ -619,7 +622,7 @@ def _fire(pattern: _TimedPattern, frame: int) -> Beams:
 
 @dataclass(frozen=True)
 class RosettePattern(_TimedPattern):
-    """The pattern of two counter-rotating wedge prisms before a row of lasers.
+    """The pattern of two counter-rotating wedge prisms and a row of lasers.
 
     Each prism bends a beam by a quarter of the field of view, and both bends
     add up as vectors. The field of view is therefore a disc about x, densest in
@@ -674,7 +677,7 @@ class RosettePattern(_TimedPattern):
 
 @dataclass(frozen=True)
 class NoddingPattern(_TimedPattern):
-    """A pattern of lines that rotate and slowly nod, each in its own band.
+    """A pattern of lines that rotate and slowly nod within their bands.
 
     Bands of equal height fill the field of view. The lines turn about z 100
     times a second and nod 6.18 times a second. The ratio of these rates is not

@@ -18,7 +18,7 @@ UnitPattern: TypeAlias = (
 
 
 class LidarPreset(NamedTuple):
-    """The beams of a unit, and the source of their numbers."""
+    """The beams of a unit, and the source of these data."""
 
     pattern: UnitPattern
     source: str
@@ -52,7 +52,7 @@ class LidarPreset(NamedTuple):
 
 
 _UNITS = parse_yaml(Path(__file__).with_name("presets.yaml").read_bytes())
-# Units with more columns in a slower turn.
+# Units that fire at a fixed rate: a slower turn has more columns.
 _STEADY = {n for n, unit in _UNITS.items() if unit.pop("fires_steadily", False)}
 LIDAR_PRESETS: dict[str, LidarPreset] = {
     name: LidarPreset.of(**unit) for name, unit in _UNITS.items()
@@ -72,8 +72,8 @@ def make_beam_pattern(
     Args:
         preset: a key of `LIDAR_PRESETS`; `source` there names its data sheet.
         period: duration of a turn [s]; by default that of the data sheet.
-        num_columns: columns in a turn; by default those of the data sheet. A
-            unit that fires at a fixed rate has as many as fit into the period.
+        num_columns: columns in a turn; by default those of the data sheet. The
+            number is fixed by the period if a unit fires at a fixed rate.
         min_range: nearest range that is measured [m]; by default that of the
             data sheet.
         max_range: farthest range that is measured [m]; by default that of the

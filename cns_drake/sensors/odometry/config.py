@@ -4,12 +4,12 @@ from cns_drake.sensors.sensor_config import Section
 
 
 class OdometrySection(Section):
-    """How often the exact motion of the vehicle is recorded.
+    """How often the true motion of the vehicle is recorded.
 
     Attributes:
-        rate: messages per second, at most 1000: a multiple of the fastest
-            LiDAR's rate that divides 1,000,000,000 ns, such as 100; by default
-            one message per scan.
+        rate: messages per second [Hz], such as 100: a multiple of the fastest
+            LiDAR's rate, at most 1000, and with a whole number of nanoseconds
+            between two messages. By default one message per scan.
     """
 
     rate: int | None = None

@@ -37,7 +37,7 @@ class Odometry:
 
 
 class OdometrySensor(LeafSystem):
-    """Measures pose and velocity of a body, or a place on it, without error.
+    """Measures pose and velocity of a body, or a frame on it, without error.
 
     .. pydrake_system::
 

@@ -1,1 +1,1 @@
-"""Calibrated returns: the measurement of returning light by real units."""
+"""Calibrated returns: a model of how real units measure returning light."""

@@ -1,4 +1,4 @@
-"""Returns of a LiDAR after its data sheet, in any weather."""
+"""Returns of a LiDAR modelled by its data sheet, in any weather."""
 
 from __future__ import annotations
 
@@ -29,12 +29,12 @@ CLEAR = Weather()
 
 @dataclass(frozen=True)
 class CalibratedReturns:
-    """A model of returns after the data sheet of a LiDAR.
+    """A model of returns that follows the data sheet of a LiDAR.
 
     It adds the unit's noise, losses, angular errors and calibrated intensities.
     Random numbers depend only on the seed, the name of the sensor, the frame
-    and the beam. Errors of the unit depend on its own seed, its name and the
-    laser: two drives with one unit share them.
+    and the beam. Errors of the individual unit depend on `unit_seed`, its name
+    and the laser; two drives with one unit share them.
 
     Attributes:
         sheet: data sheet of the unit.
@@ -96,9 +96,9 @@ class CalibratedReturns:
         geometries: Sequence[PerceptionGeometry],
         structures: object,
     ) -> Materials:
-        """Returns how geometries reflect; rain wets the ground.
+        """Returns the materials of geometries, with wet ground in rain.
 
-        Structures have classes if they are a `StructureTable`.
+        The classes of structures are known only from a `StructureTable`.
         """
         if not isinstance(structures, StructureTable):
             structures = StructureTable(())
@@ -146,8 +146,8 @@ class CalibratedReturns:
     ) -> Reported:
         """Returns the reported points of a turn.
 
-        Of the rays in the order of casting, ray i takes pose i mod K and time i
-        mod T.
+        Rays are numbered in the order of casting. Ray i takes pose i mod K and
+        time i mod T.
 
         Args:
             scene: geometry on which rays are cast.
@@ -156,7 +156,7 @@ class CalibratedReturns:
             turn: random errors of the turn.
             p_WSset: (K, 3) positions of S [m].
             R_WSset: (K, 3, 3) orientations of S.
-            times: (T,) firing times as parts of the turn.
+            times: (T,) firing times as fractions of the turn.
             frame: number of the turn.
         """
         key = frame_key(self.seed, self.sensor_name, frame)
@@ -236,7 +236,7 @@ class CalibratedReturns:
         key = frame_key(self.unit_seed, f"unit/{self.sensor_name}", 0)
         sheet, head = self.sheet, self.sheet.head
         angle = np.radians(sheet.angle_error_deg)
-        # What alternates is a part of the errors of range.
+        # The alternating offset is part of the unit's range errors.
         rest = np.sqrt(sheet.range_bias**2 - head.alternate**2)
         unit = sheet.response
         sizes = (rest, angle, angle, unit.gain, unit.flicker)
@@ -273,16 +273,17 @@ class CalibratedReturns:
 
 
 def _taken(values: np.ndarray, rows: np.ndarray) -> np.ndarray:
-    """Returns values of rows that take them in turn; a single one is left."""
+    """Returns row i's value, values[i mod K]; a single value stays single."""
     return values if len(values) == 1 else values[rows % len(values)]
 
 
 def _turned(
     d_Sset: np.ndarray, left: np.ndarray | float, up: np.ndarray | float
 ) -> np.ndarray:
-    """Returns (N, 3) directions with other azimuths and, a little, elevations.
+    """Returns (N, 3) directions turned by small angles.
 
-    Azimuths differ by `left` [rad], elevations by `up` over the cosine of each.
+    Azimuths grow by `left` [rad]. Elevations grow by about `up` times the
+    cosine of the elevation [rad].
     """
     x, y, z = d_Sset.T
     c, s = cos(left), sin(left)
@@ -297,13 +298,13 @@ class CalibratedTurn:
     Attributes:
         d_Sset: (N, 3) true directions of the beams, in the order of casting.
         height: (N,) height of each beam's laser above the origin [m].
-        blocks: each height, and the rows of the beams that have it.
+        blocks: pairs of a height and the rows of the beams that have this
+            height.
         reported: (N, 3) directions that the unit reports, in firing order.
-        p_SLset: (N, 3) place of each beam's laser, in firing order [m].
-        beam: (N,) number of each beam, in firing order.
-        orders: (2, N) two orders in which neighbouring rays follow each other:
-            the order of casting, and the firing order, which contains the row
-            of each beam.
+        p_SLset: (N, 3) position of each beam's laser, in firing order [m].
+        beam: (N,) number in firing order of each beam, in the order of casting.
+        orders: (2, N) two orders of the rows, in each of which neighbouring
+            rays follow each other: the order of casting and the firing order.
         range_error: (N,) range error of each beam's laser, in firing order [m].
         gain: (N,) gain of each beam's laser.
     """

@@ -1,4 +1,4 @@
-"""Echoes: what a unit reports of the returning light of each beam."""
+"""Echoes: the points that a unit reports for the light of each beam."""
 
 import math
 from typing import NamedTuple
@@ -24,23 +24,24 @@ from cns_drake.sensors.returns.weather import Scattering
 
 # The index of the weather, in place of a geometry's.
 SCATTERED = -2
-# Numbers of a beam's draws; lower ones serve the sub-rays.
+# Numbers of a beam's random draws; lower numbers belong to the sub-rays.
 _FIRST_ECHO_DRAW = 128
 _DRAWS_PER_ECHO = 4
 _FIRST_DROP_DRAW = 200
-# The most echoes of surfaces, and drops, of a beam that are processed.
+# Greatest numbers of echoes of surfaces, and of drops, per beam.
 _MOST_ECHOES = 12
 _MOST_DROPS = 8
-# Energy of a retro-reflector that makes the intensity full: 10,000 times that
-# of a white target.
+# Energy of a retro-reflector at which intensity saturates: 10,000 times that of
+# a white target.
 _FULL_RETRO = 1e4
 _FULL_INTENSITY = 255.0
 
 
 class Receiver(NamedTuple):
-    """The receiver of a unit in weather of an extinction [1/m].
+    """The receiver of a unit, in a given weather.
 
-    It reports ranges within limits [m]. `scattering` is None in clear air.
+    The extinction of the air is in 1/m, the limits of reported ranges in m.
+    `scattering` is None in clear air.
     """
 
     sheet: UnitSheet
@@ -70,10 +71,10 @@ class Reported(NamedTuple):
 
 
 class _Pulses(NamedTuple):
-    """N echoes of beams, numbered in their beams, at distances [m].
+    """N echoes, with beam, number within the beam and distance [m].
 
-    `energy` is as the unit infers it for clear air; see `Reported` for
-    `geometry`. An echo that is sure is detected in any case.
+    `energy` is the energy that the unit infers if it assumes clear air; see
+    `Reported` for `geometry`. Echoes marked `sure` need no test of detection.
     """
 
     beam: np.ndarray
@@ -103,7 +104,7 @@ def report_echoes(
         light: the light that came back.
         receiver: receiver of the unit.
         key: key of the random draws.
-        range_error: (N,) error of range of each beam's laser [m].
+        range_error: (N,) range error of each beam's laser [m].
         gain: (N,) gain of each beam's laser.
     """
     num_beams = len(gain)
@@ -115,7 +116,8 @@ def report_echoes(
         pulses = join([pulses, drops])
     pulses = _detect(pulses, receiver, key, range_error)
     if scattering is not None and scattering.fog_energies[-1] > 0.0:
-        # A unit reports the broad echo of fog only without any other.
+        # A unit reports the broad echo of fog only if the beam has no other
+        # echo.
         nearest = np.full(num_beams, np.inf)
         np.minimum.at(nearest, light.beam, light.distance)
         nearest[pulses.beam] = -np.inf
@@ -140,8 +142,8 @@ def _merge(
 ) -> _Pulses:
     """Returns the echoes of surfaces, beam by beam, the nearest first.
 
-    An echo begins where light is farther than a pulse, the resolution [m], from
-    the beginning of the last echo.
+    A new echo begins where the light is more than `resolution`, half the length
+    of a pulse [m], behind the beginning of the last echo.
     """
     row, first = _sorted(light, num_beams)
     count = len(row)
@@ -160,7 +162,7 @@ def _merge(
                     break
                 echo += 1
                 beam[echo], number[echo] = one, index
-                # Light that is alone needs no mean.
+                # A single part of the light needs no mean.
                 mean[echo], total[echo] = distance, snr
                 energy[echo] = light.energy[k]
                 geometry[echo] = light.geometry[k]
@@ -189,7 +191,8 @@ def _merge(
 def _sorted(light: Light, num_beams: int) -> tuple[np.ndarray, np.ndarray]:
     """Returns the rows of the light beam by beam, the nearest first.
 
-    And the place of each beam's first row, and the end, (num_beams + 1,).
+    Also returns where the rows of each beam begin, and where the last ones end,
+    (num_beams + 1,).
     """
     first = np.zeros(num_beams + 1, np.int64)
     for beam in light.beam:
@@ -216,8 +219,9 @@ def _drops(
 ) -> _Pulses:
     """Returns the echoes of drops in front of surfaces."""
     distances, counts = scattering.distances, scattering.counts
-    # Drops are arrivals of a Poisson process, in units of their mean number.
-    # The first one of most beams is beyond the farthest end of any.
+    # Drops along a beam are arrivals of a Poisson process; distance is measured
+    # by the mean number of drops up to it. In most beams, even the first drop
+    # is beyond the maximum range.
     beam = np.arange(num_beams)
     none = uniform(key, beam, _FIRST_DROP_DRAW) > 1.0 - math.exp(-counts[-1])
     end = np.full(num_beams, receiver.max_range)
@@ -250,7 +254,7 @@ def _drops(
                 snr,
                 echo_energy(receiver.budget, snr, distance),
                 np.full(len(beam), SCATTERED, np.int32),
-                # Drops in the table are detected already.
+                # The table contains only drops that are detected.
                 np.ones(len(beam), bool),
             )
         )
@@ -259,7 +263,7 @@ def _drops(
 
 @compiled
 def _number_before(key: np.uint64, beam: np.ndarray, draw: int) -> np.ndarray:
-    """Returns the mean number of drops before the next one, at random."""
+    """Draws the distance to the next drop, as a mean number of drops."""
     return -np.log(1.0 - uniform(key, beam, draw))
 
 
@@ -269,7 +273,7 @@ def _fog(
     scattering: Scattering,
     key: np.uint64,
 ) -> _Pulses:
-    """Returns the echoes of fog in front of the nearest light of beams [m]."""
+    """Returns the echoes of fog nearer than `nearest` light of a beam [m]."""
     beam = np.flatnonzero(nearest > 0.0)
     share = uniform(key, beam, _FIRST_DROP_DRAW + 2 * _MOST_DROPS)
     distance = np.interp(share, scattering.fog_counts, scattering.distances)
@@ -291,8 +295,8 @@ def _fog(
 def _detect(
     pulses: _Pulses, receiver: Receiver, key: np.uint64, range_error: np.ndarray
 ) -> _Pulses:
-    """Returns the echoes that are detected, with errors of their ranges."""
-    # Where a surface lies decides; an error of its range does not.
+    """Returns the echoes that are detected, with range errors added."""
+    # The true distance of a surface decides, not the measured one.
     is_seen = pulses.snr >= HOPELESS_SNR
     is_seen &= pulses.energy >= receiver.sheet.response.least
     is_seen |= pulses.is_sure
@@ -316,7 +320,7 @@ def _detect(
 
 
 def _choose(pulses: _Pulses, choice: Echoes, num_beams: int) -> np.ndarray:
-    """Returns the rows of the reported echoes, in the order of their beams."""
+    """Returns the rows of the echoes to report, in the order of the beams."""
 
     def find_greatest(values: np.ndarray) -> np.ndarray:
         return _find_greatest(pulses.beam, pulses.number, values, num_beams)
@@ -328,8 +332,8 @@ def _choose(pulses: _Pulses, choice: Echoes, num_beams: int) -> np.ndarray:
     else:
         rows = find_greatest(pulses.snr)
     if choice == Echoes.DUAL:
-        # The last one as well, or the second strongest if the last is the
-        # strongest.
+        # The second echo is the last one, or the second strongest if the last
+        # is the strongest.
         rest = pulses.snr.copy()
         rest[rows[rows >= 0]] = -1.0
         second, last = find_greatest(rest), find_greatest(pulses.distance)
@@ -344,7 +348,7 @@ def _find_greatest(
 ) -> np.ndarray:
     """Returns the row of the greatest value of each group, -1 for none.
 
-    Among equal values that of the least number wins.
+    Among equal values, the one with the lowest number wins.
     """
     best = np.full(num_groups, -1)
     for row in range(len(group)):
@@ -359,7 +363,7 @@ def _find_greatest(
 
 
 def _first_draw(pulses: _Pulses) -> np.ndarray:
-    """Returns the number of the first draw of each echo."""
+    """Returns the number of the first random draw of each echo."""
     number = np.minimum(pulses.number, _MOST_ECHOES)
     return _FIRST_ECHO_DRAW + _DRAWS_PER_ECHO * number
 
@@ -367,10 +371,10 @@ def _first_draw(pulses: _Pulses) -> np.ndarray:
 def _intensity(
     pulses: _Pulses, receiver: Receiver, key: np.uint64, gain: np.ndarray
 ) -> np.ndarray:
-    """Returns the calibrated reflectivity in the scale of the unit.
+    """Returns the intensity that the unit reports, a whole number.
 
-    It is a whole number: by the unit's response up to a reflectivity of 1,
-    logarithmic above.
+    Up to a reflectivity of 1 it follows the unit's response; above that, its
+    scale is logarithmic.
     """
     unit, retro_from = receiver.sheet.response, receiver.sheet.retro_from
     rest, draw = _FULL_INTENSITY - retro_from, _first_draw(pulses)
@@ -385,7 +389,7 @@ def _intensity(
     intensity[is_above] = retro_from + rest * part
     if unit.speckle:
         speckle = normal(key, pulses.beam, draw + 2)
-        # Most shots differ little, and a few much.
+        # Most shots differ little from the mean; a few differ much.
         speckle *= speckle * speckle * (unit.speckle / math.sqrt(15.0))
         speckle += 1.0
         intensity *= speckle

@@ -2,9 +2,9 @@
 
 A beam's irradiance falls as exp(-2 r^2 / w^2) with the distance r from its
 axis; w is its radius at 1 / e^2. If the neighbour of a beam meets another
-surface, a ray at a random place of the beam's half on that side represents the
-half. The surface that it meets gets that part of the light. The mean over beams
-is then that of the whole profile.
+surface, an additional ray at a random place in the beam's half on that side
+represents this half. The surface that the additional ray meets gets half of the
+light. The mean over beams is then that of the whole profile.
 """
 
 from typing import NamedTuple
@@ -15,25 +15,26 @@ from cns_drake.base.compiled import compiled
 from cns_drake.sensors.returns.light import BeamHits, Shots
 from cns_drake.sensors.returns.random_numbers import uniform
 
-# Numbers of a beam's draws for the rays at its sides, two each.
+# Numbers of a beam's random draws for the rays at its sides, two per ray.
 _SIDE_DRAW = 0
-# Surfaces are apart if ranges differ from those on the own plane by this much
-# [m], and by this part of the range.
+# Two surfaces are apart if a range differs from the range at the neighbour's
+# plane by more than this distance [m] plus this fraction of the range.
 _JUMP, _JUMP_PART = 0.1, 0.01
-# Beams are neighbours if their angle is at most this many divergences. An edge
-# between beams farther apart is hardly ever within either.
+# Beams are neighbours if the angle between them is at most this many
+# divergences. If beams are farther apart, an edge between them is hardly ever
+# within either beam.
 _NEIGHBOURS = 10.0
 
 
 class Sides(NamedTuple):
-    """P rays in those parts of beams that are next to an edge.
+    """P additional rays in those parts of beams that are next to an edge.
 
     Attributes:
         row: (P,) row of the beam.
         neighbour: (P,) row of the beam beyond the edge.
         share: (P,) part of the beam's light.
         d_Wset: (P, 3) directions.
-        reach: (P,) float32: beyond the nearer of both surfaces [m].
+        reach: (P,) float32 length to cast, just beyond the nearer surface [m].
     """
 
     row: np.ndarray
@@ -46,11 +47,11 @@ class Sides(NamedTuple):
 def find_sides(shots: Shots, orders: np.ndarray, hits: BeamHits) -> Sides:
     """Returns extra rays to cast where neighbouring beams hit an edge.
 
-    Two neighbours meet one surface, or two surfaces that touch, if one point is
-    on the plane of the other, or if both planes meet in between. Otherwise an
-    edge lies between the neighbours: within one of their beams, or in the gap.
     Beams are neighbours if they follow each other in one of the (2, N) orders.
-    The hits are those of the axes of the beams.
+    Two neighbours hit the same surface, or touching surfaces, if the point hit
+    by one lies in the plane hit by the other, or if the two planes meet in
+    between. Otherwise there is an edge between the neighbours, which may lie
+    within one of the beams or in the gap. `hits` are those of the beams' axes.
     """
     farthest = _NEIGHBOURS * shots.divergence
     edges = [_find_edges(order, hits, farthest) for order in orders]
@@ -96,13 +97,14 @@ def _aim(
     divergence: float,
     max_range: float,
 ) -> None:
-    """Fills in the directions of rays at P sides, and their reach.
+    """Fills in directions and reach of P additional rays.
 
     Args:
         toward: (P, 3) unit vectors across the beams, to the neighbours.
         rest: (P,) part of a beam's light farther from its axis.
-        angle: (P,) between `toward` and the way to the ray [rad].
-        hits: by the axes of the beams.
+        angle: (P,) angle between `toward` and the direction from the axis to
+            the ray [rad].
+        hits: hits of the beams' axes.
     """
     for side in range(len(rest)):
         i, j = sides.row[side], sides.neighbour[side]
@@ -126,11 +128,11 @@ def _aim(
 def _share(
     num_beams: int, row: np.ndarray, number: np.ndarray, toward: np.ndarray
 ) -> np.ndarray:
-    """Returns the (P,) part of the light at each side.
+    """Returns the (P,) fraction of a beam's light that each side gets.
 
-    A side has half of the beam, or a quarter if there are edges at other sides,
-    too. A second neighbour on the same side has no part. Directions `toward`
-    the neighbours are (P, 3).
+    A side gets half of the light, or a quarter if other sides have edges, too.
+    A second neighbour on the same side gets nothing. `toward` has the (P, 3)
+    directions to the neighbours.
     """
     side_of = np.full((num_beams, 4), -1)
     for side in range(len(row)):
@@ -152,15 +154,16 @@ def _share(
 
 @compiled
 def meet_sides(sides: Sides, side_hits: BeamHits, hits: BeamHits) -> np.ndarray:
-    """Returns the share (N,) of each beam's light that its axis stands for.
+    """Completes the hits of additional rays, and shares out the light.
 
-    The extra rays at its sides stand for the rest. A ray that passes the nearer
-    of two surfaces has met the farther one, on its plane. Hits of rays at sides
-    are within their reach. Those on the surface of their beam become misses,
-    those that pass the nearer surface become hits.
+    The additional rays were cast only within their reach, just beyond the
+    nearer of the two surfaces at an edge. A ray that hit the surface of its own
+    beam becomes a miss. A ray that passed the nearer surface becomes a hit on
+    the plane of the farther one.
 
     Returns:
-        The (N,) part of each beam's light that its axis stands for.
+        (N,) fraction of each beam's light that its axis represents; its
+        additional rays represent the rest.
     """
     rest = np.ones(len(hits.ranges))
     for side in range(len(sides.row)):
@@ -190,7 +193,7 @@ def meet_sides(sides: Sides, side_hits: BeamHits, hits: BeamHits) -> np.ndarray:
 def _range_on(hits: BeamHits, i: int, d_W: np.ndarray) -> float:
     """Returns a ray's range at the plane of the i-th hit [m].
 
-    It is inf if the ray does not meet the plane, or there is no hit.
+    The range is inf if the ray does not meet the plane, or there is no hit.
     """
     along = 0.0
     for axis in range(3):
@@ -206,7 +209,7 @@ def _find_edges(
 ) -> np.ndarray:
     """Returns the (E, 2) rows of neighbours with an edge between them.
 
-    They are beside each other in the order of rows, up to an angle [rad].
+    Neighbours follow each other in the order, at most an angle [rad] apart.
     """
     edges, count = np.empty((len(order), 2), np.int64), 0
     # As names of their own, fields are fast.
@@ -228,7 +231,7 @@ def _find_edges(
 
 @compiled
 def _touch(a: BeamHits, i: int, b: BeamHits, j: int) -> bool:
-    """Returns whether the planes of two places are one, or meet in between."""
+    """Returns whether the planes at two hits coincide, or meet in between."""
     if a.geometry[i] < 0 or b.geometry[j] < 0:
         return False
     # -n . d for the plane of each and the direction of the other.

@@ -1,4 +1,4 @@
-"""What the rays of beams have met, and the light that comes back along them."""
+"""The hits of beams' rays, and the light that comes back along them."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from cns_drake.base.compiled import compiled
 from cns_drake.ray_casting.ray_casting_scene import RayHits
 from cns_drake.sensors.returns.materials import BEADS, RETRO, Materials
 
-# The sheeting of signs and plates works up to this angle of incidence.
+# The retro-reflective sheeting of signs and plates works up to this angle.
 _RETRO_COSINE = 0.5
 
 # A named tuple of arrays with as many rows each.
@@ -70,7 +70,8 @@ class Shots(NamedTuple):
         key: key of the frame; see `frame_key`.
         beam: (N,) number of each beam.
         p_WSset: (K, 3) places of the lasers, taken in turn.
-        times: (T,) float32 parts of the turn at which they fire, taken in turn.
+        times: (T,) float32 firing times as fractions of the turn, taken in
+            turn.
         divergence: half angle of a beam [rad].
         max_range: how far light is followed [m].
         materials: materials of all geometries.
@@ -94,8 +95,8 @@ class Light(NamedTuple):
     Attributes:
         beam: (N,) int64 number of its beam.
         distance: (N,) float64, from the time of flight [m].
-        energy: (N,) float64: reflectivity, cosine of incidence, and the part of
-            the beam that got there and back.
+        energy: (N,) float64 product of reflectivity, cosine of incidence, and
+            fraction of the beam's light that got there and back.
         geometry: (N,) int32 index of the reflecting geometry.
     """
 
@@ -118,8 +119,8 @@ def reflect(
 
     Args:
         beam: (N,) number of the beam of each ray.
-        share: (N,) part of its beam for which a ray stands.
-        distance: (N,) whole way of the light to the surface [m].
+        share: (N,) fraction of its beam's light that a ray represents.
+        distance: (N,) length of the light's path to the surface [m].
         geometry: (N,) number of the geometry that each ray meets.
         cosine: (N,) cosine of the angle of incidence.
         materials: materials of the geometries.
@@ -147,19 +148,20 @@ def reflected(
 
 # Edges of the cells of equal albedo [m]: areas, as of repairs, patches, grains.
 _AREA, _PATCH, _GRAIN = 5.0, 0.35, 0.06
-# How far areas differ, and by how much the darkest stain is darker.
+# How much the brightness of areas varies, and how much darker the darkest stain
+# is.
 _AREAS, _DEEPEST = 0.15, 1.15
-# Height of courses of a wall, width and height of what hangs on it [m], and
-# the part of the wall that it covers; the farthest that ground ends a beam
-# aside [m].
+# Height of a wall's courses [m]; width and height of objects that hang on the
+# wall [m], and the fraction of the wall that they cover; greatest sideways
+# distance at which rough ground ends a beam [m].
 _COURSE, _WIDE, _HIGH, _COVERED = 0.3, 0.25, 1.2, 0.16
 _FARTHEST = 1.0
-# By what height the mean of a spot on rough ground is off, as a part of the
+# Height error of the mean of a spot on rough ground, as a fraction of the
 # distance.
 _ROUGH = 1.5e-4
 # Lengths of the waves of the ground [m].
 _WAVES = 11.3, 7.9, 17.1
-# The darkest place has a ninth of the mean albedo, the brightest nine times it.
+# Albedo varies from a ninth of its mean to nine times its mean.
 _DARKEST = -0.8
 
 
@@ -174,14 +176,15 @@ def texture(
     normal_matrices: np.ndarray,
     p_WLset: np.ndarray,
 ) -> Light:
-    """Returns the light with the albedo and depth of single spots.
+    """Returns the light, varied by the texture of the surfaces.
 
-    Albedo and depth belong to the surface. They are a hash of the spot in the
-    surface's own frame, so that all scans of all drives meet the same values.
-    Darker spots are deeper. No wall or floor lies along the axes of the cells.
+    Each spot of a surface has an albedo and a depth. Both are hashes of the
+    spot's position in the surface's own frame, so that all scans of all drives
+    find the same values. Darker spots are deeper. The axes of the hash cells
+    are not parallel to walls or floors.
 
     Args:
-        row: (B,) row of each beam in:
+        row: (B,) row of each beam in `d_Wset`.
         d_Wset: (B, 3) directions.
         p_WSset: (K, 3) positions of S, taken in turn.
         group_of, normal_matrices, p_WLset: see
@@ -223,7 +226,7 @@ def texture(
         energy[k] *= (1.0 + share) / (1.0 - share)
         distance[k] -= relief[geometry[k]] * grain
         if tufts[geometry[k]] + swell[geometry[k]] > 0.0:
-            # What stands up ends a flat beam far in front of its foot.
+            # A tall blade stops a flat beam far in front of the blade's foot.
             down = max(-d_Wset[ray, 2], 0.01)
             height = 0.5 + 0.35 * patch + 0.15 * grain
             height *= tufts[geometry[k]]
@@ -242,7 +245,7 @@ def texture(
 
 @compiled
 def _swell(a: float, b: float) -> float:
-    """Returns a smooth number from -1 to 1 at a place of the ground [m]."""
+    """Returns a smooth function of a place on the ground [m], from -1 to 1."""
     first, second, third = _WAVES
     crossed = _wave(a / first) * _wave(b / second)
     return 0.5 * crossed + 0.5 * _wave((a + b) / third)
@@ -250,14 +253,14 @@ def _swell(a: float, b: float) -> float:
 
 @compiled
 def _wave(turns: float) -> float:
-    """Returns nearly the sine of a number of turns, by parabolas."""
+    """Returns about the sine of an angle in turns, made of parabolas."""
     part = turns - np.floor(turns) - 0.5
     return -16.0 * part * (0.5 - abs(part))
 
 
 @compiled
 def cell_number(a: float, b: float, c: float) -> float:
-    """Returns a random number from -1 to 1, constant in each unit cell."""
+    """Returns a random number from -1 to 1 for the unit cell of a point."""
     z = (
         np.uint64(np.int64(np.floor(a))) * np.uint64(0x9E3779B97F4A7C15)
         ^ np.uint64(np.int64(np.floor(b))) * np.uint64(0xC2B2AE3D27D4EB4F)

@@ -7,8 +7,8 @@ One equation holds for all surfaces, the LiDAR equation of an extended target
 
 `e` is the target's reflectivity times the cosine of incidence, alpha the
 extinction of the weather. S and alpha_0 are the unit's own. They follow from
-the two rows of its data sheet, the ranges at 80 % and 10 % reflectivity.
-alpha_0 covers all differences of the two rows from 1 / r^2.
+two rows of the data sheet: the ranges at 80 % and at 10 % reflectivity. alpha_0
+accounts for every deviation of these rows from 1 / r^2.
 """
 
 from dataclasses import dataclass
@@ -27,15 +27,15 @@ _Value = TypeVar("_Value", float, np.ndarray)
 # The SNR that a unit detects in half of all cases: Ouster's sheet of the OS1
 # (first generation) states 10 cm of range noise at an SNR of 12, its lowest.
 THRESHOLD_SNR = 9.0
-# Above it an echo is missed less than once in 10^13 times.
+# Above this SNR, an echo is missed less than once in 10^13 times.
 CERTAIN_SNR = 81.0
-# Below it the probability of detection is 0 in double precision.
+# Below this SNR, the probability of detection is 0 in double precision.
 HOPELESS_SNR = 0.9
 
 
 @dataclass(frozen=True)
 class SheetRow:
-    """A range on a data sheet [m], with the probability of detection there.
+    """A row of a data sheet: range [m] and probability of detection there.
 
     The Lambertian target faces the unit; its reflectivity is from 0 to 1.
     """
@@ -61,7 +61,8 @@ class LinkBudget(NamedTuple):
         own_extinction: alpha_0 [1/m].
         range_noise: standard deviation of a range at an SNR of 1 [m].
         range_floor: least standard deviation, at any SNR [m].
-        range_bias: the part of `range_floor` that is constant for a laser [m].
+        range_bias: standard deviation of the range error that is constant for
+            each laser; a part of `range_floor` [m].
     """
 
     scale: float
@@ -79,7 +80,7 @@ def fit_link_budget(
 ) -> LinkBudget:
     """Returns the budget that fits one or two rows of a sheet exactly.
 
-    Two rows have different ranges.
+    If there are two rows, their ranges must differ.
     """
     # log(snr r^2 / e) = log(S) - 2 alpha_0 r at each row.
     logs = [math.log(row.snr * row.range**2 / row.reflectivity) for row in rows]
@@ -108,8 +109,8 @@ def target_snr(
 def detection_probability(snr: ArrayLike) -> np.ndarray:
     """Returns the probability that an echo of an SNR is detected.
 
-    The count of photons, whose mean is the SNR and whose spread is the root
-    of that (shot noise), is compared with a threshold.
+    The model compares a photon count with a threshold. The mean of the count is
+    the SNR, its standard deviation the root of the SNR (shot noise).
     """
     snr = np.asarray(snr)
     deviation = (snr - THRESHOLD_SNR) / np.sqrt(np.maximum(snr, 1e-9))
@@ -132,6 +133,6 @@ def range_deviation(budget: LinkBudget, snr: np.ndarray) -> np.ndarray:
 
 @compiled
 def echo_energy(budget: LinkBudget, snr: _Value, distance: _Value) -> _Value:
-    """Returns the energy that the unit infers from echoes, for clear air."""
+    """Returns the energy of echoes that the unit infers, assuming clear air."""
     gain = np.exp(2.0 * budget.own_extinction * distance)
     return snr * distance * distance * gain / budget.scale

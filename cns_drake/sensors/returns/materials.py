@@ -22,9 +22,9 @@ from cns_drake.scene.surfaces import HalfSpaceSurface, Surface, TriangleSurface
 # Kinds of materials.
 LAMBERT, RETRO, GLASS, LEAVES, BEADS, SPRAYS = range(6)
 
-# Class -> its fields, which the file explains.
+# Class -> its fields; the YAML file explains them.
 _CLASSES = parse_yaml(Path(__file__).with_name("materials.yaml").read_bytes())
-# Diffuse light from dust on a pane, and from water.
+# Diffuse reflectivity of the dust on a pane, and of water.
 _GLASS_DUST = 0.02
 _WATER = 0.02
 _BARK = 0.30
@@ -81,7 +81,7 @@ def find_materials(
 ) -> Materials:
     """Returns the materials of geometries.
 
-    Structures that a table lacks have no class.
+    Structures that are missing in the table have no class.
 
     The perception property ("lidar", "reflectivity") overrides the column
     `reflectivity` of a table of structures, which overrides class and colour.
@@ -104,7 +104,7 @@ def find_materials(
 def _material(
     geometry: PerceptionGeometry, entry: StructureEntry, is_wet: bool
 ) -> tuple[float, ...]:
-    """Returns the row of a geometry in `Materials`."""
+    """Returns the values of the fields of `Materials` for one geometry."""
     kind, reflectivity, density = _reflection(geometry, entry)
     fields = _CLASSES[entry.semantic_class]
     if is_wet and kind == LAMBERT and fields.get("gets_wet"):
@@ -118,7 +118,7 @@ def _material(
         density,
         fields["rough"],
         fields["contrast"],
-        # A volume of leaves has depth in any case.
+        # A volume of leaves needs no relief: it has depth anyway.
         0.0 if kind == LEAVES else fields["relief"],
         fields.get("tufts", 0.0),
         fields.get("swell", 0.0),
@@ -130,7 +130,7 @@ def _material(
 def _reflection(
     geometry: PerceptionGeometry, entry: StructureEntry
 ) -> tuple[int, float, float]:
-    """Returns kind, reflectivity and leaf area density."""
+    """Returns kind, reflectivity and leaf area density of a geometry."""
     given = geometry.reflectivity
     if given is None:
         given = entry.reflectivity
@@ -161,9 +161,9 @@ def _reflection(
 
 
 def _brightness(rgb: tuple[float, float, float] | None) -> float:
-    """Returns the reflected part of white light of a colour, 0 to 1.
+    """Returns the fraction of white light that a colour reflects, 0 to 1.
 
-    Colours of screens are nearly the roots of light (IEC 61966-2-1).
+    sRGB values are about the square roots of the light (IEC 61966-2-1).
     """
     if rgb is None:
         return 0.5

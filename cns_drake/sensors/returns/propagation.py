@@ -1,9 +1,9 @@
 """Light through leaves and panes.
 
 Leaves are a medium: a ray passes a distance s with the probability exp(-G LAD
-s). LAD is the leaf area in a volume, and G = 1/2 the part of it that faces a
-ray, for leaves of all directions. Rays that enter at one clump or twig pass the
-same leaf area, in all scans of all drives.
+s). LAD is the leaf area per volume. G is the fraction of that area that faces a
+ray: 1/2 for leaves of all directions. All rays that enter at the same clump or
+twig pass the same leaf area, in every scan of every drive.
 
 A pane reflects R of the light like a mirror and lets T through, by Fresnel's
 equations for both of its faces. Light scattered by dust on it comes back
@@ -32,34 +32,35 @@ from cns_drake.sensors.returns.materials import GLASS, LEAVES, SPRAYS, Materials
 _GLASS_INDEX = 1.52
 # G of leaves of all directions.
 _LEAF_PROJECTION = 0.5
-# Leaf area that a ray passes through a spray: one of four goes on.
+# Leaf area of a spray: one ray in four passes it.
 _SPRAY = 1.4
-# Greatest number of continuations of a ray.
+# How often a ray is continued at most.
 _MOST_STEPS = 6
 # A continued ray begins this far behind the surface [m].
 _SKIN = 1e-3
-# Light is not followed if a white target right behind would give less than this
-# SNR.
+# A ray is not continued if a white target right behind would return less than
+# this SNR.
 _FAINT_SNR = 3.0
-# Panes are flat to this angle: within it and the beam's own they send the
-# mirrored light back to the unit [rad].
+# Panes are flat to within this angle [rad]. If the angle of incidence is below
+# the sum of this angle and the beam's divergence, a pane mirrors light back to
+# the unit.
 _FLATNESS = 2e-3
-# Edges of the cells of clumps and of twigs [m], and the part that are clumps.
+# Cell sizes of clumps and of twigs [m], and the fraction of clumps.
 _CLUMP, _TWIG, _CLUMPS = 0.5, 0.1, 0.6
 
 
 class Ways(NamedTuple):
-    """N rays on their way.
+    """N rays that are still travelling.
 
     Attributes:
         beam: (N,) number of each ray's beam.
         p_Wset: (N, 3) present origins.
         d_Wset: (N, 3) directions.
-        time: (N,) float32 part of the turn at which it was sent.
-        length: (N,) distance of the light so far [m].
-        energy: (N,) part of the beam that gets here and back.
-        depth: (N,) leaf area that is still to pass.
-        inside: (N,) geometry in which it begins, -1 for none.
+        time: (N,) float32 firing time as a fraction of the turn.
+        length: (N,) length of the path so far [m].
+        energy: (N,) fraction of the beam's light that gets here and back.
+        depth: (N,) leaf area that the ray still passes before it hits a leaf.
+        inside: (N,) geometry in which the ray begins, -1 for none.
         reach: (N,) float32: greatest useful range of the ray [m].
     """
 
@@ -81,17 +82,17 @@ def start_ways(
     sides: Sides,
     side_hits: BeamHits,
 ) -> tuple[list[Light], Ways, BeamHits]:
-    """Returns light from opaque surfaces, and rays that go on through others.
+    """Returns light from opaque surfaces, and the rays that hit others.
 
     Args:
         shots: the beams.
-        rest: (N,) part of its light for which the axis of a beam stands.
-        hits: what the axes meet.
+        rest: (N,) fraction of each beam's light that its axis represents.
+        hits: hits of the axes.
         sides: additional rays at edges.
-        side_hits: what these meet; misses do not count.
+        side_hits: hits of the additional rays; misses are left out.
 
     Returns:
-        The light, the rays that meet panes or leaves, and what they meet.
+        The returned light, the rays that hit panes or leaves, and their hits.
     """
     beam, materials = shots.beam, shots.materials
     is_open = np.isin(materials.kind, (GLASS, LEAVES, SPRAYS))
@@ -134,11 +135,15 @@ def start_ways(
 
 @compiled
 def _leaf_areas(p_Wset: np.ndarray) -> np.ndarray:
-    """Returns leaf areas before the first leaf, exponential with mean 1."""
+    """Returns the (N,) leaf areas that rays pass before they hit a leaf.
+
+    They are distributed exponentially with mean 1, and depend only on the (N,
+    3) places of entry.
+    """
     result = np.empty(len(p_Wset))
     for k, (x, y, z) in enumerate(p_Wset):
         size = _CLUMP
-        # A number from -1 to 1, another one than the share below.
+        # A second number from -1 to 1, independent of `share` below.
         if cell_number(z / size, x / size, y / size) > 2 * _CLUMPS - 1:
             size = _TWIG
         share = cell_number(x / size, y / size, z / size)
@@ -163,7 +168,7 @@ def pane_shares(cosine: float) -> tuple[float, float]:
 def follow(
     shots: Shots, ways: Ways, met: BeamHits, scale: float
 ) -> list[Light]:
-    """Returns the light that comes back to the LiDAR from further surfaces.
+    """Returns the light that comes back from behind panes and leaves.
 
     See `LinkBudget` for the scale.
     """
@@ -189,7 +194,7 @@ def _step(
     divergence: float,
     max_range: float,
 ) -> tuple[Light, Ways]:
-    """Takes each ray to its hit.
+    """Advances each ray to its hit.
 
     Returns:
         The returning light, and the continued rays.

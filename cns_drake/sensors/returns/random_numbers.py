@@ -46,10 +46,10 @@ def uniform(
 def normal(
     key: np.uint64, beam: np.ndarray, draw: int | np.ndarray
 ) -> np.ndarray:
-    """Returns standard normal numbers: the quantiles of uniform ones.
+    """Returns standard normal numbers for uniform ones, by quantiles.
 
-    By algorithm AS 241 (Wichura, Applied Statistics 37, 1988), whose short
-    form, PPND7, has seven digits.
+    The algorithm is PPND7, the short form of AS 241 (Wichura, Applied
+    Statistics 37, 1988), which is exact to seven digits.
     """
     result = uniform(key, beam, draw)
     for k, u in enumerate(result):
@@ -60,7 +60,8 @@ def normal(
             below = ((67.187563600 * r + 78.757757664) * r + 17.895169469) * r
             result[k] = q * (above + 3.3871327179) / (below + 1.0)
             continue
-        # Never 0: a value below the smallest step counts as half a step.
+        # The argument must not be 0: values below the smallest step become half
+        # a step.
         r = np.sqrt(-np.log(max(min(u, 1.0 - u), 0.5 * _UNIT)))
         if r <= 5.0:
             r -= 1.6

@@ -20,7 +20,7 @@ _LIGHT = 299_792_458.0
 
 @dataclass(frozen=True)
 class Response:
-    """How a unit converts energy to intensity, which no data sheet states.
+    """How a unit converts energy to intensity; data sheets do not state it.
 
     Attributes:
         slope: the intensity of a diffuse target is `full` plus this times the
@@ -29,15 +29,16 @@ class Response:
         full: intensity of an energy of 1.
         far: range up to which the unit compensates intensity for distance [m].
         floor: lower intensities are reported as 0, whatever the gain.
-        least: echoes of less energy are not reported, however near: the unit
-            turns its power down.
+        least: echoes of less energy are not reported even at close range, where
+            the unit turns its power down.
         gain: standard deviation of a laser's gain.
-        dim: how much faster gains fall that are more than one standard
-            deviation below the mean.
-        flicker: by which part every second shot of a laser is brighter, and the
-            others darker, as the standard deviation over lasers.
-        speckle: standard deviation of the intensity of single shots, as a part
-            of the intensity.
+        dim: extra slope of gains more than one standard deviation below the
+            mean: such gains fall faster.
+        flicker: a laser's shots are alternately brighter and darker by a fixed
+            fraction of their intensity. This is the standard deviation of that
+            fraction over lasers.
+        speckle: standard deviation of the intensity of single shots, as a
+            fraction of the intensity.
     """
 
     slope: float = 0.0
@@ -52,7 +53,7 @@ class Response:
 
     @cached_property
     def table(self) -> np.ndarray:
-        """Intensities of diffuse targets, at even steps of the energy's root.
+        """Intensities of diffuse targets at even steps of sqrt(energy).
 
         Computing the logarithms of all points would take half a frame.
         """
@@ -63,15 +64,15 @@ class Response:
 
 @dataclass(frozen=True)
 class Head:
-    """Where the lasers of a unit sit, and how it reports its turn.
+    """Where the lasers of a unit are, and how it reports azimuths.
 
     Attributes:
-        blocks: the lowest elevation of each block of lasers [deg], its height
-            above the origin [m], and the part that its errors of range are of
-            the stated ones, from the top.
-        alternate: range offset by which every second laser, from the first on,
-            measures too far, and all others too near. It is a part of their
-            range errors [m].
+        blocks: for each block of lasers, from the top: its lowest elevation
+            [deg], its height above the origin [m], and its range errors as a
+            fraction of the stated ones.
+        alternate: range offset [m]. Every second laser, starting with the
+            first, measures this much too far and the other lasers this much too
+            near. The offset is part of the lasers' range errors.
         tick_deg: step in which azimuths are reported [deg]; 0 for exact
             azimuths. With a step, each laser has an azimuth offset of its own,
             of up to one step.
@@ -98,15 +99,15 @@ class UnitSheet:
         pulse_ns: width of a pulse at half of its peak [ns].
         retro_from: least intensity of retro-reflectors. Diffuse targets with
             reflectivities from 0 to 1 have intensities from 0 to this.
-        unknown: fields that the sheet does not state.
+        unknown: names of the fields that the sheet does not state.
         source: where the numbers are from.
         angle_error_deg: standard deviation of a laser's elevation and azimuth
             [deg].
-        own_part: the part of the best accuracy that is constant for a laser.
-            The rest differs from shot to shot; the squares of both parts add up
-            to 1.
+        own_part: the fraction of the best accuracy that is constant for a
+            laser. The rest varies from shot to shot; the squares of the two
+            fractions add up to 1.
         response: how the unit converts energy to intensity.
-        head: places of the lasers.
+        head: positions of the lasers.
     """
 
     rows: tuple[link_budget.SheetRow, ...]
@@ -140,7 +141,7 @@ class UnitSheet:
 
     @property
     def resolution(self) -> float:
-        """Distance below which two echoes are one [m]."""
+        """Distance below which two echoes merge [m]."""
         return _LIGHT * self.pulse_ns * 1e-9 / 2.0
 
     def aimed(self, pattern: _Pattern) -> _Pattern:
@@ -158,7 +159,7 @@ class UnitSheet:
 def _sheet(
     rows: list, unknown: list[str], source: str, **fields: Any
 ) -> UnitSheet:
-    """Returns a sheet of its fields in unit_sheets.yaml."""
+    """Returns a unit's sheet from its fields in unit_sheets.yaml."""
     if "response" in fields:
         fields["response"] = Response(**fields["response"])
     if "head" in fields:

@@ -5,12 +5,12 @@ follows Marshall and Palmer (1948) and Sekhon and Srivastava (1970),
 
     N(D) = N_0 exp(-L D) [1/(m3 mm)]
 
-with N_0 = 8000 and L = 4.1 R^-0.21 for rain, N_0 = 2500 R^-0.94 and
-L = 2.29 R^-0.45 for snow; D in mm, of a flake once it has melted; the rate R in
-mm/h of water. Extinction is that of geometric optics, with twice the area of
-each drop. The back-scatter of a raindrop is that of LISA (Kilic et al., 2021).
-The back-scatter of a flake follows from the lidar ratio of ice crystals, 25 sr
-(Young and Vaughan, 2009).
+with N_0 = 8000 and L = 4.1 R^-0.21 for rain, N_0 = 2500 R^-0.94 and L = 2.29
+R^-0.45 for snow; D is the diameter in mm, for a flake that of the melted drop;
+R is the rate in mm/h of water. Extinction follows geometric optics: each drop
+counts with twice its cross-section. The back-scatter of a raindrop is that of
+LISA (Kilic et al., 2021). The back-scatter of a flake follows from the lidar
+ratio of ice crystals, 25 sr (Young and Vaughan, 2009).
 
 Fog is a medium: alpha = ln 20 / V by the meteorological visibility V, and a
 back-scatter coefficient of 0.046 / V [1/(m sr)] (Rasshofer et al., 2011).
@@ -41,8 +41,8 @@ _FLAKE_REFLECTIVITY = 2.0 * np.pi / 25.0
 _DISTANCES = _geometric(0.3, 60.0, 96)
 # The aperture of a unit: the radius of a beam at its start [m].
 _APERTURE = 0.004
-# The receiver sees none of the beam before the first distance, and all of it
-# behind the second one [m]. Surfaces are bright enough in any case.
+# The receiver sees nothing of the beam up to the first distance, and all of it
+# beyond the second one [m]. Surfaces are bright enough at any distance.
 _OVERLAP = (1.0, 3.0)
 
 
@@ -80,7 +80,7 @@ class Weather:
 
     @property
     def is_clear(self) -> bool:
-        """Whether the air neither weakens light nor sends it back."""
+        """Whether the air neither attenuates nor scatters light."""
         return self.visibility is None and self.rain == self.snowfall == 0.0
 
     @property
@@ -94,7 +94,7 @@ class Weather:
         )
 
     def drops(self, diameters_mm: np.ndarray) -> list[tuple[np.ndarray, float]]:
-        """Returns size distribution and reflectivity of each kind of drops.
+        """Returns size distribution and reflectivity of each kind of drop.
 
         The distribution is N(D) [1/(m3 mm)].
         """
@@ -124,7 +124,7 @@ class Scattering(NamedTuple):
         distances: (R,) rising [m].
         counts: (R,) mean number of detected echoes of drops that are nearer
             than each distance.
-        energies: (R, Q) quantiles of the energy of such an echo, at each
+        energies: (R, Q) quantiles of the energy of a drop's echo at each
             distance.
         fog_energies: (R,) energy of the echo of fog at each distance; 0 without
             fog.
@@ -158,9 +158,10 @@ def tabulate_scattering(
 
     Args:
         weather: fog, rain and snowfall.
-        budget: budget of the unit: SNR by distance and reflectivity.
-        divergence: half the angle of a beam [rad].
-        resolution: length of a pulse, there and back [m].
+        budget: link budget of the unit: SNR by distance and reflectivity.
+        divergence: half angle of a beam [rad].
+        resolution: distance below which two echoes merge: half the length of a
+            pulse [m].
         min_range: least range of the unit [m].
     """
     distances = _DISTANCES[min_range < _DISTANCES]

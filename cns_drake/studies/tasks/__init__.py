@@ -1,5 +1,5 @@
-"""What a study asks of two drives: each task is a class in a file of its own.
+"""What a study measures on two drives: one class and one file per task.
 
-A task adds the jobs that measure a pair of drives, and turns what they find
-into the numbers of a table.
+A task adds the jobs that measure a pair of drives, and turns their results into
+the numbers of a table.
 """

@@ -1,4 +1,4 @@
-"""How much the city changed between two drives."""
+"""The task `change`: how much the city changed between two drives."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ _WHOLE_COST, _COST = 60.0, 20.0
 
 
 class ChangeTask(Task):
-    """TCR_sym of the two drives, or of the query's way through both cities."""
+    """TCR_sym of two drives, or of the query's route in the two cities."""
 
     name = "change"
     defaults: ClassVar[Mapping[str, Any]] = {"spacing": None}
@@ -87,7 +87,8 @@ def measure_change(
         Surveyed(name, *part.read())
         for name, part in (("database", first), ("query", second))
     )
-    # No number of the task is the spread, which costs sixteen times as much.
+    # The spread over grids is not reported: it would take sixteen times as
+    # long.
     report = compare(a, b, grids=())
     found = {}
     for name, change in (

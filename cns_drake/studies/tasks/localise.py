@@ -1,4 +1,4 @@
-"""Localisation of scans in the map of a database, from drawn starts."""
+"""Localisation of scans in the map of a database, from random starts."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ from evaluation.recognition.place_outcome import Number, kept_share
 from evaluation.study.parts import Part
 from evaluation.study.surveys import DriveSource
 
-# Those of the wheel that this package needs.
+# The methods that need no optional package.
 SHIPPED = tuple(
     name for name in estimators.METHODS if name != estimators.KISS_MATCHER
 )
@@ -73,7 +73,7 @@ class LocaliseTask(Task):
         return tuple(Starts(float(r), float(turn)) for r, turn in values)
 
     def measure(self, pair: Pair, jobs: Jobs) -> Part:
-        # Own estimators are known by their place and their content.
+        # Estimators of the user are identified by path and content.
         named = tuple(
             Path(one).absolute() if one.endswith(".py") else one
             for one in self.settings["methods"]
@@ -143,8 +143,8 @@ def measure_localisation(
         spacing: distance between two queries [m].
 
     Returns:
-        (K,) of `QUERY` for each method and start, the starts of a method side
-        by side; nothing if the query is nowhere near the map.
+        (K,) records of `QUERY` for each method and start, with the starts of a
+        method next to each other; empty if the query is nowhere near the map.
     """
     del texts
     mapped, asked = database(), query()

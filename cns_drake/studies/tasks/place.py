@@ -1,4 +1,4 @@
-"""Place recognition, the poses that come with it, and what both cost."""
+"""Place recognition, its poses, and the costs of both."""
 
 from __future__ import annotations
 
@@ -74,12 +74,12 @@ class PoseTask(PlaceTask):
             yield from pose_numbers(now, _same(before, now))
 
     def answers(self, found: Outcomes) -> Iterator[Answered]:
-        # Those of `place` have the errors of poses.
+        # The results of `place` contain the errors of poses.
         yield from ()
 
 
 class CostTask(Task):
-    """What a query costs, and a database made of descriptions."""
+    """The cost of a query, and of building a database from descriptions."""
 
     name = "cost"
     asks = True

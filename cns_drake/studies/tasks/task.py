@@ -47,12 +47,12 @@ class Pair:
     Attributes:
         name: a name that no other pair has, except with another radius of a
             match.
-        way: the drive whose map is compared with the query's for TCR_sym: it
-            follows the query's route through the city of the database. If the
-            database has a route of its own, it is the database itself.
-        is_as_before: whether the condition leaves both drives as they are, and
-            only changes how queries are asked, or adds places. Tasks that ask
-            no queries then measure nothing new.
+        way: the drive whose map is compared with the query's for TCR_sym. It
+            follows the query's route through the database's city, or is the
+            database itself if that has another route.
+        is_as_before: whether the drives are those of the baseline, and the
+            condition changes only the protocol or adds places. Tasks without
+            queries then have nothing new to measure.
     """
 
     name: str
@@ -79,8 +79,9 @@ class Jobs:
 
     Attributes:
         methods: the methods that are run.
-        distractors: described drives elsewhere, the first to be added first.
-        notes: what is left out, in words.
+        distractors: described drives through other cities, in the order in
+            which they are added.
+        notes: notes on what is left out.
         radii: name of a pair -> radii of a match [m].
     """
 
@@ -115,8 +116,9 @@ class Jobs:
             drive: the drive.
             role: role of its scans.
             protocol: protocol of the pair.
-            needs: gets the name of the job that writes the parts.
-            kept: whether the parts are needed in any case.
+            needs: list to which the name of the job that writes the parts is
+                added.
+            kept: whether to write the parts even if only one pair needs them.
         """
         name = _description_name(drive, role, protocol)
         if not (kept or len(self._uses.get(name, ())) > 1):
@@ -169,7 +171,7 @@ class Jobs:
             function: what the job runs.
             arguments: arguments of the function.
             needs: names of jobs that come first.
-            cost: cost of the job, about [s].
+            cost: approximate cost of the job [s].
         """
         name = f"{part.path.parent.name} {part.path.stem}"
         step = MakePart(part, function, arguments)
@@ -189,8 +191,8 @@ class Task(abc.ABC):
 
     Attributes:
         name: name of the task in files and on the command line.
-        asks: whether it depends on how queries are asked, and on the places
-            of the database; other tasks depend on the drives alone.
+        asks: whether the task depends on the protocol of the queries and on the
+            places of the database. Other tasks depend only on the drives.
         defaults: settings of an experiment's file, and their values.
     """
 
@@ -229,7 +231,7 @@ class Task(abc.ABC):
         """Adds the jobs that measure a pair; returns the parts they write."""
 
     def found(self, part: Part, pair: Pair) -> Any:
-        """Returns what the part of a pair holds of it."""
+        """Returns the task's result for a pair from the part."""
         return part.read()
 
     @abc.abstractmethod
@@ -247,10 +249,10 @@ class Task(abc.ABC):
 
 
 def _names(value: Any, where: str) -> list[str]:
-    """Returns a list of names of methods, or one, as a list.
+    """Returns one or several names of methods as a list.
 
     Raises:
-        InputError: it is none, or two results would have one name.
+        InputError: there is no name, or two results would have the same name.
     """
     found = [value] if isinstance(value, str) else value
     if not (found and isinstance(found, list)):
@@ -266,7 +268,7 @@ def positive(value: Any, where: str) -> None:
     """Checks that a setting is a positive number.
 
     Raises:
-        InputError: it is not.
+        InputError: the value is not a positive number.
     """
     is_number = isinstance(value, int | float) and not isinstance(value, bool)
     if not (is_number and 0.0 < value < 1e6):

@@ -1,4 +1,4 @@
-"""What of a map must be updated: labels of its points, scored."""
+"""Map update: scores of labels that say which points have changed."""
 
 from __future__ import annotations
 
@@ -33,7 +33,7 @@ _SCORES = (
     "called_structures",
     "right_structures",
 )
-# The true labels, as those of a method.
+# Name under which the true labels are scored, like a method's labels.
 TRUTH = "truth"
 _COST = 60.0
 
@@ -95,7 +95,7 @@ def measure_maps(
         reporter: reports progress.
         database, query: the older and the newer drive.
         methods: names of change detectors.
-        spacing: way between two scans [m].
+        spacing: distance driven between two scans [m].
     """
     a, b = (
         map_truth.simulate_survey(source.scenario)
