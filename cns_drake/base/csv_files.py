@@ -21,11 +21,17 @@ _FORMER_COLUMNS = {
 
 
 def csv_text(header: Iterable[object], rows: Iterable[Iterable[object]]) -> str:
-    """Returns a header and rows as CSV."""
+    """Returns a header and rows as CSV.
+
+    An unknown cell, None or NaN, is empty; truth values are 0 or 1.
+    """
     stream = io.StringIO()
     writer = csv.writer(stream, lineterminator="\n")
     writer.writerow(header)
-    writer.writerows(rows)
+    writer.writerows(
+        [int(v) if isinstance(v, bool) else "" if v != v else v for v in row]
+        for row in rows
+    )
     return stream.getvalue()
 
 

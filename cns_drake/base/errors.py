@@ -81,6 +81,24 @@ def value_errors(place: object) -> Iterator[None]:
         raise InputError(f"{place}: {error}") from error
 
 
+@contextlib.contextmanager
+def errors_at(place: object, instead_of: str = "") -> Iterator[None]:
+    """Has an InputError of the block begin with a place.
+
+    Args:
+        place: file, field or other place, in words.
+        instead_of: beginning of the error that the place replaces.
+
+    Raises:
+        InputError: if the block raises it.
+    """
+    try:
+        yield
+    except InputError as error:
+        fault = str(error).removeprefix(instead_of)
+        raise InputError(f"{place}: {fault}") from error
+
+
 def one_line(message: object) -> str:
     """Returns a message as one printable line of bounded length.
 

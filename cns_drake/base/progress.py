@@ -11,5 +11,4 @@ Track = Callable[[Iterable[Any], str, int], Iterable[Any]]
 
 def silent(items: Iterable[Any], description: str, total: int) -> Iterable[Any]:
     """The `Track` that reports nothing."""
-    del description, total
     return items

@@ -67,9 +67,10 @@ def train(
         drawn_streets: Draw the streets at random as well, instead of using
             those of the shipped maps. Use it to test the weights on shipped
             maps without having trained on their streets.
-        graded: Rank the places of a query by their exact overlap with it,
-            instead of treating every place within 7.5 m as right. The training
-            then takes about half as long again.
+        graded: Train with exact overlaps: the more of a query's scan a place
+            shows, the higher it should rank. Without this option, every place
+            within 7.5 m of a query counts as right. With it, the training takes
+            about 1.5 times as long.
     """
     with uninterrupted():
         from cns_drake.base.jobs.cluster import choose_cluster
@@ -188,13 +189,13 @@ def map_truth(
 ) -> None:
     """Label what changed between the maps of two drives.
 
-    Both drives pass through one place; A is the older and B the newer one. Each
-    can be a recording of cns-drake, or a scenario, which is then simulated.
-    Every point of A's map gets a label that says whether B finds it kept, gone
-    or unobserved. Every point of B's map gets a label that says whether it is
-    kept, new or newly seen. The labels are exact, because rays are cast in the
-    worlds of both drives. To score the labels of your own change detector
-    against them, run cns-eval map-update.
+    Both drives go through the same place; A is the older drive, B the newer
+    one. Each can be a recording of cns-drake, or a scenario, which is then
+    simulated. Every point of A's map gets a label that says whether B finds it
+    kept, gone or unobserved. Every point of B's map gets a label that says
+    whether it is kept, new or newly seen. The labels are exact, because rays
+    are cast in the worlds of both drives. To score the labels of your own
+    change detector against them, run cns-eval map-update.
 
     Args:
         a: Older drive A: a recording, a shipped drive or a scenario file.

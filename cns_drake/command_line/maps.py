@@ -196,10 +196,10 @@ def import_city(
             [m], to save memory. By default none is left out.
         drive_on: Side of the street on which cars drive; by default as the file
             says, or right if it does not say.
-        grow: Share of the buildings, from 0.01 to 0.9, that an additional first
-            stage lacks or shows lower. They are drawn at random. By default
-            0.3; but with --years, with --plain or from OpenDRIVE, no such stage
-            is added.
+        grow: Add a first stage in which this share of the buildings, drawn at
+            random, is missing or lower. A number from 0.01 to 0.9; by default
+            0.3. With --years, --plain or an OpenDRIVE file, no such stage is
+            added, and --grow is an error.
         plain: Do not add windows, lamps, parked cars and other details that the
             file does not contain. Buildings along the roads of an OpenDRIVE
             file are added nevertheless.

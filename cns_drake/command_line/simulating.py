@@ -231,20 +231,20 @@ def film(
         int | None, typer.Option(min=0, max=2000, metavar="N")
     ] = None,
 ) -> None:
-    """Film a drive through all stages of its city.
+    """Film the same stretch of a drive in each stage of its city.
 
-    The film shows the street from behind the car and the points that the LiDAR
-    measures: the same place in one stage after the other. Then it shows the
-    city from above.
+    The film is a series of shots of equal length. First, one shot per stage
+    shows the stretch from behind the car, with the points that the LiDAR
+    measures. Then one shot per stage shows it from above.
 
     Args:
         scenario: Name of a shipped drive, or a scenario file of your own.
         output: File for the film. Its name ends in .webp, or in .mp4, which
             needs ffmpeg. By default NAME.webp.
-        seconds: Length of the film [s].
+        seconds: Length of the film [s]. All shots together have this length.
         size: Width and height of the film in pixels, each from 32 to 1920.
-        start: Time in the drive at which each shot begins [s]; by default the
-            moment when the road ahead is straightest.
+        start: Time in the drive at which the stretch begins [s]. By default,
+            it begins where the road ahead is straightest.
         traffic: Number of moving vehicles. The same number of walkers is added.
             By default as the scenario says; if it has no traffic, 60 of each,
             provided that the streets have room.

@@ -83,11 +83,12 @@ def study(
 ) -> None:
     """Measure what a change costs each method.
 
-    An experiment is a file that says what differs between two drives, the
-    database and the query, and which tasks and methods to measure. The drives
-    are simulated but not recorded. The command writes results.csv (one number
-    per row), queries.csv (one query per row) and a page, index.html. To resume
-    after an interruption, run the same command again.
+    An experiment is a file. It describes two drives, of which one makes the
+    database and the other the queries, what differs between them, and which
+    tasks and methods to measure. The drives are simulated but not recorded. The
+    command writes results.csv (one number per row), queries.csv (one query per
+    row) and a page, index.html. To resume after an interruption, run the same
+    command again.
 
     Args:
         name: Name of a shipped experiment, as --list shows it, or an experiment

@@ -14,7 +14,7 @@ import shutil
 from cns_drake.base import files
 from cns_drake.base.drives.deskewing import deskew
 from cns_drake.base.drives.mcap_drive import McapDrive, holds_mcap
-from cns_drake.base.errors import InputError
+from cns_drake.base.errors import InputError, value_errors
 from cns_drake.base.yaml_files import read_yaml
 from cns_drake.export.layouts import (
     CNS,
@@ -191,11 +191,8 @@ def _write_drive(
                 if drive.distortion_note is None
                 else deskew(drive, frame)
             )
-            try:
+            with value_errors(f"{drive.name}: scan {frame}"):
                 made = layout.scan_files(drive, frame, stamp_ns, scan)
-            except ValueError as error:
-                where = f"{drive.name}: scan {frame}"
-                raise InputError(f"{where}: {error}") from error
             for name, content in made.items():
                 path = folder / name
                 if frame == 0:

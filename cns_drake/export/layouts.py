@@ -243,7 +243,6 @@ def _in_kittis_scale(drive: McapDrive, scan: np.ndarray) -> np.ndarray:
 def _kitti_scan_files(
     drive: McapDrive, frame: int, stamp_ns: int, scan: np.ndarray
 ) -> dict[str, bytes]:
-    del stamp_ns
     scan = _in_kittis_scale(drive, scan)
     files = {f"velodyne/{frame:06d}.bin": encode_bin(scan)}
     if {"label", "instance"} <= set(scan.dtype.names or ()):

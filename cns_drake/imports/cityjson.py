@@ -23,7 +23,7 @@ import shapely
 from shapely.geometry.base import BaseGeometry
 
 from cns_drake.base.errors import InputError
-from cns_drake.base.files import check_regular
+from cns_drake.base.files import check_regular, user_errors
 from cns_drake.base.json_text import parse_json
 from cns_drake.imports import foreign_city
 from cns_drake.imports.building_years import construction_year
@@ -312,7 +312,7 @@ def read_cityjson(path: Path) -> CityFile:
 def _documents(path: Path) -> Iterator[tuple[int, dict]]:
     """Yields each JSON object with its line number, 0 for a whole file."""
     check_regular(path)
-    try:
+    with user_errors(path):
         if path.suffix == ".jsonl":
             with path.open("rb") as stream:
                 for number, line in enumerate(stream, start=1):
@@ -320,8 +320,6 @@ def _documents(path: Path) -> Iterator[tuple[int, dict]]:
                         yield number, _object(line, f"{path}: line {number}")
         else:
             yield 0, _object(path.read_bytes(), str(path))
-    except OSError as error:
-        raise InputError(f"{path}: {error.strerror or error}") from error
 
 
 def _object(text: bytes, where: str) -> dict:

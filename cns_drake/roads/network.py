@@ -12,7 +12,7 @@ from shapely import STRtree
 from shapely.geometry.base import BaseGeometry
 
 from cns_drake.base.angles import wrapped
-from cns_drake.base.errors import InputError
+from cns_drake.base.errors import InputError, value_errors
 from cns_drake.roads import carriageway
 from cns_drake.roads.centreline import Centreline, blend
 from cns_drake.roads.road import (
@@ -233,10 +233,8 @@ def load_road_network(path: Path | str) -> RoadNetwork:
             if (arm.road, arm.end) == (name, end)
         ]
         heights = [junction.height for junction in ends]
-        try:
+        with value_errors(f"{path}: roads.{name}"):
             roads[name] = Road(name, entry, curves[name], setbacks, heights)
-        except ValueError as error:
-            raise InputError(f"{path}: roads.{name}: {error}") from error
     network = RoadNetwork(roads, junctions)
     _check_crossings(path, network)
     return network
@@ -258,10 +256,8 @@ def _make_curve(
         *((x, y) for x, y, _ in entry.via),
         file.junctions[entry.end].position,
     ]
-    try:
+    with value_errors(f"{path}: roads.{name}.via"):
         return Centreline(points, [radius for _, _, radius in entry.via])
-    except ValueError as error:
-        raise InputError(f"{path}: roads.{name}.via: {error}") from error
 
 
 def _make_junction(
@@ -322,10 +318,8 @@ def _check_crossings(path: Path, network: RoadNetwork) -> None:
     names = list(network.roads)
     strips = []
     for name in names:
-        try:
+        with value_errors(f"{path}: roads.{name}"):
             strips.append(carriageway.road_strip(network.roads[name]))
-        except ValueError as error:
-            raise InputError(f"{path}: roads.{name}: {error}") from error
     pairs = STRtree(strips).query(strips, predicate="intersects")
     for a, b in sorted(pairs.T.tolist()):
         if a < b and strips[a].intersection(strips[b]).area > (

@@ -384,7 +384,6 @@ def _parse_small_obj(
 
     The stages of a city share most of their files.
     """
-    del identity
     p_GVset, triangles = _parse_obj(path)
     for array in (p_GVset, triangles):
         array.setflags(write=False)

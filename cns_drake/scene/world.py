@@ -18,7 +18,7 @@ from pydrake.multibody.parsing import Parser
 from pydrake.multibody.plant import MultibodyPlant
 from pydrake.multibody.tree import ModelInstanceIndex
 
-from cns_drake.base.errors import InputError
+from cns_drake.base.errors import InputError, errors_at, value_errors
 from cns_drake.base.files import is_there, read_bytes
 from cns_drake.base.map_folder import MapFolder
 from cns_drake.scene.drake_errors import PARSER_ERRORS, collected_errors
@@ -83,10 +83,8 @@ def _check_visible(
     for geometry_id in inspector.GetAllGeometryIds(Role.kPerception):
         name = inspector.GetName(geometry_id)
         structures.add(structure_name(name))
-        try:
+        with errors_at(sdf):
             check_shape(name, inspector.GetShape(geometry_id))
-        except InputError as error:
-            raise InputError(f"{sdf}: {error}") from None
     if not structures:
         left_out = "; ".join(note.removeprefix(f"{sdf}: ") for note in notes)
         raise InputError(
@@ -152,10 +150,8 @@ def _mesh_notes(scene_graph: SceneGraph) -> tuple[str, ...]:
     sources = [one.source() for one in shapes if isinstance(one, Mesh | Convex)]
     notes = []
     for path in sorted({str(one.path()) for one in sources if one.is_path()}):
-        try:
+        with value_errors(path):
             notes += [f"{path}: {one}" for one in unread_parts(Path(path))]
-        except ValueError as error:
-            raise InputError(f"{path}: {error}") from error
     return tuple(notes)
 
 
@@ -251,10 +247,8 @@ def load_world(
         notes += _mismatches(table, {entry.name for entry in entries}, found)
     else:
         entries = StructureTable(())
-    try:
+    with errors_at(sdf):
         entries = entries.completed(found)
-    except InputError as error:
-        raise InputError(f"{sdf}: {error}") from None
     return World(scene_graph, plant, vehicle_model, entries, notes)
 
 

@@ -1,4 +1,4 @@
-"""The two drives of each condition of an experiment."""
+"""Makes the two drives of each condition of an experiment."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ import re
 from typing import Any
 
 from cns_drake.base.csv_files import read_records
-from cns_drake.base.errors import InputError, validated
+from cns_drake.base.errors import InputError, errors_at, validated
 from cns_drake.base.jobs.fingerprint import fingerprint
 from cns_drake.scenarios.scenario import Scenario
 from cns_drake.scenarios.scenario_files import map_folder
@@ -60,18 +60,19 @@ _FROZEN = ("map", "level", "drives")
 
 
 class MissingError(Exception):
-    """A map cannot have a condition; the message says what it lacks."""
+    """Raised if a map lacks what a condition needs; the message says what."""
 
 
 @dataclass(frozen=True)
 class Compared:
-    """A database and a query in one condition.
+    """The database drive and the query drive of one condition.
 
     Attributes:
         database: the drive of the database.
         query: the drive of the queries.
         protocol: protocol of the queries.
-        distractors: number of places elsewhere that are added to the database.
+        distractors: number of places of other cities that are added to the
+            database, to make recognition harder.
         asked: fields of the protocol that the condition sets.
     """
 
@@ -82,7 +83,10 @@ class Compared:
     asked: Changes = field(default_factory=dict)
 
     def fingerprint(self) -> str:
-        """Returns a hash of both drives, names included."""
+        """Returns a hash of the database drive and the query drive.
+
+        Drives that differ only in their names have different hashes.
+        """
         return fingerprint(
             {
                 "database": self.database.model_dump(mode="json"),
@@ -103,16 +107,16 @@ Redraw = Callable[[Scenario, int], tuple[str, str]]
 
 @dataclass
 class PairOfDrives:
-    """The two drives of a map whose conditions are built.
+    """Changes two drives of a map as the conditions of an experiment say.
 
     Attributes:
-        database: the drive of the database, in the unchanged map.
-        query: the drive of the queries.
-        same_route: whether the database drives the query's route, at another
-            viewpoint.
+        database: the drive that makes the database, without any change.
+        query: the drive that makes the queries, without any change.
+        same_route: whether the database drive follows the query's route, with
+            its LiDAR at another viewpoint.
         source: file of the experiment, for errors.
-        age, redraw: functions that make the maps of a condition.
-        on_note: takes notes on what was left out.
+        age, redraw: functions that age a drive's city, or draw it anew.
+        on_note: is called with a note on everything that is left out.
     """
 
     database: Scenario
@@ -143,10 +147,10 @@ class PairOfDrives:
         }
 
     def build(self, condition: Condition, seed: int) -> Compared:
-        """Returns the drives of a condition.
+        """Returns the database drive and the query drive of a condition.
 
         Raises:
-            MissingError: the map cannot have the condition.
+            MissingError: the map lacks what the condition needs.
             InputError: a field is unknown or not usable.
         """
         chosen: list[Mapping[str, Changes]] = [condition.changes]
@@ -214,7 +218,7 @@ class PairOfDrives:
         """Returns those fields of a case that are possible on the map.
 
         Raises:
-            MissingError: none of them is possible.
+            MissingError: none of the fields is possible.
         """
         missing: MissingError | None = None
         found: dict[str, Changes] = {}
@@ -275,23 +279,18 @@ class PairOfDrives:
     def _changed(
         self, side: str, changes: Changes, age: tuple[Any, Any], seed: int
     ) -> Scenario:
-        """Returns a drive with its changed fields.
+        """Returns a drive with the changes of a condition.
 
-        `age` is the number of years by which its city is aged, with the rates
-        of change.
+        `side` is `database` or `query`. `age` contains the years by which the
+        drive's city is aged, and the rates of change.
         """
         drive = self._unchanged[side]
         left = dict(changes)
         for name in (*_QUERY_FIELDS, "distractors", "years", "rates"):
             left.pop(name, None)
         if "lidar" in left:
-            try:
+            with errors_at(f"{self.source}: {side}.lidar", "--lidar: "):
                 drive = drive.with_lidar_preset(left.pop("lidar"))
-            except InputError as error:
-                fault = str(error).removeprefix("--lidar: ")
-                raise InputError(
-                    f"{self.source}: {side}.lidar: {fault}"
-                ) from None
         if "returns" in left:
             returns, weather = left.pop("returns"), left.pop("weather", None)
             if returns not in _RETURNS:
@@ -423,7 +422,7 @@ class PairOfDrives:
         return drive.replaced(without=member.without)
 
     def _fit(self, drive: Scenario, fields: dict[str, Any]) -> None:
-        """Reduces traffic to the roads' room; drops impossible lane changes."""
+        """Reduces traffic to what roads hold; drops impossible lane changes."""
         driver, traffic = (
             one if isinstance(one := fields.get(name), Mapping) else {}
             for name in ("driver", "traffic")
@@ -472,8 +471,9 @@ class PairOfDrives:
 def control_drive(drive: Scenario, stage: str) -> Scenario:
     """Returns a drive on the same route through another stage.
 
-    The drive serves as a control: compared with the own drive of that stage,
-    only the route differs, not the city. The driver is the same.
+    The drive serves as a control: it sees the same city as the usual drive of
+    that stage, and differs from it only in the route. The driver stays the
+    same.
     """
     driver = drive.driver
     if driver.departs and driver.seed is None:
@@ -522,10 +522,13 @@ def moved(
 
 
 def frozen_drives(table: str) -> dict[tuple[str, int], str]:
-    """Returns (map, level) -> fingerprint of the drives when frozen.
+    """Returns the fingerprint of each frozen condition, by map and level.
+
+    A fingerprint is a hash of the two drives of a condition. A level is the
+    strength of its change.
 
     Args:
-        table: a file of the shipped worlds.
+        table: name of a file in the folder of the shipped worlds.
 
     Raises:
         InputError: there is no such file.
@@ -537,7 +540,10 @@ def frozen_drives(table: str) -> dict[tuple[str, int], str]:
 def check_frozen(
     table: str, compared: Mapping[tuple[str, int], Sequence[str]]
 ) -> None:
-    """Checks that drives of frozen conditions still have their fingerprints.
+    """Checks that drives of frozen conditions have not changed.
+
+    They have not changed if their fingerprints, which are hashes, are still
+    those of a table.
 
     Maps that the table lacks are not checked.
 

@@ -4,15 +4,18 @@ For simulated drives, rays cast in the world decide which points of a query's
 scan the place's sensor sees (see `evaluation.recognition.overlap_truth`). A
 point is seen if
 
-- it is within the ranges of the LiDAR and of the protocol, - the place's beams
-cover its direction, - nothing hides it, and a surface lies within `TOLERANCE`
-of it on the line of sight.
+- it is within the ranges of the LiDAR and of the protocol,
+- the place's beams cover its direction,
+- nothing hides it, and a surface lies within `TOLERANCE` of it on the line of
+  sight.
 
 The place's sensor sees the world of its own drive, with that drive's stage and
 traffic.
 """
 
+from collections.abc import Callable
 from dataclasses import dataclass
+import functools
 import math
 
 import numpy as np
@@ -30,22 +33,67 @@ from evaluation.recognition.seen_surfaces import TOLERANCE
 
 
 @dataclass(frozen=True)
-class VisibleSurfaces:
-    """The surfaces that a LiDAR sees from a place of a simulated drive.
-
-    Points with a coordinate beyond `max_range` [m] in its frame are left out.
-    """
+class Sight:
+    """A LiDAR at a place of a simulated drive, and the world around it."""
 
     scene: RayCastingScene
     X_WS: RigidTransform
     pattern: BeamPattern
     coverage: BeamCoverage
+
+    def reached(
+        self, p_S: np.ndarray
+    ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        """Returns which points are in range, and in the field of view.
+
+        Args:
+            p_S: (N, 3) points in the LiDAR's frame [m].
+
+        Returns:
+            (K,) row numbers of these points; (K, 3) directions to these points
+            in S; and (K,) their distances [m].
+        """
+        distances = np.linalg.norm(p_S, axis=1)
+        rows = np.flatnonzero(
+            (distances >= self.pattern.min_range)
+            & (distances <= self.pattern.max_range)
+        )
+        d_Sset = p_S[rows] / distances[rows, None]
+        covered = self.coverage.covers(d_Sset)
+        rows = rows[covered]
+        return rows, d_Sset[covered], distances[rows]
+
+
+def sights(drive: SimulatedDrive) -> Callable[[int], Sight]:
+    """Returns a function: frame of a drive -> what its LiDAR can see there."""
+
+    @functools.lru_cache(maxsize=1)
+    def coverage(turn: int) -> BeamCoverage:
+        return BeamCoverage(drive.pattern.beams(turn).d_Sset)
+
+    return lambda frame: Sight(
+        *drive.look(frame),
+        drive.pattern,
+        coverage(0 if drive.pattern.repeats else frame),
+    )
+
+
+@dataclass(frozen=True)
+class VisibleSurfaces:
+    """The surfaces that a LiDAR sees from a place.
+
+    Points with a coordinate beyond `max_range` [m] in the LiDAR's frame do not
+    count as seen.
+    """
+
+    sight: Sight
     max_range: float
 
     @property
     def reach(self) -> float:
         """Distance of the farthest visible surface [m]."""
-        return min(self.pattern.max_range, math.sqrt(3.0) * self.max_range)
+        farthest = self.sight.pattern.max_range
+        return min(farthest, math.sqrt(3.0) * self.max_range)
 
     def share_of(self, points: np.ndarray) -> float:
         """Returns which share of points (N, 3) is visible.
@@ -55,20 +103,15 @@ class VisibleSurfaces:
         if len(points) == 0:
             return math.nan
         kept = points[within_range(points, self.max_range)]
-        distances = np.linalg.norm(kept, axis=1)
-        reached = (distances >= self.pattern.min_range) & (
-            distances <= self.pattern.max_range
+        _, d_Sset, distances = self.sight.reached(kept)
+        X_WS = self.sight.X_WS
+        hits = self.sight.scene.cast_rays(
+            X_WS.translation(),
+            d_Sset,
+            self.sight.pattern.max_range,
+            R_WSset=X_WS.rotation().matrix(),
         )
-        kept, distances = kept[reached], distances[reached]
-        d_Sset = kept / distances[:, None]
-        covered = self.coverage.covers(d_Sset)
-        hits = self.scene.cast_rays(
-            self.X_WS.translation(),
-            d_Sset[covered],
-            self.pattern.max_range,
-            R_WSset=self.X_WS.rotation().matrix(),
-        )
-        is_seen = np.abs(hits.ranges - distances[covered]) <= TOLERANCE
+        is_seen = np.abs(hits.ranges - distances) <= TOLERANCE
         return float(is_seen.sum() / len(points))
 
 
@@ -80,21 +123,18 @@ def exact_overlaps(
 ) -> np.ndarray:
     """Returns the exact overlap of every query with every place, (Q, D).
 
-    NaN for a query without a point.
+    The overlap is the share of the query's points that the LiDAR at the place
+    sees. It is NaN for a query without points.
 
     Raises:
-        InputError: the two are of different maps.
+        InputError: the drives are through different maps.
     """
     check_same_world(database, query)
-    pattern = database.pattern
-    first = BeamCoverage(pattern.beams(0).d_Sset)
-
-    def see(frame: int) -> VisibleSurfaces:
-        coverage = first
-        if not pattern.repeats:
-            coverage = BeamCoverage(pattern.beams(frame).d_Sset)
-        return VisibleSurfaces(
-            *database.look(frame), pattern, coverage, protocol.max_range
-        )
-
-    return overlap_matrix(database, query, protocol, track, see)
+    look = sights(database)
+    return overlap_matrix(
+        database,
+        query,
+        protocol,
+        track,
+        lambda frame: VisibleSurfaces(look(frame), protocol.max_range),
+    )

@@ -26,7 +26,13 @@ from pydantic import (
     model_validator,
 )
 
-from cns_drake.base.errors import InputError, did_you_mean, validated
+from cns_drake.base.errors import (
+    InputError,
+    did_you_mean,
+    errors_at,
+    validated,
+    value_errors,
+)
 from cns_drake.base.yaml_files import parse_yaml, read_yaml
 from cns_drake.scenarios.scenario import Name
 from cns_drake.sensors.sensor_config import Section
@@ -85,7 +91,7 @@ def _base(value: Any) -> Any:
 
 
 def _case(value: Any) -> Case | tuple[str, ...]:
-    """Returns the fields of each side of a case, or names of cases."""
+    """Returns a case's fields for each drive, or the names of cases to join."""
     if isinstance(value, list | tuple):
         if not value or not all(isinstance(one, str) for one in value):
             raise ValueError("a list of a case holds names of other cases")
@@ -117,7 +123,8 @@ class MadeMap(Section):
             experiment.
         sha256: SHA-256 digest of the imported file, so that everyone imports
             the same one.
-        grow: share of the imported buildings that the first stage lacks.
+        grow: share of the imported buildings, drawn at random, that are missing
+            or lower in the first stage.
         plain: whether to leave out the windows, roofs and kerbs that the file
             does not contain. By default they are drawn at random, as by
             `cns-drake import`.
@@ -202,8 +209,8 @@ class Experiment(Section):
         baseline: values of the factors in the condition with which all other
             conditions are compared. By default the first value of each factor.
         frozen: table with the fingerprint of the drives of each level. Use it
-            to keep shipped worlds the same: an error names a drive that no
-            longer has its fingerprint.
+            to keep shipped worlds the same: if a drive no longer has its
+            fingerprint, the study stops with an error.
         charts: charts to show on the page of the experiment.
         quick: fields to replace if `--quick` is given. `tasks`, `methods` and
             lists are replaced as a whole; in other mappings, only the fields
@@ -253,7 +260,10 @@ class Experiment(Section):
 
     @property
     def fresh(self) -> list[int]:
-        """Freshly drawn versions of maps, each with its own baseline."""
+        """Numbers of the freshly drawn versions of maps to use.
+
+        Each version has its own baseline.
+        """
         found = self.both.get("fresh", [])
         return found if isinstance(found, list) else [found]
 
@@ -285,10 +295,11 @@ def load_experiment(
 
     Args:
         name_or_file: a shipped experiment by name, or a file.
-        overrides: `FIELD=VALUE` of fields, nested ones with dots, such as
-            `database.years=[0, 5]`, whose value is YAML; or a top-level field
-            and its value.
-        quick: whether the section `quick` replaces fields.
+        overrides: fields to change. Each is a text `FIELD=VALUE`, or a pair of
+            a top-level field and its value. In a text, VALUE is YAML and dots
+            separate nested fields, as in `database.years=[0, 5]`.
+        quick: whether the fields in the section `quick` of the experiment
+            replace its other fields.
 
     Raises:
         InputError: there is no such experiment, or a field is unknown or not
@@ -322,17 +333,12 @@ def load_experiment(
         else:
             values = values | dict([one])
     experiment = validated(Experiment, values, path)
-    try:
+    with value_errors(path):
         conditions(experiment)
         method_variants(experiment.methods or {})
-    except ValueError as error:
-        raise InputError(f"{path}: {error}") from None
     if not quick and experiment.quick:
-        try:
+        with errors_at(f"{path}: quick", f"{path}: "):
             load_experiment(name_or_file, overrides, quick=True)
-        except InputError as error:
-            fault = str(error).removeprefix(f"{path}: ")
-            raise InputError(f"{path}: quick: {fault}") from None
     return experiment
 
 
@@ -340,10 +346,8 @@ def _override(text: str) -> dict[str, Any]:
     name, equals, value = text.partition("=")
     if not (name and equals):
         raise InputError(f"--set: {text!r} is not FIELD=VALUE")
-    try:
+    with value_errors(f"--set: {name}"):
         parsed = parse_yaml(value)
-    except ValueError as error:
-        raise InputError(f"--set: {name}: {error}") from None
     return _nested(name, parsed)
 
 
@@ -361,20 +365,23 @@ def merged(values: Any, changes: Any) -> Any:
 
 
 def _chosen_anew(values: Changes, changes: Changes) -> dict[str, Any]:
-    """Returns `merged` fields; new tasks or methods replace all old ones."""
+    """Returns `merged` fields, with tasks and methods replaced as a whole."""
     chosen = {n: changes[n] for n in ("tasks", "methods") if n in changes}
     return {**merged(values, changes), **chosen}
 
 
 @dataclass(frozen=True)
 class Condition:
-    """One cell of an experiment's grid.
+    """One condition of an experiment: a value for each factor.
 
     Attributes:
-        factors: column of a table -> value.
-        changes: side, or `protocol` -> nested fields.
-        causes: the cases that are combined. Each has its fields at the wanted
-            level, then at lower levels, for maps that lack a level.
+        factors: name of each factor -> its value. Each factor is a column of
+            the tables.
+        changes: fields that the condition sets, under `database`, `query`,
+            `both` or `protocol`.
+        causes: the cases that are combined. Each contains its fields at the
+            wanted level (strength of the change), followed by those at lower
+            levels, for maps that cannot have the wanted level.
         is_baseline: whether other conditions are compared with this one.
     """
 
@@ -388,8 +395,8 @@ def conditions(experiment: Experiment) -> list[Condition]:
     """Returns the conditions, the baseline first.
 
     Raises:
-        ValueError: a factor has no value or one twice, the baseline names no
-            factor or no value of it, or there are too many conditions.
+        ValueError: a factor has no values or the same value twice, the baseline
+            names an unknown factor or value, or there are too many conditions.
     """
     fixed, factors = _factors(experiment)
     wanted = dict(_leaves(experiment.baseline, ()))
@@ -445,7 +452,7 @@ def conditions(experiment: Experiment) -> list[Condition]:
 def _factors(
     experiment: Experiment,
 ) -> tuple[dict[str, Any], dict[str, list[Any]]]:
-    """Returns fixed fields of sides and protocol, and path -> values."""
+    """Returns the fixed fields, and the values of each factor by its path."""
     fixed: dict[str, Any] = {}
     factors: dict[str, list[Any]] = {}
     for side in _FACTORED:
@@ -480,7 +487,7 @@ def _split(
 
 
 class _Values(list):
-    """The values of a factor."""
+    """The values of a factor, as a type of its own."""
 
 
 def _leaves(
@@ -549,7 +556,7 @@ def _shown(value: Any) -> Any:
 def _cases(
     experiment: Experiment,
 ) -> Iterator[tuple[str, int, tuple[tuple[Case, ...], ...]]]:
-    """Yields cause, level and the fields of its members, `none` first."""
+    """Yields name, level and members' fields of each case, `none` first."""
     yield NO_CAUSE, 0, ()
     if experiment.levels and not experiment.cases:
         raise ValueError("levels: there are no cases")
@@ -615,10 +622,11 @@ _ProtocolFields = create_model(  # type: ignore[call-overload]  # Fields are com
 def base_protocol(
     fields: Changes, source: object, place: str = "protocol"
 ) -> RetrievalProtocol:
-    """Returns the protocol of a condition's fields.
+    """Returns the protocol that some fields describe.
 
     Args:
-        fields: field -> value; `base` is the protocol that has all others.
+        fields: field -> value. The field `base` names the protocol from which
+            all fields come that are not given.
         source: file of the experiment, for errors.
         place: place of the fields in this file, for errors.
 
@@ -643,7 +651,7 @@ def base_protocol(
 
 @dataclass(frozen=True)
 class MethodVariant:
-    """A method with settings; the varied ones are columns of a table."""
+    """A method with settings; each varied setting is a column of tables."""
 
     name: str
     settings: tuple[tuple[str, str | tuple[str, ...]], ...] = ()
@@ -656,7 +664,7 @@ def method_variants(
     """Returns each method with each combination of its varied settings.
 
     Raises:
-        ValueError: a setting has no value, or one twice.
+        ValueError: a setting has no values, or the same value twice.
     """
     found = []
     for name, settings in methods.items():

@@ -1,6 +1,7 @@
 """Maps that an experiment makes: aged, drawn anew or imported.
 
-Also drives through other cities, for a crowded database.
+The module also makes drives through other cities, whose places are added to a
+database to make recognition harder.
 """
 
 from __future__ import annotations
@@ -21,7 +22,7 @@ from cns_drake.ageing.rates import (
     check_rates,
     read_rates,
 )
-from cns_drake.base.errors import InputError
+from cns_drake.base.errors import InputError, errors_at
 from cns_drake.base.files import read_bytes
 from cns_drake.base.jobs.cluster import Cluster
 from cns_drake.base.jobs.fingerprint import code_digest, fingerprint
@@ -108,8 +109,9 @@ class ImportCity(MakeMap):
 class MadeMaps:
     """The maps that the conditions of an experiment need, in one folder.
 
-    Ask for all maps first; `make` then makes them together, so that an aged
-    city is one map with a stage for each of the years.
+    First call `want_age` and `want_redrawn` for all maps; `make` then makes
+    them together. In this way, a city that is aged by several numbers of years
+    becomes one map with a stage for each number.
     """
 
     folder: Path
@@ -154,13 +156,13 @@ class MadeMaps:
     def aged(
         self, drive: Scenario, years: int, rates: Any, seed: int
     ) -> tuple[str, str]:
-        """Returns map folder and stage of a drive's aged city."""
+        """Returns the map folder and stage of a drive's aged city."""
         key = self._key(drive, rates, seed)
         number = sorted(self._ages[key]).index(years)
         return str(self._aged_folder(*key)), f"{number + 2:02d}"
 
     def redrawn(self, drive: Scenario, seed: int) -> tuple[str, str]:
-        """Returns map folder and stage of a drive's city, drawn anew."""
+        """Returns the map folder and stage of a drive's city, drawn anew."""
         source = map_folder(drive).path.resolve()
         return str(self.folder / f"{source.name}_c{seed}"), _STAGE
 
@@ -168,7 +170,7 @@ class MadeMaps:
         """Makes all maps that were noted and do not exist yet.
 
         Raises:
-            InputError: one could not be made; all are named.
+            InputError: maps could not be made; the error names all of them.
         """
         aged = [
             AgeCity(
@@ -197,11 +199,8 @@ class MadeMaps:
             check_rates(found, "rates")
         if isinstance(factor, bool) or not isinstance(factor, int | float):
             raise InputError(f"rates: {factor!r} is no number")
-        try:
+        with errors_at("rates", "--rate: "):
             known = read_rates(None, factor)
-        except InputError as error:
-            fault = str(error).removeprefix("--rate: ")
-            raise InputError(f"rates: {fault}") from None
         return {**known, **found}
 
     def _aged_folder(
@@ -256,22 +255,22 @@ def distracting_drives(
     cluster: Cluster,
     on_note: Callable[[str], None] = lambda text: None,
 ) -> list[Scenario]:
-    """Returns drives through other cities that distract a method.
+    """Returns drives through other cities, whose places distract a method.
 
-    Together, the drives have about the wanted number of places. The first ones
-    are the shipped drives of other maps, each through its own stage. If the
-    query's map is shipped, drives along its streets between other buildings
-    follow. Then come the drives of other maps through their other stages, and
-    at last the same drives through those cities drawn anew.
+    Together, the drives have about the wanted number of places. They come in
+    this order: the shipped drives of other maps, each through its own stage; if
+    the query's map is shipped, drives along its streets between other
+    buildings; the drives of other maps through their other stages; and the
+    drives of other maps through their cities drawn anew.
 
     Args:
-        query: the drive whose LiDARs measure all of them, and whose city is
-            left out.
+        query: the query drive. The returned drives have its LiDARs, and do not
+            go through its city.
         number: approximate number of places.
         spacing: distance between two places [m].
         output: folder for cities that are drawn anew.
         cluster: runs the jobs.
-        on_note: takes notes for the user.
+        on_note: is called with each note for the user.
 
     Raises:
         InputError: a shipped map cannot be used.

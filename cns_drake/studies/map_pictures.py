@@ -1,4 +1,4 @@
-"""The pictures of a map: its drives, and how its streets change."""
+"""Draws pictures of a map: its drives, and how its streets change."""
 
 from dataclasses import dataclass
 from pathlib import Path
@@ -18,7 +18,7 @@ _STAGE_COST = 10.0
 
 @dataclass(frozen=True)
 class _ReadFile:
-    """An input of a job: the content of a file and of the files it names."""
+    """Input of a job: the content of a file and of all files it refers to."""
 
     path: Path
 
@@ -28,7 +28,7 @@ class _ReadFile:
 
 @dataclass(frozen=True)
 class _ShownDrive:
-    """An input of a job: a scenario and the content of its files."""
+    """Input of a job: a scenario and the content of its files."""
 
     scenario: Scenario
 
@@ -78,7 +78,6 @@ def picture_drives(
     reporter: Reporter, drives: tuple[_ShownDrive, ...], picture: Path
 ) -> None:
     """Draws the drives of a map from above."""
-    del reporter
     scenarios = [one.scenario for one in drives]
     stage_pictures.draw_drives(
         {s.name.replace("_", " "): s for s in scenarios}, picture
@@ -89,7 +88,6 @@ def picture_stages(
     reporter: Reporter, read: tuple[_ReadFile, ...], picture: Path
 ) -> None:
     """Draws a street of a map in its first and its last stage."""
-    del reporter
     views, *stages = (one.path for one in read)
     stage_pictures.draw_stages(
         {stage.stem.replace("_", " "): stage for stage in stages},

@@ -10,7 +10,7 @@ Rays that are cast in the worlds of both drives decide.
   lies more than `_SKIN` behind, measured perpendicular to the surface. A wall
   that has moved a little therefore does not hide its old position.
 - A surface is **there** if it passes within `NEAR` of the point, measured
-perpendicular to the surface. Moving objects do not count.
+  perpendicular to the surface. Moving objects do not count.
 
 A point of the older map A is `kept` if B's drive observes it and a surface of
 B's world is there, `gone` if B's drive observes it and none is there, and
@@ -18,8 +18,8 @@ B's world is there, `gone` if B's drive observes it and none is there, and
 A's world decide whether a point of the newer map B is `kept`, `new` or `newly
 seen`.
 
-The poses are those of the sessions' scans. Surfaces are ideal: glass and leaves
-count as solid geometry.
+The poses of a drive are those of the scans that make its map. Surfaces are
+ideal: glass and leaves count as solid geometry.
 """
 
 from collections import Counter
@@ -32,7 +32,6 @@ from pathlib import Path
 
 import jinja2
 import numpy as np
-from pydrake.math import RigidTransform
 
 from cns_drake.base.drives.drive import Drive, check_same_world
 from cns_drake.base.drives.mcap_drive import McapDrive, holds_mcap
@@ -48,10 +47,10 @@ from cns_drake.scenarios.scenario_files import (
     load_scenario,
     map_folder,
 )
-from cns_drake.sensors.lidar.patterns import BeamCoverage, BeamPattern
 from cns_drake.simulation.loaded_drive import load_stage
 from cns_drake.simulation.scanning import still_scene
 from cns_drake.simulation.simulated_drive import SimulatedDrive
+from cns_drake.studies.exact_overlap import Sight, sights
 from evaluation.drives.sampling import sample_frames
 from evaluation.map_update.sessions import (
     SIDES,
@@ -120,14 +119,17 @@ _MOST_ROWS = 200
 
 @dataclass(frozen=True)
 class Survey:
-    """One of the two drives, recorded or simulated, with its simulation."""
+    """A drive whose map is labelled, with the simulation of its world."""
 
     drive: Drive
     simulated: SimulatedDrive
     scenario: Scenario
 
     def still(self) -> RayCastingScene:
-        """Returns the drive's world without the vehicle and moving objects."""
+        """Returns the drive's world for ray casting, without moving objects.
+
+        The recording vehicle is left out, too.
+        """
         if self.scenario.traffic.is_off:
             # The LiDAR does not see its own vehicle.
             return self.simulated.look(0)[0]
@@ -145,8 +147,9 @@ def open_survey(place: str | Path) -> Survey:
     """Opens a recording, or simulates a shipped drive or a scenario's file.
 
     Raises:
-        InputError: it cannot be used, the points have no instances, or the
-            files of its world have changed since it was recorded.
+        InputError: the drive cannot be used, its points do not name their
+            structures, or the files of its world have changed since it was
+            recorded.
     """
     path = Path(place)
     if not path.exists() or not holds_mcap(path):
@@ -173,7 +176,7 @@ def open_survey(place: str | Path) -> Survey:
 
 
 def simulate_survey(scenario: Scenario) -> Survey:
-    """Returns a drive that is simulated when its scans are read.
+    """Returns a drive that is simulated only when its scans are read.
 
     Raises:
         InputError: the scenario cannot be run.
@@ -203,7 +206,8 @@ def write_truth(
             aged map has.
 
     Returns:
-        Side -> label -> number of points; and the change of each structure.
+        The number of points with each label, for A and for B; and the change of
+        each structure.
 
     Raises:
         InputError: the drives are of different worlds, or the folder cannot be
@@ -253,7 +257,8 @@ def label_points(
 ) -> np.ndarray:
     """Returns a label for each point of a map, (N,) uint8.
 
-    The other drive observes the points from its frames (K,).
+    A point counts as observed if the drive `other` sees it from one of its
+    frames `frames` (K,).
     """
     unobserved, kept, changed = SIDES[session.side]
     labels = np.full(len(session.points), unobserved, np.uint8)
@@ -272,25 +277,24 @@ def observed(
 ) -> np.ndarray:
     """Returns which points (N, 3) in W [m] a drive observes, (N,) bool.
 
-    The drive observes them from its frames (K,).
+    Only the drive's frames `frames` (K,) count.
     """
     result = np.zeros(len(points), bool)
-    pattern = drive.pattern
-    coverage = BeamCoverage(pattern.beams(0).d_Sset)
+    look = sights(drive)
     tiles = _Tiles(points)
     first = sample_frames(drive.X_WS[frames, :3, 3], _FIRST_LOOKS)
     looks = np.concatenate([frames[first], np.delete(frames, first)]).tolist()
     with ThreadPoolExecutor(num_cores()) as threads:
         for frame in track(looks, f"looking from {drive.name}", len(looks)):
-            if not pattern.repeats:
-                coverage = BeamCoverage(pattern.beams(frame).d_Sset)
-            near = tiles.near(drive.X_WS[frame, :3, 3], pattern.max_range)
+            near = tiles.near(drive.X_WS[frame, :3, 3], drive.pattern.max_range)
             if not near:
                 continue
-            look = _Look(*drive.look(frame), pattern, coverage)
+            sight = look(frame)
             rows = np.concatenate([tiles.left[tile] for tile in near])
             for seen in threads.map(
-                lambda chunk, look=look: chunk[look.sees(points[chunk])],
+                lambda chunk, sight=sight: chunk[
+                    _visible(points[chunk], sight)
+                ],
                 list(_chunks(rows)),
             ):
                 result[seen] = True
@@ -301,41 +305,22 @@ def observed(
     return result
 
 
-@dataclass(frozen=True)
-class _Look:
-    """What a LiDAR observes from a place."""
-
-    scene: RayCastingScene
-    X_WS: RigidTransform
-    pattern: BeamPattern
-    coverage: BeamCoverage
-
-    def sees(self, points: np.ndarray) -> np.ndarray:
-        """Returns the rows of the points (N, 3) in W that are observed."""
-        p_WS, R_WS = self.X_WS.translation(), self.X_WS.rotation().matrix()
-        offsets = points - p_WS
-        distances = np.sqrt(np.einsum("ij,ij->i", offsets, offsets))
-        rows = np.flatnonzero(
-            (distances >= self.pattern.min_range)
-            & (distances <= self.pattern.max_range)
-        )
-        distances = distances[rows]
-        d_Sset = (offsets[rows] / distances[:, None]) @ R_WS
-        covered = self.coverage.covers(d_Sset)
-        rows, d_Sset = rows[covered], d_Sset[covered]
-        distances = distances[covered]
-        hits = self.scene.cast_rays(p_WS, d_Sset, distances, R_WSset=R_WS)
-        # A miss is infinitely far behind the point.
-        before = distances - hits.ranges
-        is_free = before <= NEAR
-        grazed = np.flatnonzero(~is_free & (before <= _GRAZING))
-        d_Sset = d_Sset[grazed]
-        hits = self.scene.cast_rays(
-            p_WS, d_Sset, distances[grazed], R_WSset=R_WS, with_normals=True
-        )
-        cosines = np.einsum("ij,ij->i", hits.normals_W, d_Sset @ R_WS.T)
-        is_free[grazed] = before[grazed] * np.abs(cosines) <= _SKIN
-        return rows[is_free]
+def _visible(points: np.ndarray, sight: Sight) -> np.ndarray:
+    """Returns the rows of the points (N, 3) in W that are observed."""
+    p_WS, R_WS = sight.X_WS.translation(), sight.X_WS.rotation().matrix()
+    rows, d_Sset, distances = sight.reached((points - p_WS) @ R_WS)
+    hits = sight.scene.cast_rays(p_WS, d_Sset, distances, R_WSset=R_WS)
+    # A miss is infinitely far behind the point.
+    before = distances - hits.ranges
+    is_free = before <= NEAR
+    grazed = np.flatnonzero(~is_free & (before <= _GRAZING))
+    d_Sset = d_Sset[grazed]
+    hits = sight.scene.cast_rays(
+        p_WS, d_Sset, distances[grazed], R_WSset=R_WS, with_normals=True
+    )
+    cosines = np.einsum("ij,ij->i", hits.normals_W, d_Sset @ R_WS.T)
+    is_free[grazed] = before[grazed] * np.abs(cosines) <= _SKIN
+    return rows[is_free]
 
 
 class _Tiles:
@@ -375,7 +360,7 @@ def _spiral() -> np.ndarray:
 def is_there(points: np.ndarray, scene: RayCastingScene) -> np.ndarray:
     """Returns which points (N, 3) in W [m] lie on a surface, (N,) bool.
 
-    They are within `NEAR` of it.
+    A point lies on a surface if it is at most `NEAR` away from it.
     """
     result = np.zeros(len(points), bool)
     left = np.arange(len(points))
@@ -445,7 +430,8 @@ def _check_unchanged(drive: McapDrive, path: Path, scenario: Scenario) -> None:
 def _check_same_map(a: Survey, b: Survey) -> None:
     """Refuses drives of different map folders, even of the same name.
 
-    For worlds without a map, the user must know that they show one place.
+    For worlds without a map folder this cannot be checked; the user must make
+    sure that both show the same place.
     """
     if (a.scenario.map is None) != (b.scenario.map is None):
         raise InputError(

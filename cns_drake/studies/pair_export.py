@@ -1,4 +1,4 @@
-"""Sets of scans for trainers of place recognition, with exact truth.
+"""Writes training data for place-recognition networks, with exact truth.
 
 The drives are simulated without recording them. Scans of drives through the
 same city can match each other. Cities are put `CITY_DISTANCE` apart, so that
@@ -64,10 +64,11 @@ class ExportOptions:
     """Settings of the export of each drive.
 
     Attributes:
-        format: format of the program that trains.
+        format: data format, that of the training program.
         spacing: distance between two clouds, along the path [m].
         scans: consecutive scans that are merged into a cloud.
-        max_range: points with a greater x, y or z are left out [m].
+        max_range: points that are farther away than this along x, y or z are
+            left out [m].
     """
 
     format: Format = "pointnetvlad"
@@ -83,7 +84,10 @@ def write_overlap_table(
     protocol: RetrievalProtocol,
     track: Track = silent,
 ) -> Path:
-    """Writes `<output>/overlaps.csv`: the overlap of queries with places.
+    """Writes the exact overlap of each query with each place, as CSV.
+
+    The overlap is the share of a query's points that the LiDAR at the place
+    sees. The file is `<output>/overlaps.csv`.
 
     Args:
         database: the drive of the places, in whose city rays are cast.
@@ -93,7 +97,8 @@ def write_overlap_table(
         track: reports progress.
 
     Raises:
-        InputError: the drives are of two maps, or cannot be simulated.
+        InputError: the drives are through different maps, or cannot be
+            simulated.
     """
     # Before minutes of work.
     make_folder(output)
@@ -120,16 +125,16 @@ def export_pairs(
 
     Args:
         scenarios: the drives to learn from.
-        held_out: drives for evaluation only; without any, all drives are
-            evaluated.
+        held_out: drives for evaluation only. If there are none, all drives are
+            used for training and evaluation.
         output: the folder of the set.
         options: format and spacing of the exported clouds.
         cluster: runs the work.
-        on_note: takes notes on missing parts of the set.
+        on_note: is called with notes on missing parts of the set.
 
     Raises:
-        InputError: there is no drive to learn from, two drives have one name,
-            or one cannot be simulated; all such are named.
+        InputError: there is no drive to learn from, two drives have the same
+            name, or drives cannot be simulated; the error names all of these.
     """
     if not scenarios:
         raise InputError("export-pairs: no drive to learn from")
@@ -184,7 +189,7 @@ def export_run(
     folder: Path,
     options: ExportOptions,
 ) -> np.ndarray:
-    """Writes the clouds of a drive; returns (N, 4, 4) poses X_WS."""
+    """Simulates a drive and writes its clouds; returns poses X_WS (N, 4, 4)."""
     drive = simulation()
     frames = sample_frames(drive.X_WS[:, :3, 3], options.spacing)
     make_folder(folder)
@@ -231,7 +236,11 @@ def compare_runs(
     database: DriveSimulation,
     options: ExportOptions,
 ) -> np.ndarray:
-    """Returns the exact overlaps of a drive's scans with another's, (Q, D)."""
+    """Returns the exact overlap of each query with each place, (Q, D).
+
+    The overlap is the share of a query's points that the LiDAR at the place
+    sees.
+    """
     protocol = RetrievalProtocol(
         query_spacing=options.spacing,
         place_spacing=options.spacing,
@@ -262,7 +271,7 @@ class Run:
 
     @property
     def files(self) -> list[str]:
-        """The cloud files."""
+        """File names of the drive's clouds, relative to the data set."""
         return [f"{self.folder}/{k:06d}.bin" for k in range(len(self.X_WS))]
 
 
@@ -309,9 +318,9 @@ def _locations(
 
     A location is a city; if there are fewer cities than locations, some cities
     occur twice. The evaluation divides by the number of pairs of drives, and
-    for each of these by the number of queries with a match. Cities for which
-    that is impossible are left out, with a note; without any city, there is no
-    location.
+    for each of these by the number of queries with a match. Cities where one of
+    these numbers is 0 are left out, with a note. If no city is left, there is
+    no location.
     """
     cities: dict[int, list[Run]] = {}
     for run in runs:
@@ -400,7 +409,7 @@ _MODULE = "datasets.base_datasets"
 
 
 def _tuple_class() -> type:
-    """Returns the class that trainers unpickle, under its name there."""
+    """Returns the class that training programs unpickle, named as there."""
     if _MODULE in sys.modules:
         return sys.modules[_MODULE].TrainingTuple
     module: Any = types.ModuleType(_MODULE)

@@ -1,4 +1,4 @@
-"""Recordings as jobs, side by side, one process each."""
+"""Records drives as jobs that run side by side, each in its own process."""
 
 from collections import Counter
 from collections.abc import Iterator, Mapping, Sequence
@@ -46,8 +46,8 @@ def record_all(
     one goes on.
 
     Raises:
-        InputError: some could not be recorded, all of which are named, or the
-            folder cannot be made.
+        InputError: scenarios could not be recorded (the error names all of
+            them), or the folder cannot be made.
     """
     jobs = plan_recordings(scenarios, output, overwrite=overwrite)
     make_folder(output)
@@ -64,11 +64,12 @@ def plan_recordings(
     """Returns a job for each unfinished recording; notes the finished ones.
 
     Each job has the recording's name. `overwrite` allows it to replace another
-    recording of this name. If `pages` is given, a recording without its web
-    page there is not finished.
+    recording of this name. If `pages` (name of a recording -> file of its web
+    page) is given, a recording counts as finished only if its page exists.
 
     Raises:
-        InputError: two have one name, or a folder must not be used.
+        InputError: two scenarios have the same name, or a folder must not be
+            used.
     """
     for name, count in Counter(s.name for s in scenarios).items():
         if count > 1:
@@ -179,7 +180,8 @@ class Record(Step):
 def is_recorded(scenario: Scenario, folder: Path) -> bool:
     """Returns whether a finished recording of exactly this scenario exists.
 
-    It must be of the present world, roads and program.
+    It counts only if the world, the roads and the program have not changed
+    since it was recorded.
 
     Raises:
         InputError: the scenario's files cannot be read.

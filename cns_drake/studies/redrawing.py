@@ -23,7 +23,7 @@ import yaml
 
 from cns_drake.base import files
 from cns_drake.base.csv_files import read_records
-from cns_drake.base.errors import InputError
+from cns_drake.base.errors import InputError, errors_at
 from cns_drake.base.jobs.cluster import Cluster
 from cns_drake.base.jobs.fingerprint import code_digest
 from cns_drake.base.jobs.running import Job, run_jobs
@@ -60,19 +60,20 @@ def redraw_cities(
 ) -> dict[int, Path]:
     """Draws the city of a map anew with several seeds.
 
-    Shows progress on stderr. An existing city of the same inputs and program is
-    kept.
+    Shows progress on stderr. A city that exists is kept if its inputs and the
+    program have not changed.
 
     Args:
         map_folder: folder of the map, with `roads.yaml` and `city.yaml`.
         stage: the stage that is drawn.
-        seeds: one for each city.
+        seeds: a seed for each city.
         output: folder for the cities.
         cluster: runs the jobs.
 
     Raises:
         InputError: the map cannot be used, another file or folder has the name
-            of a city, or some could not be drawn; all are named.
+            of a city, or cities could not be drawn; the error names all of
+            them.
     """
     map_folder, output = map_folder.resolve(), output.resolve()
     folders = {seed: output / f"{map_folder.name}_c{seed}" for seed in seeds}
@@ -140,8 +141,8 @@ def make_maps(steps: Sequence[MakeMap], output: Path, cluster: Cluster) -> None:
     """Makes maps in a folder, with progress on stderr; finished ones are kept.
 
     Raises:
-        InputError: another file or folder has the name of a map, or some could
-            not be made; all are named.
+        InputError: another file or folder has the name of a map, or maps could
+            not be made; the error names all of them.
     """
     # Quick checks come before all slow work.
     for step in steps:
@@ -154,33 +155,28 @@ def make_maps(steps: Sequence[MakeMap], output: Path, cluster: Cluster) -> None:
 
 @dataclass(frozen=True)
 class RedrawCity(MakeMap):
-    """Draws the city of a map anew, with one stage, the whole city."""
+    """Draws a map's city anew; its only stage contains the whole city."""
 
     map_folder: Path
     stage: str
     seed: int
 
     def make(self, finish: Callable[[Path], None], reporter: Reporter) -> None:
-        del reporter
         with files.draft_folder(self.folder) as draft:
             for name, content in self.inputs().items():
                 (draft / name).write_bytes(content)
-            try:
+            place = f"{self.map_folder}: seed {self.seed}"
+            with errors_at(place, f"{draft}{os.sep}"):
                 self.finish_inputs(draft)
                 generate_city(draft)
-            except InputError as error:
-                fault = str(error).removeprefix(f"{draft}{os.sep}")
-                raise InputError(
-                    f"{self.map_folder}: seed {self.seed}: {fault}"
-                ) from error
             finish(draft)
 
     def inputs(self) -> dict[str, bytes]:
-        """Returns name -> content of the inputs of the city."""
+        """Returns name -> content of the files from which the city is drawn."""
         return redrawn_inputs(self.map_folder, self.stage, self.seed)
 
     def finish_inputs(self, draft: Path) -> None:
-        """Writes the inputs that can only be made once the city is drawn."""
+        """Writes the inputs that can be made only after the city is drawn."""
 
     def sources(self) -> dict[str, object]:
         """Returns everything on which the city depends, ready for JSON."""
@@ -196,9 +192,10 @@ class RedrawCity(MakeMap):
 def redrawn_inputs(map_folder: Path, stage: str, seed: int) -> dict[str, bytes]:
     """Returns the inputs of a map's city drawn anew: name -> content.
 
-    They are `roads.yaml`, which is the map's own, `city.yaml` and `stages.yaml`
-    with one stage, the whole city. The map's own stages name structures that
-    another draw need not have.
+    The inputs are the map's own `roads.yaml`, a `city.yaml` with the new seed,
+    and a `stages.yaml` with one stage that contains the whole city. The map's
+    own stages cannot be used, because they name structures that the new city
+    may lack.
 
     Raises:
         InputError: a file of the map cannot be read, or is no plan.
@@ -219,7 +216,7 @@ def redrawn_inputs(map_folder: Path, stage: str, seed: int) -> dict[str, bytes]:
 
 
 def to_yaml(title: str, values: dict) -> bytes:
-    """Returns an input of a redrawn city, with its mark and a title."""
+    """Returns values as YAML, with a title in comments."""
     comment = (
         f"{_MARK.decode()} {__version__}: {title}.\n"
         "# `cns-drake generate --vary` writes it anew when the map changes.\n"
@@ -232,7 +229,11 @@ def to_yaml(title: str, values: dict) -> bytes:
 
 @dataclass(frozen=True)
 class Version:
-    """A version of a shipped map, from 1 on, turned about the origin [deg]."""
+    """A freshly drawn version of a shipped map.
+
+    Its number begins with 1. Its city is rotated about the origin by
+    `turn_deg`.
+    """
 
     map_name: str
     number: int
@@ -241,7 +242,7 @@ class Version:
 
 
 def fresh_versions() -> list[Version]:
-    """Returns the frozen list of freshly drawn versions."""
+    """Returns the versions of shipped maps in `worlds/fresh.csv`."""
     rows = read_records(worlds_folder() / "fresh.csv", _COLUMNS)
     return [
         Version(
@@ -260,7 +261,7 @@ def draw_fresh_cities(
     """Draws fresh cities; returns their map folders, `<output>/<map>_fNN`.
 
     Raises:
-        InputError: there is no such version, or it could not be drawn.
+        InputError: a version is unknown or could not be drawn.
     """
     versions = fresh_versions()
     for what, given, known in (
@@ -291,7 +292,7 @@ def draw_fresh_cities(
 
 @dataclass(frozen=True)
 class DrawFreshCity(RedrawCity):
-    """Draws a version of a map, with its stages and drives."""
+    """Draws a fresh version of a map, with its stages and drives."""
 
     turn_deg: float = 0.0
 
@@ -328,9 +329,10 @@ class DrawFreshCity(RedrawCity):
 
 
 def turned(values: Any, turn_deg: float) -> Any:
-    """Returns the content of `roads.yaml` or `city.yaml`, turned about W.
+    """Returns the content of `roads.yaml` or `city.yaml`, with a turned city.
 
-    The turn is anticlockwise [deg].
+    All positions and headings are turned anticlockwise about the world's origin
+    [deg].
     """
     if isinstance(values, list):
         return [turned(one, turn_deg) for one in values]
@@ -368,7 +370,7 @@ def _turned_bounds(bounds: Sequence[float], turn_deg: float) -> list[float]:
 def kept_names(stages: Any, names: Sequence[str]) -> Any:
     """Returns a `stages.yaml` without the structures that a city lacks.
 
-    A row can have fewer houses in another draw. Groups that would have no
+    A row can have fewer houses if it is drawn anew. Groups that would have no
     structure are left out.
     """
     if isinstance(stages, list):

@@ -1,4 +1,4 @@
-"""The experiments on maps, from simulation to report."""
+"""Records the drives of maps, evaluates them and writes a report."""
 
 from collections.abc import Callable, Sequence
 from dataclasses import replace
@@ -45,9 +45,9 @@ def reproduce_maps(
     contains the tables and figures. Finished work is not repeated. The function
     returns the path of the report's page.
 
-    With `quick`, only the report is made, from the same frames. Drives that are
-    not recorded yet are then evaluated while they are simulated, and they are
-    not recorded.
+    With `quick`, only the report is made, and no drive is recorded. Drives that
+    are not recorded yet are evaluated while they are simulated, at the same
+    frames as a recording.
 
     Args:
         maps: names or folders of maps; all shipped maps if None.
@@ -59,7 +59,7 @@ def reproduce_maps(
         own_methods: Python files of further methods.
         settings: settings of methods, each `METHOD.NAME=VALUE`.
         with_costs: whether times are measured.
-        on_note: takes notes for the user.
+        on_note: is called with each note for the user.
 
     Raises:
         InputError: a map is unknown, the folder cannot be made, or a step
@@ -122,7 +122,11 @@ def _drives(folder: Path) -> list[Scenario]:
 
 
 def control_drives(drives: Sequence[Scenario]) -> list[Scenario]:
-    """Returns the control drives of a map's drives, see `control_drive`."""
+    """Returns the control drives of a map's drives.
+
+    A control drive follows the route of one drive through the stage of another,
+    so that a comparison with the latter contains no change of the city.
+    """
     last = max(drives, key=lambda drive: drive.stage or "")
     return [
         control_drive(drive, str(last.stage))

@@ -1,4 +1,4 @@
-"""A study: an experiment on maps, from its conditions to its table and page."""
+"""Runs a study: an experiment on maps, from conditions to tables and page."""
 
 from __future__ import annotations
 
@@ -7,9 +7,7 @@ from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
-import numpy as np
-
-from cns_drake.base.errors import InputError, did_you_mean
+from cns_drake.base.errors import InputError, did_you_mean, errors_at
 from cns_drake.base.files import make_folder
 from cns_drake.base.jobs.cluster import Cluster
 from cns_drake.base.jobs.fingerprint import fingerprint
@@ -98,7 +96,7 @@ _FORMER = (
 
 @dataclass(frozen=True)
 class _Measured:
-    """A pair of drives in a condition, with the parts that tasks write."""
+    """A pair of drives in a condition, with the files of its results."""
 
     map_name: str
     names: tuple[str, str]
@@ -112,7 +110,7 @@ class _Measured:
 
 @dataclass(frozen=True)
 class _Drives:
-    """The pairs of drives of one map, before any condition."""
+    """The pairs of drives of one map, before a condition changes them."""
 
     map_name: str
     factors: Mapping[str, Any]
@@ -152,8 +150,8 @@ def run_study(
         cluster: does the work.
         maps: maps that replace those of the experiment.
         source: file of the experiment, for errors.
-        on_note: takes notes on what is left out, and on how long the study
-            takes.
+        on_note: is called with notes on what is left out, and on how long the
+            study takes.
 
     Returns:
         The path of the page.
@@ -174,7 +172,7 @@ def run_study(
 
 @dataclass
 class Study:
-    """An experiment that is being measured; see `run_study`."""
+    """An experiment that is being measured on maps."""
 
     experiment: Experiment
     output: Path
@@ -191,11 +189,8 @@ class Study:
                     f" {', '.join(TASKS)}){did_you_mean(name, TASKS)}"
                 )
             self._tasks[name] = TASKS[name](settings, self.source)
-        try:
+        with errors_at(f"{self.source}: methods", "--method: "):
             self._variants = self._choose_methods()
-        except InputError as error:
-            fault = str(error).removeprefix("--method: ")
-            raise InputError(f"{self.source}: methods: {fault}") from None
         self._conditions = conditions(self.experiment)
         self._protocol = self._protocol_of(self._conditions[0])
         self._made = MadeMaps(self.output / "cities")
@@ -270,7 +265,7 @@ class Study:
         return found
 
     def _drives(self, maps: Sequence[str]) -> Iterator[_Drives]:
-        """Yields the drives of all maps; makes maps that are named by files."""
+        """Yields the drives of all maps; makes aged and imported maps."""
         made = {
             one.name: one
             for one in self.experiment.maps or ()
@@ -415,7 +410,7 @@ class Study:
     ) -> Iterator[_Measured]:
         """Yields the pairs of a map in all conditions that it allows.
 
-        Without `made`, the maps that conditions need are only noted.
+        If `made` is false, the maps that conditions need are only noted.
         """
         noted: dict[str, None] = {}
         age, redraw = self._made.want_age, self._made.want_redrawn
@@ -524,7 +519,7 @@ class Study:
                 )
 
     def _check_recordable(self, city: City) -> None:
-        """Checks that no condition changes more than recordings can have."""
+        """Checks that conditions vary only the stage, as recordings require."""
         for condition in self._conditions:
             sides = {n: condition.changes.get(n, {}) for n in SIDES}
             given = [f"{side}.{name}" for side in sides for name in sides[side]]
@@ -588,17 +583,8 @@ class Study:
                 for method, gate, columns in self._tasks[name].answers(
                     self._found(one, name)
                 ):
-                    yield Answers(
-                        **self._key(one, name, method, gate),
-                        columns={
-                            column: np.array(
-                                [-1 if v is None else v for v in some]
-                            )
-                            if isinstance(some, list)
-                            else np.asarray(some)
-                            for column, some in columns.items()
-                        },
-                    )
+                    key = self._key(one, name, method, gate)
+                    yield Answers(**key, columns=columns)
 
     def _found(self, one: _Measured, task: str) -> Any:
         return self._tasks[task].found(one.parts[task], one.pair)

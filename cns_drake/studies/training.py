@@ -1,11 +1,11 @@
 """Trains the method `learned` on scans of drawn cities.
 
 In a batch, scans of one drive are queries for places of another drive through
-the same city. Scores are those of the method. The loss is the cross entropy
-between a softmax over all places of the batch and the weights of the right
-places. These weights grow with the exact overlap of two scans, or fall with
-their distance, so that the best place ranks first and less similar ones after
-it.
+the same city. Queries and places are compared as the method does. The loss is
+the cross entropy between a softmax over all places of the batch and the weights
+of the right places. These weights grow with the exact overlap of two scans, or
+fall with their distance, so that the best place ranks first and less similar
+ones after it.
 """
 
 from collections.abc import Callable, Mapping, Sequence
@@ -93,7 +93,7 @@ class TrainingScans:
 
     @classmethod
     def of(cls, parts: Sequence["TrainingScans"]) -> "TrainingScans":
-        """Joins scans of several cities, which are numbered in order."""
+        """Joins scans of several cities; numbers the cities in their order."""
         overlaps = [part.overlaps for part in parts]
         return cls(
             np.concatenate([part.images for part in parts]),
@@ -120,7 +120,7 @@ class Batch:
 
 
 class Sampler:
-    """Draws batches; each depends only on the seed and its step."""
+    """Draws batches; each depends only on the seed and the step's number."""
 
     def __init__(self, scans: TrainingScans, seed: int):
         """Finds the pairs of drives that meet.
@@ -191,7 +191,7 @@ class Sampler:
     def _cluster(
         self, city: int, rng: np.random.Generator
     ) -> tuple[list[int], list[int]]:
-        """Returns near queries, and two places for each of them."""
+        """Returns neighbouring queries, with a right and a wrong place each."""
         xy = self._scans.xy
         drives = list(self._groups[city].values())
         first, second = rng.permutation(len(drives))[:2]
@@ -312,10 +312,11 @@ def train(
 ) -> tuple[Parameters, np.ndarray]:
     """Trains a network; an interrupted training goes on from its `state` file.
 
-    Returns the weights, and (steps, 2) loss and share of right best places.
+    Returns the weights; and, for each step, the loss and the share of queries
+    whose best place is right, (steps, 2).
 
     Args:
-        scans: images of scans and which of them are of one place.
+        scans: images of the scans, and which scans show the same place.
         steps: number of batches.
         seed: seed of all draws.
         state: file from which an interrupted training goes on.
@@ -432,8 +433,8 @@ def write_weights(
 ) -> None:
     """Writes a file of weights, as the method `learned` reads it.
 
-    `seen` is the least and the greatest share of sectors with a point that the
-    scans of the training have.
+    `seen` describes the training scans: the least and the greatest share of a
+    scan's sectors that contain a point.
     """
     arrays: dict[str, Any] = {
         "version": np.int64(WEIGHTS_VERSION),
@@ -511,7 +512,7 @@ def make_weights(
     Args:
         plan: cities, drives and steps.
         output: file of weights.
-        command: text that the file keeps.
+        command: command line that is stored in the file.
         cluster: runs the jobs.
         track: reports progress.
 

@@ -27,10 +27,9 @@ from cns_drake.roads.route import draw_route
 from cns_drake.scenarios.scenario import Scenario
 from cns_drake.scenarios.scenario_files import load_scenario
 from cns_drake.scenarios.shipped import shipped_maps
-from cns_drake.sensors.lidar.patterns import BeamCoverage
 from cns_drake.simulation.simulated_drive import SimulatedDrive
 from cns_drake.studies.comparisons import moved
-from cns_drake.studies.exact_overlap import VisibleSurfaces
+from cns_drake.studies.exact_overlap import VisibleSurfaces, sights
 from cns_drake.studies.redrawing import redrawn_inputs, to_yaml, turned
 from evaluation.drives.sampling import gather, sample_frames
 from evaluation.methods.learned import polar_image
@@ -61,9 +60,9 @@ _OVERLAP_POINTS = 1000
 class DrawnCity:
     """A city with its drives, all drawn from a seed.
 
-    `map_name` is the shipped map that has its streets, or `DRAWN_STREETS`. With
-    `graded`, the overlap of each scan with the places of the other scans is
-    computed.
+    `map_name` is the shipped map whose streets the city has, or
+    `DRAWN_STREETS`. With `graded`, the overlap of each scan with the places of
+    the other scans is computed.
     """
 
     map_name: str
@@ -77,14 +76,15 @@ class DrawnCity:
 
     @property
     def city_seed(self) -> int:
-        """The seed of the city itself."""
+        """Seed of the city without its drives."""
         return _FIRST_SEED + self.seed * _MOST_CITIES + self.number
 
     def write(self, folder: Path) -> None:
         """Writes the map folder of the city.
 
         Raises:
-            InputError: it cannot be made or written.
+            InputError: the city cannot be drawn, or the folder cannot be
+                written.
         """
         with draft_folder(folder, replaces=True) as draft:
             if self.map_name == DRAWN_STREETS:
@@ -206,7 +206,7 @@ def _few(points: np.ndarray) -> np.ndarray:
 
 
 def _overlaps(scans: Sequence[_Taken], reporter: Reporter) -> np.ndarray:
-    """Returns the share of each scan that is seen from each other scan.
+    """Returns which share of each scan is visible from every other scan.
 
     The share is exact (see `exact_overlap`). It is 0 for two scans of one drive
     and for scans over 50 m apart.
@@ -218,19 +218,11 @@ def _overlaps(scans: Sequence[_Taken], reporter: Reporter) -> np.ndarray:
     X_WSs = np.stack([one.drive.X_WS[one.frame] for one in scans])
     places = reporter.track(enumerate(scans), "overlaps", len(scans))
     for column, place in places:
-        drive = place.drive
-        scene, X_WP = drive.look(place.frame)
-        seen = VisibleSurfaces(
-            scene,
-            X_WP,
-            drive.pattern,
-            BeamCoverage(drive.pattern.beams(place.frame).d_Sset),
-            _MAX_RANGE,
-        )
+        seen = VisibleSurfaces(sights(place.drive)(place.frame), _MAX_RANGE)
         X_PW = poses.inverse(X_WSs[column])
         apart = np.linalg.norm(X_WSs[:, :2, 3] - X_WSs[column, :2, 3], axis=1)
         for row in np.flatnonzero(apart <= _FARTHEST_OVERLAP).tolist():
-            if scans[row].drive is not drive:
+            if scans[row].drive is not place.drive:
                 X_PS = X_PW @ X_WSs[row]
                 p_P = scans[row].points @ X_PS[:3, :3].T + X_PS[:3, 3]
                 result[row, column] = seen.share_of(p_P)
@@ -296,10 +288,12 @@ def draw_streets(rng: np.random.Generator) -> dict[str, Any]:
 
 
 def draw_stages(city: City, rng: np.random.Generator) -> dict[str, dict]:
-    """Returns random stages of a city: absent or lower buildings, small trees.
+    """Returns random stages: buildings are missing or lower, trees smaller.
+
+    The last stage is the whole city.
 
     Returns:
-        The content of `stages.yaml`, in which the last one is the whole city.
+        The content of `stages.yaml`.
     """
     buildings = [s for s in city.structures if s.semantic_class == "building"]
     trees = [s for s in city.structures if s.name.startswith("tree_")]

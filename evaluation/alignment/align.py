@@ -6,12 +6,15 @@ robust:
 1. Each drive is checked against itself where it passes a place again, and
    straightened if it has drifted.
 2. A first guess is made. It is the identity if both drives name the same datum
-or frame. Otherwise, or if that fails, it comes from places that look alike. 3.
-Submaps are registered along the source's path, outwards from where the guess
-holds. Each registration starts from its neighbour's result, so that drift does
-not add up. 4. The source gets one rigid pose if the loops agree on one;
-otherwise a pose graph bends it. The target stays fixed. 5. Heights are counted
-from the target's ground, as the grid of the TCR needs.
+   or frame. Otherwise, or if that fails, it comes from places that look alike.
+3. Submaps are registered along the source's path, outwards from where the guess
+   holds. Each registration starts from its neighbour's result, so that drift
+   does not add up.
+4. The source is moved as a rigid whole if the loops (registered pairs of
+   submaps) agree on one pose; otherwise a pose graph bends its path. The target
+   stays fixed.
+5. Heights are measured from the target's ground, as the measure of change (TCR)
+   needs.
 """
 
 from dataclasses import asdict, dataclass
@@ -82,8 +85,9 @@ class AlignmentReport:
         distance_95: distance below which 95 % of the inliers lie [m].
         angle_median_deg: median angle between inliers and result [deg].
         model: "anchor" for one rigid pose, "pose graph" for a bent drive.
-        move: move of the source's middle frame, along x, y, z [m].
-        turn_deg: turn of that frame about the vertical.
+        move: how far the middle frame of the moved drive was moved along x, y,
+            z [m].
+        turn_deg: angle by which that frame was turned about the vertical [deg].
         bend: greatest difference between the move of a frame and that of the
             middle frame [m].
         straightened: upper quartile of the errors of the drives' loops with
@@ -155,8 +159,8 @@ def in_one_world(
 
     Args:
         first, second: the drives.
-        when: `auto` aligns drives whose world frames differ by name; `always`,
-            `never`.
+        when: `auto` aligns the drives only if the names of their world frames
+            differ; the alternatives are `always` and `never`.
         track: reports progress.
         hold_first: whether the first drive must stay where it is, see `align`.
         across_maps: whether the drives may be of maps of different names.
@@ -190,8 +194,8 @@ def align(
             because other drives are already aligned to it.
 
     Raises:
-        InputError: if the two have too little in common, or a scan cannot
-            be read.
+        InputError: if the drives have too little in common, or a scan cannot be
+            read.
     """
     if hold_first:
         target, held = Submaps(first), 0.0

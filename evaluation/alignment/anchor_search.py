@@ -338,7 +338,7 @@ def _heading(X: np.ndarray) -> float:
 def fit_anchor(
     loops: list[Loop], X_TL: np.ndarray, X_SK: np.ndarray
 ) -> np.ndarray:
-    """Returns the pose X_TS (4, 4) with the most agreeing loops.
+    """Returns the pose X_TS (4, 4) with which the most loops agree.
 
     Args:
         loops: one or more loops (M) from a source to a target.

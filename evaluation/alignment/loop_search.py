@@ -96,7 +96,7 @@ def loop_errors(
 
 
 def implied_poses(loops: list[Loop], X_WL: np.ndarray) -> np.ndarray:
-    """Returns poses X_WK (M, 4, 4) of the sources' keyframes, by loops."""
+    """Returns the poses X_WK (M, 4, 4) of keyframes that loops imply."""
     X_LK = np.array([loop.X_LK for loop in loops]).reshape(-1, 4, 4)
     return X_WL[[loop.target for loop in loops]] @ X_LK
 
@@ -120,14 +120,14 @@ class LoopSearch:
     num_attempts: int = 0
 
     def near(self, X_TK: np.ndarray) -> np.ndarray:
-        """Returns the keyframes (M,) near the other drive.
+        """Returns the source's keyframes (M,) that are near the target drive.
 
         `X_TK` has the guessed poses (K, 4, 4) of all keyframes.
         """
         return np.flatnonzero([self._place(X) is not None for X in X_TK])
 
     def attempt(self, k: int, X_TK: np.ndarray) -> bool:
-        """Registers keyframe k to the other drive, from a guess X_TK (4, 4).
+        """Registers the source's keyframe k to the target, from a guess X_TK.
 
         Returns:
             Whether a loop was found.
@@ -175,7 +175,7 @@ class LoopSearch:
 
         Args:
             keyframes: numbers of the keyframes.
-            X_TK: (K, 4, 4) guesses for all.
+            X_TK: (K, 4, 4) guessed poses of all keyframes of the source.
 
         Returns:
             The number of new loops.

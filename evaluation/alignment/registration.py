@@ -61,7 +61,7 @@ class Surface:
 
     @cached_property
     def covariances(self) -> np.ndarray:
-        """(N, 3, 3) covariances around the points, made planar for GICP."""
+        """(N, 3, 3) covariance around each point, made planar for GICP."""
         return covariances(self.cloud)
 
     @cached_property

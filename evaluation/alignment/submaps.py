@@ -1,4 +1,4 @@
-"""A drive cut into overlapping small maps, for alignment."""
+"""Cuts a drive into overlapping small maps, which serve to align drives."""
 
 from functools import lru_cache
 

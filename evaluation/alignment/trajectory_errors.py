@@ -1,20 +1,19 @@
-"""Errors of an estimated trajectory, such as that of a LiDAR odometry.
+"""Errors of an estimated trajectory, such as the result of a LiDAR odometry.
 
 Two figures are in common use. X_i are true poses, Y_i the estimated poses at
 the same times, p_i and q_i their positions:
 
 - ATE, the absolute trajectory error: the root mean square of |p_i - R q_i - t|
-  over all i. The rigid motion R, t is the one that minimises it; there is no
-  change of scale. J. Sturm et al., A benchmark for the evaluation of RGB-D SLAM
+  over all i. R and t are the rigid motion that minimises this error; the scale
+  is not changed. J. Sturm et al., A benchmark for the evaluation of RGB-D SLAM
   systems, IROS 2012; S. Umeyama, Least-squares estimation of transformation
   parameters between two point patterns, PAMI 13(4), 1991. `evo_ape --align`
   prints it as `rmse`.
-- Drift over 100 m: the length and the angle of
-  (Y_i^-1 Y_j)^-1 (X_i^-1 X_j), where i is every tenth pose, and j the first
-  pose that follows more than 100 m of true path later. A. Geiger et al., Are we
-  ready for autonomous driving?, CVPR 2012, and the development kit of KITTI
-  odometry, which divides by the 100 m and calls the mean the translation error
-  [%].
+- Drift over 100 m: the length and the angle of (Y_i^-1 Y_j)^-1 (X_i^-1 X_j),
+  for every tenth pose i. Pose j is the first one that lies more than 100 m of
+  true path after pose i. A. Geiger et al., Are we ready for autonomous
+  driving?, CVPR 2012, and the development kit of KITTI odometry, which divides
+  by the 100 m and calls the mean the translation error [%].
 """
 
 from collections.abc import Iterator
@@ -137,13 +136,14 @@ def trajectory_errors(
     Args:
         drive: drive with the true poses.
         estimate: poses of the frame in any world.
-        frame: the frame whose poses are estimated: that of the LiDAR or that of
-            the vehicle.
-        time_offset: time to add to the estimate's [s].
+        frame: the frame whose poses are estimated: the LiDAR's or the
+            vehicle's.
+        time_offset: time to add to the times of the estimate [s].
 
     Raises:
-        InputError: if the drive has no such poses, or if fewer than three of
-            the estimate's times lie within the drive.
+        InputError: if the estimate is of the vehicle but the drive has no poses
+            of it, or if fewer than three of the estimate's times lie within the
+            drive.
     """
     truth = _true_poses(drive, frame)
     if not abs(time_offset) <= 1e9:
@@ -189,7 +189,9 @@ def aligned_offsets(p: np.ndarray, q: np.ndarray) -> np.ndarray:
 def segment_errors(
     X: np.ndarray, Y: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Returns the errors of the motion over 100 m, from each pose on.
+    """Returns the errors of the motion over segments of 100 m of path.
+
+    A segment begins at every tenth pose.
 
     Args:
         X: (N, 4, 4) true poses.

@@ -1,8 +1,8 @@
 """The structural change between two drives, with its context.
 
-TCR_sym is reported with two more values: the control, which is due to the two
-routes only, and the coverage-masked value, for the parts of the city that both
-routes saw.
+TCR_sym is reported with two more values. The control is the TCR_sym that the
+different routes alone cause. The coverage-masked value counts only the parts of
+the city that both routes saw.
 """
 
 from __future__ import annotations
@@ -93,7 +93,10 @@ class ChangeReport:
     alignment: AlignmentReport | None = None
 
     def to_json(self) -> dict:
-        """Returns all numbers for JSON; NaN becomes None, with a reason."""
+        """Returns all numbers as a dictionary for JSON.
+
+        NaN becomes None, with a reason in words.
+        """
         change = self.change
         sides = {
             "source": change.source_to_target,
@@ -134,7 +137,7 @@ class ChangeReport:
 
 
 def survey(path: Path, track: Track = silent) -> Surveyed:
-    """Returns the map of a drive, or of a map file.
+    """Reads a drive or map file, and returns its voxel map.
 
     Raises:
         InputError: if the path can be read neither as a drive nor as a map.
@@ -194,7 +197,7 @@ def survey_in_one_world(
 
 
 def survey_drive(drive: Drive, voxels: VoxelMap) -> Surveyed:
-    """Returns a drive with a map in cells of `CELL_SIZE`."""
+    """Returns a drive and its voxel map as input for `compare`."""
     return Surveyed(
         drive.name, voxels, drive.X_WS[:, :3, 3], drive, drive.notes
     )
@@ -267,7 +270,7 @@ def open_source(
     """Returns an opened drive, or the path of a point cloud.
 
     Raises:
-        InputError: if it cannot be read.
+        InputError: if the path cannot be read as a drive or point cloud.
     """
     path = Path(path)
     if path.is_file() and is_cloud(path):
@@ -291,7 +294,10 @@ def _survey(
 def _same_stage_partner(
     source: Surveyed, target: Surveyed, control: Surveyed
 ) -> Surveyed:
-    """Returns the drive in the control's stage, which has the other route."""
+    """Returns which of two drives is in the control's stage.
+
+    It is the drive whose route the control does not follow.
+    """
     if (
         source.drive is None
         or control.drive is None
@@ -316,7 +322,11 @@ def _same_stage_partner(
 
 
 def _route_distance(first: np.ndarray, second: np.ndarray) -> float:
-    """Returns the mean distance between routes, the larger of both ways [m]."""
+    """Returns the mean distance between two routes [m].
+
+    The distance is measured from each route to the nearest points of the other
+    route; the larger mean counts.
+    """
     there, _ = cKDTree(second).query(first)
     back, _ = cKDTree(first).query(second)
     return float(max(there.mean(), back.mean()))
@@ -345,7 +355,7 @@ class ChangeResult:
 def symmetric_changes(
     changes: Iterable[ChangeResult],
 ) -> dict[tuple[str, str, str], float]:
-    """Returns (map, stage, stage) -> TCR_sym, in both orders."""
+    """Returns TCR_sym by map and two stages, in either order of the stages."""
     values = {}
     for result in changes:
         value = result.report.change.symmetric

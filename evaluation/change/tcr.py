@@ -1,14 +1,15 @@
 """Temporal change ratio (TCR) of two maps, directed and symmetric.
 
-Source: "The City that Never Settles", equations 1 to 3. The following choices
-are open in the paper.
+Source: "The City that Never Settles", equations 1 to 3. The paper leaves the
+following choices open; this module makes them.
 
 - X is the map of a whole drive in world coordinates, as the centroids of
   the voxels of a grid that is fixed in the world (see `evaluation.maps`).
-- Shifting that grid changes TCR_sym. By how much is shown by the least and the
-greatest value on `GRIDS`, shifts that are spread evenly over a voxel. - The
-hull is widened by `HULL_MARGIN` on all sides. Flat ground is a face of the
-hull; without a margin, a millimetre would decide whether the ground counts.
+- TCR_sym changes if that grid is shifted. The least and the greatest value over
+  `GRIDS`, shifts that are spread evenly over a voxel, show by how much.
+- The hull is widened by `HULL_MARGIN` on all sides. Flat ground is a face of
+  the hull; without a margin, a millimetre would decide whether the ground
+  counts.
 - O, the unchanged points, is counted inside H, the points in the other map's
   convex hull; otherwise the ratio could become negative.
 - The two sets of a union are points of different clouds, so that the union is a
@@ -152,11 +153,14 @@ class DirectedChange:
 
     @property
     def ratio(self) -> float:
-        """TCR of the NSS benchmark, 1 - |O| / |H|; NaN if H is empty."""
+        """Temporal change ratio (TCR), 1 - |O| / |H|; NaN if H is empty.
+
+        It is the TCR of the NSS benchmark.
+        """
         return _ratio(self.num_unchanged, self.num_in_hull)
 
     def restricted(self, kept: np.ndarray) -> DirectedChange:
-        """Returns the change, counted over the points of a mask (N,)."""
+        """Returns the change, counted only over the points in a mask (N,)."""
         return DirectedChange(
             self.in_hull & kept, self.unchanged & kept, self.distances
         )
@@ -183,7 +187,10 @@ class TemporalChange:
 
     @property
     def num_in_hull(self) -> int:
-        """Number of points inside the other map's hull: |H(S, T) u H(T, S)|."""
+        """Number of points of both maps in the hull of the opposite map.
+
+        In the paper's notation, it is |H(S, T) u H(T, S)|.
+        """
         return (
             self.source_to_target.num_in_hull
             + self.target_to_source.num_in_hull
@@ -191,7 +198,7 @@ class TemporalChange:
 
     @property
     def num_unchanged(self) -> int:
-        """Number of unchanged points: |O(S, T) u O(T, S)|."""
+        """Number of unchanged points of both maps: |O(S, T) u O(T, S)|."""
         return (
             self.source_to_target.num_unchanged
             + self.target_to_source.num_unchanged

@@ -1,11 +1,11 @@
 """The number of columns of `.bin` files, which have no header.
 
 A `.bin` is a sequence of float32. KITTI has four for each point: x y z
-intensity; others leave out the intensity, or add a ring, a time or a colour.
-Reading a file with a wrong number of columns gives a cloud that was never
-measured. The right number can be found from the values: the columns of a cloud
-have different distributions, while with a wrong number the columns are mixed
-and have similar distributions.
+intensity; other programs leave out the intensity, or add a ring, a time or a
+colour. Reading a file with a wrong number of columns gives a cloud that was
+never measured. The right number can be found from the values: the columns of a
+cloud have different distributions, while with a wrong number the columns are
+mixed and have similar distributions.
 """
 
 from collections.abc import Sequence
@@ -58,7 +58,7 @@ class BinLayout:
 
     @property
     def dtype(self) -> np.dtype:
-        """The type of a point: x y z intensity column_5 and so on."""
+        """NumPy type of a point: x, y, z, intensity, column_5, column_6 ..."""
         more = [f"column_{k + 1}" for k in range(len(_NAMES), self.columns)]
         names = [*_NAMES[: self.columns], *more]
         return np.dtype([(name, "<f4") for name in names])

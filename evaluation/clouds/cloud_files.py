@@ -89,7 +89,7 @@ def _text_records(
 
     Args:
         kind: the kind of file, for errors.
-        more: whether something else follows.
+        more: whether the file continues after these rows.
     """
     with open(path, "rb") as stream:
         stream.seek(offset)
@@ -352,7 +352,6 @@ def _read_ply(path: Path, block: int, on_note: OnNote) -> Iterator[np.ndarray]:
     vertices may have no lists, because lists would hide where the vertices
     begin.
     """
-    del on_note
     encoding, elements, offset = _read_ply_header(path)
     order = _PLY_ORDERS[encoding]
     before = []
@@ -450,7 +449,7 @@ def _read_ply_header(path: Path) -> tuple[str, list[_Element], int]:
 
 
 def no_note(note: str) -> None:
-    """Ignores a note for the user."""
+    """Does nothing with a note for the user."""
 
 
 def read_cloud(
@@ -466,7 +465,7 @@ def read_cloud(
         path: an existing file of a scan; see `read_blocks` for maps.
         columns: number of columns of a `.bin`; by default guessed from the
             values.
-        on_note: takes notes on how the file was read.
+        on_note: is called with notes on how the file was read.
 
     Returns:
         Structured array of shape (N,) with floating-point fields `x`, `y`, `z`
@@ -539,7 +538,7 @@ def _coarse_step(points: np.ndarray) -> float:
 
 
 def is_cloud(path: Path) -> bool:
-    """Returns whether `read_cloud` reads a file of this name."""
+    """Returns whether a file name has the ending of a point cloud file."""
     return path.suffix.lower() in _READERS
 
 
@@ -554,7 +553,6 @@ def _find_reader(path: Path) -> _Reader:
 
 
 def _read_npy(path: Path, block: int, on_note: OnNote) -> Iterator[np.ndarray]:
-    del on_note
     dtype, shape, by_column, offset = _read_npy_header(path)
     count = math.prod(shape)
     _check_size(path, offset + count * dtype.itemsize, exactly=True)

@@ -69,16 +69,16 @@ def tcr(
 
     A and B are recorded drives (MCAP, MulRan, HeLiPR, NCLT, Boreas, KITTI
     odometry, CNS) or maps (.pcd .ply .npy .bin). The main result, TCR_sym, is 0
-    if nothing changed and 1 if everything did. The ratios with a direction go
-    from A, the source, to B, the target. Drives in different world frames are
-    aligned first.
+    if nothing changed and 1 if everything did. The command also prints two
+    directed ratios: the share of A that is missing in B, and the share of B
+    that is missing in A. Drives in different world frames are aligned first.
 
     Args:
         source: Drive or map before the change.
         target: Drive or map after the change.
-        control: Recording of A's route in B's stage, or of B's route in A's
-            stage. It shows how much of TCR_sym is due to different routes
-            instead of change.
+        control: Third drive, on A's route in B's stage or on B's route in A's
+            stage. With it, the command prints how large TCR_sym is if only the
+            routes differ and nothing has changed.
     """
     from evaluation.change import drive_change as change
 
@@ -146,24 +146,24 @@ def pr(
 ) -> None:
     """Measure place recognition between two drives.
 
-    The command measures how well a method finds, among the places of DATABASE,
-    the place of each scan of QUERY. Both are recorded drives (MCAP, MulRan,
-    HeLiPR, NCLT, Boreas, KITTI odometry, CNS). Drives in different world frames
-    are aligned first.
+    For scans along QUERY, the command measures how well a method finds the same
+    place among the places of DATABASE. QUERY and DATABASE are recorded drives
+    (MCAP, MulRan, HeLiPR, NCLT, Boreas, KITTI odometry, CNS). Drives in
+    different world frames are aligned first.
 
     Args:
         database: Recorded drive that provides the known places.
         query: Recorded drive that provides the scans to recognise.
-        mode: Which queries count: all of them, or only those that have a match
-            in the database (filtered).
+        mode: Which queries count: all queries (all), or only queries that have
+            a match in the database (filtered).
         across_maps: Allow two drives through maps of different names, such as
             two cities drawn along the same streets.
         truth: What makes a place a match of a query. With radius, the place
-            lies within --radius. With overlap:PART, such as overlap:0.5, its
-            scan shows at least this share of what the query's scan shows, at
-            any distance.
-        overlaps: File to write: the overlap of each query with each place.
-            Needs --truth overlap:PART.
+            lies within --radius. With overlap:PART, such as overlap:0.5, the
+            place's scan shows at least this share of what the query's scan
+            shows, at any distance.
+        overlaps: CSV file to write, with the overlap of each query with each
+            place. Needs --truth overlap:PART.
         exact_overlaps: File with exact overlaps, as cns-drake export-pairs
             --format overlap-table writes it. Without it, overlaps are estimated
             from the scans. Needs --truth overlap:PART.
@@ -273,20 +273,21 @@ def scores(
 ) -> None:
     """Score every pair of scans from two folders.
 
-    Use it for scans without poses. Scans are .bin, .pcd, .npy or .ply files.
-    Every query is compared with every place: searches that only save time are
-    skipped. An empty score means that the method does not consider the place a
-    candidate.
+    Use this command for scans without poses, in .bin, .pcd, .npy or .ply files.
+    Every query is compared with every place, even if the method usually
+    compares only some places to save time. An empty score means that the method
+    does not consider the place a candidate.
 
     Args:
         database: Folder with the scans of the places, one file per scan.
         query: Folder with the scans of the queries, one file per scan.
         output: CSV file to write, with a score for each pair of a query and a
             place.
-        gate: Reject top-ranked places that lie, by the method's own pose
-            estimate, beyond the radius. It has no effect on methods that
-            estimate no pose.
-        radius: Radius that --gate uses [m].
+        gate: Reject top-ranked places that are farther from the query than
+            --radius, according to the method's own pose estimate. It has no
+            effect on methods that estimate no pose.
+        radius: Greatest distance between query and place that --gate accepts
+            [m].
     """
     from evaluation.recognition import scan_folders
 
@@ -380,25 +381,26 @@ def compare(
 ) -> None:
     """Rank the methods in tables of results.
 
-    RESULTS are files like results.csv, or folders that hold one. The command
-    ranks their methods together with the shipped ones, by the mean over the
-    conditions that all tables share, with 95 % intervals. For AUC it also
-    prints the differences between methods. They have p-values if a queries.csv
-    lies next to each table, corrected by Holm's method for all differences that
-    are printed. Kendall's tau says how similarly two tables rank the methods.
+    RESULTS are files like results.csv, or folders that contain one. The command
+    ranks the methods in these tables and in the shipped tables by their means,
+    with 95 % intervals. The means are over the conditions that all tables
+    share. For AUC, if a queries.csv lies next to each table, the command also
+    prints the AUC difference of any two methods, with a p-value that is
+    corrected by Holm's method for the number of differences. Kendall's tau says
+    how similarly two tables rank the methods.
 
     Args:
         tables: Tables of results to compare, or folders with a results.csv.
-        metric: Metric to rank by: auc, r1 or another one in the tables. An
-            unknown name prints those that there are.
-        protocol: Compare only the rows that were measured by this protocol; own
-            stands for a protocol with changed options. By default the rows of
-            all protocols are compared, each with rows of the same protocol.
-        gate: Compare the results that were measured with the gate. By default
-            those without it.
-        rankings: Compare only the order of the methods. Each table is ranked
-            over its own conditions, so they need not be the same, as for
-            simulated and real drives.
+        metric: Metric to rank by: auc, r1 or another one in the tables. Give an
+            unknown name to see the list of metrics.
+        protocol: Compare only results that were measured by this protocol; own
+            stands for a protocol with changed options. By default all results
+            are compared, but only with results of the same protocol.
+        gate: Compare the results that were measured with --gate. By default the
+            results without it are compared.
+        rankings: Compare only the order of the methods in the tables. Each
+            table is ranked over its own conditions. The tables may therefore
+            have different conditions, such as simulated and real drives.
     """
     from evaluation.results import comparing
 

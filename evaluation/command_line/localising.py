@@ -36,15 +36,14 @@ def localise(
 ) -> None:
     """Localise scans in a map.
 
-    Each scan of QUERY is aligned to MAP from a start near its true pose. The
-    start is moved away from this pose by --start in a random direction, and
-    turned by --start-turn about a random axis. The results are errors and rates
-    of success.
+    Each scan of QUERY is aligned to MAP from an initial guess of its pose: the
+    true pose, moved by --start in a random direction and turned by --start-turn
+    about a random axis. The results are pose errors and success rates.
 
     MAP and QUERY are drives (MCAP, MulRan, HeLiPR, NCLT, Boreas, KITTI
-    odometry, CNS) or point clouds (.pcd .ply .npy .bin). The scans of a drive
-    as MAP are put together at their true poses. A cloud as QUERY is one scan,
-    whose true pose is the origin of the map.
+    odometry, CNS) or point clouds (.pcd .ply .npy .bin). If MAP is a drive, its
+    scans are merged at their true poses. If QUERY is a point cloud, it is one
+    scan, whose true pose is the origin of the map.
 
     Args:
         place: Drive or point cloud to use as the map.
@@ -52,16 +51,19 @@ def localise(
         method: Registration method: icp, plane-icp, gicp, vgicp,
             robust-plane-icp, robust-gicp or kiss-matcher; or a Python file with
             a function of your own.
-        start: Distance between each start and the true pose [m]. A larger one
-            makes the task harder.
-        start_turn: Angle between each start and the true pose [deg].
-        seed: Seed of the random directions of the starts.
+        start: Distance of the initial guess from the true position [m]. A
+            larger distance makes the task harder.
+        start_turn: Angle by which the initial guess is turned away from the
+            true orientation [deg].
+        seed: Seed of the random directions in which the initial guesses are
+            moved and turned.
         query_spacing: Distance that the car drives between two queries [m].
-        follow: Track the whole drive instead of single scans: each scan starts
-            from the estimated pose of the scan before, moved by the odometry.
-        odometry_drift: Drift of the odometry that --track uses, as a share of
-            the distance driven. With 0.01, lengths are wrong by about 1 %, and
-            the heading drifts by about 0.01 deg per metre.
+        follow: Track the whole drive instead of localising single scans: the
+            initial guess of each scan is the estimated pose of the previous
+            scan, moved by the odometry.
+        odometry_drift: Drift of the simulated odometry that --track uses, as a
+            share of the distance driven. With 0.01, lengths are wrong by about
+            1 %, and the heading drifts by about 0.01 deg per metre.
         output: Folder to write: localisation.csv, with the result of each
             query, and with --track a picture.
     """
@@ -86,7 +88,10 @@ def localise(
     )
     estimator = estimators.make_estimator(method, settings)
     source = open_source(place, lidar, columns)
-    drive = queries.as_query(open_source(query, lidar, columns), columns)
+    asked = open_source(query, lidar, columns)
+    drive = (
+        asked if isinstance(asked, Drive) else queries.OneScan(asked, columns)
+    )
     for one in (source, drive):
         for note in one.notes if isinstance(one, Drive) else ():
             terminal.note(note)

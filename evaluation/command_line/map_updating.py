@@ -14,6 +14,7 @@ from evaluation.command_line.options import (
     Json,
     LidarName,
     open_noted,
+    show,
 )
 
 
@@ -33,11 +34,12 @@ def map_update(
 ) -> None:
     """Score labels of what changed between two maps.
 
-    The command scores your own labels (--labels-a and --labels-b), or else
-    those of a baseline, against the true labels. DIR is a folder that cns-drake
-    map-truth wrote, or a folder with the same files for real drives: A/map.ply,
-    A/truth.npy, B/map.ply and B/truth.npy. A baseline also needs the scans and
-    poses in it. Points whose true label is 255 are ignored.
+    The command compares labels with the true labels: your own (--labels-a and
+    --labels-b) or, without these options, those of a shipped change detector,
+    the baseline. DIR is a folder that cns-drake map-truth wrote, or a folder
+    with the same files for real drives: A/map.ply, A/truth.npy, B/map.ply and
+    B/truth.npy. A baseline also needs the scans and poses in this folder.
+    Points whose true label is 255 are ignored.
 
     Args:
         folder: Folder with the maps and their true labels.
@@ -78,10 +80,7 @@ def map_update(
         for session, labels in zip(pair, found, strict=True):
             sessions.write_labels(output / f"{session.side}.npy", labels)
     scores = score(pair, truth, found, class_names(folder))
-    if json:
-        terminal.print_json({"method": name, **scores})
-    else:
-        terminal.print_rows(_rows(name, scores))
+    show({"method": name, **scores}, _rows(name, scores), json=json)
 
 
 def map_sessions(
@@ -97,7 +96,7 @@ def map_sessions(
 
     The command writes the maps, scans and poses that cns-drake map-truth
     writes, but no labels. Use it for drives whose world is unknown, such as
-    real ones. Both drives must be in one world frame.
+    real ones. Both drives must be in the same world frame.
 
     Args:
         a: Older drive A.

@@ -22,7 +22,8 @@ Align = Annotated[
     When,
     typer.Option(
         help="Whether to align the drives to each other before they are "
-        "compared. With auto, they are aligned if their world frames differ."
+        "compared. With auto, they are aligned only if their world frames "
+        "differ."
     ),
 ]
 Json = Annotated[
@@ -94,7 +95,7 @@ def open_noted(
 def aligned(
     drives: Sequence[Drive], when: When, *, across_maps: bool = False
 ) -> tuple[Drive, Drive]:
-    """Returns two drives in one world, with a note if one was moved."""
+    """Returns two drives in one world; shows a note if a drive was moved."""
     from evaluation.alignment import in_one_world
 
     first, second = drives

@@ -18,9 +18,9 @@ def real(
 
     DIR contains excerpts of public data sets, each in a folder with the name
     that the page "Real drives" of the documentation lists: KITTI 00 and its
-    revisits, nuScenes 1072, Newer College, NCLT and HeLiPR. The command names
-    and skips missing data sets. It writes results.csv and queries.csv, which
-    cns-eval compare reads.
+    revisits, nuScenes 1072, Newer College, NCLT and HeLiPR. If a data set is
+    missing, the command says so and goes on without it. It writes results.csv
+    and queries.csv, which cns-eval compare reads.
 
     Args:
         folder: Folder with the excerpts.
@@ -28,10 +28,11 @@ def real(
         method: Place-recognition method or registration method to run: the name
             of a shipped one, or a Python file with your own. By default all
             shipped ones. May be repeated.
-        simulated: Folder with simulated recordings. Those of a data set's LiDAR
-            are added to its database as further places. A classifier is also
+        simulated: Folder with simulated recordings. Recordings with the same
+            model of LiDAR as a data set are used twice. Their scans are added
+            to the data set's database as further places; and a classifier is
             trained to tell them from the real scans, which shows how realistic
-            they are.
+            the simulated scans are.
     """
     from cns_drake.base.files import make_folder
     from evaluation.real.measuring import Measuring

@@ -26,10 +26,11 @@ def drives(
 ) -> None:
     """Compare the paths of two drives.
 
-    Every 5 m along A, the command measures how B passes there: its offset,
-    lane, heading, height and stops. Next to these figures it shows those of two
-    pairs of real drives along one route (Boreas, 28 days apart; KAIST 01 and 02
-    of MulRan), so that you can see whether yours differ as real drives do.
+    Every 5 m along A, the command measures how B differs from A: sideways
+    offset, lane, heading and height. It also prints which share of the time
+    each car stands, and its speeds. For comparison, it shows the same numbers
+    for two pairs of real drives, so that you can see whether your drives differ
+    as real drives do: Boreas, 28 days apart, and KAIST 01 and 02 of MulRan.
 
     Args:
         first: Recorded drive A.

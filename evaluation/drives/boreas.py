@@ -4,11 +4,11 @@
     SEQ/applanix/lidar_poses.csv     us, x y z [m], velocity, roll pitch yaw
                                      [rad], angular velocity
 
-The time of a scan is that of its middle; the time of a point is in seconds
-relative to it. Angles describe the rotation of the world in the LiDAR's frame
-S, as in the data set's development kit: Rz(yaw) Ry(pitch) Rx(roll) is R_SW. All
-drives share W, with its axes east, north and up. In the first releases W was
-the UTM grid.
+The time of a scan is the middle of the scan; the time of a point is relative to
+this time, in seconds. Angles describe the rotation of the world in the LiDAR's
+frame S, as in the data set's development kit: Rz(yaw) Ry(pitch) Rx(roll) is
+R_SW. All drives share W, with its axes east, north and up. In the first
+releases W was the UTM grid.
 """
 
 from pathlib import Path
@@ -44,15 +44,14 @@ _ORIGIN = (620_000.0, 4_845_000.0, 0.0)
 
 
 class BoreasDrive(FileDrive):
-    """The scans of the Alpha Prime on a drive of Boreas."""
+    """A drive of Boreas, with the scans of its LiDAR, an Alpha Prime."""
 
     def __init__(self, path: Path, columns: int | None = None):
-        """Opens a drive, whose scans have a fixed layout.
+        """Opens a drive; `columns` is ignored, because the layout is fixed.
 
         Raises:
             InputError: there is no such drive, or its poses cannot be used.
         """
-        del columns
         files, stamps_ns = list_stamped(
             path / _SCANS, ".bin", parse_microseconds
         )
@@ -70,18 +69,20 @@ class BoreasDrive(FileDrive):
             files=kept,
             stamps_ns=stamps_ns[spanned],
             X_WS=X_WS,
+            read=_read,
             notes=unknown + notes,
             unit="alpha-prime",
         )
 
-    def _read(self, path: Path, stamp_ns: int) -> np.ndarray:
-        stored = read_packed(path, _STORED)
-        check_below(stored, "laser", _NUM_LASERS)
-        points = np.empty(len(stored), _POINT)
-        for name in ("x", "y", "z", "intensity", "laser"):
-            points[name] = stored[name]
-        points["t"] = np.rint(stored["time"] * 1e9)
-        return points
+
+def _read(path: Path, stamp_ns: int) -> np.ndarray:
+    stored = read_packed(path, _STORED)
+    check_below(stored, "laser", _NUM_LASERS)
+    points = np.empty(len(stored), _POINT)
+    for name in ("x", "y", "z", "intensity", "laser"):
+        points[name] = stored[name]
+    points["t"] = np.rint(stored["time"] * 1e9)
+    return points
 
 
 def holds_boreas(path: Path) -> bool:

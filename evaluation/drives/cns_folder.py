@@ -49,9 +49,9 @@ _TOLERANCE_NS = 1000
 class CnsFolderDrive(FileDrive):
     """A drive in the published layout of CNS.
 
-    The mount of the LiDAR is read from `transformation_lidar.yaml`, beside
-    the drive or up to two folders above it. Without such a file it is that
-    of the data set: 1.6 m above the vehicle.
+    The mount of the LiDAR is read from `transformation_lidar.yaml`, next to the
+    drive or up to two folders above it. Without such a file, the LiDAR is
+    mounted as in the data set: 1.6 m above the vehicle.
     """
 
     def __init__(self, path: Path, columns: int | None = None):
@@ -78,13 +78,13 @@ class CnsFolderDrive(FileDrive):
                 "map": resolved.parent.name.lower(),
                 "stage": resolved.name,
             }
-        del columns
         super().__init__(
             name=str((scenario or {}).get("name", name)),
             world_frame="map",
             files=files,
             stamps_ns=stamps_ns,
             X_WS=X_WB @ _read_mount(mount),
+            read=lambda path, stamp_ns: read_cloud(path),
             scenario=scenario,
             unit="cns",
         )
@@ -106,9 +106,6 @@ class CnsFolderDrive(FileDrive):
         imu["angular_velocity"] = values[:, 4:7]
         imu["specific_force"] = values[:, 7:]
         return imu
-
-    def _read(self, path: Path, stamp_ns: int) -> np.ndarray:
-        return read_cloud(path)
 
 
 def holds_cns(path: Path) -> bool:

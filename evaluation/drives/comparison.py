@@ -43,12 +43,13 @@ class Driving:
 
     Attributes:
         name: the drive's name.
-        length: length of the way [m].
+        length: length of the path [m].
         standing: share of the time with a speed below `STANDING_SPEED`.
-        speed_10, speed_50, speed_90: quantiles of the speed while it moves
-            [m/s]; NaN if it never does.
+        speed_10, speed_50, speed_90: 10 %, 50 % and 90 % quantiles of the speed
+            while the car moves [m/s]; NaN if it never moves.
         roll_spread_deg, pitch_spread_deg: standard deviations of the sensor's
-            roll and pitch at the stops [deg].
+            roll and pitch, at points of the path that are `STOP_SPACING` apart
+            [deg].
     """
 
     name: str
@@ -65,7 +66,8 @@ class Driving:
 class DriveComparison:
     """How the path of a drive B differs from that of a drive A.
 
-    Stops are points of A's path, `STOP_SPACING` apart. B meets a stop if its
+    Here, a stop is a point of A's path at which B is compared with A; stops are
+    `STOP_SPACING` apart. The cars need not stand there. B meets a stop if its
     path passes within `MEETING_RADIUS` of it. The two drives are then compared
     at the nearest point of B's path that has A's direction. Offsets are
     horizontal and perpendicular to A's path. Values without a measurement are
@@ -121,7 +123,7 @@ class DriveComparison:
     reverse_95: float
 
     def to_json(self) -> dict:
-        """Returns all numbers; NaN becomes None."""
+        """Returns all numbers as a dictionary for JSON; NaN becomes None."""
 
         def plain(fields: list[tuple[str, Any]]) -> dict:
             return {
@@ -149,7 +151,7 @@ class _Way:
     tangent: np.ndarray
 
     def stops(self) -> np.ndarray:
-        """Returns the indices of those samples of the path that are stops."""
+        """Returns the indices of samples that are `STOP_SPACING` apart."""
         return np.arange(0, len(self.p_WS), round(STOP_SPACING / _PATH_SPACING))
 
 
@@ -161,7 +163,8 @@ def compare_drives(first: Drive, second: Drive) -> DriveComparison:
         second: drive B, in the same world, with its LiDAR mounted as on A.
 
     Raises:
-        InputError: the two drives are not in one world, or one never moves.
+        InputError: the drives are not in the same world, or a drive never
+            moves.
 
     Example:
         from evaluation import compare_drives, open_drive
@@ -239,10 +242,11 @@ def _way(drive: Drive) -> _Way:
 
 
 def _nearest(p_A: np.ndarray, direction: np.ndarray, way: _Way) -> np.ndarray:
-    """Returns the index of the path's sample nearest to each stop, (N,).
+    """Returns the path's sample that is nearest to each point of A, (N,).
 
-    Only samples within `MEETING_RADIUS` count whose direction is less than 90
-    deg from that of the stop (N, 2); the index is -1 if there are none.
+    A sample counts only if it lies within `MEETING_RADIUS` and its direction
+    differs by less than 90 deg from A's direction (N, 2). The index is -1 if no
+    sample counts.
     """
     xy = way.p_WS[:, :2]
     found = np.full(len(p_A), -1)

@@ -1,4 +1,4 @@
-"""Undoing the distortion of scans that a moving LiDAR takes."""
+"""Removes the distortion that the motion of the LiDAR causes in a scan."""
 
 from cns_drake.base.drives.deskewing import deskew
 

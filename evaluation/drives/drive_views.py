@@ -11,7 +11,7 @@ from cns_drake.base.drives.lidar_fields import LidarField
 
 
 class DriveView(Drive):
-    """A drive that takes length, times, poses and scenario from another one."""
+    """Base of drives that wrap another drive and change some of its data."""
 
     def __init__(self, drive: Drive):
         """Wraps another drive."""
@@ -111,7 +111,7 @@ class RecentScans(DriveView):
     """
 
     def __init__(self, drive: Drive, kept: int):
-        """Wraps a drive, without a scan in memory.
+        """Wraps a drive; no scan is in memory yet.
 
         Args:
             drive: the drive.

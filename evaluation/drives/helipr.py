@@ -7,6 +7,7 @@
 Poses are those of the LiDAR itself, one for each scan.
 """
 
+from functools import partial
 from pathlib import Path
 
 import numpy as np
@@ -88,7 +89,6 @@ class HeliprDrive(FileDrive):
             InputError: there is no such drive, or its poses cannot be used.
         """
         drive, lidar = _choose(path, lidar)
-        self._lidar = lidar
         files, stamps_ns = list_stamped(drive / _SCANS / lidar, ".bin")
         in_utm = (drive / _POSES / f"global_{lidar}_gt.txt").is_file()
         poses_name = f"global_{lidar}_gt.txt" if in_utm else f"{lidar}_gt.txt"
@@ -104,13 +104,11 @@ class HeliprDrive(FileDrive):
             files=kept,
             stamps_ns=stamps_ns[spanned],
             X_WS=X_WS,
+            read=partial(read_scan, lidar),
             notes=notes,
             datum=DATUM if in_utm else None,
             unit=_UNITS.get(lidar),
         )
-
-    def _read(self, path: Path, stamp_ns: int) -> np.ndarray:
-        return read_scan(self._lidar, path, stamp_ns)
 
 
 def read_scan(lidar: str, path: Path, stamp_ns: int = 2**63) -> np.ndarray:
@@ -120,7 +118,7 @@ def read_scan(lidar: str, path: Path, stamp_ns: int = 2**63) -> np.ndarray:
 
     Raises:
         ValueError: if the file is not of that LiDAR.
-        InputError: if it cannot be read.
+        InputError: if the file cannot be read.
     """
     dtype = _RECORDS[lidar]
     if lidar == "Aeva" and stamp_ns <= _AEVA_CHANGE_NS:

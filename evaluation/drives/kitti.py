@@ -5,11 +5,11 @@
     sequences/NN/calib.txt           Tr: upper 3 x 4 of X_CS
     poses/NN.txt                     upper 3 x 4 of X_C0C, a row a scan
 
-C is the left grey camera (x right, y down, z forward), C0 that at the first
-scan, S the LiDAR. Without a `calib.txt` the poses are those of the LiDAR,
-X_S0S. If scans are missing, the numbers in the names of the remaining files
-select the rows of the tables. If scans were renumbered, `frames.txt` has their
-old numbers, one for each scan.
+C is the frame of the left grey camera (x right, y down, z forward), C0 is C at
+the first scan, and S is the frame of the LiDAR. Without a `calib.txt` the poses
+are those of the LiDAR, X_S0S. If scans are missing, the numbers in the names of
+the remaining files select the rows of the tables. If scans were renumbered,
+`frames.txt` has their old numbers, one for each scan.
 
 There may also be labels, in SemanticKITTI's form,
 
@@ -142,8 +142,8 @@ class KittiDrive(BinDrive):
             table = parse_json(read_bytes(path))
         return index_instances(table, str(path))
 
-    def _read(self, path: Path, stamp_ns: int) -> np.ndarray:
-        stored = super()._read(path, stamp_ns)
+    def _read_bin(self, path: Path, stamp_ns: int) -> np.ndarray:
+        stored = super()._read_bin(path, stamp_ns)
         if self._labels is None:
             return stored
         labels_path = self._labels / f"{path.stem}.label"
@@ -201,8 +201,8 @@ def _rows_of_scans(
 ) -> np.ndarray:
     """Returns the rows of a table that belong to the scans.
 
-    The table must have a row for each scan, or a row for each number; in the
-    second case a note is returned as well.
+    The table must have a row for each scan, or a row for each number up to the
+    greatest number of a scan. In the second case a note is added to `notes`.
     """
     if len(rows) == len(numbers):
         return rows

@@ -91,8 +91,8 @@ class MulranDrive(BinDrive):
             unit="os1-64-33" if scenario is None else None,
         )
 
-    def _read(self, path: Path, stamp_ns: int) -> np.ndarray:
-        stored = super()._read(path, stamp_ns)
+    def _read_bin(self, path: Path, stamp_ns: int) -> np.ndarray:
+        stored = super()._read_bin(path, stamp_ns)
         if len(stored) != _NUM_RINGS * _NUM_COLUMNS:
             return stored
         # Points are stored column by column, and within a column ring by ring.

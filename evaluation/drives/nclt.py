@@ -3,8 +3,8 @@
     DATE/velodyne_sync/<us>.bin     uint16 x y z, uint8 intensity, uint8 laser
     groundtruth_DATE.csv            us, x y z [m], roll pitch yaw [rad] of X_NB
 
-The table is in the drive's folder, beside that folder, or in a folder
-`ground_truth` there. The axes of N point north, east and down. B is the
+The table is in the drive's folder, next to that folder, or in a folder
+`ground_truth` next to it. The axes of N point north, east and down. B is the
 vehicle's body, with x forward, y right and z down. Points are expressed in B
 and stored as multiples of 5 mm, counted from -100 m. All sessions share N.
 """
@@ -60,12 +60,11 @@ class NcltDrive(FileDrive):
     """
 
     def __init__(self, path: Path, columns: int | None = None):
-        """Opens a session, whose scans have a fixed layout.
+        """Opens a session; `columns` is ignored, because the layout is fixed.
 
         Raises:
             InputError: there is no such session, or its poses cannot be used.
         """
-        del columns
         if not (path / _SCANS).is_dir():
             raise InputError(
                 f"{path / _HITS}: packets as they came; {_SCANS}, the data"
@@ -84,12 +83,10 @@ class NcltDrive(FileDrive):
             files=kept,
             stamps_ns=stamps_ns[spanned],
             X_WS=_X_WN @ X_NB @ _X_BS,
+            read=lambda path, stamp_ns: read_scan(path),
             notes=unknown + notes,
             unit="hdl-32e-upside-down",
         )
-
-    def _read(self, path: Path, stamp_ns: int) -> np.ndarray:
-        return read_scan(path)
 
 
 def holds_nclt(path: Path) -> bool:
@@ -98,11 +95,11 @@ def holds_nclt(path: Path) -> bool:
 
 
 def read_scan(path: Path) -> np.ndarray:
-    """Returns the points (N,) of a `velodyne_sync` file, in S.
+    """Returns the points (N,) of a `velodyne_sync` file, in the LiDAR's frame.
 
     Raises:
-        ValueError: if the file is not of its format.
-        InputError: if it cannot be read.
+        ValueError: if the file does not have NCLT's format.
+        InputError: if the file cannot be read.
     """
     stored = read_packed(path, _STORED)
     check_below(stored, "laser", _NUM_LASERS)

@@ -73,7 +73,7 @@ class QuerySensor:
         return cls(X_SQ, float(hidden_from), math.radians(hidden_deg))
 
     def without_hidden(self, scan: np.ndarray) -> np.ndarray:
-        """Returns those points of a scan in S that the hidden sector leaves."""
+        """Returns the points of a scan in S outside the hidden sector."""
         if self.hidden == 0.0:
             return scan
         azimuth = np.arctan2(scan["y"], scan["x"]).astype(np.float64)

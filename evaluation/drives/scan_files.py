@@ -1,6 +1,5 @@
 """Drives that are stored as one file for each scan."""
 
-import abc
 from collections.abc import Callable, Mapping
 from functools import cached_property
 from pathlib import Path
@@ -34,8 +33,9 @@ def to_world(X_UB: np.ndarray, path: Path) -> np.ndarray:
 
     W has its axes east, north and up, and its origin at a fixed point of that
     grid near the drives of MulRan and HeLiPR. Coordinates in W are at most a
-    few kilometres, which float32 resolves to under a millimetre. It would
-    resolve easting and northing, thousands of kilometres, only to 0.25 m.
+    few kilometres, which float32 resolves to under a millimetre. UTM
+    coordinates can be thousands of kilometres, which float32 resolves only to
+    0.25 m.
 
     Raises:
         InputError: if a position cannot be in UTM metres.
@@ -66,6 +66,7 @@ class FileDrive(Drive):
         files: list[Path],
         stamps_ns: np.ndarray,
         X_WS: np.ndarray,
+        read: Callable[[Path, int], np.ndarray],
         notes: tuple[str, ...] = (),
         datum: str | None = None,
         scenario: Mapping | None = None,
@@ -79,6 +80,9 @@ class FileDrive(Drive):
             files: N scans.
             stamps_ns: (N,) int64 [ns], strictly increasing.
             X_WS: (N, 4, 4) poses of the LiDAR in the world.
+            read: function that returns the points in the file of a scan,
+                unchanged. Its arguments are the file and the time of the scan
+                [ns]. It raises ValueError if the file has another format.
             notes: see `Drive.notes`.
             datum: see `Drive.datum`.
             scenario: see `Drive.scenario`.
@@ -89,6 +93,7 @@ class FileDrive(Drive):
         self._files = files
         self._stamps_ns = stamps_ns
         self._X_WS = X_WS
+        self._read = read
         self._notes = notes
         self._datum = datum
         self._scenario = scenario
@@ -128,15 +133,6 @@ class FileDrive(Drive):
         with user_errors(path), value_errors(path):
             return _returns(self._read(path, int(self._stamps_ns[index])))
 
-    @abc.abstractmethod
-    def _read(self, path: Path, stamp_ns: int) -> np.ndarray:
-        """Reads the points of one scan as they are in the file.
-
-        Raises:
-            ValueError: if the file is not of its format.
-            OSError: if it cannot be read.
-        """
-
 
 class BinDrive(FileDrive):
     """A drive whose scans are `.bin` files: float32 without a header."""
@@ -148,7 +144,7 @@ class BinDrive(FileDrive):
             columns: see `find_layout`.
             drive: see `FileDrive`.
         """
-        super().__init__(**drive)
+        super().__init__(read=self._read_bin, **drive)
         self._columns = columns
 
     @cached_property
@@ -160,7 +156,7 @@ class BinDrive(FileDrive):
         note = self._layout.note
         return (*super().notes, *([note] if note else []))
 
-    def _read(self, path: Path, stamp_ns: int) -> np.ndarray:
+    def _read_bin(self, path: Path, stamp_ns: int) -> np.ndarray:
         return read_packed(path, self._layout.dtype)
 
 

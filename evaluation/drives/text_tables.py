@@ -139,7 +139,8 @@ def check_increasing(path: Path, stamps_ns: np.ndarray, what: str) -> None:
     """Raises an error for times that do not increase.
 
     Raises:
-        InputError: that names the first such row.
+        InputError: the times do not increase; the error names the first such
+            row.
     """
     disorder = np.flatnonzero(np.diff(stamps_ns) <= 0)
     if len(disorder):
@@ -154,7 +155,7 @@ def check_finite(path: Path, values: np.ndarray) -> None:
     """Raises an error for a table (N, width) with NaN or infinity.
 
     Raises:
-        InputError: that names the first such row.
+        InputError: a number is not finite; the error names the first such row.
     """
     bad = np.flatnonzero(~np.isfinite(values).all(axis=1))
     if len(bad):
@@ -209,8 +210,8 @@ class Trajectory:
                 interpolated [ns].
 
         Returns:
-            (K, 4, 4) poses at those times that the table spans; (M,) bool,
-            which times these are.
+            (K, 4, 4) poses at the times between the first and the last pose of
+            the table; (M,) bool, which of the given times these are.
 
         Raises:
             InputError: the table spans none of the times, or a time lies in a
@@ -344,10 +345,8 @@ def read_angles(path: Path, width: int) -> tuple[Trajectory, tuple[str, ...]]:
     columns = [("stamp", "U40"), ("values", "f8", width)]
     rows = read_numbers(path, columns, ",")
     known = rows[~np.isnan(rows["values"]).any(axis=1)]
-    try:
+    with value_errors(f"{path}: time"):
         stamps_ns = parse_microseconds(known["stamp"])
-    except ValueError as error:
-        raise InputError(f"{path}: time: {error}") from error
     values = known["values"]
     if not len(values):
         raise InputError(f"{path}: no row without NaN")

@@ -1,4 +1,4 @@
-"""Estimators: each registers a scan to a map, from a start pose.
+"""Estimators: functions that register a scan to a map from an initial pose.
 
 Shipped are the estimators of small_gicp (K. Koide, "small_gicp: Efficient and
 parallel algorithms for point cloud registration", JOSS 2024), two with a robust
@@ -68,8 +68,9 @@ class Settings:
         scan_voxel: side of the voxels to which a scan is thinned [m].
         width: greatest distance of a pair of points [m]. VGICP pairs a point
             with the Gaussian of its own voxel at any distance.
-        last_width: width of a second alignment from the end of the first [m];
-            0 for none. The robust estimators shrink their width down to it.
+        last_width: `width` of a second alignment, which starts from the result
+            of the first [m]; 0 for no second alignment. The robust estimators
+            shrink their width down to this value.
         resolution: side of the voxels of VGICP and of KISS-Matcher [m].
         neighbours: number of points that a normal or a covariance is fitted
             to.
@@ -132,9 +133,10 @@ class LocalisationMap:
         return {}
 
     def voxels(self, resolution: float) -> small_gicp.GaussianVoxelMap:
-        """Returns the map as one Gaussian per voxel, in a shifted frame W.
+        """Returns the map as one Gaussian per voxel, for VGICP.
 
-        The side of a voxel is `resolution` [m]; see `_voxel_shift`.
+        The side of a voxel is `resolution` [m]. The frame is W, shifted by
+        `_voxel_shift`.
         """
         if resolution not in self._voxels:
             voxels = small_gicp.GaussianVoxelMap(resolution)
@@ -203,7 +205,7 @@ def make_map(
 def _scans(
     drive: Drive, track: Track
 ) -> Iterator[tuple[np.ndarray, np.ndarray | None]]:
-    """Yields the scans that make a map, cropped, each with its X_WS."""
+    """Yields the cropped scans of which a map is made, each with its X_WS."""
     frames = sample_frames(drive.X_WS[:, :3, 3], _MAP_SPACING).tolist()
     for frame in track(frames, f"mapping {drive.name}", len(frames)):
         scan = drive.scan(frame)
@@ -214,7 +216,10 @@ def _scans(
 def map_of(
     points: np.ndarray, name: str, settings: Settings
 ) -> LocalisationMap:
-    """Returns the map of points (M, 3) in W, M >= FEWEST_POINTS [m]."""
+    """Returns a localisation map of points (M, 3) in W [m].
+
+    M must be at least `FEWEST_POINTS`.
+    """
     surface = make_surface(points, settings.neighbours)
     return LocalisationMap(name, surface)
 
@@ -225,8 +230,8 @@ class Estimate:
 
     Attributes:
         X_WS: (4, 4) pose; None if the estimator found none.
-        score: the estimator's own score, higher for a better result; None if
-            the share of the scan that fits is to be the score.
+        score: the estimator's own score, higher for a better result. If it is
+            None, the share of the scan's points that lie on the map is used.
         iterations: number of steps; 0 if unknown.
     """
 
@@ -262,7 +267,7 @@ class Fit:
 
 
 def judge(surface: Surface, scan: np.ndarray, X_WS: np.ndarray) -> Fit:
-    """Returns the `Fit` of a scan (N, 3) in S to a map at a pose."""
+    """Returns how well a scan (N, 3) in S fits a map at a given pose."""
     p_W = poses.transform(X_WS, scan)
     found, squares = surface.tree.batch_nearest_neighbor_search(p_W)
     is_pair = np.asarray(squares) < _PAIR**2
@@ -302,7 +307,6 @@ def _by_small_gicp(
     measured: np.ndarray,
     start: np.ndarray,
 ) -> Estimate:
-    del measured
     source = small_gicp.PointCloud(scan)
     surface = surroundings.surface
     X_VW = np.eye(4)
@@ -340,7 +344,6 @@ def _by_robust(
     measured: np.ndarray,
     start: np.ndarray,
 ) -> Estimate:
-    del measured
     spread = None
     if kind == "GICP":
         source = small_gicp.PointCloud(scan)
@@ -368,7 +371,6 @@ def _by_kiss_matcher(
     measured: np.ndarray,
     start: np.ndarray,
 ) -> Estimate:
-    del scan
     # Its numbers are float32: far coordinates would lose decimals.
     p_WS = start[:3, 3]
     target = surroundings.around(p_WS, MAX_RANGE) - p_WS
@@ -397,7 +399,6 @@ def _by_own(
     measured: np.ndarray,
     start: np.ndarray,
 ) -> Estimate:
-    del scan
     nearby = surroundings.around(start[:3, 3], MAX_RANGE)
     answer = function(nearby, measured.copy(), start.copy())
     try:

@@ -1,4 +1,4 @@
-"""Single scans, each localised in a map from its own random start.
+"""Localises single scans in a map, each from a random initial pose.
 
 Frames: world W, LiDAR S. An error has three components relative to the
 vehicle's path: along it, across it (to the left) and up.
@@ -20,11 +20,12 @@ from cns_drake.base import points as clouds
 from cns_drake.base import poses
 from cns_drake.base.csv_files import write_csv
 from cns_drake.base.drives.drive import Drive
-from cns_drake.base.errors import InputError
+from cns_drake.base.errors import InputError, errors_at
 from cns_drake.base.json_text import json_number
 from cns_drake.base.progress import Track, silent
 from evaluation.clouds.cloud_files import read_cloud
 from evaluation.drives.sampling import cropped, sample_frames
+from evaluation.drives.scan_files import FileDrive
 from evaluation.localisation.estimators import (
     Estimator,
     LocalisationMap,
@@ -33,6 +34,7 @@ from evaluation.localisation.estimators import (
     thinned,
 )
 from evaluation.localisation.robust import MAX_RANGE
+from evaluation.recognition.place_outcome import Number
 from evaluation.recognition.pose_errors import (
     SUCCESS_ROTATION_DEG,
     SUCCESS_TRANSLATION,
@@ -88,12 +90,13 @@ COLUMNS = tuple(QUERY.fields or ())
 
 @dataclass(frozen=True)
 class Starts:
-    """How random starts are drawn.
+    """How the random initial poses of scans are drawn.
 
     Attributes:
-        radius: distance to the true position [m].
-        turn_deg: angle to the true orientation [deg].
-        seed: seed of all directions.
+        radius: distance of each initial position from the true position [m].
+        turn_deg: angle between each initial and true orientation [deg].
+        seed: seed of the random directions in which initial poses are moved and
+            turned.
 
     Raises:
         InputError: if a value is out of range.
@@ -117,11 +120,11 @@ class Starts:
             raise InputError(f"--seed: {self.seed} is below 0")
 
     def draw(self, frame: int) -> tuple[np.ndarray, np.ndarray]:
-        """Returns the random start of a frame, the same for all methods.
+        """Returns the error of a frame's initial pose, equal for all methods.
 
         Returns:
-            (3,) offset of the start in W, on a sphere [m]; (3,) turn about a
-            random axis, as a rotation vector in S [rad].
+            (3,) offset of the position in W, in a random direction [m]; (3,)
+            turn about a random axis, as a rotation vector in S [rad].
         """
         rng = np.random.default_rng([self.seed, frame])
         offset, axis = rng.normal(size=(2, 3))
@@ -131,44 +134,36 @@ class Starts:
         )
 
 
-class _OneScan(Drive):
-    """A cloud as a drive of one scan, at the origin of its world."""
+class OneScan(FileDrive):
+    """A point cloud as a drive of one scan, at the origin of its world."""
 
-    def __init__(self, path: Path, columns: int | None):
-        self.name = path.name
-        self.world_frame = "map"
-        self._notes: list[str] = []
-        self._scan = read_cloud(path, columns, self._notes.append)
-
-    @property
-    def notes(self) -> tuple[str, ...]:
-        return tuple(self._notes)
-
-    def __len__(self) -> int:
-        return 1
-
-    @property
-    def stamps_ns(self) -> np.ndarray:
-        return np.zeros(1, np.int64)
-
-    @property
-    def X_WS(self) -> np.ndarray:
-        return np.eye(4)[None]
+    def __init__(self, path: Path, columns: int | None = None):
+        """Reads the cloud, with its columns if it is a `.bin` file."""
+        notes: list[str] = []
+        scan = read_cloud(path, columns, notes.append)
+        super().__init__(
+            name=path.name,
+            world_frame="map",
+            files=[path],
+            stamps_ns=np.zeros(1, np.int64),
+            X_WS=np.eye(4)[None],
+            read=lambda path, stamp_ns: scan,
+            notes=tuple(notes),
+        )
 
     def scan(self, index: int) -> np.ndarray:
-        del index
-        return self._scan
+        """Returns the whole cloud, including points at the origin.
 
-
-def as_query(source: Drive | Path, columns: int | None = None) -> Drive:
-    """Returns the queries: a drive, or a cloud as one scan at the origin."""
-    return source if isinstance(source, Drive) else _OneScan(source, columns)
+        In the scan of a LiDAR, such points mark beams without a return; in a
+        map they are measured.
+        """
+        return self._read(self._files[index], 0)
 
 
 def mapped_frames(
     place: Drive | Path, surroundings: LocalisationMap, query: Drive
 ) -> np.ndarray:
-    """Returns which query frames lie within the map, (N,) bool.
+    """Returns which frames of a query drive lie within the map, (N,) bool.
 
     Raises:
         InputError: no frame lies within the map.
@@ -247,9 +242,10 @@ class Localiser:
             scan: structured array, in S.
             X_WS: the true pose.
             R_WT: see `way_axes`.
-            offset: (3,) offset of the start in W [m].
-            turn: (3,) turn of the start in S [rad].
-            X_WS0: the start pose; by default it follows from `offset` and
+            offset: (3,) offset of the initial from the true position, in W [m].
+            turn: (3,) rotation vector from the true to the initial orientation,
+                in S [rad].
+            X_WS0: the initial pose; by default it follows from `offset` and
                 `turn`.
 
         Returns:
@@ -314,7 +310,7 @@ def localise(
         localiser: the map and the estimator.
         query: the drive.
         frames: frames of the scans, in any order.
-        starts: how starts are drawn.
+        starts: how the initial poses are drawn.
         jobs: number of processes, where the system can fork.
         track: reports progress.
 
@@ -351,10 +347,8 @@ def localise(
                     yield one.result()
 
     _localiser = localiser
-    try:
+    with errors_at(query.name):
         done = list(track(rows(), f"localising {query.name}", len(frames)))
-    except InputError as error:
-        raise InputError(f"{query.name}: {error}") from error
     return np.array(done, QUERY)
 
 
@@ -363,7 +357,7 @@ def is_right(
     translation: float = RIGHT_TRANSLATION,
     rotation_deg: float = RIGHT_ROTATION_DEG,
 ) -> np.ndarray:
-    """Returns which results have at most these errors, (K,) bool."""
+    """Returns which results are within limits of the error, (K,) bool."""
     return (rows["translation_error"] <= translation) & (
         rows["rotation_error_deg"] <= rotation_deg
     )
@@ -371,7 +365,7 @@ def is_right(
 
 @dataclass(frozen=True)
 class Localisation:
-    """The results of one method on one pair.
+    """The results of one method for the scans of one drive in one map.
 
     Attributes:
         rows: (K,) of `QUERY`.
@@ -381,7 +375,7 @@ class Localisation:
 
     @property
     def believed_from(self) -> float:
-        """Score that 95 % of the right results reach; NaN if none is right."""
+        """Score that 95 % of correct results reach; NaN if none is correct."""
         scores = self.rows["own_score"][is_right(self.rows)]
         if len(scores) == 0:
             return math.nan
@@ -438,11 +432,14 @@ class Localisation:
         found["seconds_mean"] = float(rows["seconds"].mean())
         return found
 
-    def numbers(self) -> dict[str, float]:
-        """Returns the numbers of the summary that go into tables of results."""
+    def numbers(self, method: str) -> Iterator[Number]:
+        """Yields the numbers of the summary as rows for tables of results."""
         found = self.to_json()
-        known = {name: found[name] for name in _SHOWN}
-        return {k: float(v) for k, v in known.items() if v is not None}
+        for name in _SHOWN:
+            if (value := found[name]) is not None:
+                yield Number(
+                    method, False, name, float(value), n=len(self.rows)
+                )
 
     def columns(self) -> dict[str, np.ndarray]:
         """Returns the columns of `queries.csv`."""
@@ -461,7 +458,7 @@ class Localisation:
 
 
 def write_rows(rows: np.ndarray, path: Path) -> None:
-    """Writes results by query as CSV; an unknown number is empty."""
+    """Writes the result of each query as CSV; unknown numbers are empty."""
     cells = (
         [
             ""
@@ -477,7 +474,7 @@ def write_rows(rows: np.ndarray, path: Path) -> None:
 def query_frames(
     query: Drive, is_mapped: np.ndarray, spacing: float
 ) -> list[int]:
-    """Returns query frames within the map, at a given spacing [m]."""
+    """Returns frames of a query drive within the map, `spacing` apart [m]."""
     frames = sample_frames(query.X_WS[:, :3, 3], spacing)
     chosen = frames[is_mapped[frames]]
     # A short pass through the map may lie between two sampled frames.

@@ -1,16 +1,17 @@
-"""Point to plane and GICP with a robust kernel and a shrinking search.
+"""Point-to-plane ICP and GICP with a robust kernel and a shrinking search.
 
-Changed parts of a city lead to wrong pairs, to which the Python package of
-small_gicp gives the same weight as to others. Here a pair at a distance d from
-its surface has the weight (k / (k + d^2))^2 (Geman and McClure); k falls with
-the search width, the greatest distance of a pair.
+Changed parts of a city lead to wrong pairs, and the Python package of
+small_gicp gives wrong pairs the same weight as right ones. Here a pair at a
+distance d from its surface has the weight (k / (k + d^2))^2 (Geman and
+McClure); k falls with the search width, the greatest distance of a pair.
 
-Width and kernel follow KISS-ICP (Vizzo et al., RA-L 2023): they are 3 s and s /
-3 for a deviation s, by which the last alignment moved from its start. A
-rotation counts as the distance by which it moves a point at the greatest range.
-KISS-ICP takes s from the previous scans, but a scan that is localised by itself
-has none. It is therefore aligned repeatedly, each time from the last result and
-with at most half the width, until the least width is reached.
+Width and kernel follow KISS-ICP (Vizzo et al., RA-L 2023): the search width is
+3 s and k is s / 3, where s is how far the last alignment moved the scan from
+its initial pose. A rotation counts as the distance by which it moves a point at
+the greatest range. KISS-ICP takes s from the previous scans, but here a scan is
+localised by itself. The scan is therefore aligned repeatedly, each time from
+the last result and with at most half the width, until the least width is
+reached.
 """
 
 import math
@@ -44,7 +45,7 @@ def align_robustly(
     Args:
         surface: the map.
         scan: (N, 3) in S [m].
-        start: X_WS (4, 4).
+        start: initial pose X_WS (4, 4).
         widths: greatest distance of a pair, at the beginning and at the end
             [m].
         iterations: greatest number of steps of each alignment.

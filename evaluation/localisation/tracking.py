@@ -1,4 +1,4 @@
-"""Tracking: each scan of a drive is registered from the last estimate."""
+"""Tracks a drive in a map: each scan is registered from the last estimate."""
 
 from dataclasses import dataclass
 
@@ -83,23 +83,23 @@ def track_drive(
     drift: float,
     track: Track = silent,
 ) -> np.ndarray:
-    """Tracks a drive along the parts of its path that the map covers.
+    """Tracks a drive along each section of its path that the map covers.
 
-    On each part, the first start is random. Each later start is the last
-    estimate, moved by the odometry.
+    In each section, the initial pose of the first scan is random. The initial
+    pose of each later scan is the last estimate, moved by the odometry.
 
     Args:
         localiser: the map and the estimator.
         query: the drive.
         is_mapped: (N,) see `mapped_frames`.
-        starts: how starts are drawn.
+        starts: how the initial pose of a section's first scan is drawn.
         drift: see `drifting_steps`.
         track: reports progress.
 
     Returns:
         (K,) records of `TRACKED`. Before the fields of `QUERY`, each contains
-        the number of the part, the length of the path from the drive's first
-        scan, and that from the scan before [m].
+        the number of the section, the length of the path since the drive's
+        first scan, and the length since the previous scan [m].
 
     Raises:
         InputError: a scan cannot be read, or has too few points.
@@ -160,7 +160,7 @@ def track_drive(
 
 @dataclass(frozen=True)
 class TrackSummary:
-    """The results of a track.
+    """The results of a drive that was tracked in a map.
 
     Attributes:
         rows: (K,) of `TRACKED`.
@@ -171,8 +171,8 @@ class TrackSummary:
     def losses(self) -> list[tuple[float, bool]]:
         """Returns, for each loss, its length [m] and whether it ended.
 
-        The length is the path from the loss until the error is at most `LOST`
-        again, or else to the end of the part.
+        The length is that of the path from the loss to the next scan with an
+        error of at most `LOST`, or else to the end of the mapped section.
         """
         found = []
         for stretch in np.unique(self.rows["stretch"]):

@@ -7,14 +7,14 @@ otherwise it is gone or new. No point is unobserved.
   gone or new if this distance exceeds both the level of detection and 0.1 m,
   otherwise kept. It is unobserved if a map lacks the points to measure.
 - `free-space`: cells of 0.2 m are compared with each scan of the other drive.
-The three returns nearest to the direction of a cell define a surface. A scan
-sees past the cell if this surface lies behind it, or if there is no return
-although the LiDAR looks there. A scan shows the cell if the surface passes
-through it. The first rule that applies gives the label: kept if the other map
-has a point near the cell; gone or new if a scan sees past it; kept if enough
-scans show it; otherwise unobserved. Where more than a fifth of the labelled
-points in a cube of 1 m are gone or new, the kept points there are relabelled as
-well, except points with a point of the other map within 0.12 m.
+  The three returns nearest to the direction of a cell define a surface. A scan
+  sees past the cell if this surface lies behind it, or if there is no return
+  although the LiDAR looks there. A scan shows the cell if the surface passes
+  through it. The first rule that applies gives the label: kept if the other map
+  has a point near the cell; gone or new if a scan sees past it; kept if enough
+  scans show it; otherwise unobserved. Where more than a fifth of the labelled
+  points in a cube of 1 m are gone or new, the kept points there are relabelled
+  as well, except points with a point of the other map within 0.12 m.
 """
 
 from collections.abc import Callable
@@ -80,8 +80,7 @@ def run_baseline(name: str, pair: Pair, track: Track = silent) -> Labels:
 def by_distance(
     mine: Session, theirs: Session, track: Track = silent
 ) -> np.ndarray:
-    """Returns labels (N,) of a map by its distance from the other map."""
-    del track
+    """Returns labels (N,) of a map's points by distance from the other map."""
     _, kept, changed = SIDES[mine.side]
     far = np.isinf(nearest(mine.points, theirs.points, _APART))
     return np.where(far, changed, kept).astype(np.uint8)
@@ -125,7 +124,10 @@ def by_free_space(
 def _count_views(
     points: np.ndarray, other: Session, track: Track
 ) -> np.ndarray:
-    """Returns how many scans see past each point, show it and hide it.
+    """Returns how many scans see past each point, show it, or hide it.
+
+    The module's text on `free-space` defines the first two. A scan hides a
+    point if a surface lies in front of it.
 
     Returns:
         (3, N) counts for the points (N, 3).
@@ -175,7 +177,7 @@ def _slopes(p_S: np.ndarray) -> np.ndarray:
 def by_m3c2(
     mine: Session, theirs: Session, track: Track = silent
 ) -> np.ndarray:
-    """Returns labels (N,) of a map by the method M3C2, from py4dgeo."""
+    """Returns labels (N,) of a map by the method M3C2 of py4dgeo."""
     py4dgeo = _py4dgeo()
     unobserved, kept, changed = SIDES[mine.side]
     epochs = [py4dgeo.Epoch(one.points) for one in (mine, theirs)]

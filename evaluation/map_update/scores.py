@@ -6,14 +6,16 @@ together. The class `unobserved` includes points that B is the first to see. A
 class that does not occur in the truth is left out of the mean, `miou`.
 
 Precision and recall of gone (in A) and new (in B) exist in three forms: by
-points; within 0.2 m and 0.5 m, where a point is right if a point of the other
-set lies within this distance; and by structure, see `structures.verdicts`.
+points; within 0.2 m and 0.5 m, where a predicted point is right if a truly
+changed point lies within this distance, and the reverse for recall; and by
+structure, see `structures.verdicts`.
 
-The updated map is A without the points that are predicted gone, plus the points
-of B that are predicted new or newly seen. Its completeness is the share of B's
-map within 0.2 m of the updated map. Its accuracy is the share of the updated
-map within 0.2 m of B's map, over points that B's drive observed by truth. Its
-Chamfer distance is the mean of the mean distances in both directions.
+The predictions also give an updated map: A without the points that are
+predicted gone, plus the points of B that are predicted new or newly seen. Its
+completeness is the share of B's map within 0.2 m of the updated map. Its
+accuracy is the share of the updated map within 0.2 m of B's map, over points
+that B's drive observed by truth. Its Chamfer distance is the mean of the mean
+distances in both directions.
 """
 
 from __future__ import annotations
@@ -145,7 +147,7 @@ def _within(both: _Labelled, distance: float) -> dict[str, float]:
 def _share_near(
     points: np.ndarray, others: np.ndarray, distance: float
 ) -> float:
-    """Returns the share of points (N, 3) with another point this near."""
+    """Returns the share of points with one of `others` within a distance."""
     if len(points) == 0:
         return math.nan
     if len(others) == 0:
@@ -192,7 +194,8 @@ def _by_structure(both: _Labelled) -> dict[str, float]:
 def _called(both: _Labelled) -> dict[str, float]:
     """Returns shares of points and structures predicted gone or new.
 
-    A third share is that of the observed structures with the right verdict.
+    The function also returns the share of the observed structures whose verdict
+    (kept, gone or new) is right.
     """
     points, structures, right = [], [], []
     for session, true, found, rows in zip(*both, strict=True):
@@ -238,7 +241,10 @@ def _updated_map(both: _Labelled) -> dict[str, float]:
 
 
 def _by_distance(both: _Labelled) -> dict:
-    """Returns class of distance from the other drive -> scores by points."""
+    """Returns the scores by points for ranges of distance.
+
+    The distance is that of a point from the path of the other drive.
+    """
     pair = both.pair
     if not (len(pair.A.X_WS) and len(pair.B.X_WS)):
         return {}

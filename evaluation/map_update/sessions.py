@@ -1,12 +1,13 @@
-"""Two drives of one place as maps, with labels for each point.
+"""Reads and writes the maps of two drives, with a label for each point.
 
-A folder holds the older drive as `A` and the newer one as `B`. Each has
+A folder contains a session, which is a drive with its map, in each of its
+subfolders: the older drive in `A`, the newer one in `B`. A session consists of
 
 - `map.ply`: the merged map in the world, one point for each 0.1 m, with `x`,
   `y`, `z` [m], and, where they are known, `label` (class, SemanticKITTI's ids)
   and `instance` (number of a structure),
 - `truth.npy`: a label for each point of the map, see `Label`,
-- `Scans/000000.pcd` and on: the scans in the frame of the LiDAR,
+- `Scans/000000.pcd` onwards: the scans in the frame of the LiDAR,
 - `poses.txt`: a row for each scan, the upper 3 x 4 of the LiDAR's pose in the
   world, and `singlesession_posegraph.g2o`, the same as a pose graph.
 
@@ -55,10 +56,10 @@ MOVES = (*range(252, 260), 10, 11, 13, 15, 18, 20, 30, 31, 32)
 
 
 class Label(IntEnum):
-    """What became of a point.
+    """What happened to a point of a map: kept, gone, new or not observed.
 
     Points of A have the labels 0, 1 and 2; points of B have 1, 3 and 4. IGNORED
-    occurs only in labels of a user; scores leave out such points.
+    occurs only in your own true labels; scores leave out such points.
     """
 
     UNOBSERVED = 0
@@ -78,7 +79,7 @@ SIDES = {
 
 @dataclass(frozen=True)
 class Session:
-    """One of the two drives, with its map.
+    """A session: one of the two drives of a folder, with its map.
 
     Attributes:
         folder: folder of the session's files.
@@ -107,7 +108,7 @@ class Session:
         """Returns a scan (M, 3) in the frame of the LiDAR [m].
 
         Raises:
-            InputError: it cannot be read.
+            InputError: the scan cannot be read.
         """
         scan = xyz(read_cloud(self.folder / "Scans" / _scan_name(index)))
         return scan[np.isfinite(scan).all(axis=1)]
@@ -176,7 +177,7 @@ def write_session(
     spacing: float = SPACING,
     track: Track = silent,
 ) -> tuple[Session, np.ndarray]:
-    """Writes map, scans and poses of a drive.
+    """Writes the map, scans and poses of a drive to a folder.
 
     Args:
         drive: the drive.
@@ -188,7 +189,7 @@ def write_session(
         The session, and the frames (K,) of the drive that are its scans.
 
     Raises:
-        InputError: a scan cannot be read, or a file not be written.
+        InputError: a scan cannot be read, or a file cannot be written.
     """
     frames = sample_frames(drive.X_WS[:, :3, 3], spacing)
     X_WS = drive.X_WS[frames]
@@ -365,17 +366,17 @@ def _rows(X: np.ndarray) -> Iterable[str]:
 
 
 class Pair(NamedTuple):
-    """Both sessions of a folder."""
+    """The two sessions of a folder: the older drive A and the newer drive B."""
 
     A: Session
     B: Session
 
 
 def read_pair(folder: Path) -> Pair:
-    """Reads both sessions of a folder.
+    """Reads the maps of the two drives in a folder, A and B.
 
     Raises:
-        InputError: one of them is missing or cannot be read.
+        InputError: a map is missing or cannot be read.
     """
     for side in SIDES:
         if not (folder / side).is_dir():

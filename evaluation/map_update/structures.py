@@ -1,4 +1,4 @@
-"""How much of each structure changed, and a verdict on each structure."""
+"""Computes how much of each structure changed, and a verdict on each."""
 
 from collections.abc import Collection, Mapping, Sequence
 from dataclasses import astuple, dataclass, fields
@@ -13,7 +13,7 @@ from evaluation.map_update.sessions import MOVES, SIDES, Label, Pair
 
 @dataclass(frozen=True)
 class StructureChange:
-    """A structure in map A or B, or in the world of one session only.
+    """How much a structure of map A or B has changed.
 
     Attributes:
         side: map in which the structure is, A or B.
@@ -26,7 +26,8 @@ class StructureChange:
         changed: number of the observed points that are gone (A) or new (B).
         verdict: gone (A) or new (B) if most of the observed points are, else
             kept. Without an observed point: unobserved (A) or newly_seen (B).
-        alone: whether the other drive's world has no structure of this name.
+        alone: whether the world of the other drive lacks a structure of this
+            name.
     """
 
     side: str
@@ -49,7 +50,7 @@ class StructureChange:
 def verdicts(
     instances: np.ndarray, labels: np.ndarray, side: str
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Returns whether each structure of a map is kept, gone or new.
+    """Returns a verdict on each structure of a map: kept, gone or new.
 
     Args:
         instances: (N,) number of the structure of each point; 0 for none.
@@ -86,8 +87,8 @@ def write_structures(
 ) -> list[StructureChange]:
     """Writes the table of structures of both maps, and returns its rows.
 
-    A structure that only one world contains has a row even if no point is on
-    it.
+    A structure that exists in only one of the two worlds has a row even if no
+    map point lies on it.
 
     Args:
         path: path of the CSV file.
@@ -137,9 +138,7 @@ def write_structures(
         field.name.replace("semantic_class", "class")
         for field in fields(StructureChange)
     ]
-    write_csv(
-        path, header, ((*astuple(row)[:-1], int(row.alone)) for row in rows)
-    )
+    write_csv(path, header, map(astuple, rows))
     return rows
 
 

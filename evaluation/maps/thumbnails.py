@@ -26,9 +26,10 @@ def thumbnail(
 
     Returns:
         (M, 3) uint8, M <= 2000: cell along x, cell along y, and height above
-        the ground in steps of 0.1 m, at most 25.5 m. Cell 128 is the first in
-        front, or left, of the sensor. The order is random, so that the first
-        points alone show the whole scan, thinned.
+        the ground in steps of 0.1 m, at most 25.5 m. Cell numbers along x and y
+        begin at 0; cell 128 begins at the sensor, so that greater numbers lie
+        in front of it (x) or to its left (y). The order is random, so that the
+        first points alone show the whole scan, thinned.
     """
     x, y = np.floor(points[:, :2].T / CELL).astype(np.int64) + _HALF_CELLS
     heights = points[:, 2] + sensor_height

@@ -115,8 +115,8 @@ def enter(
     Args:
         points: (3, N) points in the frame of a sensor [m].
         number: how many of the points to enter, beginning with the first.
-        X: (4, 4) pose of the sensor in the lifted world, whose voxels begin at
-            height 0.
+        X: (4, 4) pose of the sensor in the lifted world: the world, moved up so
+            that voxels begin at height 0.
         voxel_size: length of a voxel's side [m].
         divisions: number of parts of a voxel's side; 0 for no samples.
         table: (S,) slots of type `SLOT`, with room for all voxels.
@@ -411,8 +411,8 @@ def map_drive(
 ) -> VoxelMap:
     """Returns the voxel map of scans of a drive, in the world frame.
 
-    Scans are read once, one at a time. The default voxel size is the one for
-    which structural change is defined; by default all frames are mapped.
+    Each scan is read once. The default voxel size is that of the measure of
+    structural change (TCR). By default all frames are mapped.
 
     Raises:
         InputError: if a scan or a pose cannot be read.

@@ -1,16 +1,16 @@
 """BTC, the binary and triangle combined descriptor (Yuan et al., T-RO 2024).
 
-Places that stand out from the ground (walls, trunks, posts) are keypoints; the
+Spots that stand out from the ground (walls, trunks, posts) are keypoints; the
 occupied heights above them are a binary descriptor. Triangles of nearby
-keypoints do not change when the sensor moves: clouds that share enough
-triangles, by their sides and the descriptors of their vertices, are candidates.
-A candidate counts if its triangles agree on a motion; its score is the fit of
-both clouds' planes under that motion.
+keypoints do not change when the sensor moves: a place is a candidate if its
+cloud and the query's share enough triangles with similar sides and similar
+descriptors at their vertices. A candidate counts if its triangles agree on a
+motion; its score is the fit of both clouds' planes under that motion.
 
-The clouds are several consecutive scans, in the frame of one of them. (The
-method's authors describe all clouds in one world frame. This favours the
-method, because the grids on which planes and keypoints are found then
-coincide.)
+A cloud consists of several consecutive scans, in the frame of one of these
+scans. (The method's authors describe all clouds in one world frame. This
+favours the method, because the grids on which planes and keypoints are found
+then coincide.)
 
 Scores are those of the public program (equal for 243 single scans of two LiDARs
 and 163 submaps, each against 308 places). Two details that the method leaves
@@ -180,7 +180,7 @@ class BtcDatabase:
 
 @register("btc")
 class Btc(Method[BtcDescription, BtcDatabase]):
-    """BTC; the score of a pair is the share of the planes that match.
+    """BTC; the score is the share of the query's planes that match.
 
     A place has no score if too few triangles match, too few of the matches
     agree on a motion, or no plane fits. The public program's limit on the score
@@ -339,15 +339,16 @@ def align(query: np.ndarray, place: np.ndarray) -> np.ndarray:
 def find_motion(query: np.ndarray, place: np.ndarray) -> np.ndarray | None:
     """Returns the motion on which most pairs of triangles agree.
 
-    Every pair, or every n-th of many, proposes the motion that aligns it.
+    Every pair (or, if there are many, every n-th pair) proposes the motion that
+    aligns its two triangles.
 
     Args:
         query: (M, 3, 3) vertices, M > 0.
         place: (M, 3, 3) vertices of their partners.
 
     Returns:
-        X_PQ (4, 4), the first of equally good ones; None where too few
-        pairs agree.
+        X_PQ (4, 4), the first one if several motions are equally good; None if
+        too few pairs agree.
     """
     stride = len(query) // _TRIALS + 1
     # One proposal for each whole stride.
@@ -368,7 +369,7 @@ def plane_overlap(
     normal_limit: float,
     distance_limit: float,
 ) -> float:
-    """Returns the share of a query's patches that match one of a place.
+    """Returns the share of a query's patches that match a patch of a place.
 
     Each patch is compared with the patch whose center is nearest to its own.
 

@@ -4,7 +4,8 @@ Part of BTC (see `evaluation.methods.btc`). The order in which patches are
 compared decides which of them are merged into the largest plane, the ground, on
 which all keypoints depend. The public program takes the voxels in the order of
 the hash table of its C++ library (libstdc++). This order is not part of the
-method, but it is reproducible, and scores agree only with it.
+method, but it can be reproduced; with any other order, scores differ from those
+of the program.
 """
 
 from __future__ import annotations
@@ -61,7 +62,7 @@ class Planes:
 def voxel_planes(
     points: np.ndarray, voxel_size: float, max_points: int, flatness: float
 ) -> Planes:
-    """Returns the voxels whose points lie on a plane.
+    """Returns a plane for each voxel whose points lie on one.
 
     The voxels are in the order of the public program, which depends on the
     order of the points.
@@ -209,8 +210,9 @@ def _moments(
     """Returns the voxels of a cloud, in the order of their first points.
 
     Returns:
-        (V, 3) int64 indices along x, y and z; (V,) number of points; (V, 3)
-        their mean; (V, 3, 3) their covariance, times their number.
+        For each voxel: (V, 3) int64 indices along x, y and z; (V,) number of
+        points; (V, 3) mean of the points; (V, 3, 3) covariance of the points,
+        times their number.
     """
     num_points = len(points)
     places = np.empty(3 * num_points, dtype=np.int64)
@@ -305,7 +307,7 @@ def hash_table_order(codes: np.ndarray) -> np.ndarray:
             were put in, one by one.
 
     Raises:
-        ValueError: there are too many.
+        ValueError: there are too many elements.
     """
     if len(codes) > _NUM_BUCKETS[-1]:
         raise ValueError(f"{len(codes)} elements")

@@ -64,11 +64,12 @@ class HeightImage(NamedTuple):
     """A cloud seen along the normal of a plane.
 
     Attributes:
-        heights: (rows, columns) int64, bit k set if there are points in
-            layer k. The image exceeds the points by at least one cell up and to
-            the right. Its size is a multiple of the segment.
-        means: (rows, columns, 2) mean of the points of a cell, along rows
-            and along columns [m]; NaN where there are none.
+        heights: (rows, columns) int64, bit k set if there are points in layer
+            k. The image exceeds the points by at least one cell up and to the
+            right. Its numbers of rows and columns are multiples of the side of
+            a segment, see `peaks`.
+        means: (rows, columns, 2) mean position of the points of each cell,
+            along rows and along columns [m]; NaN for a cell without points.
     """
 
     heights: np.ndarray
@@ -182,14 +183,14 @@ def peaks(
 ) -> tuple[np.ndarray, np.ndarray]:
     """Returns the cells of an image that stand out and are not on a line.
 
-    Each segment has at most one peak: the cell with the most heights, or the
-    first of several equal ones. A cell is part of a line, and no peak, if in
-    some direction one neighbour is nearly as high and the opposite neighbour is
-    at least half as high.
+    The image is divided into square segments, each of which has at most one
+    peak: the cell with the most heights, or the first of several equal ones. A
+    cell is part of a line, and no peak, if in some direction one neighbour is
+    nearly as high and the opposite neighbour is at least half as high.
 
     Args:
-        num_heights: (rows, columns) bits set in each cell; multiples of the
-            segment.
+        num_heights: (rows, columns) number of layers with points in each cell.
+            Rows and columns must be multiples of the side of a segment.
         min_heights: number of heights that a peak needs.
 
     Returns:
@@ -287,7 +288,7 @@ class Triangles:
 
     Attributes:
         sides: (T, 3) lengths, shortest first [m].
-        positions: (T, 3, 3) of the vertices, one a row [m].
+        positions: (T, 3, 3) positions of the vertices, one in each row [m].
         heights: (T, 3) int64 binary descriptors of the vertices.
     """
 
@@ -313,7 +314,7 @@ class TriangleTable:
     to the same three numbers.
 
     Attributes:
-        triangles: T of them.
+        triangles: the T triangles.
         clouds: (T,) number of each triangle's cloud.
         resolution: length that is one unit of the sides [m].
         tree: search tree over the sides [m].
@@ -331,9 +332,9 @@ def make_triangles(
     """Returns the triangles between each keypoint and its neighbours.
 
     Args:
-        keypoints: K of them.
-        num_neighbours: nearest keypoints that are looked at, the keypoint
-            itself included. (If a cloud has fewer keypoints, the public program
+        keypoints: the K keypoints.
+        num_neighbours: number of nearest keypoints that are used, including the
+            keypoint itself. (If a cloud has fewer keypoints, the public program
             reads beyond its array.)
         side_range: limits of the sides [m].
     """
@@ -424,8 +425,8 @@ def match(
     Two triangles are similar in two respects: the difference of their sides is
     small relative to the sides (as Euclidean norms of three numbers), and their
     vertices have about the same heights (by the mean Dice similarity of the
-    three). Only cells near those of the query are searched, so that large
-    triangles must be more similar than the tolerance requires.
+    three). Only cells of the table near those of the query are searched. Large
+    triangles must therefore be more similar than the tolerance requires.
 
     Args:
         query: triangles of one cloud.

@@ -1,4 +1,4 @@
-"""Layered overlap: a matched filter on maps of bits, made to survive change.
+"""Layered overlap: a matched filter on binary maps, robust to change.
 
 A scan becomes maps from above: one for each layer of height, one for poles and
 one for kerbs. Two scans are compared at the pose at which most of their filled
@@ -30,7 +30,7 @@ from evaluation.methods.overlap_maps import (
 
 
 def _moves(turn: int, shift: int) -> np.ndarray:
-    """Returns (K, 3) changes of heading, row and column within reach."""
+    """Returns all changes (K, 3) of heading, row and column up to a limit."""
     near = range(-shift, shift + 1)
     return np.array([*itertools.product(range(-turn, turn + 1), near, near)])
 
@@ -71,15 +71,16 @@ class LayeredOverlapConfig(MethodConfig):
     Attributes:
         cell: side of a cell of the finest maps [m]. These maps have 256 x 256
             cells.
-        min_points: number of points from which on a cell is occupied.
+        min_points: least number of points in an occupied cell.
         poses: number of candidate poses (a place and a heading) that the second
             search compares.
         refined: number of candidate poses that the third search compares.
         candidates: number of places that the last search compares cell by cell.
         weights: weights of a common cell in the score, by layer: low, middle
             and high points, poles, kerbs.
-        least_cells: weighted number of cells that is added to that of each scan
-            in the score, so that two nearly empty scans do not look alike.
+        least_cells: number that is added to the weighted number of filled cells
+            of each scan in the score, so that two nearly empty scans do not
+            look alike.
     """
 
     cell: PositiveFloat = 0.5
@@ -102,7 +103,7 @@ class LayeredScan:
     """Descriptor of one cloud.
 
     Attributes:
-        cells: (M,) uint16, filled cells, layer by layer.
+        cells: (M,) uint16 numbers of the filled cells, layer by layer.
         starts: (6,) int64, index in `cells` at which each layer begins and the
             last one ends.
     """
@@ -152,8 +153,8 @@ class LayeredOverlap(Method[LayeredScan, LayeredDatabase]):
     of the place or its neighbour. It is divided by the geometric mean of the
     two scans' weighted numbers of cells.
 
-    Among equal counts, the first wins. All counts are integers, so that scores
-    are the same on every processor.
+    Of several poses with equal counts, the first one is used. All counts are
+    integers, so that scores are the same on every processor.
     """
 
     Config = LayeredOverlapConfig
@@ -206,7 +207,7 @@ class LayeredOverlap(Method[LayeredScan, LayeredDatabase]):
     ) -> list[np.ndarray | None]:
         """Returns poses with the query's heading and horizontal translation.
 
-        A pose is None if one of the two scans shows nothing.
+        A pose is None if one of the two scans has no filled cell.
         """
         scans = [database.places[place] for place in places]
         poses: list[np.ndarray | None] = [None] * len(scans)
@@ -340,7 +341,7 @@ def _overlaps(
 def _maps_of_places(
     places: Sequence[LayeredScan], halvings: int, margin: int
 ) -> CoarseMaps:
-    """Returns maps of places at their own heading, with a margin of rows."""
+    """Returns coarse maps of places as recorded, with a margin of rows."""
     maps = [_draw(place, turns(1), halvings) for place in places]
     bits = np.concatenate([one.bits for one in maps])
     return CoarseMaps(

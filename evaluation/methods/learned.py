@@ -116,10 +116,11 @@ class LearnedConfig(MethodConfig):
     Attributes:
         weights: file with weights from `cns-drake train`. By default the
             shipped weights of the variant.
-        variant: which shipped weights to use. `radius` was trained on streets
-            of the shipped cities, and every place within 7.5 m counted as
-            right. `graded` was trained on streets of no shipped map, and places
-            were ranked by their exact overlap.
+        variant: which shipped weights to use. With `radius`, the network was
+            trained on streets of the shipped cities, and every place within 7.5
+            m of a query counted as right. With `graded`, it was trained on
+            other streets, and the places of a query were ranked by their exact
+            overlap.
     """
 
     weights: Path | None = None
@@ -127,7 +128,7 @@ class LearnedConfig(MethodConfig):
 
     @property
     def path(self) -> Path:
-        """The file of the weights."""
+        """Path of the file with the weights."""
         return (
             self.weights or {"radius": SHIPPED, "graded": GRADED}[self.variant]
         )
@@ -135,7 +136,11 @@ class LearnedConfig(MethodConfig):
     @computed_field  # type: ignore[prop-decorator]
     @property
     def digest(self) -> str:
-        """Digest of the weights' file; its name alone would not identify it."""
+        """Digest of the file of weights.
+
+        Results depend on it, because the file's name alone does not identify
+        the weights.
+        """
         load_weights(self.path)
         return hashlib.sha256(self.path.read_bytes()).hexdigest()[:16]
 
@@ -145,8 +150,8 @@ class LearnedScan:
     """Descriptor of one scan.
 
     Attributes:
-        features: (TURNS, FEATURES) float32 of unit length; all zero without a
-            point in reach.
+        features: (TURNS, FEATURES) float32 of unit length; all zero if the scan
+            has no points within range.
     """
 
     features: np.ndarray
@@ -167,7 +172,7 @@ class LearnedDatabase:
 
 @register("learned")
 class Learned(Method[LearnedScan, LearnedDatabase]):
-    """The network; the score of a pair is the cosine at the best turn."""
+    """The network; the score of two scans is their cosine at the best turn."""
 
     Config = LearnedConfig
     skips_places = True
@@ -230,7 +235,7 @@ class Learned(Method[LearnedScan, LearnedDatabase]):
         return yaw_pose(yaw)
 
     def _check_seen(self, image: np.ndarray) -> None:
-        """Warns once if the sensor sees less than any did in training."""
+        """Warns once if the sensor sees less than any sensor in training."""
         if self._warned:
             return
         seen = seen_part(image)
@@ -244,7 +249,7 @@ class Learned(Method[LearnedScan, LearnedDatabase]):
 
 
 def seen_part(image: np.ndarray) -> float:
-    """Returns the share of a polar image's sectors that have a point."""
+    """Returns the share of a polar image's sectors with at least one point."""
     return float(image.any(axis=(0, 2)).mean())
 
 
@@ -266,7 +271,6 @@ def load_weights(path: Path) -> Mapping[str, np.ndarray]:
 
 @lru_cache(maxsize=4)
 def _load(path: Path, mtime_ns: int, size: int) -> Mapping[str, np.ndarray]:
-    del mtime_ns
     if size > _MOST_BYTES:
         raise InputError(
             f"{path}: {size} bytes are too many for weights (at most "

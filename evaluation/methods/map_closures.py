@@ -61,7 +61,8 @@ class MapClosuresDatabase:
         program: object of the package that stores all local maps.
         num_queries: number of queries that were added to the local maps.
         query: the last query.
-        found: place -> inliers and pose X_PQ (4, 4) of the last query.
+        found: place -> number of inliers and pose X_PQ (4, 4) of the last
+            query.
     """
 
     num_places: int
@@ -137,7 +138,7 @@ class MapClosures(Method[np.ndarray, MapClosuresDatabase]):
         return None if found is None else found[1]
 
     def _find(self, query: np.ndarray, database: MapClosuresDatabase) -> None:
-        """Aligns a query with all places, unless it was just done."""
+        """Aligns a query with all places, unless it was aligned last."""
         if database.query is query:
             return
         number = _ALL - database.num_queries

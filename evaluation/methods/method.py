@@ -32,18 +32,18 @@ PlaceScan = Literal["middle", "first"]
 class MethodConfig(BaseModel):
     """The parameters that all methods share.
 
-    A method with further parameters derives its own class from this one.
+    If your method has further parameters, derive its class of parameters from
+    this class.
 
     Attributes:
         sensor_height: height of the LiDAR above the ground [m]. The default is
             that of the CNS vehicle.
-        place: which of the merged scans gives a place its pose: the one in the
-            `middle`, or the `first`. By default the protocol decides. Methods
-            that describe single scans do not use it.
+        place: which of several merged scans gives a place its pose: the scan in
+            the `middle`, or the `first`. By default the protocol decides.
+            Methods that describe single scans do not use this parameter.
         sequence: length of the path before a query [m]. Earlier queries on this
-            path also vote for the place of the query, as in SeqSLAM (see
-            `sequences.along_the_way`). With 0, each query is recognised by
-            itself.
+            path also vote for the place of the query, as in SeqSLAM. With 0,
+            each query is recognised by itself.
 
     Example:
         from evaluation import MethodConfig
@@ -63,22 +63,23 @@ class Method(abc.ABC, Generic[Descriptor, Database]):
     """A place-recognition method: describes and compares scans.
 
     A cloud is (N, 3) float64, finite, in the frame of the LiDAR at the place
-    [m]. If the method names `point_fields`, it is a structured array (N,)
-    instead, of float64 `x`, `y` and `z` and those fields in the types of the
-    recording.
+    [m]. If the method names `point_fields`, the cloud is a structured array
+    (N,) instead. It contains `x`, `y` and `z` as float64, and these fields with
+    the types that they have in the recording.
 
     Attributes:
         name: name of the method on the command line.
         Config: type of its parameters.
         scans_per_place: number of consecutive scans that are merged into the
-            described cloud, in the frame of the scan that stands for it.
+            described cloud. The cloud is in the frame of the scan that stands
+            for the place.
         point_fields: additional fields of points that it needs, such as
             intensity, ring, t or label.
         batch_size: number of clouds for one call of `describe_batch`.
-        skips_places: whether scores may be NaN even when `exhaustive`, for
-            places that are no candidates; if not, NaN is an error.
-        rerank_best: number of best places that `rerank`, a second stage,
-            compares by their points; 0 without one.
+        skips_places: whether scores may be NaN (no candidate) even if every
+            place is compared (`exhaustive`). If false, such a NaN is an error.
+        rerank_best: number of best places that a second stage, `rerank`,
+            compares by their points; 0 without a second stage.
         config: the parameters in use.
 
     Example:
@@ -113,7 +114,8 @@ class Method(abc.ABC, Generic[Descriptor, Database]):
     ) -> list[Descriptor]:
         """Returns the descriptions of several clouds.
 
-        Override it in methods that are faster with several.
+        Override this function if your method describes several clouds faster
+        than one by one.
 
         Args:
             clouds: up to `batch_size` clouds.
@@ -127,17 +129,15 @@ class Method(abc.ABC, Generic[Descriptor, Database]):
 
         By default, the method itself is returned.
         """
-        del field
         return self
 
     def assumption(self, field: LidarField | None) -> str | None:
         """Returns what the method assumes about a LiDAR, in words, or None."""
-        del field
         return None
 
     @property
     def describes_alike(self) -> bool:
-        """Whether places and queries are described in the same way."""
+        """Whether the method describes places and queries in the same way."""
         return type(self).describe_place is Method.describe_place
 
     @abc.abstractmethod
@@ -170,7 +170,8 @@ class Method(abc.ABC, Generic[Descriptor, Database]):
     ) -> np.ndarray:
         """Returns how similar a query is to every place, given earlier queries.
 
-        For methods that match drives instead of single scans.
+        Override this function if your method matches sequences of scans instead
+        of single scans. By default, only the present query is used.
 
         Args:
             queries: descriptions of a drive's queries, from the first to the
@@ -200,9 +201,9 @@ class Method(abc.ABC, Generic[Descriptor, Database]):
             scores: (K,) scores of these places by `score`, decreasing.
 
         Returns:
-            (K,) float64, higher is more similar; NaN for no candidate.
+            (K,) float64, higher is more similar; NaN for a place that is no
+            candidate.
         """
-        del query, places
         return scores
 
     def relative_pose(
@@ -221,7 +222,8 @@ class Method(abc.ABC, Generic[Descriptor, Database]):
     ) -> list[np.ndarray | None]:
         """Returns the `relative_pose` of a query at each of several places.
 
-        Override it in methods that are faster with several.
+        Override this function if your method estimates several poses faster
+        than one by one.
         """
         return [self.relative_pose(query, database, one) for one in places]
 
@@ -287,7 +289,8 @@ def register(name: str) -> Callable[[_MethodClass], _MethodClass]:
 def known_methods() -> tuple[str, ...]:
     """Returns the names of all registered methods.
 
-    Methods that run only on request are registered when they are first made.
+    Optional methods, which run only on request, are registered when they are
+    first made.
 
     Example:
         from evaluation import known_methods
@@ -354,10 +357,11 @@ def make_method(name: str, parameters: Mapping[str, Any]) -> Method:
 def load_method(path: Path) -> type[Method]:
     """Returns the method that a Python file defines.
 
-    Exceptions in the file's code, now or later, become one line for its author.
+    If the file's code raises an exception, now or later, the user sees an error
+    of one line that names the file.
 
     Args:
-        path: a file with one subclass of Method of its own, registered.
+        path: Python file that defines and registers one subclass of Method.
 
     Raises:
         InputError: there is no such file, it fails, or it does not register
@@ -416,7 +420,10 @@ def run_module(path: Path) -> ModuleType:
 
 
 def with_named_faults(function: Callable, path: Path) -> Callable:
-    """Returns a function whose exceptions become one line with the file."""
+    """Returns a function whose exceptions become one-line errors.
+
+    The errors name the file of the method.
+    """
 
     @functools.wraps(function)
     def call(*arguments: Any, **options: Any) -> Any:

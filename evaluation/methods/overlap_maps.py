@@ -107,8 +107,8 @@ def _ground_below(
     """Returns the height of the ground below each point (N,) [m].
 
     In each sector, the lowest points of successive rings give the height of the
-    ground. It begins at the height `start` below the sensor and is followed up
-    to `half` in x and y [m].
+    ground. The search begins with the ground `start` below the sensor, and
+    continues outwards to `half` in x and y [m].
     """
     # Sectors divide the sides of a square evenly. Angles would need an arc
     # tangent, whose last bits differ between processors.
@@ -145,7 +145,7 @@ def _extremes(
 
 
 def _poles(is_tall: np.ndarray) -> np.ndarray:
-    """Returns the numbers of isolated tall cells: poles.
+    """Returns the numbers of the cells with poles: isolated tall cells.
 
     Args:
         is_tall: (GRID, GRID) bool.

@@ -17,8 +17,8 @@ BSD-3); on the same scans, scores agree to 1e-6. Deliberate differences:
 - All places are compared. The program first takes the 50 nearest ones by the
   means of the rings, which saves time.
 - A place without points within range is never a candidate, and a query without
-such points has no candidates. - Scans with a narrow field of view get no
-special treatment.
+  such points has no candidates.
+- Scans with a narrow field of view get no special treatment.
 """
 
 from collections.abc import Sequence
@@ -79,7 +79,11 @@ class Probe:
     mu: np.ndarray
 
     def evidence(self) -> tuple[np.ndarray, np.ndarray]:
-        """Returns occupancy probabilities, moved towards 1/2, and log-odds."""
+        """Returns what a comparison needs: probabilities and their log-odds.
+
+        The probabilities that cells are occupied are first moved towards 1/2
+        where they are uncertain. Both arrays are (rings, sectors).
+        """
         mu = self.mu.astype(np.float64)
         sigma = np.sqrt(mu * (1.0 - mu))
         p = mu * (1.0 - sigma) + 0.5 * sigma

@@ -12,9 +12,9 @@ The rest is thinned to 4096 points, centred, and scaled so that the mean
 distance from the centre is 1/2. Points outside of [-1, 1] are replaced by other
 points. As in that program, x points backwards. Deliberate differences:
 
-- A place is one scan of a spinning LiDAR, not 20 m of a planar scanner. -
-Random draws have a fixed seed. - A cloud with fewer points than 4096 repeats
-some.
+- A place is one scan of a spinning LiDAR, not 20 m of a planar scanner.
+- Random draws have a fixed seed.
+- A cloud with fewer points than 4096 repeats some.
 """
 
 import abc
@@ -97,7 +97,7 @@ def _without_ground(points: np.ndarray, rng: np.random.Generator) -> np.ndarray:
 def _drawn(
     points: np.ndarray, chosen: np.ndarray, rng: np.random.Generator
 ) -> np.ndarray:
-    """Returns random points, as many as `chosen` lacks of the full number."""
+    """Returns random points, as many as `chosen` lacks to be complete."""
     lacking = NUM_POINTS - len(chosen)
     repeats = lacking > len(points)
     return points[rng.choice(len(points), lacking, replace=repeats)]
@@ -334,7 +334,9 @@ def dpa_net(weights: Weights, cloud: np.ndarray) -> np.ndarray:
 
 
 def farthest_points(points: np.ndarray, number: int) -> np.ndarray:
-    """Returns indices of points, each the farthest from all before it.
+    """Returns indices of points that are far apart from each other.
+
+    Each point is the one that is farthest from all points chosen before.
 
     The first index is 0.
     """
@@ -403,13 +405,19 @@ class NetworkConfig(MethodConfig):
     @computed_field  # type: ignore[prop-decorator]
     @property
     def digest(self) -> str:
-        """Digest of the weights' file; its name alone would not identify it."""
+        """Digest of the file of weights.
+
+        Results depend on it, because the file's name alone does not identify
+        the weights.
+        """
         content = read_bytes(self.weights, MOST_BYTES)
         return hashlib.sha256(content).hexdigest()[:16]
 
 
 class _Network(Method[np.ndarray, np.ndarray]):
-    """A network; descriptors (256,) are NaN without points.
+    """A published network as a place-recognition method.
+
+    The descriptor (256,) of a cloud without points is NaN.
 
     Scores are negative distances.
     """
@@ -450,7 +458,7 @@ class _Network(Method[np.ndarray, np.ndarray]):
 
 @register("svt-net")
 class SvtNet(_Network):
-    """SVT-Net."""
+    """The place-recognition method SVT-Net."""
 
     shapes = _SVT_NET
     infer = staticmethod(svt_net)
@@ -458,7 +466,7 @@ class SvtNet(_Network):
 
 @register("dpa-net")
 class DpaNet(_Network):
-    """DPA-Net."""
+    """The place-recognition method DPA-Net."""
 
     shapes = _DPA_NET
     infer = staticmethod(dpa_net)

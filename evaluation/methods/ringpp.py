@@ -50,8 +50,9 @@ class RingPlusPlusConfig(MethodConfig):
             uses points up to 100 m away; RING++ leaves out those beyond this
             square.
         crop: which points of the map are used: `square` uses all of them,
-            `round` only those within `half_width` of its centre. A square
-            contains other points if the LiDAR is turned; a circle does not.
+            `round` only those within `half_width` of its centre. If the LiDAR
+            is turned, a square contains other points than before, but a circle
+            contains the same points.
         min_height: smallest height above the ground of a point that is used
             [m]; the authors have z > -1.0 m for a LiDAR at 1.73 m.
         max_height: largest height above the ground of a point that is used [m];
@@ -123,17 +124,19 @@ class RingDatabase:
 
 @register("ring++")
 class RingPlusPlus(Method[Ring, RingDatabase]):
-    """RING++; the score of a pair is 1 - its distance.
+    """RING++; the score of two scans is 1 minus their distance.
 
     Where it differs from the authors' program:
 
     - For neighbours that lie in a plane, omnivariance and entropy are the
-    limits of their formulas. In the program's single precision, rounding makes
-    about one in ten of these values NaN, and it skips such points. - Rays
-    sample the map from above until it is zero. The program's rays end at the
-    edge of the map, where rounding adds or drops a sample. - If there are fewer
-    points than `neighbours`, all points are neighbours. - A place with an empty
-    map is never a candidate, and a query with an empty map has no candidates.
+      limits of their formulas. In the authors' program, which has single
+      precision, rounding makes about one in ten of these values NaN, and such
+      points are skipped.
+    - Rays sample the map from above until it is zero. The program's rays end at
+      the edge of the map, where rounding adds or drops a sample.
+    - If there are fewer points than `neighbours`, all points are neighbours.
+    - A place with an empty map is never a candidate, and a query with an empty
+      map has no candidates.
     """
 
     Config = RingPlusPlusConfig
@@ -283,8 +286,8 @@ class RingPlusPlus(Method[Ring, RingDatabase]):
     def _weigh(self, query: Ring) -> np.ndarray:
         """Returns a query's spectrum (6 F, F), weighted for the correlation.
 
-        The weights account for the frequencies that are not stored, about half
-        of them. The scale is that of the program, whose transforms are unitary.
+        The weights account for the frequencies that are not stored (about half
+        of all). The scale is that of the program, whose transforms are unitary.
         """
         n = self.config.cells
         scale = _CORRELATION_SCALE * _NUM_FEATURES * n * n * math.sqrt(n)
@@ -314,7 +317,10 @@ def _without_duplicates(points: np.ndarray) -> np.ndarray:
 
 
 def _frequency_weights(n: int) -> np.ndarray:
-    """Returns how many of n frequencies each of n // 2 + 1 represents."""
+    """Returns for how many of n frequencies each stored one stands.
+
+    Of n frequencies, n // 2 + 1 are stored.
+    """
     weights = np.full(n // 2 + 1, 2.0)
     weights[0] = 1.0
     if n % 2 == 0:
@@ -360,7 +366,7 @@ def _spectrum(image: np.ndarray) -> np.ndarray:
 
 
 def _best_offset(product: np.ndarray, n: int) -> tuple[float, tuple[int, int]]:
-    """Returns the greatest correlation of two images, and its shift.
+    """Returns the greatest correlation of two images, and the shift.
 
     `product` (C, n, F) is the spectrum of the image times the conjugate
     spectrum of the reference; n is the side of the images. The correlation is

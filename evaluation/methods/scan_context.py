@@ -11,15 +11,16 @@ therefore stores each place of the database three times: as seen, and as if seen
 from 2 m to either side.
 
 The defaults are those of the authors' T-RO program. On the same thinned scans,
-scores agree with it to 1e-15 for all variants except `augmented-cart`, for
-which it has no code. With `variant: polar`, `min_points: 1` and `far_points:
-dropped`, scores agree with the authors' C++ program to 3e-4, the precision of
-its heights. Deliberate differences:
+scores agree with those of this program to 1e-15 for all variants except
+`augmented-cart`, which the program lacks. With `variant: polar`, `min_points:
+1` and `far_points: dropped`, scores agree with the authors' C++ program to
+3e-4, the precision of its heights. Deliberate differences:
 
 - The voxels for thinning start at the sensor. The T-RO program leaves this to
-MATLAB, the C++ program to its caller. - The sensor's height is a parameter, 1.6
-m for CNS, instead of 1.9 or 2 m. - A function of the T-RO program accumulates
-the shifts that it tries; the code here follows its corrected copy.
+  MATLAB, the C++ program to its caller.
+- The sensor's height is a parameter, 1.6 m for CNS, instead of 1.9 or 2 m.
+- A function of the T-RO program wrongly adds up the shifts that it tries; the
+  code here follows a corrected copy of this function.
 - A cell may hold more than 500 points.
 - Two scans without a column in common have no score.
 """
@@ -63,8 +64,8 @@ class ScanContextConfig(MethodConfig):
         far_points: what happens to points beyond `max_range`. With `last-ring`
             they count in the last ring, as in [T]; with `dropped` they are left
             out, as in [C].
-        min_points: number of points from which on a cell of the polar context
-            is filled; [T] 5, [C] 1.
+        min_points: least number of points in a filled cell of the polar
+            context; [T] 5, [C] 1.
         cart_cell: length and width of a cell of the Cartesian context [m]; [T]
             5 and 2.
         cart_range: half the length and half the width of the Cartesian context
@@ -137,7 +138,7 @@ class ContextDatabase:
 
 @register("scan-context++")
 class ScanContext(Method[Contexts, ContextDatabase]):
-    """Scan Context++; the score of a pair is 1 - its distance."""
+    """Scan Context++; the score of two scans is 1 minus their distance."""
 
     Config = ScanContextConfig
     skips_places = True
@@ -306,7 +307,7 @@ def _polar_context(points: np.ndarray, config: ScanContextConfig) -> np.ndarray:
 
 
 def _cart_context(points: np.ndarray, config: ScanContextConfig) -> np.ndarray:
-    """Returns the greatest height per cell: rows along x, columns across.
+    """Returns the greatest height per cell: rows along x, columns along y.
 
     As in the T-RO program, cells are counted outwards from the axes, so that
     the cells around the axes are twice as large, and the first row and column
@@ -360,10 +361,11 @@ def _unit_columns(images: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
 
 
 def _key_shift(key: np.ndarray, others: np.ndarray) -> np.ndarray:
-    """Returns the shift (C,) at which each other key fits a key best.
+    """Returns the shift (C,) at which each of `others` fits `key` best.
 
-    It is the s that minimises |key - roll(other, s)|, and equally the s that
-    maximises the product of the two; the lowest of several equal ones.
+    The shift is the s that minimises |key - roll(other, s)|, which also
+    maximises the product of the two keys. Of several equal shifts, the lowest
+    is returned.
     """
     column = np.arange(len(key))
     rolled = key[(column + column[:, None]) % len(key)]

@@ -33,11 +33,11 @@ class SolidConfig(MethodConfig):
 
     Attributes:
         voxel_size: side of the voxels to which each cloud is first thinned [m];
-            [P] 1.0. ([C] has 0.4, but only [P] is for LiDARs with this field of
-            view.)
+            [P] 1.0. ([C] has 0.4, but only [P] is for LiDARs with a field of
+            view like that of `cns`.)
         min_range: smallest range of a point that is used [m]; [P] 3.
         max_range: largest range of a point that is used [m]; [P] 80, for a
-            LiDAR with this field of view.
+            LiDAR with a field of view like that of `cns`.
         ranges: number of equal cells of range, up to `max_range`; [P], [C] 40.
         azimuths: number of equal cells of azimuth in a turn; [P], [C] 60.
         elevations: number of equal cells of elevation over the field of view;
@@ -68,7 +68,7 @@ class SolidConfig(MethodConfig):
         return self
 
     def field(self, lidar: LidarField = _CNS) -> LidarField:
-        """Returns the given field of view, or else that of the LiDAR."""
+        """Returns the field of view of the settings, or else of the LiDAR."""
         elevations, lowest_deg, highest_deg = lidar
         if self.elevations is not None:
             elevations = self.elevations
@@ -107,18 +107,20 @@ class SolidDatabase:
 
 @register("solid")
 class SolidMethod(Method[Solid, SolidDatabase]):
-    """SOLiD; the score of a pair is the cosine of its range descriptors.
+    """SOLiD; the score of two scans is the cosine of their range descriptors.
 
     Where it differs from the authors' programs:
 
-    - An elevation outside the field of view counts in the outermost cell.
-      In [P], elevations below it wrap around to the top; [C] reads outside its
-      table if they are more than one cell too low.
+    - An elevation outside the field of view counts in the outermost cell. In
+      [P] (the authors' Python program), elevations below the field of view wrap
+      around to the top. [C] (their C++ program) reads outside its table if
+      elevations are more than one cell too low.
     - Coordinates that are exactly zero stay zero; the programs replace them
       by 1 mm.
     - If all elevations have the same number of points, all weights are 1 (the
-    programs divide by zero). - A place without points within range is never a
-    candidate, and a query without such points has no candidates.
+      programs divide by zero).
+    - A place without points within range is never a candidate, and a query
+      without such points has no candidates.
     """
 
     Config = SolidConfig
@@ -208,7 +210,8 @@ class SolidMethod(Method[Solid, SolidDatabase]):
     def _prepare(self, points: np.ndarray) -> np.ndarray:
         """Returns the thinned points within range.
 
-        The voxels of [P] begin half a voxel below the least coordinates.
+        As in the authors' Python program, the voxels begin half a voxel below
+        the least coordinates.
         """
         config = self.config
         # One column at a time: NumPy reduces slowly along a short axis.

@@ -24,7 +24,7 @@ _TYPES = {"FloatStorage": np.float32, "LongStorage": np.int64}
 
 
 class _Unknown:
-    """Stands for any object that is no tensor."""
+    """Stands for any object in a file that is no tensor."""
 
     def __init__(self, *arguments: Any, **options: Any):
         del arguments, options

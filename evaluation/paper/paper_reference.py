@@ -59,7 +59,7 @@ _MEAN_DIFFERENCE = 0.15
 
 
 def reference_for(map_names: Iterable[str]) -> Reference:
-    """Returns the paper's values if it has one of the maps, else none."""
+    """Returns the paper's values if it uses one of the maps, else none."""
     return NO_REFERENCE if paper().city_names.isdisjoint(map_names) else paper()
 
 
@@ -69,9 +69,10 @@ def paper() -> Reference:
 
     Two misprints are corrected, each with a note in its row: Table I gives
     Downtown 01-04 the value of 02-04, and one R@1 of RING++ on Riverside 02->01
-    contradicts the F1 beside it. The paper does not state the mode of
-    `recognition.metrics` of a method. The mode is inferred from the relation
-    between R@1, F1 and AUC in all rows of a method.
+    contradicts the F1 beside it. The paper does not state whether a method was
+    scored on all queries or only on queries with a match (the mode, see
+    `recognition.metrics`). This is inferred from the relation between R@1, F1
+    and AUC in all rows of the method.
     """
     changes = {
         (row["map"], row["sequence_a"], row["sequence_b"]): float(
@@ -188,7 +189,10 @@ def findings(
 
 
 def trend(change: Sequence[float], auc: Sequence[float]) -> Trend:
-    """Returns the trend of AUC over TCR_sym over three or more pairs."""
+    """Returns the trend of AUC over TCR_sym.
+
+    There must be three or more pairs of drives.
+    """
     x, y = np.asarray(change), np.asarray(auc)
     spread = float(np.ptp(y))
     if np.ptp(x) == 0.0 or spread == 0.0:
@@ -207,7 +211,7 @@ def trend(change: Sequence[float], auc: Sequence[float]) -> Trend:
 
 
 def paper_trend(method: str) -> Trend:
-    """Returns the trend in the paper's own Table II."""
+    """Returns a method's trend of AUC over TCR_sym in the paper's Table II."""
     return trend(*zip(*paper().auc_over_change(method), strict=True))
 
 
@@ -216,7 +220,7 @@ def _trends(
     tcr: Mapping[tuple[str, str, str], float],
     methods: Sequence[str],
 ) -> dict[str, Trend]:
-    """Returns method -> its trend in mode all, if it has enough pairs."""
+    """Returns the trend of each method (mode all) that has enough pairs."""
     trends = {}
     for method in methods:
         points = [
@@ -250,9 +254,10 @@ def _larger_than_real(changes: Sequence[ChangeResult]) -> Finding:
         f"The change meets or surpasses that of four years at KAIST"
         f" ({real:.4f}).",
         FITTED,
-        f"First stage against last, TCR_sym: {values};"
-        f" {len(reached)} of {len(widest)} do. These values were fitted to the"
-        " paper's, of which only Suburbia (0.1840) and Metropolis (0.2920) do.",
+        f"TCR_sym between the first and the last stage: {values}. It reaches"
+        f" KAIST's in {len(reached)} of {len(widest)} cities. The cities were"
+        " fitted to the paper's values, which reach KAIST's only in Suburbia"
+        " (0.1840) and Metropolis (0.2920).",
         "Table I",
     )
 
@@ -262,13 +267,13 @@ def _ring_is_best(
 ) -> Finding:
     best = _best_methods(results)
     evidence = (
-        "By AUC in the table beside the paper's numbers (protocol paper), on"
-        f" {len(best)} pairs of the paper's cities, the best of the paper's"
-        f" methods is {_listed(best)}. {_counted_alike(results)}"
+        "In the table beside the paper's numbers (protocol paper), the paper's"
+        f" method with the greatest AUC on {len(best)} pairs is"
+        f" {_listed(best)}. {_counted_alike(results)}"
     )
     asked = shown[0].protocol.name
     if asked != "paper":
-        words = f"By the protocol {asked} of the tables of all methods"
+        words = f"With the protocol {asked}, as in the other tables"
         evidence += f" {_counted_alike(shown, words)}"
     return Finding(
         "RING++ is the best of the paper's methods on every pair, as the paper"
@@ -281,13 +286,16 @@ def _ring_is_best(
 
 def _counted_alike(
     results: Sequence[PlaceRecognition],
-    words: str = "When all methods are counted alike",
+    words: str = "If all queries count for every method",
 ) -> str:
-    """Returns a sentence on which methods are best if all are in mode all."""
+    """Returns a sentence on which methods are best if all queries count.
+
+    That is the mode `all` for every method.
+    """
     best = _best_methods(results, "all")
     number = sum(_RING in methods for methods in best)
     return (
-        f"{words}, on all queries, {_RING} is best on {number} of {len(best)}"
+        f"{words}, {_RING} is best on {number} of {len(best)} pairs"
         f" ({_listed(best)})."
     )
 
@@ -297,8 +305,9 @@ def _best_methods(
 ) -> list[list[str]]:
     """Returns the methods with the greatest AUC on each pair.
 
-    Table II prints these in bold; there are several if their printed digits are
-    equal. If no mode is given, each method has the paper's mode.
+    Table II of the paper prints these methods in bold. A pair has several if
+    their AUCs are equal as printed. By default, each method is scored in the
+    mode that the paper used for it.
     """
     table = recognition_table(results, (), mode, paper())
     methods = [name for name, _ in table.groups[1:]]
@@ -316,7 +325,10 @@ def _best_methods(
 
 
 def _listed(best: Iterable[Iterable[str]]) -> str:
-    """Returns "<method> on <number>, ...": the pairs on which each is best."""
+    """Returns on how many pairs each method is best, as text.
+
+    The text has the form "<method> on <number>, ...".
+    """
     counts = Counter(itertools.chain.from_iterable(best)).most_common()
     return ", ".join(f"{method} on {number}" for method, number in counts)
 
@@ -381,7 +393,9 @@ def _part(number: int, total: int) -> str:
 def aims(
     results: Sequence[PlaceRecognition], changes: Sequence[ChangeResult]
 ) -> list[Finding]:
-    """Returns whether each aim is met; empty unless all pairs are present.
+    """Returns whether each aim of the shipped cities is met.
+
+    The list is empty unless the results of all the paper's pairs are present.
 
     RING++ is evaluated on queries with a match and all other methods on all
     queries, as the paper seems to have done.

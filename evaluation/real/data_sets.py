@@ -9,7 +9,7 @@ from collections.abc import Callable, Sequence
 from functools import partial
 import hashlib
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 
@@ -37,12 +37,12 @@ class DataSet(NamedTuple):
         origin: repository of the data set, and the path in it.
         licence: terms of use.
         digest: SHA-256 of all scans, concatenated in the order of their names.
-        poses: where poses come from: `drive` for a folder that `open_drive`
-            reads; `matrices` for a `poses.txt` whose rows are the upper 3 x 4
-            of X_WS; `named` for a `poses.txt` whose rows are a scan's name, x y
-            z and quat_xyzw; "" for none.
+        poses: where the poses are: `drive` for a folder that `open_drive`
+            reads; `matrices` for a file `poses.txt` with the upper 3 x 4 part
+            of X_WS in each row; `named` for a `poses.txt` with a scan's name, x
+            y z and quat_xyzw in each row; "" for a data set without poses.
         read: function that reads a scan.
-        whole: whether the scans contain all points that the unit measured.
+        whole: whether the scans contain all points that the LiDAR measured.
     """
 
     folder: str
@@ -157,17 +157,6 @@ class RealScans(NamedTuple):
         return self.data_set.folder
 
 
-class _Scans(FileDrive):
-    """Files without times, each read by the data set's own function."""
-
-    def __init__(self, read: Callable[[Path], np.ndarray], **drive: Any):
-        self._read_file = read
-        super().__init__(**drive)
-
-    def _read(self, path: Path, stamp_ns: int) -> np.ndarray:
-        return self._read_file(path)
-
-
 def open_data_sets(folder: Path, on_note: OnNote) -> list[RealScans]:
     """Returns the drives of the data sets in a folder.
 
@@ -216,19 +205,19 @@ def _open(folder: Path, one: DataSet, files: Sequence[Path]) -> Drive:
             raise InputError(f"{table}: {len(X_WS)} rows for {number} scans")
     elif one.poses:
         X_WS = _named_poses(table, files)
-    return _Scans(
-        one.read,
+    return FileDrive(
         name=one.folder,
         world_frame=one.world,
         files=list(files),
         stamps_ns=np.arange(number),
         X_WS=X_WS,
+        read=lambda path, stamp_ns: one.read(path),
         unit=one.unit,
     )
 
 
 def _named_poses(table: Path, files: Sequence[Path]) -> np.ndarray:
-    """Returns the pose of each file by the number that is its name."""
+    """Returns the poses of files, whose names are numbers in a table."""
     try:
         numbers = np.array([int(file.stem) for file in files])
     except ValueError as error:
@@ -242,7 +231,7 @@ def simulated_drives(folder: Path, unit: str) -> list[Drive]:
     """Returns the drives in a folder that were simulated with a LiDAR unit.
 
     Raises:
-        InputError: one cannot be opened.
+        InputError: a drive cannot be opened.
     """
     if not folder.is_dir():
         raise InputError(f"{folder}: no such folder")

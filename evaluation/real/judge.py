@@ -1,4 +1,4 @@
-"""Can a classifier tell real scans from simulated ones?
+"""Tests whether a classifier can tell real scans from simulated scans.
 
 Of each scan, sixteen patches of 8 m within 30 m of the LiDAR are described by
 features. Boosted trees then learn to tell the patches of the two sets apart; a
@@ -9,16 +9,16 @@ As a control, the classifier tells the first half of the simulated places from
 the second half. All AUCs are means over random draws of patches; single draws
 differ by up to 0.04.
 
-Rings come from recordings, or from files with one ring after the other, as
-KITTI's. Features that need rings are left out if one of the sets has none.
+Some features need the ring (laser) of each point. Rings are read from
+recordings, or from files that store one ring after the other, like KITTI's. If
+one of the two sets has no rings, these features are left out.
 
-Needs the extra `judge`.
+The module needs the optional packages of the extra `judge`.
 """
 
 from __future__ import annotations
 
 from collections.abc import Iterator
-from pathlib import Path
 
 import numpy as np
 from scipy.spatial import cKDTree
@@ -26,9 +26,8 @@ from sklearn.ensemble import HistGradientBoostingClassifier
 from sklearn.metrics import roc_auc_score
 from threadpoolctl import threadpool_limits
 
-from cns_drake.base.errors import InputError
 from cns_drake.base.progress import Track, silent
-from evaluation.drives import Drive, open_drive
+from evaluation.drives import Drive
 
 _PATCHES = 16
 _HALF_WIDTH = 4.0
@@ -70,26 +69,8 @@ def scan_table(scan: np.ndarray) -> np.ndarray:
     return table[np.isfinite(table[:, :3]).all(axis=1)]
 
 
-def read_places(path: Path) -> list[list[np.ndarray]]:
-    """Returns the scans of each place in a data set."""
-    if not path.is_dir():
-        raise InputError(f"{path}: no folder of scans")
-    files = sorted(path.glob("*.bin"))
-    if files:
-        raws = (np.fromfile(file, np.float32).reshape(-1, 4) for file in files)
-        return [[scan_table(raw) for raw in raws]]
-    try:
-        drive = open_drive(path)
-    except InputError:
-        folders = sorted(one for one in path.iterdir() if one.is_dir())
-        if not folders:
-            raise
-        return [place for one in folders for place in read_places(one)]
-    return places_of(drive)
-
-
 def places_of(drive: Drive) -> list[list[np.ndarray]]:
-    """Returns the scans of each place of a drive, at most 40 in all."""
+    """Returns the scans of a drive by place, at most 40 scans in all."""
     step = -(-len(drive) // _MOST_SCANS)
     places: list[list[np.ndarray]] = []
     first = np.full(3, np.inf)
@@ -103,7 +84,7 @@ def places_of(drive: Drive) -> list[list[np.ndarray]]:
 
 
 def patches(scan: np.ndarray, rng: np.random.Generator) -> Iterator[np.ndarray]:
-    """Yields small pieces of a scan."""
+    """Yields small pieces of a scan, at random places."""
     ranges = np.linalg.norm(scan[:, :3], axis=1)
     near = np.flatnonzero((ranges > _NEAREST) & (ranges < _FARTHEST))
     found = 0
@@ -118,7 +99,11 @@ def patches(scan: np.ndarray, rng: np.random.Generator) -> Iterator[np.ndarray]:
 
 
 def describe(patch: np.ndarray, rng: np.random.Generator) -> dict[str, float]:
-    """Returns name -> feature of a patch; a name begins with its group."""
+    """Returns name -> feature of a patch.
+
+    A name begins with the name of the group of features, such as all features
+    of intensity.
+    """
     p, bright, ring = patch[:, :3], patch[:, 3], patch[:, 4]
     tree = cKDTree(p)
     result = _intensity(bright, tree) | _density(p, ring, tree)
@@ -272,7 +257,7 @@ def _quantile(values: np.ndarray, part: float) -> float:
 
 
 class Features:
-    """The features of the patches of a set.
+    """The features of all patches of a set of scans (real or simulated).
 
     Attributes:
         rows: a dictionary for each patch.
@@ -291,7 +276,7 @@ class Features:
         self.place = np.array(numbers)
 
     def of(self, names: list[str]) -> np.ndarray:
-        """Returns (N, F) features; NaN where a patch has none."""
+        """Returns features (N, F) by their names; NaN if a patch lacks one."""
         return np.array(
             [[row.get(name, np.nan) for name in names] for row in self.rows]
         )
@@ -307,7 +292,10 @@ class Features:
 
 
 def common_names(sets: list[Features]) -> list[str]:
-    """Returns the features that at least a tenth of each set's patches have."""
+    """Returns the names of features that at least a tenth of patches have.
+
+    That must be so in each of the sets.
+    """
     names = list(dict.fromkeys(n for s in sets for row in s.rows for n in row))
     shares = [np.isfinite(one.of(names)).mean(axis=0) for one in sets]
     kept = np.min(shares, axis=0) >= 0.1
@@ -342,14 +330,16 @@ def tell_apart(real: Features, simulated: Features, names: list[str]) -> float:
 
 
 def _in_folds(one: Features) -> np.ndarray:
-    """Returns the number of each patch's place, in order of appearance."""
+    """Returns the number of each patch's place, counted by appearance."""
     return np.unique(one.place, return_inverse=True)[1]
 
 
 def judge(real: Features, simulated: Features) -> dict:
-    """Returns the AUC of a classifier by groups of features, and of a control.
+    """Returns how well a classifier tells real from simulated scans.
 
-    The classifier tells real from simulated scans.
+    The result contains the AUC of the classifier for each group of features,
+    and that of a control: the same classifier on two halves of the simulated
+    scans.
     """
     names = common_names([real, simulated])
     groups = {"all": names}
@@ -381,7 +371,10 @@ def judge_draws(
     draws: int,
     track: Track = silent,
 ) -> dict:
-    """Returns the result of `judge`, averaged over draws of patches."""
+    """Returns how well a classifier tells real from simulated scans.
+
+    The result is that of `judge`, averaged over several draws of patches.
+    """
     results = []
     for seed in track(range(draws), "judging", draws):
         sets = Features(real, seed), Features(simulated, seed)

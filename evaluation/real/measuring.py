@@ -1,19 +1,20 @@
 """The tasks of a study, measured on public data sets of few scans.
 
-Each scan of a data set with poses is a query. Its candidates are all other
-scans of the same LiDAR unit: from its data set, other data sets and simulated
-recordings. A place is a single scan; queries are turned and tilted as in the
-protocol `fair`. Each scan is also localised, from a random start, in a map of
-the scans around it. The judge, a classifier, tells each data set from simulated
-scans of the same unit.
+Each scan of a data set with poses is a query. The places among which it is
+searched are all other scans of the same model of LiDAR: from its data set, from
+other data sets and from simulated recordings. A place is a single scan; queries
+are turned and tilted as in the protocol `fair`. Each scan is also localised,
+from a random start, in a map of the scans around it. A classifier (see `judge`)
+also tries to tell each data set from simulated scans of the same model of
+LiDAR.
 """
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import replace
 import importlib.util
 import math
 from pathlib import Path
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -34,16 +35,16 @@ from evaluation.recognition.description import (
     describe_drive,
     joined_scans,
 )
-from evaluation.recognition.metrics import UNKNOWN, Interval
 from evaluation.recognition.overlap_truth import best_overlaps
 from evaluation.recognition.place_outcome import (
+    Number,
     PlaceOutcome,
     place_numbers,
     pose_numbers,
 )
 from evaluation.recognition.protocol import FAIR_PROTOCOL, RetrievalProtocol
 from evaluation.recognition.retrieval import compare_with_gates
-from evaluation.results.table import Answers, Key, QueryRows, Results, Row
+from evaluation.results.table import Answers, QueryRows, Results, Row
 
 _SIMULATED = replace(FAIR_PROTOCOL, scans_per_place=1)
 # Every real scan is a query and a place.
@@ -61,7 +62,7 @@ _DRAWS = 1
 
 
 class _Part(NamedTuple):
-    """Places, with descriptions, from one data set or one recording."""
+    """Described places from one data set or one recording."""
 
     name: str
     world: str
@@ -84,7 +85,7 @@ class Measuring:
             names: names of methods and estimators, or Python files with your
                 own methods; if empty, all shipped ones.
             track: reports progress.
-            on_note: takes notes.
+            on_note: is called with each note for the user.
 
         Raises:
             InputError: a method is not known, or its file cannot be used.
@@ -117,11 +118,12 @@ class Measuring:
 
         Args:
             folder: see `open_data_sets`.
-            simulated: folder of simulated recordings. They add places, and the
-                judge tells real scans from theirs.
+            simulated: folder of simulated recordings. Their scans are added as
+                places, and a classifier tries to tell the real scans from them.
 
         Raises:
-            InputError: no data set is there, or one cannot be read.
+            InputError: the folder contains no data set, or a data set cannot be
+                read.
         """
         found = open_data_sets(folder, self._note)
         for unit in dict.fromkeys(one.data_set.unit for one in found):
@@ -147,30 +149,28 @@ class Measuring:
         one: RealScans,
         task: str,
         method: str,
-        values: Sequence[tuple[str, float, Interval]],
-        n: int,
+        numbers: Iterable[Number],
         *,
         gate: bool = False,
         database: str = "",
-    ) -> Key:
-        """Adds rows, and returns what identifies them."""
-        key = Key(
-            experiment="real",
-            map=one.data_set.world,
-            database=database or one.name,
-            query=one.name,
-            seed=_REAL.seed,
-            factors={},
-            task=task,
-            method=method,
-            gate=gate,
-            protocol=_REAL.name,
-        )
-        self.rows += [
-            Row(**vars(key), metric=m, value=v, low=i.low, high=i.high, n=n)
-            for m, v, i in values
-        ]
-        return key
+        columns: Mapping[str, np.ndarray] | None = None,
+    ) -> None:
+        """Adds the results of a method, and its answers if it has columns."""
+        key: dict[str, Any] = {
+            "experiment": "real",
+            "map": one.data_set.world,
+            "database": database or one.name,
+            "query": one.name,
+            "seed": _REAL.seed,
+            "factors": {},
+            "task": task,
+            "method": method,
+            "gate": gate,
+            "protocol": _REAL.name,
+        }
+        self.rows += [Row.of(number, **key) for number in numbers]
+        if columns is not None:
+            self.answers.append(Answers(**key, columns=columns))
 
     def _recognise(
         self, sets: Sequence[RealScans], made: Sequence[Drive]
@@ -215,7 +215,7 @@ class Measuring:
         parts: Sequence[_Part],
         methods: Sequence[Method],
     ) -> None:
-        """Adds the rows of `place` and `pose` of a data set."""
+        """Adds a data set's results of the tasks `place` and `pose`."""
         world, drive = one.data_set.world, one.drive
         # The data set itself comes first, then other sets of the same world.
         parts = sorted(
@@ -259,34 +259,22 @@ class Measuring:
                     overlaps,
                     _REAL.radius,
                 )
-                numbers = [
-                    (n.metric, n.value, n.interval)
-                    for n in place_numbers(now, None)
-                ]
-                key = self._add(
-                    one, "place", method.name, numbers, len(drive), gate=gate
-                )
-                columns = {
-                    # None, in whole numbers, is empty.
-                    name: np.array([-1 if v is None else v for v in values])
-                    for name, values in now.columns().items()
-                }
-                self.answers.append(Answers(**vars(key), columns=columns))
-                poses = [
-                    (n.metric, n.value, n.interval)
-                    for n in pose_numbers(now, None)
-                ]
                 self._add(
                     one,
-                    "pose",
+                    "place",
                     method.name,
-                    poses,
-                    int(now.outcomes.has_match.sum()),
+                    place_numbers(now, None),
                     gate=gate,
+                    columns=now.columns,
                 )
+                poses = pose_numbers(now, None)
+                self._add(one, "pose", method.name, poses, gate=gate)
 
     def _localise(self, one: RealScans) -> None:
-        """Adds the rows of `localise`: each scan in a map of the rest."""
+        """Adds a data set's results of the task `localise`.
+
+        Each scan is localised in a map of the other scans.
+        """
         drive, X_WS = one.drive, one.drive.X_WS
         R_WT = localise.way_axes(X_WS[:, :3, 3], X_WS)
         found: dict[str, list[np.ndarray]] = {n: [] for n in self._estimators}
@@ -310,13 +298,15 @@ class Measuring:
         for name, rows in found.items():
             if rows:
                 result = localise.Localisation(np.array(rows))
-                values = [(n, v, UNKNOWN) for n, v in result.numbers().items()]
-                key = self._add(one, "localise", name, values, len(rows))
+                numbers = result.numbers(name)
                 columns = result.columns()
-                self.answers.append(Answers(**vars(key), columns=columns))
+                self._add(one, "localise", name, numbers, columns=columns)
 
     def _judge(self, one: RealScans, made: Sequence[Drive]) -> None:
-        """Adds the rows of `judge`, by groups of features."""
+        """Adds how well a classifier tells a data set from simulated scans.
+
+        There is a result for each group of features.
+        """
         if not one.data_set.whole:
             self._note(f"{one.name}: thinned scans, not judged")
             return
@@ -340,6 +330,9 @@ class Measuring:
         )
         for group, auc in found["auc"].items():
             values = {"auc": auc, "auc_control": found["control"][group]}
-            known = [(n, v, UNKNOWN) for n, v in values.items() if v == v]
-            number = found["patches"][0]
-            self._add(one, "judge", group, known, number, database="simulated")
+            known = [
+                Number(group, False, n, v, n=found["patches"][0])
+                for n, v in values.items()
+                if v == v
+            ]
+            self._add(one, "judge", group, known, database="simulated")

@@ -1,4 +1,4 @@
-"""Costs of a method: time to describe and query, and memory per place."""
+"""Measures a method's cost: time to describe and query, memory per place."""
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
@@ -21,11 +21,12 @@ class Cost:
 
     Attributes:
         method: name of the method.
-        scans_per_place: number of scans merged into a cloud.
+        scans_per_place: number of scans that are merged into a cloud.
         points: mean number of points in a cloud.
         describe_ms: time to describe a query's cloud [ms].
-        query_ms: time to compare a query with all places, including a second
-            stage, the gate and the pose of the best place [ms].
+        query_ms: time to compare a query with all places [ms]. It includes the
+            method's second stage and the gate, if used, and the pose of the
+            best place.
         places: number of places.
         place_bytes: mean size of a place's pickled description.
     """
@@ -55,8 +56,8 @@ def measure_cost(
             counted, since it includes loading and compiling.
         scans_per_place: number of merged scans.
         database: described drive with places.
-        query: described drive with queries; the number used is that of the
-            clouds.
+        query: described drive with queries, of which as many are measured as
+            there are clouds.
         gate_radius: see `score_places`.
     """
     describing = [cpu_ms(method.describe, cloud) for cloud in clouds]

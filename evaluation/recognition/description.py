@@ -1,4 +1,4 @@
-"""Descriptions of a drive's places and queries, by methods."""
+"""Lets place-recognition methods describe a drive's places and queries."""
 
 from collections.abc import Callable, Iterable, Mapping, Sequence, Set
 from dataclasses import dataclass, field
@@ -35,11 +35,12 @@ class DescribedScans:
         frames: (K,) frame numbers in the drive.
         stamps_ns: (K,) int64 time stamps.
         X_WS: (K, 4, 4) poses of the sensor.
-        descriptors: K descriptors; empty if the drive does not have this role.
+        descriptors: K descriptors; empty if the drive has no places, or no
+            queries.
         clouds: the K described clouds if the method has a second stage;
             otherwise empty.
-        blocks: (K,) block of the route in which each lies, see `route_blocks`;
-            None if the route is unknown.
+        blocks: (K,) block of the route in which each place or query lies, see
+            `route_blocks`; None if the route is unknown.
     """
 
     frames: np.ndarray
@@ -62,7 +63,9 @@ def joined_scans(
 ) -> DescribedScans:
     """Returns the scans of several drives, by default all of them.
 
-    Worlds are moved so far apart that scans of different worlds never match.
+    `worlds` contains the number of each drive's world. Different worlds are
+    moved so far apart that their scans never match. At most `most` scans are
+    returned.
     """
     poses = []
     for one, world in zip(every, worlds, strict=True):
@@ -110,17 +113,18 @@ def describe_drive(
     Args:
         drive: the drive.
         methods: methods that describe the scans.
-        roles: roles of the drive.
+        roles: whether the drive has places, queries or both.
         protocol: protocol by which frames of places and queries are chosen, and
             their clouds made.
         track: reports progress.
-        visit: function that is called with each described frame and its single
-            scan (N, 3), cropped, in the sensor's frame. The scan is as recorded
-            if the drive has places, otherwise as its queries see it.
+        visit: function that is called with the number and the cropped scan (N,
+            3) of each described frame. The scan is in the sensor's frame. If
+            the drive has only queries, the scan is turned, tilted and hidden
+            like the query.
         further: requests for descriptions by other protocols.
 
     Returns:
-        The descriptions by each method, then the further ones.
+        The descriptions by each method, then those of the further requests.
 
     Raises:
         InputError: if the drive cannot be read, it lacks a field that a
@@ -161,7 +165,7 @@ class _Seen:
         self._clouds: dict[tuple, np.ndarray] = {}
 
     def sensor(self, protocol: RetrievalProtocol) -> QuerySensor | None:
-        """Returns the sensor of the frame's query; None if as recorded."""
+        """Returns the sensor of the frame's query; None if it is unchanged."""
         if protocol not in self._sensors:
             self._sensors[protocol] = protocol.query_sensor(self.frame)
         return self._sensors[protocol]
@@ -169,7 +173,10 @@ class _Seen:
     def cloud(
         self, sensor: QuerySensor | None, kind: _Kind, max_range: float
     ) -> np.ndarray:
-        """Returns a cloud, the same array for the same arguments."""
+        """Returns the frame's cloud as a sensor sees it.
+
+        Equal arguments return the same array.
+        """
         key = sensor, kind, max_range
         if key not in self._clouds:
             number, before, fields = kind
@@ -186,7 +193,7 @@ class _Seen:
 
     @property
     def most_points(self) -> int:
-        """Size of the greatest cloud."""
+        """Number of points of the frame's largest cloud."""
         return max(map(len, self._clouds.values()), default=0)
 
 
@@ -200,7 +207,7 @@ def _frames(
 
 
 class _Describing:
-    """The descriptions of one drive by one method, in progress."""
+    """Collects the descriptions of one drive by one method."""
 
     def __init__(
         self,
@@ -240,7 +247,10 @@ class _Describing:
         return set().union(*self._members.values())
 
     def add(self, seen: _Seen) -> None:
-        """Adds a frame in its roles; it is described when a batch is full."""
+        """Adds a frame as place, query or both, to be described with a batch.
+
+        It is described when enough frames for a batch are waiting.
+        """
         clouds = {
             role: seen.cloud(
                 seen.sensor(self._protocol) if role == "queries" else None,

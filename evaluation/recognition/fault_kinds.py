@@ -1,4 +1,4 @@
-"""Reasons for a wrong best place, from the scans of both drives."""
+"""Finds why the best place of a query is wrong, from both drives' scans."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -30,28 +30,30 @@ MUCH_CHANGED = 0.25
 
 @dataclass(frozen=True)
 class PairEvidence:
-    """Comparisons of the scans of Q queries and of places.
+    """Evidence from the scans of a pair of drives, for each of Q queries.
 
-    The right place of a query is the match whose scan shows most of the query's
-    scan.
+    A query can have several true matches. Here, its right place is the match
+    whose scan shows most of the query's scan.
 
     Attributes:
         overlaps: (Q,) share of the query's scan that the right place's scan
             shows; NaN without a match.
         hidden: (Q,) share of the query's scan that is hidden from the right
             place's sensor; NaN without a match.
-        changed: (Q,) share of both scans' upright points that lie on a
-            structure that is absent from the other scan although it is not
-            hidden there. NaN without a match, or if a recording does not name
-            its structures.
-        changed_classes: Q names of the class with most of these points; "" if
-            there are none.
+        changed: (Q,) share of the upright points of both scans, the query's and
+            its right place's, that show a change: the other scan has no point
+            on their structure, although it is not hidden from that scan's
+            sensor. NaN without a match, or if a recording does not name its
+            structures.
+        changed_classes: for each query, the class of structures with most of
+            the points counted in `changed`; "" if there are none.
         right_fits: (Q,) share of the upright points of the query and its right
             place that coincide at the best alignment of the two scans; NaN if
-            no method is wrong.
+            `fits` is NaN for every method.
         fits: method -> (Q,) the same share for the query and its wrong best
-            place; NaN if the best place is right or only too far.
-        unchanged: (Q,) `overlaps` of the control; None without a control.
+            place; NaN if the best place is right, or less than two radii away.
+        unchanged: (Q,) `overlaps` of the control, which is the same comparison
+            without a change of the city; None without a control.
     """
 
     overlaps: np.ndarray
@@ -64,25 +66,33 @@ class PairEvidence:
 
     @property
     def visible_changes(self) -> np.ndarray:
-        """(Q,) share of each query's scan that the right place lacks."""
+        """(Q,) share of a query's scan that its right place does not show."""
         return 1.0 - self.overlaps
 
     @property
     def visible_change(self) -> tuple[float, int]:
-        """Mean visible change, and the number of queries that have one."""
+        """Mean visible change, and the number of queries with a match.
+
+        The visible change is the share of a query's scan that its right place
+        does not show.
+        """
         return mean_visible_change(self.overlaps)
 
     @property
     def visible_change_added(self) -> float:
-        """Mean visible change minus the control's; NaN without a control."""
+        """Mean visible change minus that of the control; NaN without a control.
+
+        The control is the same comparison without a change of the city.
+        """
         return visible_change_added(self.overlaps, self.unchanged)
 
 
 def visible_change_added(now: np.ndarray, before: np.ndarray | None) -> float:
     """Returns the mean visible change minus that of a baseline.
 
-    Both values contain what is not visible only because of the different
-    viewpoints (parallax); the difference cancels this part.
+    The visible change also contains parts of a scan that are hidden only
+    because the viewpoints differ (parallax). Subtracting the baseline removes
+    this share.
 
     Args:
         now: (Q,) overlaps, see `PairEvidence`.
@@ -122,14 +132,15 @@ def fault_kinds(result: PlaceRecognition, evidence: PairEvidence) -> list[str]:
     """Returns the reason for each query's wrong best place.
 
     Returns:
-        Q reasons, the first that applies: "" if the best place is right;
-        `no_place` if the query has no match; `no_candidate` if the method finds
-        no place or rejects all; `too_far` if the best place is within two
-        radii; `hidden` if the right place shows less than half of the query's
-        scan, and most of the rest is hidden there; `no_overlap` if it shows
-        less than half for another reason; `changed` if at least a quarter of
-        the surroundings has come or gone; `twin` if the best place fits the
-        query as well as the right place does; otherwise `elsewhere`.
+        For each of Q queries, the first reason that applies: "" if the best
+        place is right; `no_place` if the query has no match; `no_candidate` if
+        the method finds no place or rejects all places; `too_far` if the best
+        place is less than two radii away, but not a match; `hidden` if the
+        right place shows less than half of the query's scan, and most of the
+        rest is hidden from its sensor; `no_overlap` if it shows less than half
+        for another reason; `changed` if at least a quarter of the surroundings
+        is new or gone; `twin` if the best place fits the query as well as the
+        right place does; otherwise `elsewhere`.
     """
     retrieval = result.retrieval
     little = evidence.overlaps < _ENOUGH

@@ -3,28 +3,32 @@
 The definitions were derived from the paper's numbers. Only the best place of
 each query counts:
 
-- TP: accepted, and the best place is a true match, - FP: accepted, and the best
-place is not a true match, whether or not the query has a match, - FN: rejected,
-although the query has a match.
+- TP: accepted, and the best place is a true match,
+- FP: accepted, and the best place is not a true match, whether or not the query
+  has a match,
+- FN: rejected, although the query has a match.
 
-A rejected query without a match is in none of these. A query without a
+A rejected query without a match is neither TP, FP nor FN. A query without a
 candidate is never accepted. In mode `all` every query counts; in mode
-`filtered` only queries that have a match (F1max then follows from recall at 1).
+`filtered` only queries that have a match (there, the greatest F1 follows from
+R@1).
 
-A query with a match that gets a wrong answer is FP once it is accepted, and no
-longer FN. Recall = TP / (TP + FN) therefore reaches 1 for every method that
-answers all queries. `auc_strict` is the area with recall = TP / N, of N queries
-with a match.
+A query with a match and a wrong best place is FN while it is rejected, and FP
+once it is accepted. Recall = TP / (TP + FN) therefore reaches 1 for every
+method that has a best place for all queries. The strict AUC, `auc_strict`, is
+the area under the curve with recall = TP / N instead, where N is the number of
+queries with a match.
 
 In both modes, R@N is the share of the queries with a match that have a match
 among their N best places.
 """
 
-from collections.abc import Sequence
+from collections.abc import Hashable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import lru_cache
+import itertools
 import math
-from typing import Literal
+from typing import Any, Literal
 
 import numpy as np
 from scipy.special import stdtr, stdtrit
@@ -45,7 +49,9 @@ MAX_RANK = 25
 
 @dataclass(frozen=True)
 class PrCurve:
-    """Precision and recall at every distinct score, from the best score down.
+    """The precision-recall curve: a point for every distinct score.
+
+    The first point is that of the best score.
 
     Attributes:
         thresholds: (K,) least accepted scores, decreasing.
@@ -61,14 +67,14 @@ class PrCurve:
 
     @property
     def precision(self) -> np.ndarray:
-        """(K,) precision; every threshold accepts at least one query."""
+        """(K,) precision TP / (TP + FP) at each threshold."""
         return self.true_positives / (
             self.true_positives + self.false_positives
         )
 
     @property
     def recall(self) -> np.ndarray:
-        """(K,) recall at each threshold; 0 if there is nothing to recall."""
+        """(K,) recall TP / (TP + FN) at each threshold; 0 if TP + FN is 0."""
         return recall_of(self.true_positives, self.false_negatives)
 
     @property
@@ -83,7 +89,7 @@ class PrCurve:
 
     @property
     def auc(self) -> float:
-        """Area under the curve, by trapezoids over the recalls it reaches.
+        """Area under the curve by trapezoids, up to its greatest recall.
 
         From recall 0 to its first point, the curve has that point's precision.
         The area is 0 if nothing is ever accepted.
@@ -149,7 +155,7 @@ def weighted_counts(
 
 
 def areas_under(precision: np.ndarray, recall: np.ndarray) -> np.ndarray:
-    """Returns the areas (B,) under curves (B, K); K can be 0."""
+    """Returns the areas (B,) under B precision-recall curves; K can be 0."""
     if precision.shape[1] == 0:
         return np.zeros(len(precision))
     start = precision[:, 0] * recall[:, 0]
@@ -159,13 +165,13 @@ def areas_under(precision: np.ndarray, recall: np.ndarray) -> np.ndarray:
 
 
 def recall_of(tp: np.ndarray, fn: np.ndarray) -> np.ndarray:
-    """Returns TP / (TP + FN), 0 if there is nothing to recall."""
+    """Returns the recall TP / (TP + FN); 0 if TP + FN is 0."""
     return tp / np.maximum(tp + fn, 1)
 
 
 @dataclass(frozen=True)
 class Interval:
-    """A confidence interval; NaN if it is unknown."""
+    """A 95 % confidence interval; its limits are NaN if it is unknown."""
 
     low: float = math.nan
     high: float = math.nan
@@ -180,6 +186,9 @@ UNKNOWN = Interval()
 
 def route_blocks(positions: np.ndarray, frames: np.ndarray) -> np.ndarray:
     """Returns the block (Q,) of the route in which each query lies.
+
+    A block is a stretch of the route; the bootstrap draws whole blocks, because
+    neighbouring queries tend to be right or wrong together.
 
     Args:
         positions: (N, 3) positions of the sensor along the drive [m].
@@ -248,7 +257,9 @@ def resampled_metrics(
 def own_samples(
     outcomes: QueryOutcomes, seed: int = 0
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Returns `resampled_metrics` of queries by their own blocks.
+    """Returns AUC, R@1 and strict AUC of bootstrap samples of queries.
+
+    The samples draw blocks of the queries' route, see `resampled_metrics`.
 
     The samples are cached, so that several comparisons use the same ones.
     """
@@ -259,11 +270,12 @@ def own_samples(
 def paired_samples(
     outcomes: QueryOutcomes, other: QueryOutcomes
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Returns `resampled_metrics` of queries by the blocks of others.
+    """Returns metrics of bootstrap samples, paired with those of `other`.
 
-    The number of other queries must be equal. `own_samples` of the other
-    queries draws the same blocks, so that the two sets of samples can be
-    compared pair by pair.
+    Both outcomes must have the same number of queries. The samples of
+    `outcomes` draw the same blocks as `own_samples(other)`, so that the two
+    results can be compared sample by sample. The metrics are AUC, R@1 and
+    strict AUC.
     """
     if np.array_equal(outcomes.own_blocks, other.own_blocks):
         return own_samples(outcomes)
@@ -272,7 +284,7 @@ def paired_samples(
 
 
 def percentile_interval(samples: np.ndarray) -> Interval:
-    """Returns the interval of the middle 95 % of samples, without NaN."""
+    """Returns the interval of the middle 95 % of samples; NaN is left out."""
     known = samples[~np.isnan(samples)]
     if len(known) == 0:
         return UNKNOWN
@@ -319,18 +331,6 @@ class Difference:
     value: float
     interval: Interval
     p_value: float
-
-
-def auc_difference(first: QueryOutcomes, second: QueryOutcomes) -> Difference:
-    """Returns the AUC difference of two methods on the same queries.
-
-    See `mean_auc_difference`.
-
-    Args:
-        first: outcomes of Q queries.
-        second: outcomes of the same queries, in the same blocks.
-    """
-    return mean_auc_difference([(first, second)])
 
 
 def mean_auc_difference(
@@ -383,6 +383,29 @@ def holm(p_values: np.ndarray) -> np.ndarray:
     return result
 
 
+def compared_by_auc(
+    answers: Mapping[Hashable, Sequence[QueryOutcomes]],
+) -> dict[tuple[Any, Any], tuple[Difference, float]]:
+    """Returns the AUC difference between any two of several methods.
+
+    Args:
+        answers: method -> its outcomes on each set of queries. All methods
+            answered the same queries, in the same blocks.
+
+    Returns:
+        (first method, second method) -> AUC of the first minus that of the
+        second, see `mean_auc_difference`; and the p-value, corrected by Holm's
+        method for the number of differences.
+    """
+    pairs = list(itertools.combinations(answers, 2))
+    found = [
+        mean_auc_difference(list(zip(answers[a], answers[b], strict=True)))
+        for a, b in pairs
+    ]
+    corrected = holm(np.array([one.p_value for one in found])).tolist()
+    return dict(zip(pairs, zip(found, corrected, strict=True), strict=True))
+
+
 @dataclass(frozen=True)
 class PlaceRecognitionMetrics:
     """The scores of one method on one pair of drives.
@@ -401,8 +424,8 @@ class PlaceRecognitionMetrics:
             places.
         num_queries: number of queries.
         num_with_match: N, the number of queries with a match.
-        num_right: TP with every candidate accepted: the queries whose best
-            place is right. R@1 = num_right / N.
+        num_right: number of queries whose best place is right. R@1 = num_right
+            / N.
         auc_interval: 95 % interval of `auc`, by bootstrap over blocks of the
             route.
         recall_at_1_interval: 95 % interval of R@1, by the same bootstrap.

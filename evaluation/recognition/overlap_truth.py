@@ -34,7 +34,7 @@ class Seen(Protocol):
     """The surfaces that a sensor sees from a place.
 
     Attributes:
-        reach: reach of its farthest surface [m].
+        reach: distance of the farthest surface [m].
     """
 
     @property
@@ -128,7 +128,7 @@ def best_overlaps(
     X_WQs: np.ndarray,
     matches: np.ndarray,
 ) -> np.ndarray:
-    """Returns the share of each query's scan that its best match shows, (Q,).
+    """Returns how much of each query's scan its best match shows, (Q,).
 
     Args:
         place_scans: D scans (N, 3), each in the frame of its sensor.
@@ -138,8 +138,8 @@ def best_overlaps(
         matches: (Q, D) bool, the truth.
 
     Returns:
-        (Q,) greatest overlap with a match; NaN for a query without a point or
-        without a match.
+        (Q,) greatest share of the query's scan that the scan of a match shows;
+        NaN for a query without points or without a match.
     """
     matched = np.flatnonzero(matches.any(axis=0)).tolist()
     seen = {k: SeenSurfaces.of(place_scans[k].astype(float)) for k in matched}
@@ -199,8 +199,9 @@ def read_overlaps(
 
     Args:
         path: path of the table.
-        query_frames: (Q,) frames of the queries, which the table must have.
-        database_frames: (D,) frames of the places, which the table must have.
+        query_frames: (Q,) frames of the queries. The table must have a row for
+            each query and place.
+        database_frames: (D,) frames of the places.
 
     Raises:
         InputError: the file cannot be read, a number is impossible, or the

@@ -1,15 +1,19 @@
-"""The outcome of a method on two drives, query by query."""
+"""The answers of a method on two drives, query by query, as numbers."""
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 import math
 from typing import NamedTuple
 
 import numpy as np
 
-from evaluation.recognition.fault_kinds import NEARLY, visible_change_added
+from evaluation.recognition.fault_kinds import (
+    NEARLY,
+    mean_visible_change,
+    visible_change_added,
+)
 from evaluation.recognition.metrics import (
     UNKNOWN,
     Interval,
@@ -29,38 +33,24 @@ _HALF = 0.5
 
 @dataclass(frozen=True)
 class PlaceOutcome:
-    """The outcome of a method on two drives.
+    """The answers of a method to the queries of a drive, and their truth.
 
     Attributes:
         method: name of the method.
-        is_gated: whether the gate was used.
+        is_gated: whether the gate was used, which rejects places that lie too
+            far away by the method's own pose estimate.
         outcomes: outcomes of Q queries.
-        query_frames: (Q,) frames of the queries in their drive.
-        stamps_ns: (Q,) int64 time stamps of the queries.
-        p_WQs: (Q, 3) positions of the sensor at the queries [m].
-        match_drives: Q names of the drive of the best place; "" without a
-            candidate.
-        match_frames: (Q,) frame of the best place in that drive; -1 without a
-            candidate.
-        distances: (Q,) distances between query and best place [m]; NaN without
-            a candidate, and where the best place is in another city.
+        columns: columns of `queries.csv`, (Q,) each. If unknown, an index is -1
+            and any other number NaN or infinite.
         pose_errors: errors of the poses at the best places.
-        overlaps: (Q,) how much of the query's scan the best of its matches
-            shows, see `overlap_truth`; NaN without a match.
         radius: radius of a match [m].
     """
 
     method: str
     is_gated: bool
     outcomes: QueryOutcomes
-    query_frames: np.ndarray
-    stamps_ns: np.ndarray
-    p_WQs: np.ndarray
-    match_drives: list[str]
-    match_frames: np.ndarray
-    distances: np.ndarray
+    columns: Mapping[str, np.ndarray]
     pose_errors: PoseErrors
-    overlaps: np.ndarray
     radius: float
 
     @classmethod
@@ -78,33 +68,46 @@ class PlaceOutcome:
 
         Args:
             method: method that made the scores.
-            is_gated: whether they were gated.
+            is_gated: whether the scores are those after the gate.
             retrieval: retrieval of Q queries and D places.
-            query: (Q,) stamps [ns] and (Q, 3) places [m] of the queries.
-            drives: D names of the drives of the places; that of the query's
-                own city comes first.
-            overlaps: (Q,) of the best match of each query.
+            query: time stamps (Q,) [ns] and positions (Q, 3) [m] of the
+                queries.
+            drives: name of each place's drive (D names). The first one is the
+                drive through the query's own city; distances to places of all
+                other drives are unknown.
+            overlaps: (Q,) how much of the query's scan the best of its matches
+                shows, see `overlap_truth`; NaN without a match.
             radius: radius of a match [m].
         """
         best = retrieval.best_places.tolist()
-        names = [drives[k] if k >= 0 else "" for k in best]
-        at_home = np.array([name == drives[0] for name in names])
-        return cls(
-            method=method,
-            is_gated=is_gated,
-            outcomes=judge(
-                retrieval.scores, retrieval.matches, retrieval.query_blocks
-            ),
-            query_frames=retrieval.query_frames,
-            stamps_ns=query[0],
-            p_WQs=query[1],
-            match_drives=names,
-            match_frames=retrieval.best_frames,
-            distances=np.where(at_home, retrieval.best_distances, np.nan),
-            pose_errors=retrieval.pose_errors,
-            overlaps=overlaps,
-            radius=radius,
+        names = np.array([drives[k] if k >= 0 else "" for k in best])
+        outcomes = judge(
+            retrieval.scores, retrieval.matches, retrieval.query_blocks
         )
+        distances = retrieval.best_distances
+        distances[names != drives[0]] = math.nan
+        columns = {
+            "query_frame": retrieval.query_frames,
+            "query_stamp_ns": query[0],
+            "query_x": query[1][:, 0],
+            "query_y": query[1][:, 1],
+            "query_z": query[1][:, 2],
+            "block": outcomes.own_blocks,
+            "correct": outcomes.is_right,
+            "has_match": outcomes.has_match,
+            "score": outcomes.best_scores,
+            "first_right_rank": outcomes.first_right_ranks,
+            "why": faults(outcomes, retrieval.best_frames, distances, radius),
+            "match_drive": names,
+            "match_frame": retrieval.best_frames,
+            "distance": distances,
+            "translation_error": retrieval.pose_errors.translation,
+            "rotation_error_deg": retrieval.pose_errors.rotation_deg,
+            "overlap": overlaps,
+            "visible_change": 1.0 - overlaps,
+        }
+        errors = retrieval.pose_errors
+        return cls(method, is_gated, outcomes, columns, errors, radius)
 
     def number(
         self,
@@ -113,65 +116,45 @@ class PlaceOutcome:
         interval: Interval = UNKNOWN,
         n: int | None = None,
     ) -> Number:
-        """Returns a metric of the outcome, by default over all queries."""
+        """Returns a metric as a row of results; by default, n is Q.
+
+        Method and gate are those of the outcome.
+        """
         count = len(self.outcomes) if n is None else n
         return Number(
             self.method, self.is_gated, metric, value, interval, count
         )
 
-    @property
-    def num_hidden(self) -> int:
-        """Number of wrong answers to queries with little overlap.
 
-        Their best match shows less than half of their scan.
-        """
-        is_hidden = self.overlaps < _HALF
-        return int((is_hidden & ~self.outcomes.is_right).sum())
+def faults(
+    outcomes: QueryOutcomes,
+    match_frames: np.ndarray,
+    distances: np.ndarray,
+    radius: float,
+) -> np.ndarray:
+    """Returns the reason for each query's wrong best place.
 
-    def faults(self) -> list[str]:
-        """Returns the reason for each query's wrong best place.
+    Args:
+        outcomes: outcomes of Q queries.
+        match_frames: (Q,) frame of the best place; -1 without a candidate.
+        distances: (Q,) distance to the best place [m]; NaN in another city.
+        radius: radius of a match [m].
 
-        Returns:
-            Q of: "" if it is right; `no_place` if the query has no match;
-            `no_candidate` if the method has no place, or rejects all;
-            `other_city`; `too_far` if it is within two radii; `elsewhere`.
-        """
-        wrong = [
-            ~self.outcomes.has_match,
-            self.match_frames < 0,
-            np.isnan(self.distances),
-            self.distances <= NEARLY * self.radius,
-        ]
-        return np.where(
-            self.outcomes.is_right,
-            "",
-            np.select(wrong, FAULTS[:-1], FAULTS[-1]),
-        ).tolist()
-
-    def columns(self) -> dict[str, np.ndarray | list]:
-        """Returns the columns of `queries.csv` for each of the Q queries."""
-        outcomes = self.outcomes
-        blocks = outcomes.blocks
-        return {
-            "query_frame": self.query_frames,
-            "query_stamp_ns": self.stamps_ns,
-            "query_x": self.p_WQs[:, 0],
-            "query_y": self.p_WQs[:, 1],
-            "query_z": self.p_WQs[:, 2],
-            "block": np.arange(len(outcomes)) if blocks is None else blocks,
-            "correct": outcomes.is_right,
-            "has_match": outcomes.has_match,
-            "score": outcomes.best_scores,
-            "first_right_rank": outcomes.known_ranks,
-            "why": self.faults(),
-            "match_drive": self.match_drives,
-            "match_frame": self.match_frames,
-            "distance": self.distances,
-            "translation_error": self.pose_errors.translation,
-            "rotation_error_deg": self.pose_errors.rotation_deg,
-            "overlap": self.overlaps,
-            "visible_change": 1.0 - self.overlaps,
-        }
+    Returns:
+        (Q,) the first reason that applies: "" if the best place is right;
+        `no_place` if the query has no match; `no_candidate` if the method finds
+        no place, or rejects all places; `other_city` if the best place is in
+        another city; `too_far` if the best place is less than two radii away,
+        but not a match; otherwise `elsewhere`.
+    """
+    wrong = [
+        ~outcomes.has_match,
+        match_frames < 0,
+        np.isnan(distances),
+        distances <= NEARLY * radius,
+    ]
+    kinds = np.select(wrong, FAULTS[:-1], FAULTS[-1])
+    return np.where(outcomes.is_right, "", kinds)
 
 
 class Number(NamedTuple):
@@ -184,7 +167,8 @@ class Number(NamedTuple):
         metric: name of the metric.
         value: its value.
         interval: its 95 % interval.
-        n: number of queries, or other things, that count.
+        n: number of queries, points or other items from which the value is
+            computed.
     """
 
     method: str
@@ -201,7 +185,8 @@ def place_numbers(
     """Yields a method's place recognition results in a condition.
 
     Intervals are by bootstrap over blocks of the route. Each bootstrap sample
-    draws the same blocks in the condition and in the baseline.
+    draws the same blocks in the condition and in the baseline, in which nothing
+    differs between the drives.
 
     Args:
         now: outcome of the method in the condition.
@@ -231,7 +216,9 @@ def place_numbers(
             right, was = outcomes.is_right, before.outcomes.is_right
             yield now.number("lost", float((was & ~right).sum()))
             yield now.number("found", float((right & ~was).sum()))
-            added = visible_change_added(now.overlaps, before.overlaps)
+            added = visible_change_added(
+                now.columns["overlap"], before.columns["overlap"]
+            )
             if not math.isnan(added):
                 yield now.number("visible_change_added", added)
     yield now.number("with_match", float(outcomes.has_match.sum()))
@@ -239,13 +226,14 @@ def place_numbers(
     yield now.number(
         "recall_at_full_precision", pr_curve(outcomes).recall_at_full_precision
     )
-    why = now.faults()
+    overlaps = now.columns["overlap"]
     for name in FAULTS:
-        yield now.number(name, float(why.count(name)))
-    yield now.number("hidden", float(now.num_hidden))
-    known = now.overlaps[~np.isnan(now.overlaps)]
-    if len(known):
-        yield now.number("visible_change", 1.0 - float(known.mean()))
+        yield now.number(name, float(np.sum(now.columns["why"] == name)))
+    # Their best match shows less than half of their scan.
+    is_hidden = (overlaps < _HALF) & ~outcomes.is_right
+    yield now.number("hidden", float(is_hidden.sum()))
+    if not math.isnan(shown := mean_visible_change(overlaps)[0]):
+        yield now.number("visible_change", shown)
 
 
 def pose_numbers(
@@ -256,7 +244,8 @@ def pose_numbers(
     Args:
         now: outcome of the method in a condition.
         before: outcome of the method in the baseline, with which the kept share
-            is computed.
+            (success in the condition divided by success in the baseline) is
+            computed; None to leave it out.
     """
     errors = now.pose_errors
     value = pose_success(errors, now.outcomes)
@@ -279,14 +268,17 @@ def pose_numbers(
 def kept_share(
     changed: np.ndarray | float, unchanged: np.ndarray | float
 ) -> np.ndarray:
-    """Returns changed / unchanged; NaN where `unchanged` is 0 or NaN."""
+    """Returns the share of a result that is kept: changed / unchanged.
+
+    It is NaN where `unchanged` is 0 or NaN.
+    """
     with np.errstate(invalid="ignore", divide="ignore"):
         share = np.divide(changed, unchanged)
     return np.where(np.asarray(unchanged) > 0.0, share, math.nan)
 
 
 def _areas(outcomes: QueryOutcomes) -> dict[str, float]:
-    """Returns the metrics of which `own_samples` returns samples."""
+    """Returns AUC, R@1 and strict AUC, by their names in tables."""
     curve = pr_curve(outcomes)
     return {
         "auc": curve.auc,

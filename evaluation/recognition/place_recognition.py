@@ -1,4 +1,4 @@
-"""One method on one pair of drives, from scans to numbers."""
+"""Measures one method on one pair of drives, from scans to numbers."""
 
 from __future__ import annotations
 
@@ -31,19 +31,21 @@ RADII = (2.5, 5.0, 7.5, 10.0, 15.0, 20.0, 25.0)
 
 @dataclass(frozen=True)
 class PlaceRecognition:
-    """The outcome of one method on one pair.
+    """The result of one method on one pair of drives.
 
     Attributes:
         method: name of the method.
         parameters: all parameters of the method.
         database: name of the drive of the places.
         query: name of the drive of the queries.
-        retrieval: scores and truth of all pairs.
+        retrieval: scores and truth of all pairs of a query and a place.
         outcomes: outcomes of the queries.
         by_mode: mode -> metrics.
         pose: errors of the estimated poses.
-        protocol: protocol of the run, with every choice made.
-        mode: mode of `metrics`.
+        protocol: protocol of the run, including the choices that are the
+            method's own.
+        mode: mode of `metrics`: whether all queries count (`all`), or only
+            queries with a match (`filtered`).
         pair: names of the map and of the stages of database and query, if the
             result is for a report.
     """
@@ -62,11 +64,13 @@ class PlaceRecognition:
 
     @property
     def metrics(self) -> PlaceRecognitionMetrics:
-        """The metrics in mode `mode`."""
+        """The metrics in the result's own mode, `mode`."""
         return self.by_mode[self.mode]
 
     def auc_over_radius(self) -> dict[float, float]:
-        """Returns radius of a match [m] -> AUC in mode all.
+        """Returns the AUC for several radii of a match: radius [m] -> AUC.
+
+        All queries count.
 
         The AUC is NaN if no query has a match within the radius.
         """
@@ -81,7 +85,7 @@ class PlaceRecognition:
         return found
 
     def to_json(self) -> dict:
-        """Returns all numbers; NaN becomes None."""
+        """Returns all numbers as a dictionary for JSON; NaN becomes None."""
         metrics = self.metrics
         true_positives = counted = 0
         if metrics.f1_max_index is not None:
@@ -173,12 +177,12 @@ def judge_retrieval(
     mode: Mode = "all",
     pair: tuple[str, str, str] = ("", "", ""),
 ) -> PlaceRecognition:
-    """Returns the outcome of a method, given its retrieval.
+    """Returns the metrics of a method on a pair of drives, from its scores.
 
     Args:
         method: the method.
         database, query: names of the drives.
-        retrieval: what the method found.
+        retrieval: scores and truth of all pairs of a query and a place.
         protocol: protocol of the retrieval.
         mode: which queries count.
         pair: see `PlaceRecognition`.

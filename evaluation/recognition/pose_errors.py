@@ -42,9 +42,9 @@ class PoseErrors:
 class PoseMetrics:
     """Quality of the poses of one method on one pair of drives.
 
-    The errors are those of the accepted matches: queries whose best place is
-    a match, and whose score reaches the threshold of the greatest F1 (mode
-    all).
+    Medians and quantiles are over the accepted matches: queries whose best
+    place is a match, and whose score reaches the threshold with the greatest F1
+    (mode `all`).
 
     Attributes:
         num_accepted: number of accepted matches.
@@ -53,9 +53,9 @@ class PoseMetrics:
             pose.
         rotation_median_deg, rotation_90_deg: the same for the rotation error
             [deg].
-        success: share of the queries with a match whose pose in the world has
-            errors of at most 2 m and 5 deg, whatever the score; NaN if the
-            method estimates no pose or no query has a match.
+        success: share of the queries with a match whose estimated pose is
+            within 2 m and 5 deg of the truth. Queries of every score count. NaN
+            if the method estimates no poses or no query has a match.
     """
 
     num_accepted: int
@@ -72,7 +72,8 @@ def pose_error(
     """Returns the error of an estimated pose, in metres and in degrees.
 
     Args:
-        X_PQ: (4, 4) estimated pose of the query's sensor in that of the place.
+        X_PQ: (4, 4) estimated pose of the query's sensor in the frame of the
+            place's sensor.
         X_WP: (4, 4) true pose of the place's sensor in the world.
         X_WQ: (4, 4) true pose of the query's sensor in the world.
     """
@@ -133,7 +134,10 @@ def pose_metrics(
 
 
 def pose_success(errors: PoseErrors, outcomes: QueryOutcomes) -> float:
-    """Returns the share of right poses; see `PoseMetrics.success`."""
+    """Returns the share of poses within 2 m and 5 deg of the truth.
+
+    It is a share of the queries with a match, see `PoseMetrics.success`.
+    """
     # A method that finds no place localises no query.
     known = ~np.isnan(errors.translation)
     estimates = known.any() or np.isnan(outcomes.best_scores).all()

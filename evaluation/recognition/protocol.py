@@ -26,7 +26,7 @@ _QUERY_CHANGES = ("turn_queries", "tilt_queries", "hide_sector")
 
 @dataclass(frozen=True)
 class RetrievalProtocol:
-    """How two drives are compared: scans, truth, and changes of queries.
+    """The protocol of place recognition: how two drives are compared.
 
     The defaults are those of the paper, with queries as recorded, except for
     the choice of the merged scan that stands for a place.
@@ -38,16 +38,17 @@ class RetrievalProtocol:
         max_range: largest x, y or z of a point in the sensor's frame [m];
             farther points are left out.
         scans_per_place: number of consecutive scans that are merged into the
-            described cloud; None for each method's own number.
+            described cloud; by default each method's own number.
         place: which of the merged scans stands for a place: `middle`; or
             `first`, as in the paper. The pose of this scan is that of the
-            place. A method's own parameter `place` overrides it. With one scan
-            per place it becomes None.
-        exclude_recent: least time since the drive passed a place [s], if a
-            drive is compared with itself. None for two drives.
-        overlap: least part of a query's scan, up to 1, that a match must show,
-            at any distance (see `overlap_truth`); None for matches by the
-            radius.
+            place. A method's own parameter `place` overrides this value. With
+            one scan per place, the value becomes None.
+        exclude_recent: for a drive that is compared with itself: a query is
+            compared only with places that the drive passed at least this time
+            before [s]. None if two drives are compared.
+        overlap: share of a query's scan, up to 1, that the scan of a place must
+            show to be a match, at any distance (see `overlap_truth`). None if
+            places within `radius` are matches.
         gate: whether to reject top-ranked places that lie beyond the radius
             according to the method's own pose estimate.
         turn_queries: whether each query is turned by a random yaw. Places stay
@@ -104,13 +105,13 @@ class RetrievalProtocol:
             raise InputError(f"--seed: {self.seed} is negative")
 
     def scans(self, method: Method) -> int:
-        """Returns how many scans a method merges for one place."""
+        """Returns how many scans are merged for one place with a method."""
         if self.scans_per_place is not None:
             return self.scans_per_place
         return method.scans_per_place
 
     def scans_before(self, method: Method) -> int:
-        """Returns how many of a place's scans precede the one at its pose."""
+        """Returns how many of a place's scans precede the scan at its pose."""
         is_middle = self.of(method).place == "middle"
         return self.scans(method) // 2 if is_middle else 0
 
@@ -183,7 +184,11 @@ class RetrievalProtocol:
         return self.radius if self.gate else None
 
     def of(self, method: Method) -> RetrievalProtocol:
-        """Returns the protocol with the method's choices filled in."""
+        """Returns the protocol completed by a method's own choices.
+
+        These are the number of scans per place, and which scan stands for a
+        place.
+        """
         return replace(
             self,
             scans_per_place=self.scans(method),
@@ -191,10 +196,10 @@ class RetrievalProtocol:
         )
 
     def asked_like(self, other: RetrievalProtocol) -> RetrievalProtocol:
-        """Returns the protocol with the queries of another protocol.
+        """Returns the protocol with queries made as by another protocol.
 
-        The choice of the scan that stands for a place is also taken from the
-        other.
+        The choice of the scan that stands for a place is also taken from
+        `other`.
         """
         return replace(self, place=other.place, **other._asked)
 
@@ -213,7 +218,7 @@ class RetrievalProtocol:
         return values
 
     def to_json(self) -> dict[str, object]:
-        """Returns all options of the protocol by their names."""
+        """Returns name -> value of all options of the protocol."""
         return asdict(self)
 
     def to_text(self) -> str:

@@ -74,9 +74,9 @@ _FIELDS: Options = {
             "exclude_recent",
             float | None,
             None,
-            "Turn on loop closure, which compares each drive also with itself. "
-            "A query is then compared only with places that the car passed at "
-            "least this time before [s], such as 30.",
+            "Turn on loop closure: each drive is also compared with itself. A "
+            "query is then compared only with places that the car passed at "
+            "least this long before [s], such as 30.",
             "S",
         ),
     )
@@ -87,9 +87,9 @@ _GATE: Options = {
             bool,
             typer.Option(
                 "--gate",
-                help="Reject top-ranked places that lie, by the method's own "
-                "pose estimate, beyond the radius. It has no effect on methods "
-                "that estimate no pose.",
+                help="Reject top-ranked places that are farther from the query "
+                "than --radius, according to the method's own pose estimate. "
+                "It has no effect on methods that estimate no pose.",
             ),
         ],
         False,

@@ -10,7 +10,7 @@ import numpy as np
 
 @dataclass(frozen=True, eq=False)
 class QueryOutcomes:
-    """Whether each of Q queries found its place, and how surely.
+    """Whether the best place of each of Q queries is right, and its score.
 
     Attributes:
         best_scores: (Q,) score of the best place; NaN without a candidate.
@@ -51,7 +51,7 @@ class QueryOutcomes:
 
     @property
     def own_blocks(self) -> np.ndarray:
-        """(Q,) block of each query; each is its own block if there are none."""
+        """(Q,) block of each query; without `blocks`, one for each query."""
         return np.arange(len(self)) if self.blocks is None else self.blocks
 
     @property
@@ -62,12 +62,15 @@ class QueryOutcomes:
         ]
 
     def recall_at(self, rank: int) -> float:
-        """Returns the recall R@N; NaN if no query has a match."""
+        """Returns the recall R@N for N = `rank`.
+
+        It is NaN if no query has a match.
+        """
         return _mean(self.first_right_ranks[self.has_match] <= rank)
 
     @property
     def mean_reciprocal_rank(self) -> float:
-        """Mean of 1 / rank of the best true match, over queries with one.
+        """Mean of 1 / rank of the best true match, over queries with a match.
 
         A query without a match among its candidates counts 0. NaN if no query
         has a match.
@@ -76,12 +79,13 @@ class QueryOutcomes:
 
     @property
     def match_auroc(self) -> float:
-        """AUROC of the best score as a sign that a query has a match.
+        """How well the best score shows whether a query has a match (AUROC).
 
-        It is the area under the receiver operating characteristic: the
+        The AUROC is the area under the receiver operating characteristic: the
         probability that a query with a match has a higher best score than a
-        query without. Equal scores count half, and a query without a candidate
-        has the lowest score. NaN if all or none of the queries have a match.
+        query without a match. Equal scores count half, and a query without a
+        candidate has the lowest score. NaN if all or none of the queries have a
+        match.
         """
         return auroc(self.best_scores, self.has_match)
 
@@ -108,8 +112,8 @@ def judge(
             is a block of its own.
 
     Raises:
-        ValueError: scores are complex, masked or not numbers, or the two shapes
-            differ.
+        ValueError: scores are complex, masked or not numbers, or scores and
+            matches differ in shape.
 
     Example:
         from evaluation import judge, retrieve

@@ -1,7 +1,7 @@
 """Place recognition between two drives: scores and truth.
 
-Distances between query and database are between the positions of the sensor,
-in three dimensions.
+The distance of a query from a place is the distance between the positions of
+the sensor in three dimensions.
 """
 
 from collections.abc import Collection
@@ -61,20 +61,26 @@ class Retrieval:
 
     @property
     def best_places(self) -> np.ndarray:
-        """(Q,) best place of each query; of equals, the first; -1 for none."""
+        """(Q,) best place of each query; -1 if it has no candidate.
+
+        Of several places with the best score, the first one counts.
+        """
         candidate = ~np.isnan(self.scores)
         best = ranking(self.scores)[:, 0] if self.scores.size else -1
         return np.where(candidate.any(axis=1), best, -1)
 
     @property
     def best_frames(self) -> np.ndarray:
-        """(Q,) frame of each query's best place; -1 for none."""
+        """(Q,) frame of each query's best place; -1 without a candidate."""
         best = self.best_places
         return np.where(best < 0, -1, self.database_frames[best])
 
     @property
     def best_distances(self) -> np.ndarray:
-        """(Q,) distance of each query to its best place [m]; NaN for none."""
+        """(Q,) distance of each query to its best place [m].
+
+        It is NaN for a query without a candidate.
+        """
         best = self.best_places
         distances = self.distances[np.arange(len(best)), best]
         return np.where(best < 0, np.nan, distances)
@@ -104,7 +110,7 @@ def retrieve(
             overlap.
 
     Raises:
-        InputError: if a drive cannot be read, the two are not of the same
+        InputError: if a drive cannot be read, the drives are not in the same
             world, or the method returns an invalid result.
 
     Example:
@@ -160,7 +166,10 @@ def compare_with_gates(
     overlaps: np.ndarray | None = None,
     is_known: np.ndarray | None = None,
 ) -> list[Retrieval]:
-    """Returns one retrieval per gate; queries are scored only once.
+    """Returns the result of each gate; queries are scored only once.
+
+    A gate rejects places that lie beyond a radius by the method's own pose
+    estimate.
 
     Args:
         method, database, query, track, overlaps: see `compare`.

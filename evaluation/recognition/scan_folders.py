@@ -50,7 +50,8 @@ def write_scores(
             gate.
         columns: number of columns of `.bin` files; by default guessed for each
             folder from the values.
-        on_note: takes notes on how scans were read, one note of each kind.
+        on_note: is called with notes on how scans were read, one note of each
+            kind.
 
     Returns:
         The number of points left out because they are not finite.
@@ -123,7 +124,10 @@ def _columns(
 
 
 def _first_of_each_kind(on_note: OnNote) -> OnNote:
-    """Returns a function that drops notes like earlier ones on other files."""
+    """Returns a function that passes on only the first note of each kind.
+
+    Notes are of one kind if they differ only in the name of the file.
+    """
     seen: set[str] = set()
 
     def pass_on(note: str) -> None:

@@ -1,4 +1,4 @@
-"""The scores of a method: their checks, the gate, and the order of places."""
+"""Checks a method's scores, applies the gate and ranks places."""
 
 from collections.abc import Sequence
 import contextlib
@@ -59,9 +59,10 @@ def gated(
     """Returns the scores (D,) after the gate, for each radius.
 
     The gate rejects places that lie too far from the query according to the
-    method's own pose; their scores are NaN. Places after the best `NUM_GATED`
-    are no candidates either. A place for which the method estimates no pose
-    keeps its score. If it estimates no pose at all, all scores are unchanged.
+    method's own pose; their scores are NaN. Only the best `NUM_GATED` places
+    are tested; all other places are no candidates either. A place for which the
+    method estimates no pose keeps its score. If the method never estimates a
+    pose, all scores stay the same.
 
     Near the radius, the gate has a weight w from 1 to 0: a score s becomes s -
     (1 - w) |s|. This is w times a positive score; a negative score falls by (1
@@ -127,9 +128,9 @@ def score_places(
         query_cloud: cloud of the current query, for a second stage.
         database: the result of `build_database` for the places.
         place_clouds: clouds of the D places, for a second stage.
-        is_known: (D,) bool, which places may be candidates. If some may not,
-            every place is compared, because a search for the best few of all
-            places could find places that are not allowed.
+        is_known: (D,) bool, which places may be candidates. If this excludes a
+            place, the query is compared with every place, because a search for
+            a few best places might return only excluded ones.
         gate_radius: radius of a match for `gated` [m]; None without a gate.
         exhaustive: see `Method.score`.
         where: the name of the current query, for errors.

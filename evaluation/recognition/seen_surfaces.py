@@ -1,9 +1,9 @@
 """Surfaces that a scan shows, interpolated between its returns.
 
 A scan samples the surfaces around its sensor. The four returns around a
-direction, one in each quadrant, tell where the surface lies in that direction:
-in the plane of the three nearest returns or, at edges and at grazing incidence,
-between the ranges of the nearest and the farthest return.
+direction, one in each quadrant, determine where the surface lies in that
+direction: in the plane of the three nearest returns or, at edges and at grazing
+incidence, between the ranges of the nearest and the farthest return.
 
 Compared with rays cast in the simulated world, shares of shown points are wrong
 by some hundredths for scans taken up to 30 m apart, and by more beyond
@@ -38,11 +38,12 @@ _UNKNOWN, _SHOWN, _BEHIND = range(3)
 
 
 class Shares(NamedTuple):
-    """Shares of the points of another scan; NaN without points.
+    """How much of other points a scan shows and hides; NaN without points.
 
     Attributes:
         shown: share of points on surfaces that this scan shows.
-        hidden: share of points behind all returns around their directions.
+        hidden: share of points that lie behind all returns of this scan around
+            their direction.
     """
 
     shown: float
@@ -57,7 +58,7 @@ class SeenSurfaces:
         points: (N, 3) in the frame of the sensor [m], sorted by cell.
         angles_deg: (N, 2) elevation plus 90 deg, and azimuth counted from the
             back.
-        starts: index of each cell's first point, row by row; at the end N.
+        starts: index of each cell's first point, row by row, followed by N.
     """
 
     points: np.ndarray
@@ -189,7 +190,7 @@ def _fit_plane(
 ) -> tuple[float, float, float, float]:
     """Returns the plane n p = h through the three nearest returns.
 
-    The normal n has any length.
+    The normal n need not have unit length.
 
     Returns:
         The three components of n, and h.

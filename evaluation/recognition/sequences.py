@@ -23,10 +23,11 @@ def along_the_way(
     The score of a query q and a place p becomes a mean over q and the queries
     up to `length` before it. An earlier query at distance d from q along its
     path contributes its score for the place at distance d from p along the
-    database's path: before p, or after p if the query drives in the opposite
-    direction. The better direction counts. A place beyond the ends of the path
-    has no vote, and neither has a query without a candidate. A missing score
-    counts as the least score of its query.
+    database's path: before p, or after p if the query drive goes in the
+    opposite direction. The direction with the better mean counts. An earlier
+    query is left out of the mean if it has no candidate, or if the database's
+    path has no place at distance d. If an earlier query has no score for the
+    place, its least score is used.
 
     Args:
         scores: (Q, D) scores of single queries; NaN for places that are no

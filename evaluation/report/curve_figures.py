@@ -1,4 +1,4 @@
-"""Curves: precision over recall, and the errors along a track."""
+"""Draws curves: precision over recall, and errors along a tracked drive."""
 
 from collections.abc import Sequence
 from pathlib import Path
@@ -19,7 +19,10 @@ from evaluation.results.table_forms import by_pair, in_table_order, title
 def draw_pr_curves(
     map_name: str, results: Sequence[PlaceRecognition], stem: Path
 ) -> None:
-    """Draws precision over recall, with a row per pair, a column per mode."""
+    """Draws precision-recall curves: a row per pair of drives.
+
+    The columns are the modes: all queries, or only those with a match.
+    """
     pairs = by_pair(results)
     style_of = styles(in_table_order(result.method for result in results))
     size = (9.2, 0.3 + 2.7 * len(pairs))
@@ -80,7 +83,9 @@ def _draw_curve(
 
 
 def draw_track(rows: np.ndarray, stem: Path) -> None:
-    """Draws errors along the path, and the share without a map.
+    """Draws, along a tracked drive, position errors and unmapped points.
+
+    The unmapped points are the share of each scan's points that the map lacks.
 
     The rows are of the type `TRACKED`.
     """

@@ -108,7 +108,10 @@ class Picture:
         return left, left + width / scale, bottom, bottom + height / scale
 
     def project(self, points: np.ndarray) -> np.ndarray:
-        """Returns points (N, 3) as coordinates right and up (N, 2) [m]."""
+        """Projects points (N, 3) onto the image plane; returns (N, 2) [m].
+
+        The two coordinates point right and up.
+        """
         return points @ self.view.axes()[:2].T
 
 
@@ -120,7 +123,7 @@ _FROM_ABOVE = View(azimuth_deg=-90.0, elevation_deg=90.0, pixels_per_metre=2.5)
 def judge_points(
     points: np.ndarray, other: np.ndarray, tau: float = TAU
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Applies the two tests of the TCR to points (N, 3) of a finer map [m].
+    """Applies the two tests of the TCR to points (N, 3) of a fine map [m].
 
     `other` has the voxel centroids (M, 3) of the other map, M > 0.
 
@@ -136,7 +139,7 @@ def judge_points(
 
 
 def top_view(points: np.ndarray, positions: np.ndarray) -> Picture:
-    """Returns the surroundings of a route from above, x to the right.
+    """Returns a picture of a route's surroundings from above, x to the right.
 
     The cloud (K, 3) and the positions (N, 3) of the sensor are in W [m].
     """
@@ -186,14 +189,16 @@ def draw_change(
 ) -> None:
     """Draws what changed between two stages, in two figures.
 
-    Only the metric decides on colours. In the first figure, points without a
-    counterpart in the other map are red. They are pale red outside the other
-    map's hull: the other drive may not have passed there, and TCR does not
-    count these points. The second figure shows the sets H and O in both orders
-    and united. A point has the colour of its voxel on one of the grids.
+    The colours show how TCR counts each point. In the first figure, points
+    without a counterpart in the other map are red. They are pale red outside
+    the other map's hull: the other drive may not have passed there, and TCR
+    does not count these points. The second figure shows the sets H (points in
+    the other map's hull) and O (unchanged points) of TCR: for each of the two
+    maps, and for both together. A point has the colour of its voxel on the grid
+    of `maps`.
 
-    The clouds (K, 3) in W [m], and the maps on that grid, are those of the
-    earlier and of the later stage.
+    `clouds` are two clouds (K, 3) in W [m], and `maps` two voxel maps, in both
+    cases of the earlier and of the later stage.
     """
     titles, pictures = [], []
     for one, other in ((0, 1), (1, 0)):

@@ -83,15 +83,16 @@ class Report:
     """The contents of a report.
 
     Attributes:
-        pairs: place recognition of all pairs, each with its control.
-        recognitions: the same results without controls, and those of drives
-            compared with themselves.
-        evidence: (database, query) -> evidence why best places are wrong.
+        pairs: results of all pairs of drives, each with those of its control:
+            the same routes without a change of the city.
+        recognitions: place recognition of all pairs without their controls, and
+            of drives compared with themselves.
+        evidence: (database, query) -> evidence on why best places are wrong.
         tracks: drive -> its track, also for the controls.
         pages: drive -> address, relative to the page, of the page of its
             recording; drives without a page may be left out.
-        repeated: results by the protocol of the published numbers, if it
-            differs from the protocol of the report.
+        repeated: results by the protocol of the published numbers, if this
+            protocol differs from that of the report.
         made_by: version, protocol and settings of methods that made the report.
     """
 
@@ -112,7 +113,7 @@ class Report:
 
     @functools.cached_property
     def results(self) -> Results:
-        """The table of the pairs and of their controls."""
+        """The results of all pairs and of their controls as one table."""
         return Results.of(
             [
                 *rows.place_rows(self.pairs, self.tracks, self.evidence),
@@ -122,7 +123,7 @@ class Report:
 
     @functools.cached_property
     def survivals(self) -> list[rows.Survival]:
-        """How much each method keeps of its AUC on each pair."""
+        """How much of its AUC each method keeps under change, on each pair."""
         stages = {
             name: stage
             for one, _ in self.pairs
@@ -136,15 +137,15 @@ class Report:
 
     @property
     def compared(self) -> list[PlaceRecognition]:
-        """Results for which the reference has published numbers."""
+        """Results with which published numbers can be compared."""
         known = filter(self.reference.covers, self.recognitions)
         return [*known, *self.repeated]
 
 
 def chart_illustrations(report: Report, folder: Path) -> list[Illustration]:
-    """Draws the charts over all cities; returns those that have data.
+    """Draws charts of the results of all cities; returns those with data.
 
-    The charts of a reference stand next to ours.
+    Charts of published numbers stand next to the charts of the report.
     """
     name = "AUC against TCR_sym"
     charts: list[tuple[str, str, Section, dict[str, str], Results]] = [
@@ -185,7 +186,7 @@ def chart_illustrations(report: Report, folder: Path) -> list[Illustration]:
 
 
 def write_report(report: Report, folder: Path) -> Path:
-    """Writes all files but the figures; returns the path of `report.html`.
+    """Writes all files except figures; returns the path of `report.html`.
 
     Raises:
         InputError: a file cannot be written.
@@ -237,10 +238,10 @@ def write_report(report: Report, folder: Path) -> Path:
 
 
 def write_page(path: Path, report: Report) -> None:
-    """Writes the page.
+    """Writes the web page of a report.
 
     Raises:
-        InputError: it cannot be written.
+        InputError: the page cannot be written.
     """
     data = None
     if report.recognitions:

@@ -66,7 +66,7 @@ class CameraImages:
     Attributes:
         stamps_ns: (K,) stamps of the frames.
         times_ns: (M,) times of images, increasing.
-        files: M images as JPEG.
+        files: the M images as JPEG.
     """
 
     stamps_ns: np.ndarray
@@ -74,7 +74,10 @@ class CameraImages:
     files: list[bytes]
 
     def to_data(self, step: int) -> dict:
-        """Returns every `step`-th image, and the nearest of them to frames."""
+        """Returns every `step`-th image, and which of them each frame shows.
+
+        Each frame shows the image that is nearest in time.
+        """
         times_ns = self.times_ns[::step]
         nearest = _nearest(times_ns, self.stamps_ns)
         later = 1e-9 * (times_ns[nearest] - self.stamps_ns)
@@ -176,7 +179,7 @@ def camera_images(
 
 
 def _nearest(times_ns: np.ndarray, wanted_ns: np.ndarray) -> np.ndarray:
-    """Returns the number of the time that is nearest to each wanted one."""
+    """Returns, for each wanted time, the index of the nearest of `times_ns`."""
     return np.searchsorted((times_ns[1:] + times_ns[:-1]) // 2, wanted_ns)
 
 

@@ -22,7 +22,7 @@ class Published:
 
 @dataclass(frozen=True)
 class Finding:
-    """A claim, its verdict by our numbers, and the table that has them."""
+    """A published claim, and whether the numbers of a report confirm it."""
 
     claim: str
     verdict: str
@@ -40,21 +40,25 @@ class Judgement:
 
 @dataclass(frozen=True, eq=False)
 class Reference:
-    """Published numbers and claims; without arguments it has none.
+    """Published numbers and claims with which a report is compared.
+
+    By default there are none.
 
     Attributes:
         title: the source's name in the report.
-        counting: the modes in which the source counted its methods, in words;
-            used only if something is published.
+        counting: in words, which queries the source counted for each method
+            (the modes); used only if there are published results.
         changes: (map, earlier stage, later stage) -> TCR_sym.
-        further: changes elsewhere to compare with: label, stages and TCR_sym.
+        further: published changes without place recognition: label, stages and
+            TCR_sym.
         recognitions: (map, database, query, method, mode) -> numbers; each
             method has one mode.
-        protocols: method -> how the source ran it, its number of scans
-            included.
-        judge: function that returns verdicts on all claims that our numbers
-            allow to check. It takes the results of a report, the results that
-            the report repeated by the source's protocol, and the changes.
+        protocols: method -> protocol by which the source ran it, including the
+            number of scans per place.
+        judge: function that returns verdicts on all claims that a report's
+            numbers can test. It takes the results of the report, the results
+            that the report repeated by the source's protocol, and the changes
+            between stages.
     """
 
     title: str = ""
@@ -75,9 +79,10 @@ class Reference:
         return {key[0] for key in self.recognitions}
 
     def compares_back(self, map_name: str, earlier: str, last: str) -> bool:
-        """Returns whether the reference also queries the last stage's map.
+        """Returns whether a pair of stages was also published in reverse.
 
-        The earlier stage is then the query.
+        In the reverse pair, the last stage is the database and the earlier
+        stage the query.
         """
         pair = (map_name, last, earlier)
         return any(key[:3] == pair for key in self.recognitions)
@@ -90,27 +95,32 @@ class Reference:
     def further_changes(
         self, map_names: Iterable[str]
     ) -> Sequence[tuple[str, str, float]]:
-        """Returns the published changes without place recognition.
+        """Returns published changes for which no place recognition exists.
 
-        Only a report on a map of the source shows them.
+        The result is empty unless the report has a map that the source has,
+        too.
         """
         return () if self.city_names.isdisjoint(map_names) else self.further
 
     def protocol_of(
         self, map_name: str, database: str, query: str, method: str
     ) -> RetrievalProtocol | None:
-        """Returns the protocol of a method's published numbers of a pair."""
+        """Returns the protocol of a method's published results on a pair."""
         key = map_name, database, query, method
         if not any(known[:4] == key for known in self.recognitions):
             return None
         return self.protocols[method]
 
     def covers(self, result: PlaceRecognition) -> bool:
-        """Returns whether map, method and protocol are the source's."""
+        """Returns whether the source has results like this one.
+
+        The map must be in the source, and the method must have been run by the
+        same protocol.
+        """
         return result.pair[0] in self.city_names and self._ran(result)
 
     def mode(self, method: str) -> Mode:
-        """Returns in which mode the reference counts a method."""
+        """Returns in which mode the source counted a method's queries."""
         modes = (key[4] for key in self.recognitions if key[3] == method)
         return next(modes, "all")
 

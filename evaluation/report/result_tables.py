@@ -9,7 +9,6 @@ from __future__ import annotations
 from collections import Counter
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, fields, replace
-import itertools
 from operator import attrgetter
 from types import MappingProxyType
 from typing import Any, NamedTuple
@@ -29,8 +28,7 @@ from evaluation.recognition.metrics import (
     Difference,
     Mode,
     PlaceRecognitionMetrics,
-    auc_difference,
-    holm,
+    compared_by_auc,
 )
 from evaluation.recognition.place_outcome import kept_share
 from evaluation.recognition.place_recognition import RADII, PlaceRecognition
@@ -63,7 +61,7 @@ Evidence = Mapping[tuple[str, str], PairEvidence]
 
 
 def _inner(columns: Columns[PlaceRecognition]) -> Columns[Any]:
-    """Returns columns of results as columns of items with a field `result`."""
+    """Returns columns of results, applied to the field `result` of items."""
     return keyed(columns, lambda item, value: value(item.result))
 
 
@@ -131,8 +129,9 @@ def _visible_change(
 ) -> tuple[float | None, ...]:
     """Returns four values on a pair's visible change; None if unknown.
 
-    They are the mean, the number of queries, the mean minus the control's, and
-    this difference as a share of the mean.
+    The values are: the mean visible change (share of a query's scan that its
+    right place does not show); the number of queries; the mean minus that of
+    the control; and this difference as a share of the mean.
     """
     known = evidence.get((database, query))
     if known is None:
@@ -143,7 +142,7 @@ def _visible_change(
 
 
 class _Counted(NamedTuple):
-    """A result in a mode, with the published numbers, if any."""
+    """A result in one mode, with the published numbers if there are any."""
 
     result: PlaceRecognition
     metrics: PlaceRecognitionMetrics
@@ -239,7 +238,10 @@ def recognition_table(
 
 
 def _merging_text(results: Sequence[PlaceRecognition]) -> str:
-    """Returns a sentence on where merged scans stand; empty without them."""
+    """Returns a sentence on which of several merged scans is the place.
+
+    It is empty if no scans are merged.
+    """
     methods: dict[str, list[str]] = {}
     for one in in_table_order(result.method for result in results):
         (place,) = {
@@ -295,7 +297,7 @@ def audit_table(
 
 
 def metric_numbers(results: Sequence[PlaceRecognition]) -> Table:
-    """Returns the metrics of other publications, as `metrics.csv` has them."""
+    """Returns the metrics that other publications use, for `metrics.csv`."""
     return Table.of(
         by_pair_and_method(results),
         {
@@ -321,7 +323,7 @@ def metric_numbers(results: Sequence[PlaceRecognition]) -> Table:
 
 
 class MethodDifference(NamedTuple):
-    """Two results of a pair, and the AUC of the first less the second.
+    """The AUC of one method minus that of another on a pair of drives.
 
     The p-value is corrected for the differences of that pair of drives, so that
     it does not depend on the other pairs of a report; NaN if unknown.
@@ -336,25 +338,24 @@ class MethodDifference(NamedTuple):
 def method_differences(
     results: Sequence[PlaceRecognition],
 ) -> list[MethodDifference]:
-    """Returns the AUC difference of any two methods on each pair (mode all)."""
+    """Returns the AUC difference of any two methods on each pair of drives.
+
+    All queries count (mode `all`).
+    """
     found: list[MethodDifference] = []
     for some in by_pair(by_pair_and_method(results)).values():
-        both = list(itertools.combinations(some, 2))
-        differences = [
-            auc_difference(*(one.outcomes for one in two)) for two in both
-        ]
-        corrected = holm(np.array([one.p_value for one in differences]))
+        compared = compared_by_auc(
+            {k: [one.outcomes] for k, one in enumerate(some)}
+        )
         found += [
-            MethodDifference(*two, one, p)
-            for two, one, p in zip(
-                both, differences, corrected.tolist(), strict=True
-            )
+            MethodDifference(some[a], some[b], difference, p)
+            for (a, b), (difference, p) in compared.items()
         ]
     return found
 
 
 def difference_numbers(differences: Sequence[MethodDifference]) -> Table:
-    """Returns AUC differences of methods, as `differences.csv` has them."""
+    """Returns the AUC differences between methods, for `differences.csv`."""
     return Table.of(
         differences,
         {
@@ -403,7 +404,7 @@ _POSE_ERRORS: Columns[PlaceRecognition] = {
 
 
 def pose_table(results: Sequence[PlaceRecognition]) -> Table:
-    """Returns the errors of estimated poses for print."""
+    """Returns a table of the errors of estimated poses, for print."""
     names: list[str | tuple[str, str]] = [
         *(("translation [m]", part) for part in ("median", "90 %")),
         *(("rotation [deg]", part) for part in ("median", "90 %")),
@@ -418,7 +419,7 @@ def pose_table(results: Sequence[PlaceRecognition]) -> Table:
 
 
 def pose_numbers(results: Sequence[PlaceRecognition]) -> Table:
-    """Returns the errors of estimated poses, for `poses.csv`."""
+    """Returns a table of the errors of estimated poses, for `poses.csv`."""
     return Table.of(
         results,
         {
@@ -431,7 +432,7 @@ def pose_numbers(results: Sequence[PlaceRecognition]) -> Table:
 
 
 class _Faults(NamedTuple):
-    """The wrong best places of a result: reasons, and changed classes."""
+    """Why best places of a result are wrong: reasons, and changed classes."""
 
     result: PlaceRecognition
     kinds: Counter[str]
@@ -536,7 +537,7 @@ def cost_numbers(costs: Sequence[Cost]) -> Table:
 
 @dataclass(frozen=True)
 class DriveTrack:
-    """Times (N,) int64 of all frames, and poses (N, 4, 4) of the sensor."""
+    """Time stamps (N,) and sensor poses (N, 4, 4) of all frames of a drive."""
 
     stamps_ns: np.ndarray
     X_WS: np.ndarray
@@ -561,7 +562,7 @@ class DriveTrack:
 
 
 class _Queries(NamedTuple):
-    """The queries of a result: moments of these, and of their best places."""
+    """The queries of a result and their best places: frame, time and pose."""
 
     result: PlaceRecognition
     query: list[np.ndarray]
@@ -613,8 +614,8 @@ def query_table(
 ) -> Table:
     """Returns a row for each result and query, in the queries' order.
 
-    All drives have a track. The columns of the evidence are empty for pairs
-    without it.
+    `tracks` must have all drives. The columns with reasons for wrong places are
+    empty for pairs without evidence.
     """
 
     def queries(one: PlaceRecognition) -> _Queries:

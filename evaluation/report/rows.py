@@ -1,10 +1,10 @@
 """The numbers of a report as rows of a table of results, and conclusions.
 
 The conclusions are the ranking of the methods, and the share of its result that
-each method keeps under structural change. A control drive takes the place of
-one drive of a pair: it follows the same route, but in the stage of the other
-drive. What a method loses from the control to the pair is due to the change
-alone, and not to the routes.
+each method keeps under structural change. Each pair of drives can have a
+control: the same two routes, both driven in one stage of the city. What a
+method loses from the control to the pair is therefore due to the change alone,
+and not to the routes.
 """
 
 from collections import Counter
@@ -38,11 +38,11 @@ def place_rows(
     tracks: Mapping[str, Any],
     evidence: Mapping[tuple[str, str], PairEvidence],
 ) -> Iterator[Row]:
-    """Yields the results of place recognition: controls, then pairs.
+    """Yields the results of place recognition as rows: controls, then pairs.
 
-    They are rows of the experiment `stages`. The control of a pair is the
-    condition in which the database is of the query's stage. All queries' drives
-    have a `DriveTrack`.
+    The rows belong to the experiment `stages`. In the control of a pair, the
+    database is driven in the query's stage. `tracks` must contain the track of
+    every drive with queries.
     """
 
     def outcome(
@@ -95,7 +95,7 @@ def place_rows(
 def change_rows(
     pairs: Iterable[Controlled], changes: Iterable[ChangeResult]
 ) -> Iterator[Row]:
-    """Yields TCR_sym of pairs, without the change and with it."""
+    """Yields rows with the TCR_sym of each pair, and of its control."""
     of_stages = {
         (one.map_name, *stages): one.report
         for one in changes
@@ -124,10 +124,10 @@ def change_rows(
 
 
 def ranked_methods(results: Results) -> tuple[list[Ranked], str]:
-    """Returns the methods by their mean AUC with the change, and a headline.
+    """Returns the methods ranked by mean AUC under change, and a headline.
 
-    The means are over the pairs of drives that all methods have; without one
-    there are no methods, and the headline says so.
+    The means are over the pairs of drives with results of all methods. If there
+    is no such pair, no method is returned, and the headline says so.
     """
     rows = results.where({STAGE: OWN}, task="place", metric="auc").rows
     ranked, samples = ranking(rows)
@@ -139,11 +139,12 @@ def ranked_methods(results: Results) -> tuple[list[Ranked], str]:
 
 
 def beside(results: Results) -> dict[str, dict[str, float]]:
-    """Returns the columns next to the mean AUC: column -> method -> mean.
+    """Returns further columns of the ranking: column -> method -> mean.
 
-    The columns are shares of the queries with a match, over the pairs that all
-    methods have: the queries whose best place is right; those whose best place
-    is wrong, but within two radii; and those with a right pose.
+    The columns are three shares of the queries with a match: queries whose best
+    place is right; queries whose best place is wrong, but less than two radii
+    away; and queries with a correct pose. The means are over the pairs of
+    drives with results of all methods.
     """
     rows = results.where({STAGE: OWN})
     r1, far, matched, pose = (
@@ -182,17 +183,18 @@ def _headline(
         return text
     lead = np.percentile(samples[:, 0] - samples[:, 1], 2.5)
     if lead > 0.0:
-        return f"{text} Its lead is beyond chance (95 %)."
-    return f"{text} With other pairs, the two might change places (95 %)."
+        return f"{text} The difference is significant (95 %)."
+    return f"{text} The difference is not significant (95 %)."
 
 
 class Survival(NamedTuple):
-    """Results of a method on a pair, with and without the change.
+    """Results of a method on a pair of drives, with and without the change.
 
     Attributes:
         pair: map, stage of the database, and of the query.
         method: name of the method.
-        before: rows without the change; empty if there is no control.
+        before: rows of the control, without the change; empty if there is no
+            control.
         after: rows with the change.
     """
 
@@ -202,18 +204,19 @@ class Survival(NamedTuple):
     after: Mapping[str, Row]
 
     def number(self, side: str, metric: str, end: str = "value") -> float:
-        """Returns the value before or after the change, or a limit of it.
+        """Returns a metric's value, or one limit of its 95 % interval.
 
-        The limits are those of its interval.
+        `side` is `before` (without the change) or `after` (with it). `end` is
+        `value`, or `low` or `high` for a limit of the interval.
         """
         row = getattr(self, side).get(metric)
         return math.nan if row is None else getattr(row, end)
 
 
 def survivals(rows: Iterable[Row], stages: Mapping[str, str]) -> list[Survival]:
-    """Returns a `Survival` per method and pair, in the order of tables.
+    """Returns the results of each method on each pair, in order of tables.
 
-    The stages are those of drives.
+    `stages` maps the name of each drive to its stage.
     """
     found: dict[
         tuple[tuple[str, str, str], str],
@@ -235,14 +238,14 @@ def percent(share: float) -> str:
 
 
 def interval_text(kept: Row) -> str:
-    """Returns the interval of a kept share as text; empty without one."""
+    """Returns the interval of a kept share as text; empty if unknown."""
     if math.isnan(kept.low):
         return ""
     return f"({100.0 * kept.low:.0f}–{100.0 * kept.high:.0f})"
 
 
 def survival_numbers(survivals: Sequence[Survival]) -> tables.Table:
-    """Returns the shares that methods keep, for `survival.csv`."""
+    """Returns the shares of results that methods keep, for `survival.csv`."""
     numbers: dict[str | tuple[str, str], tuple[str, ...]] = {
         "auc_unchanged": ("before", "auc"),
         "auc_changed": ("after", "auc"),
@@ -272,7 +275,7 @@ def survival_numbers(survivals: Sequence[Survival]) -> tables.Table:
 
 
 def survival_table(survivals: Sequence[Survival]) -> tables.Table:
-    """Returns the shares that methods keep, for print."""
+    """Returns the shares of results that methods keep, for print."""
     return tables.Table.of(
         survivals,
         {
@@ -293,7 +296,7 @@ def survival_table(survivals: Sequence[Survival]) -> tables.Table:
 def _shown(
     group: str, metric: str, kept: str | None = None
 ) -> tables.Columns[Survival]:
-    """Returns the columns of a number without change, with it, and kept."""
+    """Returns table columns: a metric without change, with change, and kept."""
 
     def share(one: Survival) -> str | None:
         row = one.after.get(str(kept))
@@ -331,7 +334,7 @@ def survival_summary(survivals: Sequence[Survival]) -> str:
         number = len(groups) - without
         over = f"median of {number} pairs" if number > 1 else "one pair"
         parts.append(
-            f"Each method keeps part of its AUC without change ({over}):"
+            f"Share of its AUC without change that each method keeps ({over}):"
             f" {listed}."
         )
     if without:

@@ -1,13 +1,16 @@
 """Four kinds of charts, each described by a mapping in an experiment's file.
 
-- `dumbbell` (`over`, `metric`): at the first and the last value of a factor.
-- `lines` (`over`, `metric`): over a numeric factor, with a band from the least
-  to the greatest of seeds.
-- `matrix` (`over`, `metric`, `strips`): methods over the values of a factor, of
-  which each may have a strip for each value of another one.
+- `dumbbell` (`over`, `metric`): a metric at the first and the last value of a
+  factor.
+- `lines` (`over`, `metric`): a metric over a numeric factor, with a band from
+  the least to the greatest result of a single seed.
+- `matrix` (`over`, `metric`, `strips`): a metric for each method and each value
+  of a factor. With `strips`, each cell is divided by the values of a second
+  factor.
 - `scatter` (`x`, `y`): a metric over a metric or a numeric factor, with a
   smooth line and its 95 % band.
 
+The names in brackets are keys of the mapping; `kind` names the kind of chart.
 All other keys select rows: each is a column of the table with the values to
 show. By default, the task is `place`, or else the only task with the metric,
 and the gate is 0. Each method has the same colour in all charts. The title says
@@ -87,8 +90,8 @@ class Drawn:
     Attributes:
         message: sentence that says what the chart shows.
         figure: the drawing.
-        legend: name -> colour, line style and marker; empty where the drawing
-            has the names.
+        legend: name -> colour, line style and marker; empty if the names stand
+            in the drawing.
     """
 
     message: str
@@ -98,7 +101,7 @@ class Drawn:
 
 @dataclass(frozen=True)
 class _Chart:
-    """The inputs of a chart."""
+    """The inputs from which a chart is drawn."""
 
     keys: Mapping[str, str]
     results: Results
@@ -112,7 +115,10 @@ class _Chart:
 
     @property
     def panes(self) -> dict[str, list[Row]]:
-        """Title of a panel -> its rows; one panel per map, unless over maps."""
+        """Title of each panel -> its rows; one panel per map.
+
+        If the chart is over maps, there is one panel for all.
+        """
         found: dict[str, list[Row]] = {}
         for row in self.rows:
             name = "" if self.keys.get("over") == "map" else row.map
@@ -147,13 +153,14 @@ def draw(
     """Draws a chart from a table of results.
 
     Args:
-        chart: a mapping as above.
+        chart: description of the chart, as in an experiment's file.
         results: the table.
         width: width of the drawing [px].
-        alone: whether the drawing includes its message and its legend.
+        alone: whether the drawing stands alone and therefore includes its
+            message and legend.
 
     Raises:
-        InputError: there is no such kind or column, or no such row.
+        InputError: the chart has an unknown kind or column, or selects no rows.
     """
     keys = check(chart)
     kind = chart["kind"]
@@ -195,10 +202,10 @@ def check(chart: Mapping[str, Any]) -> dict[str, str]:
     """Checks the description of a chart, without a table.
 
     Returns:
-        The keys of its kind.
+        The keys of this kind of chart.
 
     Raises:
-        InputError: there is no such kind, or it lacks a key.
+        InputError: the kind is unknown, or the description lacks a key.
     """
     kind = chart.get("kind")
     if not isinstance(kind, str) or kind not in _KINDS:
@@ -214,7 +221,7 @@ def check(chart: Mapping[str, Any]) -> dict[str, str]:
 
 
 def styles(labels: Sequence[str]) -> dict[str, tuple[str, str, str]]:
-    """Returns title -> colour, line style and marker of each method."""
+    """Returns the colour, line style and marker of each method, by title."""
     others = [name for name in labels if name not in METHOD_STYLES]
     return {
         title(name): METHOD_STYLES.get(name)
@@ -294,10 +301,12 @@ def _dumbbell(chart: _Chart) -> tuple[str, Figure]:
 
 
 def _ends(found: Mapping[str, tuple[float, str]]) -> list[tuple[str, str]]:
-    """Returns name and text of the methods with the most and the least.
+    """Returns the methods with the greatest and the least number.
+
+    Each is a pair of name and number as text.
 
     Args:
-        found: method -> its number, and the number as text.
+        found: method -> its number, and this number as text.
     """
     order = sorted(
         found.items(), key=lambda one: (math.isnan(one[1][0]), -one[1][0])
@@ -352,7 +361,7 @@ def _number(row: Row, column: str) -> float:
 
 
 def _spread(axes: Axes, at: Sequence[float]) -> None:
-    """Makes an axis logarithmic whose values need it."""
+    """Makes the x axis logarithmic if its values span a wide range."""
     above = [one for one in at if one > 0.0]
     if min(at) >= 0.0 and above and max(above) / min(above) > _WIDE_RANGE:
         axes.set_xscale("symlog", linthresh=min(above))
@@ -481,8 +490,8 @@ def smooth(
     """Returns the local linear regression of y over x at places (M,).
 
     Weights are Gaussian (Fan and Gijbels, Local Polynomial Modelling, 1996,
-    equation 3.1 with p = 1). Not all x may be equal. If an array (B, N) states
-    how often each point counts in B samples, the result is B regressions
+    equation 3.1 with p = 1). Not all x may be equal. `counts` (B, N) can say
+    how often each point counts in B samples; the result is then B regressions
     (B, M).
     """
     counts = np.ones(len(x)) if counts is None else counts
@@ -501,7 +510,10 @@ def smooth(
 def smooth_band(
     x: np.ndarray, y: np.ndarray, grid: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Returns the 95 % band of `smooth` by resampling points."""
+    """Returns the 95 % band of the regression `smooth`, by bootstrap.
+
+    The bootstrap resamples points.
+    """
     draws = np.random.default_rng(0).integers(len(x), size=(_RESAMPLES, len(x)))
     counts = np.stack([np.bincount(d, minlength=len(x)) for d in draws])
     curves = smooth(x, y, grid, counts)

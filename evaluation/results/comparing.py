@@ -1,4 +1,4 @@
-"""Compares users' tables of results with the shipped ones."""
+"""Compares your tables of results with the shipped tables."""
 
 from __future__ import annotations
 
@@ -18,8 +18,7 @@ from cns_drake.base.json_text import json_number
 from evaluation.recognition.metrics import (
     Difference,
     Interval,
-    holm,
-    mean_auc_difference,
+    compared_by_auc,
     percentile_interval,
     resampled_metrics,
     resampled_weights,
@@ -57,7 +56,7 @@ _Place = tuple[str, tuple[object, ...]]
 
 @dataclass(frozen=True)
 class _Table:
-    """The rows of one metric, and the answers that are available."""
+    """A table's rows of one metric, and its answers to queries, if any."""
 
     name: str
     rows: Mapping[_Place, Row]
@@ -73,10 +72,10 @@ class _Table:
 
 
 class Compared(NamedTuple):
-    """The mean AUC of one method minus that of another.
+    """The mean AUC of one method minus the mean AUC of another.
 
-    The p-value is corrected, by Holm's method, for all differences of the
-    comparison.
+    The p-value is corrected by Holm's method for the number of differences in
+    the comparison.
     """
 
     first: str
@@ -88,9 +87,9 @@ class Compared(NamedTuple):
 class Agreement(NamedTuple):
     """How similarly two tables rank the methods that both of them name.
 
-    `tau` is Kendall's tau-b (Kendall, Biometrika 33, 1945): 1 if every two
-    methods have the same order in both tables, -1 if every two have the
-    opposite order. It is NaN if all values of a table are equal.
+    `tau` is Kendall's tau-b (Kendall, Biometrika 33, 1945): 1 if the two tables
+    rank the methods in the same order, -1 if they rank them in opposite orders.
+    It is NaN if all values of a table are equal.
     """
 
     first: str
@@ -109,12 +108,13 @@ class Comparison:
         task: the task to which this number belongs.
         conditions: number of the conditions that all tables have; 0 for
             rankings.
-        ranked: methods, the best first. The name of the table is appended to a
-            method that also ships, or that is in two tables. For rankings,
-            these are the methods of each table over its own conditions.
-        differences: differences of each two methods whose answers are known.
-        agreements: agreements of each two tables that have two or more methods
-            in common, by name.
+        ranked: methods, the best first. If a method is in two tables, or is
+            also shipped, the name of the table is appended to its name. If only
+            rankings are compared, each table is ranked over its own conditions.
+        differences: differences between any two methods whose answers to all
+            queries are known.
+        agreements: how similarly any two tables rank their methods, if they
+            have at least two method names in common.
         notes: what was left out.
     """
 
@@ -127,7 +127,10 @@ class Comparison:
     notes: Sequence[str]
 
     def to_json(self) -> dict[str, Any]:
-        """Returns the whole comparison for JSON; NaN becomes None."""
+        """Returns the whole comparison as a dictionary for JSON.
+
+        NaN becomes None.
+        """
         return {
             "metric": self.metric,
             "task": self.task,
@@ -172,16 +175,19 @@ def compare(
     gate: bool = False,
     rankings: bool = False,
 ) -> Comparison:
-    """Returns a comparison of tables of results with the shipped ones.
+    """Returns a comparison of tables of results with the shipped tables.
 
     Args:
-        paths: tables of results, or folders with a `results.csv`. A
-            `queries.csv` beside one gives its answers.
-        metric: the number to compare; of several tasks, `place` counts.
+        paths: tables of results, or folders with a `results.csv`. If a
+            `queries.csv` lies next to a table, its answers to queries are used,
+            too.
+        metric: the metric to compare. If several tasks have it, the results of
+            `place` are compared.
         protocol: name of the protocol whose rows count. By default, rows of the
             same protocol are compared; for rankings, only `fair` counts, or the
             only protocol of a table.
-        gate: whether rows with the gate count, or those without.
+        gate: whether to compare the rows with the gate (true) or without it
+            (false).
         rankings: whether to compare only the rankings, each over its own
             conditions, such as those of simulated and of real drives.
 
@@ -264,7 +270,7 @@ def compare(
 
 
 def _name(path: Path, paths: Iterable[Path]) -> str:
-    """Returns the name of a table: that of its file, or else of its folder."""
+    """Returns the name of a table: the name of its file or folder."""
     names = [
         one.stem
         if one.is_file() and one.name != RESULTS
@@ -288,9 +294,9 @@ def _by_one_protocol(rows: Sequence[Row], path: Path) -> tuple[Row, ...]:
 
 
 def _answers(path: Path) -> Sequence[Answers]:
-    """Returns the answers of a table of queries; none if it is not there.
+    """Returns the answers in a table of queries; none if there is no file.
 
-    The table of a report has columns of its own, and does not count.
+    The table of queries of `cns-eval report` has other columns and is ignored.
     """
     if not path.is_file():
         return ()
@@ -346,7 +352,7 @@ def _common(
 
 
 def _apart(one: _Table, other: _Table) -> str:
-    """Returns text that says why two tables have no condition in common."""
+    """Returns as text why two tables have no condition in common."""
     rows = [list(table.rows.values()) for table in (one, other)]
     factors = {
         name: None for some in rows for row in some for name in row.factors
@@ -374,36 +380,30 @@ def _differences(
     entries: Mapping[str, tuple[_Table, str]],
     common: Sequence[tuple[object, ...]],
 ) -> list[Compared]:
-    """Compares each two methods that have answers in all conditions."""
+    """Compares any two methods that have answers in all conditions."""
     asked: dict[str, list[Answers]] = {}
     for name, (table, method) in entries.items():
         places = [(method, one) for one in common]
         if all(place in table.answers for place in places):
             asked[name] = [table.answers[place] for place in places]
-    pairs = list(itertools.combinations(asked, 2))
-    found = []
-    for one, other in pairs:
-        both = list(zip(asked[one], asked[other], strict=True))
-        for first, second in both:
-            check_same_queries(first, second)
-        found.append(
-            mean_auc_difference([(a.outcomes, b.outcomes) for a, b in both])
-        )
-    corrected = holm(np.array([one.p_value for one in found])).tolist()
-    return [
-        Compared(*pair, difference, p)
-        for pair, difference, p in zip(pairs, found, corrected, strict=True)
-    ]
+    for one, *others in zip(*asked.values(), strict=True):
+        for other in others:
+            check_same_queries(one, other)
+    compared = compared_by_auc(
+        {name: [a.outcomes for a in some] for name, some in asked.items()}
+    )
+    return [Compared(*two, *found) for two, found in compared.items()]
 
 
 def _agreement(first: _Table, second: _Table, metric: str) -> Agreement:
     """Compares the rankings of two tables, each of its own conditions.
 
-    The interval is by bootstrap over blocks of the routes where all answers
-    are there, else over conditions.
+    The interval is by bootstrap: over blocks of the routes if the answers to
+    all queries are known, otherwise over conditions.
 
     Raises:
-        InputError: fewer than two methods have all conditions of both.
+        InputError: fewer than two methods have results in all conditions of
+            both tables.
     """
     whole = [
         {

@@ -49,11 +49,12 @@ def plain(text: str) -> str:
 
 
 def save(figure: Figure, stem: Path, kinds: Sequence[str] = LINES) -> None:
-    """Writes a figure for print and, last, for the page.
+    """Writes a figure as files for print and, as the last one, for the page.
 
     Equal figures give equal bytes: no time of creation, no random ids. SVG and
-    WebP have no legend of the whole figure: the page writes it below, in
-    letters that can be read on a phone. The stem is without ending.
+    WebP files leave out the legend of the whole figure: the page writes it
+    below the figure, in letters that can be read on a phone. `stem` is the path
+    of the files without the ending.
 
     Raises:
         InputError: if a file cannot be written.

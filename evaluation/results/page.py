@@ -1,4 +1,4 @@
-"""One page of an experiment: what it found, its charts, numbers and file."""
+"""Writes the page of an experiment: findings, charts, numbers and its file."""
 
 from __future__ import annotations
 
@@ -57,22 +57,25 @@ def write_page(
     notes: Iterable[str] = (),
     on_note: Callable[[str], None] = lambda text: None,
 ) -> Path:
-    """Writes `index.html`, which needs no other file.
+    """Writes an experiment's page, `index.html`, which needs no other file.
 
-    The charts for print are written beside it, and `summaries.csv` if charts
-    have summaries (see `summarised`).
+    Next to it, the function writes the charts for print and, if there are
+    numbers behind the charts (see `summarised`), `summaries.csv`.
 
     Args:
-        results: the table, beside the page as `results.csv`.
-        queries: table of queries, written as `queries.csv`; None without one.
+        results: the table of results, written next to the page as
+            `results.csv`.
+        queries: the table of queries, written as `queries.csv`; None if there
+            is none.
         folder: folder in which the page is written.
         title: title of the page.
         about: the question, in words.
-        charts: see `charts`; the message of the first chart is the headline. A
-            chart without rows in the table is left out, with a note.
+        charts: descriptions of the charts, see `charts`. The message of the
+            first chart is the headline. A chart without data in the table is
+            left out, with a note.
         experiment_text: the experiment as YAML.
-        notes: what else a reader has to know, such as settings.
-        on_note: takes a note on each chart that is left out.
+        notes: further sentences for the page, such as on settings.
+        on_note: is called with a note on each chart that is left out.
 
     Returns:
         The path of the page.
@@ -101,7 +104,7 @@ def write_page(
         shown.append({"message": alone.message, "legend": alone.legend, **svgs})
     numbers = summarised(results, queries, charts)
     if numbers:
-        write_csv(folder / _SUMMARIES, Summary._fields, map(_cells, numbers))
+        write_csv(folder / _SUMMARIES, Summary._fields, numbers)
     environment = jinja2.Environment(
         loader=jinja2.FileSystemLoader(Path(__file__).parent),
         autoescape=True,
@@ -143,10 +146,11 @@ def _svg(drawn: drawing.Drawn, prefix: str) -> Markup:
 
 
 def _summary(results: Results, task: str) -> dict[str, Any]:
-    """Returns a task's numbers by method, without and with the gate.
+    """Returns a table of a task's main results: a row for each method.
 
-    The columns are the conditions with their headline, or, where these are
-    many, the metrics with their means over all conditions.
+    Results without and with the gate are in different rows. If there are few
+    conditions, each column is a condition with the task's main metric;
+    otherwise each column is a metric, averaged over all conditions.
     """
     rows = results.where(task=task).rows
     known = dict.fromkeys(row.metric for row in rows)
@@ -194,7 +198,7 @@ def _summary(results: Results, task: str) -> dict[str, Any]:
 
 
 def _wide_table(results: Results) -> dict[str, Any]:
-    """Returns a line for each condition and method, a column a metric.
+    """Returns a table: a line per condition and method, a column per metric.
 
     Columns that have the same value in all lines are left out.
     """
@@ -220,14 +224,6 @@ def _wide_table(results: Results) -> dict[str, Any]:
         "header": list(zip(names, is_text, strict=True)),
         "rows": [[_shown(value) for value in line] for line in cells],
     }
-
-
-def _cells(numbers: Summary) -> list[object]:
-    """Returns the cells of a summary, with all digits."""
-    return [
-        "" if isinstance(v, float) and math.isnan(v) else v
-        for v in (*numbers[:4], int(numbers.gate), *numbers[5:])
-    ]
 
 
 def _shown(value: object) -> str:

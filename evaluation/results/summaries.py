@@ -1,8 +1,9 @@
-"""Numbers that are functions of the table of results, or of that of queries.
+"""Computes numbers from a table of results or of queries.
 
-Intervals of shares, excesses and differences of AUC are by bootstrap over
-blocks of the route, with the same blocks on both sides. Those of means and of
-rank correlations are by bootstrap over conditions.
+Intervals of shares, of excesses and of AUC differences are by bootstrap over
+blocks of the route; the same blocks are drawn for both results that are
+compared. Intervals of means and of rank correlations are by bootstrap over
+conditions.
 """
 
 from __future__ import annotations
@@ -38,7 +39,8 @@ _SAMPLES = 1000
 class Mean(NamedTuple):
     """A mean over rows that have the same values in some columns.
 
-    `number` counts the rows whose value is known. All other rows are left out.
+    `number` is the number of rows in the mean. Rows without a known value are
+    left out.
     """
 
     key: tuple
@@ -49,9 +51,10 @@ class Mean(NamedTuple):
 
 
 def means(rows: Iterable[Row], *columns: str) -> list[Mean]:
-    """Returns a row of means for each combination of values in columns.
+    """Returns a mean for each combination of values in given columns.
 
-    Each row also has the least and the greatest value, such as those of seeds.
+    Each mean also has the least and the greatest of its values, for example
+    over the seeds.
 
     Example:
         from evaluation import Results, means
@@ -81,7 +84,8 @@ def means(rows: Iterable[Row], *columns: str) -> list[Mean]:
 class Summary(NamedTuple):
     """A number computed from a table, with its 95 % interval or range.
 
-    `n` is the number of conditions from which it is computed, or None.
+    `n` is the number of conditions from which the number is computed; None if
+    unknown.
     """
 
     what: str
@@ -116,11 +120,14 @@ class Summary(NamedTuple):
 
 
 def excesses(queries: QueryRows) -> list[Summary]:
-    """Returns how much more two causes cost together than expected.
+    """Returns how much more AUC two causes cost together than expected.
 
-    Let a and b be the shares of the baseline's AUC that each cause leaves by
-    itself, and ab the share that both leave together. The excess is a * b - ab:
-    without an interaction, the shares would multiply.
+    A cause is a kind of change, such as snow or traffic.
+
+    Let a and b be the shares of the baseline's AUC that are left under each
+    cause by itself, and ab the share that is left under both causes together.
+    The excess is a * b - ab. It is 0 if the causes do not interact, because the
+    shares then multiply.
 
     An excess is computed for each cause whose name joins the names of two
     causes by "+", if both were also measured by themselves (at their strongest
@@ -197,13 +204,17 @@ def lifetime(
 def lifetimes(
     results: Results, factor: str, shares: Iterable[float] = (0.9, 0.5)
 ) -> list[Summary]:
-    """Returns at which value of a numeric factor only given shares are left.
+    """Returns the value of a factor at which only a given share is left.
+
+    For example, the factor is the age of a map, and the share that of the AUC
+    of a new map.
 
     The shares are the rows with the metric `kept`; the least value of the
     factor is the baseline. Each result is computed from means over the seeds,
-    and has the least and the greatest result of a single seed as its range. It
-    is infinite if more than the share is left at the greatest value. A row that
-    exists for one seed only, such as the baseline, is used for all seeds.
+    and has the least and the greatest result of a single seed as its range. The
+    result is infinite if more than the share is left at the greatest value of
+    the factor. A value of the factor that was measured with one seed only, such
+    as the baseline, is used for all seeds.
     """
     groups: dict[tuple, list[Row]] = {}
     for row in results.where(metric="kept").rows:
@@ -280,7 +291,10 @@ def paired_values(results: Results, x: str, y: str) -> list[tuple[Row, float]]:
 
 
 def growths(results: Results, over: str, metric: str) -> list[Summary]:
-    """Returns the growth exponents of a metric over a factor or metric.
+    """Returns how fast a metric grows with a factor or another metric.
+
+    The result is an exponent: 1 if the metric grows in proportion, 2 if it
+    grows with the square.
 
     Points with the same map, method and gate form a curve. Each exponent is
     computed between a point of a curve and the one before it.
@@ -304,11 +318,12 @@ def growths(results: Results, over: str, metric: str) -> list[Summary]:
 def correlations(
     results: Results, x: str, metric: str = "auc"
 ) -> list[Summary]:
-    """Returns how well a factor or metric predicts what each method misses.
+    """Returns how well a factor or metric predicts each method's losses.
 
-    This is Spearman's rank correlation of x with 1 - metric, over the
+    The result is Spearman's rank correlation of `x` with 1 - metric, over the
     conditions in which both are known. Its interval is by bootstrap over these
-    conditions. Select the rows with or without the gate before.
+    conditions. `results` must contain either only rows with the gate or only
+    rows without it.
     """
     points: dict[str, list[tuple[float, float]]] = {}
     for row, at in paired_values(results, x, metric):
@@ -345,7 +360,7 @@ def check_same_queries(one: Answers, other: Answers) -> None:
     """Raises an error unless two methods answered the same queries.
 
     Raises:
-        InputError: otherwise.
+        InputError: the two methods answered different queries.
     """
     frames, others = (a.columns["query_frame"] for a in (one, other))
     if not np.array_equal(frames, others):
@@ -374,7 +389,8 @@ def ranking(
 
     Args:
         rows: rows of one metric.
-        least_first: whether less is better.
+        least_first: whether a smaller value is better, so that the least comes
+            first.
 
     Returns:
         The methods, the best first; and their means (B, M) in the samples. Both
@@ -420,9 +436,9 @@ def summarised(
 ) -> list[Summary]:
     """Returns the numbers behind an experiment's charts.
 
-    They are lifetimes, for lines of `kept`, with their range over seeds; growth
-    rates, for lines of times; correlations, for scatter plots; and what two
-    causes cost together.
+    They are, for charts of the kind `lines`, lifetimes (metric `kept`) or
+    growth exponents (CPU times); for scatter plots, correlations; and, for two
+    kinds of change, what they cost together beyond expectation.
     """
     found = []
     for chart in charts:

@@ -1,10 +1,10 @@
 """The table of results, one number per row; and the table of queries.
 
 `results.csv` and `queries.csv` begin with the same columns: where and under
-which condition something was measured. All columns that are not named here are
-factors of an experiment, named by their place in its file, such as
-`query.transient.snow`; their values are numbers, text or truth values, and a
-cell is empty where a factor does not apply.
+which condition something was measured. All further columns are factors of an
+experiment. They are named by the path of the field in the experiment's file,
+such as `query.transient.snow`. Their values are numbers, text or truth values;
+a cell is empty where a factor does not apply.
 """
 
 from __future__ import annotations
@@ -117,7 +117,7 @@ class Key:
         database: name of the drive that makes the database.
         query: name of the drive whose scans are the queries.
         seed: seed of everything that is random.
-        factors: column -> value of those that apply.
+        factors: name -> value of each factor of the condition that applies.
         task: `place`, `pose`, `localise`, `map`, `change`, `cost` or another.
         method: method, estimator or baseline; "" for the task `change`.
         gate: whether places were rejected by the method's own pose.
@@ -136,14 +136,14 @@ class Key:
     protocol: str
 
     def __getitem__(self, column: str) -> object:
-        """Returns the value of a column, or `label`; None without one."""
+        """Returns the value of a column, or `label`; None if it is unknown."""
         if column in _NAMED:
             return getattr(self, column, None)
         return self.factors.get(column)
 
     @property
     def label(self) -> str:
-        """Name of the method, with those of its settings that are factors."""
+        """Name of the method, with its settings that are factors."""
         start = f"{SETTINGS}{self.method}."
         settings = (
             f"{name.removeprefix(start)} {value}"
@@ -153,10 +153,10 @@ class Key:
         return ", ".join((self.method, *settings))
 
     def but(self, *names: str) -> tuple[object, ...]:
-        """Returns the key without some columns.
+        """Returns the values of the key without those of some columns.
 
-        The settings of a method, such as `methods.ring++.crop`, are left out
-        with `method`.
+        If `method` is left out, so are the method's settings, such as
+        `methods.ring++.crop`.
         """
         known = [name for name in KEYS if name not in names]
         without_settings = "method" in names
@@ -195,7 +195,7 @@ class Row(Key):
 
     @classmethod
     def of(cls, number: Number, **key: Any) -> Row:
-        """Returns the row of a task's result, with the condition's key."""
+        """Returns a task's result as a row; `key` describes its condition."""
         named = {"method": number.method, "gate": number.gate, **key}
         return cls(
             **named,
@@ -213,14 +213,15 @@ class Answers(Key):
 
     Attributes:
         columns: name -> (Q,) values, of the columns of `queries.csv`. NaN
-            stands for an empty number, -1 (or NaN) for an empty whole one.
+            stands for an empty cell with a real number; -1, NaN or infinity for
+            an empty cell with a whole number.
     """
 
     columns: Mapping[str, np.ndarray]
 
     @cached_property
     def outcomes(self) -> QueryOutcomes:
-        """Outcome of each query; without the number of places."""
+        """Outcome of each query; the number of places is unknown."""
         columns = self.columns
         is_right = np.asarray(columns["correct"], dtype=bool)
         ranks = np.full(len(is_right), math.inf)
@@ -240,7 +241,7 @@ class Answers(Key):
 
 @dataclass(frozen=True)
 class Results:
-    """A table of results: the ordered names of its factors, and its rows.
+    """A table of results: its rows, and the names of its factors in order.
 
     Example:
         from evaluation import Results
@@ -254,7 +255,11 @@ class Results:
 
     @classmethod
     def of(cls, rows: Iterable[Row]) -> Results:
-        """Returns a table of rows, with factors in order of appearance."""
+        """Returns a table of rows.
+
+        The names of its factors are in the order in which they appear in the
+        rows.
+        """
         rows = tuple(rows)
         return cls(_factor_names(rows), rows)
 
@@ -262,12 +267,13 @@ class Results:
     def read(cls, path: str | Path) -> Results:
         """Returns the table in a file `results.csv`, or in a folder with one.
 
-        Columns can have any order; unknown ones are factors.
+        Columns can have any order; unknown columns are factors.
 
         Raises:
             InputError: the file cannot be read, is a table of an earlier
-                version, lacks a column, has one twice, or has a value that
-                cannot be. The line, the column and the fault are named.
+                version, lacks a column, has a column twice, or contains an
+                impossible value. The error names the line, the column and the
+                fault.
         """
         table = _Cells.read(path, RESULTS, (*KEYS, *_MEASURED))
         rows: list[Row] = []
@@ -302,8 +308,8 @@ class Results:
     ) -> Results:
         """Returns the rows that have given values in given columns.
 
-        A tuple, list or set stands for any of its values. Names of factors with
-        dots go into `columns`.
+        If the given value is a tuple, list or set, a row needs any one of its
+        values. Give the names of factors that contain dots in `columns`.
         """
         wanted = {
             name: value if isinstance(value, tuple | list | set) else (value,)
@@ -319,7 +325,7 @@ class Results:
         )
 
     def distinct(self, column: str) -> list[Any]:
-        """Returns the different values of a column in order, without None."""
+        """Returns the distinct values of a column in order, without None."""
         found = dict.fromkeys(row[column] for row in self.rows)
         return [value for value in found if value is not None]
 
@@ -340,7 +346,11 @@ class QueryRows:
 
     @classmethod
     def of(cls, answers: Iterable[Answers]) -> QueryRows:
-        """Returns a table of rows, with factors in order of appearance."""
+        """Returns a table of answers.
+
+        The names of its factors are in the order in which they appear in the
+        answers.
+        """
         answers = tuple(answers)
         return cls(_factor_names(answers), answers)
 
@@ -421,7 +431,7 @@ def _answer_cell(value: Any, kind: type) -> str:
 def _answered(
     lines: Sequence[_Line], names: Iterable[str], task: str
 ) -> dict[str, np.ndarray]:
-    """Returns column -> values of a key's lines, after checking them."""
+    """Returns column -> checked values of all lines with the same key."""
     columns: dict[str, np.ndarray] = {}
     for name in names:
         kind = _ANSWERS[name]
@@ -463,7 +473,7 @@ def _range(metric: str) -> tuple[float, float]:
 
 
 def _measured(one: _Line) -> dict[str, Any]:
-    """Returns a row's values that follow the columns of its key."""
+    """Returns a row's values in the columns after those of its key."""
     metric = one.text("metric")
     value, low, high = (
         one.value(name, float) for name in ("value", "low", "high")
@@ -517,7 +527,10 @@ class _Line:
         return cell
 
     def value(self, column: str, kind: type) -> Any:
-        """Returns a cell as a value of a type; an empty cell has a stand-in."""
+        """Returns a cell as a value of a type.
+
+        For an empty cell, the value is that in `_EMPTY`.
+        """
         cell = self.cells[self.columns[column]]
         if kind is bool:
             if cell.lower() not in _TRUTH:
@@ -536,7 +549,7 @@ class _Line:
         return int(whole)
 
     def factor(self, column: str) -> object:
-        """Returns the number, truth value or text of a factor, or None."""
+        """Returns the value of a factor: number, truth value, text or None."""
         cell = self.cells[self.columns[column]]
         if _NUMBER.fullmatch(cell) and not _NAME_OF_DIGITS.fullmatch(cell):
             value = float(cell)
@@ -548,7 +561,7 @@ class _Line:
         return cell or None
 
     def key(self, factors: Iterable[str]) -> dict[str, Any]:
-        """Returns the attributes of a `Key`."""
+        """Returns the attributes of the line's `Key`."""
         values: dict[str, Any] = {
             name: self.text(name) for name in ("experiment", "map", "task")
         }
@@ -588,7 +601,7 @@ class _Cells:
         needed: Iterable[str],
         known: Iterable[str] = (),
     ) -> _Cells:
-        """Reads a file, or the file of the usual name in a folder."""
+        """Reads a file or, in a folder, the file with the usual name."""
         path = Path(path)
         file = path / usual if path.is_dir() else path
         try:

@@ -67,10 +67,11 @@ _MARKDOWN = {ord(c): f"\\{c}" for c in "\\`*_[]|"} | {
 
 @dataclass(frozen=True)
 class Cell:
-    """A number that is ranked in its row, with the paper's number beside it.
+    """A number, its rank in the row, and the paper's number next to it.
 
-    Without a number, ours is None or NaN and the paper's None. The rank is 1
-    for the best in the row, 2 for the second, None for others.
+    `value` is our number; None or NaN if there is none. `printed` is the
+    paper's number, or None. `rank` is 1 for the best number in the row, 2 for
+    the second best, and None for all others.
     """
 
     value: float | None
@@ -82,14 +83,15 @@ class Cell:
 class Table:
     """Rows under a header; numbers stay numbers until they are written.
 
-    A missing value is empty in CSV, elsewhere a dash; truth values are 0 or 1.
+    A missing value is written as an empty cell in CSV, and as a dash in other
+    formats. Truth values are written as 0 or 1.
 
     Attributes:
         rows: one value for each column: text, a number, a `Cell`, or None for
-            an empty one.
-        groups: names over columns, each with the number of columns that it
-            spans; empty names are left out. Groups span all columns, or there
-            are none.
+            an empty cell.
+        groups: headings above the columns, each with the number of columns that
+            it spans. An empty heading is not written. Together, the headings
+            span all columns; without headings, the list is empty.
         caption: what the table shows.
     """
 
@@ -102,7 +104,7 @@ class Table:
     def of(
         cls, items: Iterable[_Item], columns: Columns[_Item], caption: str = ""
     ) -> Table:
-        """Returns a table with a row, or several, for each item."""
+        """Returns a table that has one or several rows for each item."""
         names = [n if isinstance(n, tuple) else ("", n) for n in columns]
         groups = groupby(group for group, _ in names)
         spans = tuple((group, len(list(same))) for group, same in groups)
@@ -118,7 +120,7 @@ class Table:
         )
 
     def without_empty(self, name: str) -> Table:
-        """Returns the table without a column that has no value in any row."""
+        """Returns the table without a given column if the column is empty."""
         column = self.header.index(name)
         if not all(_is_missing(row[column]) for row in self.rows):
             return self
@@ -130,14 +132,7 @@ class Table:
 
     def to_csv(self) -> str:
         """Returns the table as CSV with all digits."""
-        cells = (
-            [
-                int(v) if isinstance(v, bool) else "" if _is_missing(v) else v
-                for v in row
-            ]
-            for row in self.rows
-        )
-        return csv_text(self._full_names(), cells)
+        return csv_text(self._full_names(), self.rows)
 
     def write_csv(self, path: Path) -> None:
         """Writes the table as CSV, as `to_csv` returns it.
@@ -148,9 +143,9 @@ class Table:
         write_text(path, self.to_csv())
 
     def to_markdown(self) -> str:
-        """Returns the table as Markdown with four decimals, like the paper's.
+        """Returns the table as Markdown, with four decimals.
 
-        The paper's values follow in brackets.
+        The paper's numbers follow ours in brackets.
         """
         lines = [
             [escape_markdown(name) for name in self._full_names()],
@@ -228,7 +223,7 @@ def keyed(
 ) -> Columns[_Item]:
     """Returns one table column for each key.
 
-    `value` computes a cell from an item, the table's row, and the key.
+    `value` computes a cell from an item, which makes a row, and a key.
     """
 
     def column(key: _Key) -> Callable[[_Item], object]:
@@ -238,9 +233,11 @@ def keyed(
 
 
 def protocol_columns(path: str) -> Columns[Any]:
-    """Returns table columns with the protocol of an item, its name last.
+    """Returns table columns for the fields of the protocol of an item.
 
-    The protocol is found at a path of attributes.
+    The last column is the name of the protocol.
+
+    `path` leads from an item to its protocol, as in `result.protocol`.
     """
     columns = keyed(
         {name: name for name in PROTOCOL_COLUMNS},
@@ -260,7 +257,7 @@ def _rows(values: Sequence[object]) -> list[tuple[object, ...]]:
 def ranked(
     values: Sequence[float | None], printed: Sequence[float | None]
 ) -> list[Cell]:
-    """Returns the cells of a row with the greatest two marked.
+    """Returns the cells of a row; the greatest two numbers are marked.
 
     Values that are equal as printed, with four decimals, share a rank.
     """
@@ -285,7 +282,10 @@ def title(label: str) -> str:
 
 
 def in_table_order(methods: Iterable[str]) -> list[str]:
-    """Returns methods in the order of tables, others after them by name."""
+    """Returns methods in the order of tables.
+
+    Methods without a place in this order follow, sorted by name.
+    """
     known = list(_METHOD_TITLES)
     return sorted(
         set(methods),
@@ -294,7 +294,7 @@ def in_table_order(methods: Iterable[str]) -> list[str]:
 
 
 def by_pair(items: Iterable[Any]) -> dict[Any, list[Any]]:
-    """Returns pair -> its items."""
+    """Returns the items of each pair of drives, by pair."""
     groups: dict[Any, list[Any]] = {}
     for one in items:
         groups.setdefault(one.pair, []).append(one)
@@ -302,7 +302,7 @@ def by_pair(items: Iterable[Any]) -> dict[Any, list[Any]]:
 
 
 def by_pair_and_method(items: Sequence[Any]) -> list[Any]:
-    """Returns items pair by pair, their methods in the order of tables."""
+    """Returns items pair by pair, and by method in the order of tables."""
     pairs = list(dict.fromkeys(one.pair for one in items))
     methods = in_table_order(one.method for one in items)
     return sorted(
@@ -312,7 +312,7 @@ def by_pair_and_method(items: Sequence[Any]) -> list[Any]:
 
 
 def to_text(value: object) -> str:
-    """Returns a value as tables show it."""
+    """Returns a value as the text that tables show."""
     if _is_missing(value):
         return MISSING
     if isinstance(value, bool):
@@ -334,8 +334,8 @@ def _escape_latex(text: str) -> str:
 class _Form(NamedTuple):
     """How a markup language writes the values of a table.
 
-    `marks` are formats of the best and the second value in a row, `printed`
-    that of our value with the paper's.
+    `marks` are the formats of the best and the second best value in a row.
+    `printed` is the format of our value followed by the paper's.
     """
 
     escape: Callable[[str], str]

@@ -1,4 +1,4 @@
-"""The methods that a study runs: those of the package, and the user's own."""
+"""Chooses the methods that a study runs: shipped ones and your own."""
 
 from collections.abc import Iterable
 from dataclasses import dataclass, replace
@@ -23,10 +23,10 @@ _FORM = "METHOD.NAME=VALUE"
 
 @dataclass(frozen=True)
 class MethodChoice:
-    """A method that any process can make.
+    """A method with its settings, from which any process can make it.
 
-    A method from outside this package is registered by its file. Parameters
-    without a setting have their defaults.
+    A method of your own is registered by its Python file. Parameters without a
+    setting have their defaults.
     """
 
     name: str
@@ -35,7 +35,7 @@ class MethodChoice:
 
     @property
     def key(self) -> str:
-        """Name of the method with its settings, unique to the choice."""
+        """Unique name: the method's name with its settings."""
         settings = (f"{name}={value}" for name, value in self.settings)
         return " ".join([self.name, *settings])
 
@@ -53,7 +53,7 @@ class MethodChoice:
         return make_method(self.name, dict(self.settings))
 
     def identity(self) -> dict:
-        """Returns everything on which its results depend, ready for JSON.
+        """Returns everything on which the method's results depend, for JSON.
 
         Raises:
             InputError: if its file cannot be used.
@@ -83,7 +83,7 @@ def choose_methods(
     files: Iterable[Path] = (),
     settings: Iterable[str] = (),
 ) -> tuple[MethodChoice, ...]:
-    """Returns the methods of this package and those in files.
+    """Returns the methods of this package, and your own from files.
 
     Args:
         files: Python files that register a method each, or names of optional
@@ -92,9 +92,9 @@ def choose_methods(
             defaults.
 
     Raises:
-        InputError: if a file registers no method, or one that is there
-            already, an optional method is not installed, or a setting is not
-            known or does not fit.
+        InputError: if a file registers no method or a method with a known name,
+            an optional method is not installed, or a setting is unknown or does
+            not fit.
     """
     chosen = [MethodChoice(name) for name in shipped_methods()]
     stems = set()

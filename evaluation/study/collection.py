@@ -1,4 +1,4 @@
-"""The recordings in a folder, in groups, with their roles."""
+"""Finds the recordings in a folder, and the pairs in which to compare them."""
 
 from __future__ import annotations
 
@@ -28,11 +28,11 @@ _UNPLACED = "map and stage are unknown: no scenario, and no name <map>_<stage>"
 
 @dataclass(frozen=True)
 class RecordingInfo:
-    """A recording that exists or will be made, and its place in a study.
+    """A recording that exists or will be made, with its map and stage.
 
-    The names of a map's stages sort in the order of time. `way` is the route of
-    the drive (see `driven_way`); None if unknown. The recording is read from
-    `path`, a file or folder, unless `made_by` opens it.
+    Sorted by name, a map's stages are in the order of time. `way` describes the
+    route of the drive (see `driven_way`); None if unknown. The recording is
+    read from `path`, a file or folder, unless `made_by` opens it.
     """
 
     name: str
@@ -46,7 +46,7 @@ class RecordingInfo:
 
     @property
     def source(self) -> DriveSource:
-        """The function that opens the drive."""
+        """Function that opens the drive, see `DriveSource`."""
         return self.made_by or RecordedDrive(self.path.absolute())
 
     def drives_like(self, other: RecordingInfo) -> bool:
@@ -60,11 +60,11 @@ Pair = tuple[RecordingInfo, RecordingInfo]
 
 @dataclass(frozen=True)
 class Run:
-    """A method on a pair of drives by a protocol.
+    """One measurement: a method on a pair of drives, by a protocol.
 
-    The descriptions of the places and those of the queries have a name each;
-    the name of the queries' descriptions is also that of the run. A run that
-    repeats another one uses the protocol of published numbers.
+    `places` names the method's descriptions of the places. `queries` names its
+    descriptions of the queries, and also the run. A run can repeat another run
+    by the protocol of published numbers.
     """
 
     method: MethodChoice
@@ -74,12 +74,15 @@ class Run:
 
     @property
     def repeats(self) -> bool:
-        """Whether the run repeats another run, by the published protocol."""
+        """Whether the run repeats another run by the source's protocol.
+
+        The source is that of published numbers, see `City.runs`.
+        """
         return self.queries != self.method.key
 
     @property
     def shares_places(self) -> bool:
-        """Whether the run uses the places of the study's own protocol."""
+        """Whether the run uses places described by the study's own protocol."""
         return self.places == self.method.key
 
 
@@ -87,8 +90,11 @@ class Run:
 class City:
     """The drives through one map.
 
-    Each stage has one recording, `<map>_<stage>`; others may be controls. The
-    reference names the pairs that are compared both ways.
+    `stages` contains one drive per stage of the map. `others` are further
+    drives, such as controls, which follow the route of one stage through
+    another stage. `reference` contains published numbers: a pair of stages is
+    also compared in reverse, with database and query exchanged, if the
+    reference does so.
     """
 
     name: str
@@ -97,7 +103,10 @@ class City:
     reference: Reference = NO_REFERENCE
 
     def change_pairs(self) -> list[Pair]:
-        """Returns pairs of every earlier stage with the last one."""
+        """Returns the pairs of drives between which change is measured.
+
+        Each drive of an earlier stage is paired with that of the last stage.
+        """
         *earlier, last = (self.stages[key] for key in sorted(self.stages))
         return [(recording, last) for recording in earlier]
 
@@ -105,8 +114,8 @@ class City:
         """Returns pairs of database and query.
 
         Every earlier stage is a database for queries from the last stage. If
-        the reference has the reversed pair, too, the last stage is a database
-        for queries from the earlier one.
+        there are published numbers for the reversed pair, the last stage is
+        also a database for queries from this earlier stage.
 
         Args:
             with_itself: whether to add a pair of each stage with itself, for
@@ -129,9 +138,13 @@ class City:
         methods: Iterable[MethodChoice],
         protocol: RetrievalProtocol,
     ) -> list[Run]:
-        """Returns the runs of methods on a pair, followed by their repetitions.
+        """Returns the runs of methods on a pair, then runs that repeat them.
 
-        Places are shared if both protocols describe them alike.
+        If a method has published numbers on the pair, measured by another
+        protocol, a second run repeats the method by that protocol.
+
+        The second run uses the places of the first run if the two protocols
+        describe places in the same way.
         """
         database, query = (one.stage for one in pair)
         runs = [Run(one, protocol, one.key, one.key) for one in methods]
@@ -158,11 +171,12 @@ class City:
     def unchanged_pair(
         self, database: RecordingInfo, query: RecordingInfo
     ) -> Pair | None:
-        """Returns the control of a pair: the same routes, in one stage.
+        """Returns the control of a pair: the same two routes, in one stage.
 
-        One drive of the pair is replaced by a drive on its route in the stage
-        of the other. The database is replaced if possible, so that the queries
-        keep their scans. A drive against itself has no control.
+        One drive of the pair is replaced by a drive on the same route, but in
+        the stage of the other drive. If possible, the database is replaced, so
+        that the queries keep their scans. Returns None if there is no such
+        drive, or if a drive is compared with itself.
         """
         if database is query:
             return None
@@ -183,17 +197,18 @@ def find_recordings(
 ) -> list[RecordingInfo]:
     """Opens all recordings in a folder and its direct subfolders.
 
-    They may have the layout of MulRan or HeLiPR. Drives in the layout of CNS,
-    and drives in the layout of KITTI that contain a `scenario.yaml`, are found
-    up to three levels down, where exports put them.
+    They can be MCAP files or have the layout of a data set, such as MulRan or
+    HeLiPR. Drives in the layout of CNS, and drives in the layout of KITTI that
+    contain a `scenario.yaml`, are found up to three levels down, where exports
+    put them.
 
     A recording states its map and stage in its scenario. Without a scenario,
     they are taken from its name: `<map>_<stage>`, or without `_` as in KAIST01.
-    A recording with neither is left out.
+    A recording without map and stage is left out, with a note.
 
     Raises:
-        InputError: if no recording has a map and a stage, or one cannot be
-            read.
+        InputError: if no recording has a map and a stage, or a recording cannot
+            be read.
     """
     folder = Path(folder)
     if not folder.is_dir():
@@ -212,7 +227,7 @@ def find_recordings(
 
 
 def nothing_to_compare(cities: Iterable[City]) -> list[str]:
-    """Returns a sentence for each city that has no pair of stages."""
+    """Returns a note for the user on each city without two stages."""
     return [
         f"{city.name}: nothing to compare: all drives are through stage"
         f" {', '.join(city.stages)}. A report compares drives through two"
@@ -227,10 +242,11 @@ def nothing_to_compare(cities: Iterable[City]) -> list[str]:
 def group_cities(
     recordings: Iterable[RecordingInfo], reference: Reference = NO_REFERENCE
 ) -> list[City]:
-    """Returns the cities of recordings, by name.
+    """Groups recordings by map; returns a city for each map, sorted by name.
 
     Raises:
-        InputError: if two have one name, or claim the same place.
+        InputError: if two recordings have the same name, or the same map and
+            stage.
     """
     recordings = list(recordings)
     paths: dict[str, Path] = {}
@@ -280,7 +296,7 @@ def _place(
     lidar: str | None,
     columns: int | None,
 ) -> RecordingInfo | None:
-    """Returns a recording; None without its map and stage."""
+    """Returns a recording; None if its map or stage is unknown."""
     drive = open_drive(path, lidar, columns)
     for note in drive.notes:
         on_note(note)

@@ -1,4 +1,4 @@
-"""Evidence on why best places are wrong, from the scans of two drives."""
+"""Finds evidence on why best places are wrong, in the scans of two drives."""
 
 from __future__ import annotations
 
@@ -44,13 +44,15 @@ def explain_faults(
     results: tuple[Part, ...],
     protocol: RetrievalProtocol,
 ) -> PairEvidence | None:
-    """Returns why queries of a pair went wrong; None if a drive closes no loop.
+    """Returns evidence on why best places of a pair are wrong.
+
+    Returns None if a drive is compared with itself and closes no loop.
 
     Args:
         reporter: reports progress.
-        drives: database and query, each a `KeptDrive`.
+        drives: files of the database and the query, each with a `KeptDrive`.
         methods: methods of the results.
-        results: result of each method on the pair.
+        results: file with each method's result on the pair.
         protocol: protocol of the results.
     """
     found = []
@@ -71,7 +73,10 @@ def find_evidence(
     protocol: RetrievalProtocol,
     track: Track = silent,
 ) -> PairEvidence:
-    """Compares the scans of queries with those of matches and wrong places.
+    """Returns evidence on why best places of a pair are wrong.
+
+    The scan of each query is compared with those of its matches and of its
+    wrong best places.
 
     Args:
         database: drive of the places.
@@ -138,7 +143,10 @@ def find_evidence(
 
 
 def _wrong_places(result: PlaceRecognition) -> np.ndarray:
-    """Returns (Q,) best places that are wrong and not just too far; or -1."""
+    """Returns the wrong best place of each query, (Q,).
+
+    It is -1 if the best place is right or less than two radii away.
+    """
     found, outcomes = result.retrieval, result.outcomes
     is_far = found.best_distances > NEARLY * result.protocol.radius
     is_wrong = outcomes.has_match & ~outcomes.is_right
@@ -149,8 +157,8 @@ def _wrong_places(result: PlaceRecognition) -> np.ndarray:
 class _Shown:
     """A scan (N, 3) in the frame of the sensor [m], and its pose (4, 4).
 
-    The points lie on structures, the instances (N,); these are None where the
-    recording does not say.
+    `instances` (N,) is the number of the structure on which each point lies;
+    None if the recording does not contain it.
     """
 
     X_WS: np.ndarray
@@ -190,25 +198,25 @@ class _Shown:
         return cKDTree(self.standing, balanced_tree=False, compact_nodes=False)
 
     def coinciding(self, points: np.ndarray) -> float:
-        """Returns the part of points that coincide with standing ones.
+        """Returns the share of points that coincide with upright objects.
 
-        There are N > 0 points (N, 3) in the frame of the sensor [m].
+        The points (N, 3), N > 0, are in the frame of the sensor [m].
         """
         found, _ = self.tree.query(points, distance_upper_bound=_COINCIDENT)
         return float(np.isfinite(found).mean())
 
     @cached_property
     def some(self) -> np.ndarray:
-        """(M, 3) some of the points, drawn at random."""
+        """(M, 3) a random sample of the scan's points."""
         return sampled(self.points)
 
     @cached_property
     def some_instances(self) -> np.ndarray | None:
-        """(M,) instances of the points in `some`."""
+        """(M,) number of the structure of each point in `some`."""
         return None if self.instances is None else sampled(self.instances)
 
     def seen_from(self, other: _Shown) -> np.ndarray:
-        """Returns some points in the frame of another scan's sensor."""
+        """Returns the points `some` in the frame of another scan's sensor."""
         X_OS = inverse(other.X_WS) @ self.X_WS
         return transform(X_OS, self.some)
 
@@ -216,10 +224,10 @@ class _Shown:
 def _change(
     place: _Shown, query: _Shown, classes: Mapping[int, str]
 ) -> tuple[float, str]:
-    """Returns the part of two scans that has come or gone, and its main class.
+    """Returns the share of two scans that is new or gone, and its main class.
 
-    Points have come or gone if they stand on a structure without a point in the
-    other scan, although nothing hides them from its sensor.
+    A point is new or gone if it lies on a structure that has no point in the
+    other scan, although nothing hides the point from the other sensor.
     """
     changed: Counter[str] = Counter()
     total = 0
@@ -244,11 +252,11 @@ def _change(
 
 
 def _fits(query: _Shown, places: Sequence[_Shown]) -> list[float]:
-    """Returns for each place the share of upright points that coincide.
+    """Returns, for each place, the share of upright points that coincide.
 
-    The scans are aligned as well as possible, without their poses: the pose is
-    that of layered overlap. The result is the lesser of the query's and the
-    place's shares.
+    Query and place are aligned at the pose that the method layered overlap
+    finds, not at their true poses. The result is the lesser of two shares: of
+    the query's points and of the place's points.
     """
     shared = [0.0] * len(places)
     standing = [k for k, one in enumerate(places) if len(one.standing)]

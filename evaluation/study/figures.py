@@ -1,4 +1,4 @@
-"""The figures that a study draws of its cities, and their file names."""
+"""Draws the figures of a study's cities, and names their files."""
 
 from pathlib import Path
 
@@ -34,9 +34,9 @@ def draw_city(
 ) -> dict[str, PageDrive]:
     """Draws the routes of a city; returns its drives for the page, by name.
 
-    Each stage consists of its name, and of the `SurveyedDrive`, the cloud and
-    the source of its drive. If the source is a recording, the page shows its
-    camera.
+    Each stage consists of its name, a file with a `SurveyedDrive`, a file with
+    a cloud for pictures, and the source of the drive. If the source is a
+    recording, the page shows its camera images.
     """
     names, views, routes, drives = [], [], [], {}
     for done, (name, surveyed, fine, source) in enumerate(stages):
@@ -73,13 +73,13 @@ def compare_stages(
         reporter: reports progress.
         map_name: name of the map.
         stages: the earlier stage, and the later one.
-        drives: the earlier drive, the later one, and optionally a control.
-            Each is a `SurveyedDrive`; all are of one world.
-        clouds: clouds of the earlier and the later drive.
+        drives: the earlier drive, the later one, and optionally a control. Each
+            is a file with a `SurveyedDrive`; all are in one world frame.
+        clouds: files with the clouds of the earlier and the later drive.
         stems: paths of the two figures, without ending. The first figure shows
-            what changed, the second one the sets from which TCR is computed.
+            what changed, the second figure shows the sets of points from which
+            TCR is computed.
     """
-    del reporter
     read: list[SurveyedDrive] = [part.read() for part in drives]
     earlier, later, *controls = (
         Surveyed(one.name, one.coarse, one.positions, one.placed)
@@ -99,7 +99,7 @@ def compare_stages(
 
 
 def figure_files(*stems: Path) -> tuple[Path, ...]:
-    """Returns the files of drawn figures."""
+    """Returns the files that figures are drawn to."""
     return tuple(
         stem.with_name(f"{stem.name}.{kind}")
         for stem in stems
@@ -108,16 +108,20 @@ def figure_files(*stems: Path) -> tuple[Path, ...]:
 
 
 def routes_stem(city: City) -> str:
-    """Returns the name of the figure of a city's routes, without ending."""
+    """Returns the file name of the figure of a city's routes.
+
+    The name is without ending.
+    """
     return file_name(f"routes_{city.name}")
 
 
 def change_stems(
     city: City, pair: tuple[RecordingInfo, RecordingInfo]
 ) -> tuple[str, str]:
-    """Returns the names of the two figures of a change, without ending.
+    """Returns the file names of the two figures of a change, without ending.
 
-    The first figure shows the points, the second one the sets.
+    The first figure shows which points changed, the second figure the sets of
+    points from which TCR is computed.
     """
     # Underscores join the parts. They are escaped in all but the first, so that
     # two pairs of stages never share a name.
@@ -132,7 +136,7 @@ def change_stems(
 
 
 def curves_stem(city: City) -> str:
-    """Returns the name of the figure of a city's precision and recall."""
+    """Returns the file name of the figure of a city's precision and recall."""
     return file_name(f"pr_{city.name}")
 
 

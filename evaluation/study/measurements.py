@@ -1,4 +1,4 @@
-"""Measurements between two recordings, or on one."""
+"""Measures methods on one recording or on two."""
 
 from collections.abc import Callable
 from dataclasses import replace
@@ -63,7 +63,7 @@ def recognise_places(
     Args:
         reporter: reports progress.
         names: names of the map, and of the stages of database and query.
-        described: descriptions of the database and of the query.
+        described: files with the descriptions of the database and of the query.
         choice: the method.
         protocol: protocol of the comparison.
     """
@@ -95,9 +95,10 @@ def measure_costs(
     Args:
         reporter: reports progress.
         source: opens the query drive.
-        surveyed: survey of the query drive, with its poses.
+        surveyed: file with the survey of the query drive, which has its poses.
         methods: the methods.
-        described: descriptions of a database and the query, by each method.
+        described: files with each method's descriptions of a database and of
+            the query.
         protocol: protocol of the comparison.
     """
     drive, known = source(), surveyed.read()
@@ -149,16 +150,17 @@ def measure_places(
 ) -> list[PlaceOutcome]:
     """Returns two outcomes of each method for each radius of a match.
 
-    One is without the gate and one with it; queries are scored only once.
+    The first outcome is without the gate, the second with it; queries are
+    scored only once.
 
-    A method that would take over an hour for all queries has no outcome.
+    A method that would take more than an hour for all queries is left out.
 
     Args:
         reporter: reports progress.
         database: described drive of the places.
-        query: described drive in the same world, whose scans ask.
-        distractors: described drives through other cities, one part for each
-            method.
+        query: described drive in the same world whose scans are the queries.
+        distractors: described drives through other cities, each with one file
+            per method.
         num_distractors: number of places of these drives that are added to the
             database.
         methods: the methods.
@@ -231,10 +233,10 @@ def _describe(
     protocol: RetrievalProtocol,
     reporter: Reporter,
 ) -> tuple[list[np.ndarray], Callable[[int], DescribedDrive]]:
-    """Returns a drive's scans, and a function: method's number -> description.
+    """Returns a drive's scans, and a function that returns its descriptions.
 
-    Call the function only once for each method, because a description is then
-    freed.
+    The function takes the number of a method. Call it only once for each
+    method, because it frees the description.
     """
     if isinstance(drive, tuple):
         scans, *parts = drive
@@ -251,19 +253,21 @@ def crowded(
     method: int,
     num_others: int,
 ) -> tuple[DescribedDrive, list[str]]:
-    """Returns a drive to which places of drives elsewhere are appended.
+    """Returns a database drive with places of other cities appended.
 
-    The other drives are moved so far away that none of their places is a match.
-    Their first `num_others` places are appended, or all if there are fewer.
+    The drives through other cities are moved so far away that none of their
+    places is a match. Their first `num_others` places are appended, or all if
+    there are fewer.
 
     Args:
         database: the drive.
-        distractors: described drives elsewhere, one part for each method.
+        distractors: described drives through other cities, each with one file
+            per method.
         method: number of the method.
-        num_others: number of places.
+        num_others: number of places to append.
 
     Returns:
-        The drive, and the name of the drive of each place.
+        The drive with all places, and the name of each place's own drive.
     """
     known = [database]
     for parts in distractors:

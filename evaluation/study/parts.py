@@ -1,9 +1,9 @@
 """Files of intermediate results that name their inputs.
 
-A part begins with a line that names its format and a line of JSON with its
-inputs. Its value follows (see `encode`), compressed by zstd at its
-fastest level. This halves maps. For 50 MB of spectra, which hardly shrink, it
-takes a tenth of a second.
+A part is the file of one intermediate result. It begins with a line that names
+its format and a line of JSON with its inputs. The result follows (see
+`encode`), compressed by zstd at its fastest level. Compression halves maps. For
+50 MB of spectra, which hardly shrink, it takes a tenth of a second.
 """
 
 from __future__ import annotations
@@ -78,15 +78,15 @@ _FORMS: dict[str, type] = {
 
 
 def encode(value: object) -> bytes:
-    """Returns a value as bytes without code; equal values give equal bytes.
+    """Returns a value as bytes; equal values give equal bytes.
 
-    Unpickling can run any code that the bytes name. Here a tree of JSON
-    contains the values, and arrays follow it as NumPy stores them. A value is
-    None, a number, text, bytes, an array of no objects, or a list, tuple, dict,
-    named tuple or dataclass of such values.
+    Unlike a pickle, which can run any code when it is read, the bytes contain a
+    tree of JSON, followed by the arrays as NumPy stores them. A value is None,
+    a number, text, bytes, an array without Python objects, or a list, tuple,
+    dict, named tuple or dataclass of such values.
 
     Raises:
-        TypeError: if there is anything else in it.
+        TypeError: if the value contains anything else.
     """
     encoder = _Encoder()
     tree = json.dumps(encoder.encode(value), separators=(",", ":")).encode()
@@ -99,9 +99,9 @@ def encode(value: object) -> bytes:
 
 
 def decode(data: bytes) -> Any:
-    """Returns the value in bytes that `encode` returned.
+    """Returns the value that `encode` turned into bytes.
 
-    Dataclasses are those of this package, or of modules that have been
+    Dataclasses must belong to this package, or to modules that have been
     imported.
 
     Raises:
@@ -217,7 +217,7 @@ def _decode(tree: Any, arrays: list[np.ndarray]) -> Any:
 
 
 def _find(module: str, name: str) -> Any:
-    """Returns a type; imports nothing but modules of this package."""
+    """Returns a type by its name; imports only modules of this package."""
     if module not in sys.modules and _OWN_MODULE.fullmatch(module):
         importlib.import_module(module)
     found: Any = sys.modules[module]
@@ -275,17 +275,18 @@ def _most(size: int) -> int:
 
 @dataclass(frozen=True)
 class Part:
-    """An intermediate result in a file."""
+    """An intermediate result of a study, in a file that names its inputs."""
 
     path: Path
 
     def write(self, inputs: Mapping, value: object) -> None:
-        """Writes the value to the part, whose folder is created if needed.
+        """Writes a value to the file; creates its folder if needed.
 
         The inputs are everything on which the value depends, ready for JSON.
 
         Raises:
-            InputError: if it cannot be kept or written.
+            InputError: if the value cannot be encoded, or the file cannot be
+                written.
         """
         try:
             plain = encode(value)
@@ -311,26 +312,26 @@ class Part:
             stream.write(data)
 
     def is_current(self, inputs: Mapping) -> bool:
-        """Returns whether the part is complete and was made of these inputs."""
+        """Returns whether the file is complete and made from these inputs."""
         try:
             return self.identity() == fingerprint(inputs)
         except InputError:
             return False
 
     def identity(self) -> str:
-        """Returns the digest of the inputs that the part was made of.
+        """Returns the digest of the inputs from which the file was made.
 
         Raises:
-            InputError: if there is no such part, or it is cut off.
+            InputError: if there is no such file, or it is cut off.
         """
         with self._opened() as (header, _):
             return header["digest"]
 
     def read(self) -> Any:
-        """Returns the value of the part.
+        """Returns the value in the file.
 
         Raises:
-            InputError: if there is no such part, or it is damaged.
+            InputError: if there is no such file, or it is damaged.
         """
         with self._opened() as (header, stream):
             data = stream.read()
@@ -339,9 +340,9 @@ class Part:
             return decode(data)
 
     def fits(self, hint: object) -> bool:
-        """Returns whether the part's value can be of an annotated type.
+        """Returns whether the value in the file can be of an annotated type.
 
-        Only its beginning is read.
+        Only the beginning of the file is read.
         """
         with (
             contextlib.suppress(InputError),
@@ -387,15 +388,15 @@ class Part:
 
 @dataclass(frozen=True)
 class MakePart(Step):
-    """Writes the result of a function as a part.
+    """A job step that writes the result of a function to a file.
 
     Attributes:
-        function: a function of a module, whose code counts as an input; it
-            takes a `Reporter` before the arguments.
+        function: a function at the top of a module. Its code counts as an
+            input. Its first parameter is a `Reporter`; the arguments follow.
         arguments: the inputs. Each is a plain value, a dataclass of plain
-            values, a file or folder, of which only the name counts, or an
-            object whose method `identity` returns what counts; or a tuple of
-            such values.
+            values, a path (of which only the name counts as input), an object
+            whose method `identity` returns what counts, or a tuple of such
+            values.
         figures: further files that the function writes.
     """
 
@@ -423,7 +424,7 @@ class MakePart(Step):
         self.part.write(inputs, self.function(reporter, *self.arguments))
 
     def _inputs(self) -> dict[str, object]:
-        """Returns all inputs of the part, ready for JSON.
+        """Returns all inputs of the result, ready for JSON.
 
         Raises:
             InputError: an input cannot be read.
@@ -449,44 +450,45 @@ def _identity(argument: Any) -> object:
 
 @dataclass(frozen=True)
 class SurveyFiles:
-    """The parts that hold the survey of a recording.
+    """The files (`Part`) with the survey of a recording.
 
-    The descriptions of each method are a part of their own, so that a job reads
-    only those that it needs. Their key is the name of the method, or a
-    `described_key`.
+    The descriptions by each method are in a file of their own, so that a job
+    reads only the descriptions that it needs. The key of a file is the name of
+    the method, or a `described_key` for a second protocol.
     """
 
     folder: Path
 
     @property
     def drive(self) -> Part:
-        """The part with the `SurveyedDrive`."""
+        """The file with the drive's poses and map, a `SurveyedDrive`."""
         return Part(self.folder / "drive.data")
 
     @property
     def fine(self) -> Part:
-        """The part with the cloud for pictures."""
+        """The file with the cloud for pictures, an array (K, 3)."""
         return Part(self.folder / "fine.data")
 
     @property
     def scans(self) -> Part:
-        """The part with the scans of places and queries.
+        """The file with the drive's scans at places and queries.
 
-        It is a `KeptDrive`, or a list.
+        For a drive with a map, the file contains a `KeptDrive`; otherwise a
+        list of scans (N, 3).
         """
         return Part(self.folder / "scans.data")
 
     def described(self, key: str) -> Part:
-        """Returns the part with the descriptions by a method.
+        """Returns the file with a method's descriptions of the drive.
 
-        It holds a `PlacedDrive` and a `DescribedDrive`.
+        The file contains a `PlacedDrive` and a `DescribedDrive`.
         """
         return Part(self.folder / f"described_{file_name(key)}.data")
 
 
 @dataclass(frozen=True)
 class StudyFiles:
-    """The files of a study."""
+    """The paths of all files of a study."""
 
     output: Path
 
@@ -496,11 +498,11 @@ class StudyFiles:
         return self.output / "figures"
 
     def survey(self, recording: str) -> SurveyFiles:
-        """Returns the parts of the survey of a recording."""
+        """Returns the files with the survey of a recording."""
         folder = self.output / "parts" / "surveys"
         return SurveyFiles(folder / file_name(recording))
 
     def part(self, kind: str, *names: str) -> Part:
-        """Returns the part of a kind, such as `changes`, for some drives."""
+        """Returns the file of some drives for a kind, such as `changes`."""
         name = ",".join(map(file_name, names))
         return Part(self.output / "parts" / kind / f"{name}.data")

@@ -1,4 +1,4 @@
-"""The whole benchmark: its jobs, and the report that is made of their files."""
+"""The whole benchmark: its jobs, and the report made from their files."""
 
 from collections import defaultdict
 from collections.abc import Callable, Iterable, Mapping, Sequence
@@ -23,7 +23,6 @@ from evaluation.study.collection import (
     City,
     Pair,
     RecordingInfo,
-    Run,
     find_recordings,
     group_cities,
     nothing_to_compare,
@@ -42,13 +41,13 @@ _RECOGNITION_COST = 2.0
 
 @dataclass(frozen=True)
 class Study:
-    """The comparison of recordings, which need not exist yet.
+    """A study that compares recordings, which need not exist yet.
 
-    A recording that does not exist is made by the jobs that it needs. Drives of
-    one map that share stage and route with others serve as controls in the same
-    stage. By default, the methods are those of this package. Their costs, if
-    wanted, are measured after all other jobs. The reference contains published
-    numbers, for comparison.
+    A recording that does not exist is made by the jobs that it `needs`. If one
+    drive follows the route of another stage's drive, it serves as a control: it
+    shows what the route changes while the city stays the same. By default, the
+    methods are those of this package. If wanted, their costs are measured after
+    all other jobs. `reference` contains published numbers for comparison.
     """
 
     recordings: Sequence[RecordingInfo]
@@ -63,7 +62,7 @@ class Study:
         """The cities of the recordings.
 
         Raises:
-            InputError: two recordings claim the same place.
+            InputError: two recordings have the same map and stage.
         """
         return group_cities(self.recordings, self.reference)
 
@@ -87,8 +86,12 @@ class Study:
 
     @property
     def _costed_pairs(self) -> list[Pair]:
-        pairs = (city.recognition_pairs() for city in self.cities)
-        return [one for some in pairs for one in some if self.with_costs]
+        return [
+            pair
+            for city in self.cities
+            for pair in city.recognition_pairs()
+            if self.with_costs
+        ]
 
     def assemble(
         self,
@@ -107,10 +110,10 @@ class Study:
         and those figures that do not exist yet in the folder `figures`.
 
         Args:
-            pages: recording -> address of its 3-D page, relative to the report,
-                for those that have one.
-            on_note: gets a note on each city without a pair to compare; the
-                report has these notes too.
+            pages: name of a recording -> address of its 3-D page, relative to
+                the report. Recordings without a page are left out.
+            on_note: is called with a note on each city without a pair to
+                compare. The report contains these notes, too.
 
         Returns:
             The path of `report.html`.
@@ -142,16 +145,13 @@ class Study:
             report.costs = self._files.part("costs", "costs").read()
         return page.write_report(report, self.output)
 
-    def _runs(self, city: City, pair: Pair) -> list[Run]:
-        return city.runs(pair, self.methods, self.protocol)
-
     def _result(self, pair: Pair, key: str) -> Part:
-        """Returns the part with the result of a run by name."""
+        """Returns the file with the result of a run, which `key` names."""
         names = (one.name for one in pair)
         return self._files.part("recognition", *names, key)
 
     def _evidence(self, pair: Pair) -> Part:
-        """Returns the part with the `PairEvidence` of all methods."""
+        """Returns the file with evidence on why best places are wrong."""
         return self._files.part("why", *(one.name for one in pair))
 
     def _pairs(self, city: City) -> list[Pair]:
@@ -209,7 +209,7 @@ class Study:
         roles: dict[tuple[MethodChoice, RetrievalProtocol], set[Role]]
         roles = defaultdict(set)
         for pair in city.recognition_pairs():
-            for run in self._runs(city, pair):
+            for run in city.runs(pair, self.methods, self.protocol):
                 key = run.method, run.protocol
                 if run.repeats and pair[1] is drive:
                     roles[key].add("queries")
@@ -275,8 +275,9 @@ class Study:
         """Returns the job that runs the methods on a pair.
 
         With `explains`, the job also finds why best places are wrong, and
-        repeats runs by the protocol of published numbers. For a control, it
-        finds only the overlap of queries with their matches.
+        repeats runs by the protocol of published numbers. Without it, as for a
+        control, the job finds only how much of each query's scan its matches
+        show.
         """
         database, query = pair
         surveys = [self._files.survey(one.name) for one in pair]
@@ -294,7 +295,7 @@ class Study:
                     run.protocol,
                 ),
             )
-            for run in self._runs(city, pair)
+            for run in city.runs(pair, self.methods, self.protocol)
             if explains or not run.repeats
         ]
         asked = self.methods if explains else self.methods[:1]
@@ -314,7 +315,7 @@ class Study:
         return Job(name, step, _survey_names(pair), cost)
 
     def _cost_job(self, pair: Pair, needs: tuple[str, ...]) -> Job:
-        """Returns the job that measures costs, after all others and alone."""
+        """Returns the job that measures costs, after all other jobs."""
         places, queries = (self._files.survey(one.name) for one in pair)
         described = tuple(
             (places.described(one.key), queries.described(one.key))
@@ -337,7 +338,7 @@ class Study:
         compared = []
         for pair in self._pairs(city):
             control = city.unchanged_pair(*pair)
-            for run in self._runs(city, pair):
+            for run in city.runs(pair, self.methods, self.protocol):
                 result = self._result(pair, run.queries).read()
                 if run.repeats:
                     report.repeated.append(result)
@@ -394,9 +395,10 @@ def write_report(
 
     Args:
         own_methods, settings: see `choose_methods`.
-        on_note: gets notes on how recordings are read or left out, on what
-            methods take for granted, and on cities without a pair to compare.
-        reference_for: returns the reference for the report of some maps.
+        on_note: is called with notes: on how recordings are read or left out,
+            on what methods assume, and on cities without a pair to compare.
+        reference_for: function that returns published numbers for the maps of a
+            report.
         lidar: name of the LiDAR, for recordings with several.
         columns: see `open_drive`.
 

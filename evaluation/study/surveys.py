@@ -1,8 +1,8 @@
 """Surveys of drives: maps, places and queries, found in one pass.
 
 A job that works on a drive may run in another process, or on another machine,
-before or after the drive is recorded. The job therefore has the source of the
-drive, not the drive.
+before or after the drive is recorded. The job therefore gets the source of the
+drive, a function that opens the drive, instead of the drive.
 """
 
 from collections.abc import Callable, Mapping, Set
@@ -15,7 +15,7 @@ import numpy as np
 from numpy.lib.recfunctions import repack_fields
 
 from cns_drake.base.errors import InputError
-from cns_drake.base.files import read_bytes
+from cns_drake.base.files import read_bytes, user_errors
 from cns_drake.base.jobs.step import Reporter, Step
 from cns_drake.base.points import xyz
 from cns_drake.base.progress import Track, silent
@@ -43,8 +43,8 @@ _KEPT_FIELDS = ("x", "y", "z", "instance")
 class MappedDrive(RecentScans):
     """A drive that adds each scan to a map when it is first read.
 
-    Reading and unpacking scans takes longer than mapping them. In nearly
-    increasing order, each scan is read only once.
+    Reading and unpacking scans takes longer than mapping them. If scans are
+    requested in nearly increasing order, each scan is read only once.
     """
 
     def __init__(self, drive: Drive, kept: int):
@@ -76,22 +76,26 @@ class MappedDrive(RecentScans):
 
 
 class DriveSource(Protocol):
-    """A picklable object that opens a drive when it is called."""
+    """A picklable function that opens a drive.
+
+    A job in another process gets this function instead of the drive.
+    """
 
     def __call__(self) -> Drive:
         """Opens the drive.
 
-        Its scans are read in increasing order, each once; a drive may thus
-        be made while it is read.
+        Jobs read its scans in increasing order, each once. A drive can
+        therefore be simulated while it is read.
 
         Raises:
-            InputError: if it cannot be opened.
+            InputError: if the drive cannot be opened.
         """
 
     def identity(self) -> object:
         """Returns the identity of the drive, ready for JSON.
 
-        Results of a drive with an equal identity are not computed again.
+        If the identity of a drive has not changed, its results are not computed
+        again.
 
         Raises:
             InputError: if there is no drive.
@@ -113,11 +117,11 @@ class RecordedDrive:
         """Returns the LiDAR, the columns, and each file's name, size and time.
 
         The content of the files would be the surest identity, but reading it
-        takes as long as evaluating it. A recording of cns-drake has a
-        fingerprint beside it, which takes the place of the times: a copy is the
-        same recording.
+        takes as long as evaluating the drive. A recording of cns-drake has a
+        fingerprint next to it, which is used instead of the times, so that a
+        copy counts as the same recording.
         """
-        try:
+        with user_errors(self.path):
             path = self.path.resolve(strict=True)
             files = [path]
             if path.is_dir():
@@ -128,10 +132,6 @@ class RecordedDrive:
             if (folder / "fingerprint.txt").is_file():
                 content = read_bytes(folder / "fingerprint.txt")
                 known = content.decode("utf-8", "replace")
-        except OSError as error:
-            raise InputError(
-                f"{self.path}: {error.strerror or error}"
-            ) from error
         chosen: list[list] = [
             [one] for one in (self.lidar, self.columns) if one is not None
         ]
@@ -150,9 +150,10 @@ class RecordedDrive:
 class SurveyedDrive:
     """A drive with its map in cells of the TCR.
 
-    It has the time stamps (N,) int64 and the poses (N, 4, 4) of the sensor at N
-    frames. K frames, increasing, are places or queries, and have reduced scans
-    (see `evaluation.maps.thumbnails`). K is 0 if the drive has no role.
+    It contains the time stamps (N,) int64 and the sensor poses (N, 4, 4) of all
+    N frames. For the K frames that are places or queries, it also contains
+    reduced scans (see `evaluation.maps.thumbnails`). K is 0 if the drive has
+    neither places nor queries.
     """
 
     placed: PlacedDrive
@@ -189,7 +190,7 @@ class KeptDrive:
     scans: dict[int, np.ndarray] = field(default_factory=dict)
 
     def keep(self, frame: int, scan: np.ndarray, max_range: float) -> None:
-        """Keeps a scan, without the points beyond a range."""
+        """Keeps the scan of a frame, without the points beyond a range."""
         names = [one for one in scan.dtype.names or () if one in _KEPT_FIELDS]
         kept = within_range(xyz(scan), max_range)
         # A view would hold all fields.
@@ -202,15 +203,16 @@ class KeptDrive:
 
 @dataclass(frozen=True)
 class RecordingSurvey:
-    """A recording's maps, places and queries, which replace its scans.
+    """The results of reading a recording once: map, places and queries.
 
-    It contains the descriptions of the drive by each method, if the drive has a
-    role. Descriptions by another protocol are under a `described_key`. The
-    scans of places and queries are None unless they are kept. `fine` is a cloud
-    (K, 3) for pictures, in W [m].
+    If the drive has places or queries, `described` contains each method's
+    descriptions of them; descriptions by a second protocol are under a
+    `described_key`. `scans` contains the scans of places and queries, or None
+    if they are not kept. `fine` is a cloud (K, 3) for pictures, in W [m].
 
-    A drive that is not mapped has neither a map nor a cloud. Its scans are
-    (N, 3) float32, as their role sees them.
+    If the drive is not mapped, `drive` and `fine` are None, and `scans` is a
+    list of arrays (N, 3) float32. The scans of queries are then turned, tilted
+    and hidden as the protocol says.
     """
 
     placed: PlacedDrive
@@ -221,7 +223,10 @@ class RecordingSurvey:
 
 
 def described_key(method: str, protocol: RetrievalProtocol) -> str:
-    """Returns the key of a method's descriptions by a second protocol."""
+    """Returns the key of a method's descriptions by a second protocol.
+
+    It consists of the method's key and the name of the protocol.
+    """
     return f"{method},{protocol.name}"
 
 
@@ -242,14 +247,14 @@ def survey_recording(
         recording: the drive.
         roles: whether the drive has places of the database, queries, or both;
             the set may be empty.
-        asked: name of a description -> method, roles and protocol; empty
-            without a role.
+        asked: name of a description -> method, roles and protocol; empty if the
+            drive has neither places nor queries.
         protocol: protocol of the frames that are shown and kept.
         track: reports progress.
         with_scans: whether to keep the scans of places and queries.
 
     Raises:
-        InputError: if it cannot be read, or holds no point.
+        InputError: if the recording cannot be read, or contains no points.
     """
     frames: list[int] = []
     thumbnails = []
@@ -329,10 +334,11 @@ def _described(
 
 @dataclass(frozen=True)
 class Survey(Step):
-    """Writes the survey of a drive, or its missing parts.
+    """A job step that surveys a drive and writes the files that are missing.
 
-    It calls `survey_recording`, or `describe_recording` if the drive needs no
-    map. Further descriptions are by a second protocol, if the drive has a role.
+    A survey consists of the drive's map and the descriptions of its places and
+    queries; without a map, only the places and queries are read. If the drive
+    has places or queries, `further` requests descriptions by a second protocol.
     """
 
     source: DriveSource

@@ -20,12 +20,32 @@ from sklearn.metrics import roc_auc_score
 
 from cns_drake.base import terminal
 from cns_drake.base.errors import InputError
+from evaluation.drives import open_drive
 from evaluation.real.judge import (
     Features,
     common_names,
     judge_draws,
-    read_places,
+    places_of,
+    scan_table,
 )
+
+
+def read_places(path: Path) -> list[list[np.ndarray]]:
+    """Returns the scans of each place in a data set."""
+    if not path.is_dir():
+        raise InputError(f"{path}: no folder of scans")
+    files = sorted(path.glob("*.bin"))
+    if files:
+        raws = (np.fromfile(file, np.float32).reshape(-1, 4) for file in files)
+        return [[scan_table(raw) for raw in raws]]
+    try:
+        drive = open_drive(path)
+    except InputError:
+        folders = sorted(one for one in path.iterdir() if one.is_dir())
+        if not folders:
+            raise
+        return [place for one in folders for place in read_places(one)]
+    return places_of(drive)
 
 
 def strongest(

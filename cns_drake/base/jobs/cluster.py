@@ -125,7 +125,6 @@ class LocalWorkers:
 
         Each job has a thread.
         """
-        del priority
         self._threads.submit(self._run, name, job)
 
     def stop(self) -> None:

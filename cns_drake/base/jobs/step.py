@@ -44,7 +44,6 @@ class Reporter:
         self, items: Iterable, description: str, total: int
     ) -> Iterator[Any]:
         """Yields the items of a loop, reporting its progress."""
-        del description
         for done, item in enumerate(items):
             self.progress(done, total)
             yield item

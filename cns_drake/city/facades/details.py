@@ -347,27 +347,6 @@ def steps(x0: float, x1: float, reach: float, rise: float, count: int) -> Mesh:
     return merge_meshes(*pieces)
 
 
-def column(x: float, y: float, z0: float, z1: float, radius: float) -> Mesh:
-    """Returns a round column with base and capital.
-
-    Args:
-        x: x of its axis in the building's frame [m].
-        y: y of its axis in the building's frame [m].
-        z0: height of its foot [m].
-        z1: height of its top [m].
-        radius: radius of the shaft at its foot [m].
-    """
-    shaft = massing.regular_polygon(radius, 10, (x, y))
-    top = massing.regular_polygon(0.85 * radius, 10, (x, y))
-    r = 1.25 * radius
-    block = massing.rectangle(x - r, y - r, x + r, y + r)
-    return merge_meshes(
-        massing.prism(block, z0, z0 + 0.3),
-        massing.skirt(shaft, top, z0 + 0.3, z1 - 0.4),
-        massing.prism(block, z1 - 0.4, z1, bottom=True),
-    )
-
-
 def beam(start: ArrayLike, end: ArrayLike, width: float) -> Mesh:
     """Returns a bar of square section between two points [m].
 

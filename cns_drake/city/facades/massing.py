@@ -288,18 +288,6 @@ class Faces:
         return Mesh(vertices, tuple(self._faces))
 
 
-def bar(section: Sequence[Point | np.ndarray], y0: float, y1: float) -> Mesh:
-    """Returns a solid with a convex cross section, from y0 to y1 [m].
-
-    The section's (x, z) corners run counter-clockwise, seen from y0.
-    """
-    n = len(section)
-    vertices = np.array([(x, y, z) for y in (y0, y1) for x, z in section])
-    ends = tuple(range(n)), tuple(range(2 * n - 1, n - 1, -1))
-    sides = ((k, n + k, n + (k + 1) % n, (k + 1) % n) for k in range(n))
-    return Mesh(vertices, (*ends, *sides))
-
-
 def swapped(mesh: Mesh) -> Mesh:
     """Returns the mesh with its x and y axes exchanged."""
     return Mesh(mesh.vertices[:, [1, 0, 2]], mesh.faces).turned()

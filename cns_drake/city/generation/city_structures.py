@@ -9,7 +9,7 @@ from shapely.geometry import Polygon
 from shapely.geometry.base import BaseGeometry
 from shapely.ops import unary_union
 
-from cns_drake.base.errors import InputError
+from cns_drake.base.errors import InputError, value_errors
 from cns_drake.base.map_folder import MapFolder
 from cns_drake.city.buildings import ARCHETYPES
 from cns_drake.city.geometry import (
@@ -110,10 +110,8 @@ def make_city(world: Path) -> City:
     """
     roads = MapFolder(world).roads
     network = load_road_network(roads)
-    try:
+    with value_errors(roads):
         _ = network.areas
-    except ValueError as error:
-        raise InputError(f"{roads}: {error}") from error
     source = MapFolder(world).plan
     plan = load_plan(source)
     try:

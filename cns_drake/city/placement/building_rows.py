@@ -8,7 +8,7 @@ from numpy.random import Generator
 from shapely.geometry import LineString, Polygon
 from shapely.geometry.base import BaseGeometry
 
-from cns_drake.base.errors import InputError
+from cns_drake.base.errors import InputError, value_errors
 from cns_drake.city.buildings import ARCHETYPES, sample
 from cns_drake.city.facades.assembly import Site
 from cns_drake.city.geometry import Structure, placed
@@ -85,10 +85,8 @@ def _build(
 ) -> None:
     name = draft.next_name(kind or house.archetype)
     what = house.archetype, house.footprint, house.height
-    try:
+    with value_errors(fault_at):
         model = sample(*what, rng, name, house.blind_edges)
-    except ValueError as error:
-        raise InputError(f"{fault_at}: {error}") from error
     x, y = (round(float(value), 3) for value in house.xy)
     xyz, tags = (x, y, _floor(draft, house)), (district, house.archetype)
     yaw = round(house.yaw, 5)

@@ -18,7 +18,7 @@ import shapely
 from shapely import GEOSException
 from shapely.geometry.base import BaseGeometry
 
-from cns_drake.base.errors import InputError
+from cns_drake.base.errors import InputError, value_errors
 from cns_drake.base.map_folder import LANES_NAME, MESH_FOLDER, stage_name
 from cns_drake.city.generation.city_structures import City, Streets, build_along
 from cns_drake.city.generation.generate import render_stages
@@ -382,10 +382,8 @@ def _build(
     progress: Callable[[str], None],
     dressed: bool,
 ) -> Town:
-    try:
+    with value_errors(source):
         bands = [band for road in roads.roads for band in lane_bands(road)]
-    except ValueError as error:
-        raise InputError(f"{source}: {error}") from error
     ground, raised = split_levels(bands)
     for band in raised:
         if band.lane.inner_height and is_raised(band.kind, band.lane.height):

@@ -28,7 +28,12 @@ _WHOLE_COST, _COST = 60.0, 20.0
 
 
 class ChangeTask(Task):
-    """TCR_sym of two drives, or of the query's route in the two cities."""
+    """Measures the change (TCR_sym) between two drives or their cities.
+
+    If the query's route was also driven through the database's city, that drive
+    is compared with the query, so that only the city differs. Otherwise the
+    database is compared with the query.
+    """
 
     name = "change"
     defaults: ClassVar[Mapping[str, Any]] = {"spacing": None}
@@ -81,8 +86,10 @@ def map_city(
 def measure_change(
     reporter: Reporter, first: Part, second: Part
 ) -> dict[str, tuple[float, int]]:
-    """Returns metric -> value and number of voxels, for two mapped drives."""
-    del reporter
+    """Returns how much changed between two mapped drives.
+
+    The result is metric -> value and number of voxels.
+    """
     a, b = (
         Surveyed(name, *part.read())
         for name, part in (("database", first), ("query", second))

@@ -1,4 +1,4 @@
-"""Localisation of scans in the map of a database, from random starts."""
+"""The task `localise`: scans are localised in a map of the database."""
 
 from __future__ import annotations
 
@@ -33,7 +33,7 @@ _COST = 60.0
 
 
 class LocaliseTask(Task):
-    """Whether scans are aligned with the map, from starts off the true pose."""
+    """Measures how well scans are aligned to a map from wrong initial poses."""
 
     name = "localise"
     defaults: ClassVar[Mapping[str, Any]] = {
@@ -91,7 +91,7 @@ class LocaliseTask(Task):
         return jobs.add(part, measure_localisation, arguments, cost=_COST)
 
     def _runs(self, found: Sequence[np.ndarray]) -> Iterator[tuple[str, Any]]:
-        """Yields the name of each method and start, with its queries."""
+        """Yields the name of each method and initial error, and its queries."""
         starts = self.settings["starts"]
         rows = iter(found)
         if not found:
@@ -105,15 +105,13 @@ class LocaliseTask(Task):
     def numbers(self, found: Any, before: Any | None) -> Iterator[Number]:
         then = dict(self._runs(before)) if before is not None else {}
         for method, rows in self._runs(found):
-            values = localise.Localisation(rows).numbers()
+            yield from localise.Localisation(rows).numbers(method)
             if method in then:
                 share = kept_share(
                     float(localise.is_right(rows).mean()),
                     float(localise.is_right(then[method]).mean()),
                 )
-                values["kept"] = float(share)
-            for name, value in values.items():
-                yield Number(method, False, name, value, n=len(rows))
+                yield Number(method, False, "kept", float(share), n=len(rows))
 
     def answers(self, found: Any) -> Iterator[Answered]:
         for method, rows in self._runs(found):
@@ -131,7 +129,8 @@ def measure_localisation(
 ) -> list[np.ndarray]:
     """Localises the queries of a pair of drives in one world.
 
-    Each scan is read once, since a drive may be made while it is read.
+    Each scan is read only once, because a drive may be simulated while it is
+    read.
 
     Args:
         reporter: reports progress.
@@ -139,14 +138,15 @@ def measure_localisation(
         query: the drive whose scans are localised.
         methods: names, or Python files.
         texts: contents of those files; a job is done again if they change.
-        starts: how far away and how often each query starts.
+        starts: how the random initial poses of the scans are drawn, one entry
+            for each size of their errors.
         spacing: distance between two queries [m].
 
     Returns:
-        (K,) records of `QUERY` for each method and start, with the starts of a
-        method next to each other; empty if the query is nowhere near the map.
+        (K,) records of `QUERY` for each method and start, all entries of
+        `starts` for one method before those of the next; empty if the query is
+        nowhere near the map.
     """
-    del texts
     mapped, asked = database(), query()
     maps: dict[tuple[float, int], estimators.LocalisationMap] = {}
     localisers = []

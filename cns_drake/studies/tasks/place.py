@@ -1,4 +1,4 @@
-"""Place recognition, its poses, and the costs of both."""
+"""The tasks `place`, `pose` and `cost`, on place recognition."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ Outcomes = Sequence[PlaceOutcome]
 
 
 class PlaceTask(Task):
-    """Which place of the database a query shows."""
+    """Measures how well methods find a query's place in the database."""
 
     name = "place"
     asks = True
@@ -59,11 +59,11 @@ class PlaceTask(Task):
 
     def answers(self, found: Outcomes) -> Iterator[Answered]:
         for now in found:
-            yield now.method, now.is_gated, now.columns()
+            yield now.method, now.is_gated, now.columns
 
 
 class PoseTask(PlaceTask):
-    """Where a query lies, by the method's pose relative to the best place."""
+    """Measures the errors of the poses of queries at their best places."""
 
     name = "pose"
 
@@ -79,7 +79,7 @@ class PoseTask(PlaceTask):
 
 
 class CostTask(Task):
-    """The cost of a query, and of building a database from descriptions."""
+    """Measures the CPU time of a query, and of building a database."""
 
     name = "cost"
     asks = True
@@ -115,12 +115,12 @@ def measure_costs(
 ) -> dict[str, tuple[int, dict[str, float]]]:
     """Returns key of a method -> number of places, and times [ms].
 
-    `query_ms` is the median CPU time of some queries, `build_ms` that of a
-    database from descriptions.
+    `query_ms` is the median CPU time of some queries, and `build_ms` the CPU
+    time to build a database from descriptions.
 
     Args:
         reporter: reports progress.
-        database, query: described drives, one part for each method.
+        database, query: described drives, one file (`Part`) for each method.
         distractors: described drives through other cities.
         num_distractors: number of places of these drives.
         methods: methods to measure.
@@ -144,7 +144,7 @@ def measure_costs(
 
 
 def _same(before: Outcomes | None, now: PlaceOutcome) -> PlaceOutcome | None:
-    """Returns the outcome of the same method and gate."""
+    """Returns the baseline's outcome with the method and gate of `now`."""
     for one in before or ():
         if (one.method, one.is_gated) == (now.method, now.is_gated):
             return one

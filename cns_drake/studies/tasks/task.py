@@ -1,4 +1,4 @@
-"""The interface of tasks, and what the jobs of a study share."""
+"""The interface of a study's tasks, and the jobs that tasks share."""
 
 from __future__ import annotations
 
@@ -27,14 +27,12 @@ _DESCRIPTION_COST = 30.0
 
 # A method, whether its gate was used, and its answers to Q queries: column -> Q
 # values.
-Answered: TypeAlias = (
-    "tuple[str, bool, Mapping[str, Sequence[Any] | np.ndarray]]"
-)
+Answered: TypeAlias = "tuple[str, bool, Mapping[str, np.ndarray]]"
 
 
 @dataclass(frozen=True)
 class NamedDrive:
-    """A drive that is measured: a name that no other has, and its source."""
+    """A drive that is measured: its unique name, and where to read it."""
 
     name: str
     source: DriveSource
@@ -42,11 +40,11 @@ class NamedDrive:
 
 @dataclass(frozen=True)
 class Pair:
-    """A database and a query that are measured.
+    """A database drive and a query drive that are measured together.
 
     Attributes:
-        name: a name that no other pair has, except with another radius of a
-            match.
+        name: name of the pair. Only pairs that differ in nothing but the radius
+            of a match have the same name.
         way: the drive whose map is compared with the query's for TCR_sym. It
             follows the query's route through the database's city, or is the
             database itself if that has another route.
@@ -65,7 +63,7 @@ class Pair:
 
     @property
     def roles(self) -> tuple[tuple[NamedDrive, Role], ...]:
-        """Both drives, each with the role of its scans."""
+        """Both drives, each with its role: `places` or `queries`."""
         return (self.database, "places"), (self.query, "queries")
 
 
@@ -95,7 +93,7 @@ class Jobs:
     _uses: dict[str, set[str]] = field(default_factory=dict)
 
     def expect(self, pair: Pair) -> None:
-        """Notes that a pair will need its radius and described drives."""
+        """Registers a pair, so that its drives are described for its radius."""
         self.radii.setdefault(pair.name, set()).add(pair.protocol.radius)
         for drive, role in pair.roles:
             name = _description_name(drive, role, pair.protocol)
@@ -110,7 +108,11 @@ class Jobs:
         *,
         kept: bool = False,
     ) -> DescribedSource:
-        """Returns the source of a drive, or the parts with its descriptions.
+        """Returns where a job finds the descriptions of a drive.
+
+        If several pairs need the drive, these are the files (`Part`) with its
+        descriptions. Otherwise it is the source of the drive, and the job
+        describes it.
 
         Args:
             drive: the drive.
@@ -144,7 +146,7 @@ class Jobs:
     def elsewhere(
         self, pair: Pair, needs: list[str]
     ) -> tuple[tuple[Part, ...], ...]:
-        """Returns descriptions of the drives elsewhere that distract a pair."""
+        """Returns a pair's distractors: described drives in other cities."""
         if not pair.distractors:
             return ()
         found = []
@@ -164,7 +166,9 @@ class Jobs:
         needs: Iterable[str] = (),
         cost: float = 20.0,
     ) -> Part:
-        """Adds the job of a part, named like it; returns the part.
+        """Adds the job that writes a part (file of results); returns the part.
+
+        The job has the name of the part.
 
         Args:
             part: file and name of the part.
@@ -228,10 +232,10 @@ class Task(abc.ABC):
 
     @abc.abstractmethod
     def measure(self, pair: Pair, jobs: Jobs) -> Part:
-        """Adds the jobs that measure a pair; returns the parts they write."""
+        """Adds the jobs that measure a pair; returns the file of the result."""
 
     def found(self, part: Part, pair: Pair) -> Any:
-        """Returns the task's result for a pair from the part."""
+        """Returns the task's result for a pair, read from a file of results."""
         return part.read()
 
     @abc.abstractmethod
@@ -239,7 +243,7 @@ class Task(abc.ABC):
         """Yields the results of a pair, one number each.
 
         Args:
-            found: value of the part.
+            found: the task's result for the pair.
             before: outcome in the baseline condition; None without a baseline.
         """
 

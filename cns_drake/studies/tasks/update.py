@@ -1,4 +1,4 @@
-"""Map update: scores of labels that say which points have changed."""
+"""The task `map`: scores of change detectors on the maps of two drives."""
 
 from __future__ import annotations
 
@@ -39,7 +39,7 @@ _COST = 60.0
 
 
 class MapTask(Task):
-    """Which points of two maps are kept, gone, new or not observed."""
+    """Scores change detectors, which label points as kept, gone or new."""
 
     name = "map"
     defaults: ClassVar[Mapping[str, Any]] = {"methods": None, "spacing": 5.0}
@@ -87,9 +87,10 @@ def measure_maps(
     methods: tuple[str, ...],
     spacing: float,
 ) -> dict[str, dict[str, float | None]]:
-    """Maps two drives and returns the scores of change detectors.
+    """Maps two drives; returns method -> name -> value of scores.
 
-    The scores are those of `score_methods`.
+    The methods are change detectors, which label what changed between the two
+    maps; the scores compare their labels with exact ones.
 
     Args:
         reporter: reports progress.
@@ -114,7 +115,9 @@ def measure_maps(
 def score_methods(
     maps: Path, methods: tuple[str, ...], track: Track = silent
 ) -> dict[str, dict[str, float | None]]:
-    """Returns method -> name -> value of scores of baselines or of `TRUTH`.
+    """Returns method -> name -> value of scores of change detectors.
+
+    The name `TRUTH` stands for the true labels as a method.
 
     Raises:
         InputError: the folder cannot be read, or a baseline cannot run.

@@ -84,9 +84,9 @@ def test_none_as_in_the_paper():
         "was fitted",
         *["does not hold"] * 3,
     ]
-    assert "0 of 1 do. These values were fitted" in found[0].evidence
-    assert "is BTC on 5. When all methods are" in found[1].evidence
-    assert found[1].evidence.endswith("is best on 0 of 5 (BTC on 5).")
+    assert "KAIST's in 0 of 1 cities." in found[0].evidence
+    assert "is BTC on 5. If all queries count for" in found[1].evidence
+    assert found[1].evidence.endswith("is best on 0 of 5 pairs (BTC on 5).")
     assert "RING++ +1.00" in found[2].evidence
     assert "BTC -1.00" in found[2].evidence
 
@@ -142,8 +142,8 @@ def test_a_verdict_names_the_tables_that_contradict_it():
     assert ring.verdict == "holds"
     assert ring.claim.endswith("as the paper counts.")
     assert ring.evidence.endswith(
-        " By the protocol fair of the tables of all methods, on all queries,"
-        " RING++ is best on 0 of 2 (BTC on 2)."
+        " With the protocol fair, as in the other tables, RING++ is best on 0"
+        " of 2 pairs (BTC on 2)."
     )
     (alone,) = findings(by_paper, [])
     assert "fair" not in alone.evidence

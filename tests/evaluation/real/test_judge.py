@@ -66,19 +66,19 @@ def make_place(folder, seed, *, rough=0.005, bias=0.0, texture=3.0):
     scan.astype(np.float32).tofile(folder / "000000.bin")
 
 
-def features(judge, folder, seed, **options):
+def features(judge, program, folder, seed, **options):
     for place in range(PLACES):
         make_place(folder / str(place), 100 * seed + place, **options)
-    return judge.Features(judge.read_places(folder))
+    return judge.Features(program.read_places(folder))
 
 
 @pytest.fixture(scope="module")
-def plain(judge, tmp_path_factory):
-    return features(judge, tmp_path_factory.mktemp("plain") / "set", 1)
+def plain(judge, program, tmp_path_factory):
+    return features(judge, program, tmp_path_factory.mktemp("plain") / "set", 1)
 
 
-def test_equal_sets_are_not_told_apart(judge, plain, tmp_path):
-    result = judge.judge(plain, features(judge, tmp_path / "set", 2))
+def test_equal_sets_are_not_told_apart(judge, program, plain, tmp_path):
+    result = judge.judge(plain, features(judge, program, tmp_path / "set", 2))
     assert abs(result["auc"]["all"] - 0.5) < 0.15
     assert abs(result["control"]["all"] - 0.5) < 0.2
 
@@ -93,7 +93,7 @@ def test_equal_sets_are_not_told_apart(judge, plain, tmp_path):
 def test_it_finds_the_difference(
     judge, program, plain, tmp_path, options, group, feature
 ):
-    other = features(judge, tmp_path / "set", 3, **options)
+    other = features(judge, program, tmp_path / "set", 3, **options)
     result = judge.judge(plain, other)
     assert result["auc"][group] > 0.95
     names = judge.common_names([plain, other])
@@ -104,7 +104,7 @@ def test_it_finds_the_difference(
     assert first["auc"] > 0.95
 
 
-def test_a_result_is_the_mean_of_draws(judge, tmp_path, monkeypatch):
+def test_a_result_is_the_mean_of_draws(judge, program, tmp_path, monkeypatch):
     # Means need no good classifier.
     for name in ("_PATCHES", "_NEIGHBOURHOODS", "_TREES"):
         monkeypatch.setattr(judge, name, 5)
@@ -113,7 +113,7 @@ def test_a_result_is_the_mean_of_draws(judge, tmp_path, monkeypatch):
         for place in range(PLACES):
             folder = tmp_path / str(seed) / str(place)
             make_place(folder, 100 * seed + place)
-        sets.append(judge.read_places(tmp_path / str(seed)))
+        sets.append(program.read_places(tmp_path / str(seed)))
     single = [
         judge.judge(*(judge.Features(places, seed) for places in sets))
         for seed in (0, 1)
@@ -126,9 +126,9 @@ def test_a_result_is_the_mean_of_draws(judge, tmp_path, monkeypatch):
     assert single[0]["auc"]["all"] != single[1]["auc"]["all"]
 
 
-def test_rings_follow_from_the_order_of_a_file(judge, tmp_path):
+def test_rings_follow_from_the_order_of_a_file(program, tmp_path):
     make_place(tmp_path / "one", 0)
-    [[scan]] = judge.read_places(tmp_path)
+    [[scan]] = program.read_places(tmp_path)
     elevation = np.arcsin(scan[:, 2] / np.linalg.norm(scan[:, :3], axis=1))
     _, first = np.unique(scan[:, 4], return_index=True)
     assert np.ptp(np.diff(elevation[first])) < 1e-6
@@ -142,7 +142,7 @@ def test_without_a_folder_it_says_so(program, tmp_path, monkeypatch):
         program.main()
 
 
-def test_a_long_drive_has_a_place_every_30_m(judge, tmp_path):
+def test_a_long_drive_has_a_place_every_30_m(program, tmp_path):
     # A scan every 8 m: the fourth is 24 m from the first, the fifth 32 m.
     make_place(tmp_path / "velodyne", 0)
     file = tmp_path / "velodyne" / "000000.bin"
@@ -151,4 +151,4 @@ def test_a_long_drive_has_a_place_every_30_m(judge, tmp_path):
     rows = [f"1 0 0 {8 * k} 0 1 0 0 0 0 1 0" for k in range(9)]
     (tmp_path / "poses.txt").write_text("\n".join(rows))
     (tmp_path / "times.txt").write_text("\n".join(map(str, range(9))))
-    assert [len(one) for one in judge.read_places(tmp_path)] == [4, 4, 1]
+    assert [len(one) for one in program.read_places(tmp_path)] == [4, 4, 1]

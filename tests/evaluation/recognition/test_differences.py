@@ -7,14 +7,18 @@ import numpy as np
 import pytest
 
 from evaluation.recognition.metrics import (
-    auc_difference,
     bootstrap_intervals,
     holm,
+    mean_auc_difference,
     resampled_weights,
     route_blocks,
 )
 from evaluation.recognition.query_outcomes import judge
 from evaluation.report.result_tables import method_differences
+
+
+def auc_difference(first, second):
+    return mean_auc_difference([(first, second)])
 
 
 def outcomes_of(scores, is_right, blocks=None):

@@ -8,37 +8,32 @@ from evaluation.recognition.metrics import UNKNOWN
 from evaluation.recognition.place_outcome import (
     FAULTS,
     PlaceOutcome,
+    faults,
     place_numbers,
 )
 from evaluation.recognition.pose_errors import PoseErrors
 from evaluation.recognition.query_outcomes import QueryOutcomes
+from evaluation.recognition.retrieval import Retrieval
 
 
-def answered(is_right, scores=None, radius=7.5, blocks=None):
+def answered(is_right, scores=None, blocks=None):
     """An outcome; all queries have a match."""
     right = np.array(is_right, dtype=bool)
     number = len(right)
-    return PlaceOutcome(
-        "solid",
-        False,
-        QueryOutcomes(
-            np.ones(number) if scores is None else scores,
-            right,
-            np.ones(number, bool),
-            np.where(right, 1.0, np.inf),
-            9,
-            blocks,
-        ),
-        query_frames=np.arange(number),
-        stamps_ns=np.arange(number) * 50,
-        p_WQs=np.zeros((number, 3)),
-        match_drives=["town_01"] * number,
-        match_frames=np.arange(number),
-        distances=np.ones(number),
-        pose_errors=PoseErrors.unknown(number),
-        overlaps=np.linspace(0.2, 0.8, number),
-        radius=radius,
+    outcomes = QueryOutcomes(
+        np.ones(number) if scores is None else scores,
+        right,
+        np.ones(number, bool),
+        np.where(right, 1.0, np.inf),
+        9,
+        blocks,
     )
+    columns = {
+        "why": faults(outcomes, np.arange(number), np.ones(number), 7.5),
+        "overlap": np.linspace(0.2, 0.8, number),
+    }
+    errors = PoseErrors.unknown(number)
+    return PlaceOutcome("solid", False, outcomes, columns, errors, 7.5)
 
 
 def part(number, kept):
@@ -145,9 +140,10 @@ def test_what_is_wrong_with_each_answer():
     """Each kind of fault occurs once, and two best places are right."""
     one = answered([1, 1, 0, 0, 0, 0, 0])
     one.outcomes.has_match[2] = False
-    one.match_frames[3] = -1
-    one.distances[3:] = np.nan, np.nan, 15.0, 15.1
-    assert one.faults() == [
+    frames = np.array([0, 1, 2, -1, 4, 5, 6])
+    distances = np.array([1.0, 1.0, 1.0, np.nan, np.nan, 15.0, 15.1])
+    one.columns["why"][:] = faults(one.outcomes, frames, distances, 7.5)
+    assert one.columns["why"].tolist() == [
         "",
         "",
         "no_place",
@@ -168,31 +164,54 @@ def test_what_is_wrong_with_each_answer():
 
 @pytest.mark.parametrize("radius", [5.0, 7.5])
 def test_places_within_two_radii_are_too_far(radius):
-    one = answered([0, 0], radius=radius)
-    one.distances[:] = 2 * radius - 1e-9, 2 * radius + 1e-9
-    assert one.faults() == ["too_far", "elsewhere"]
+    outcomes = answered([0, 0]).outcomes
+    distances = 2 * radius + np.array([-1e-9, 1e-9])
+    found = faults(outcomes, np.arange(2), distances, radius)
+    assert found.tolist() == ["too_far", "elsewhere"]
 
 
 def test_overlaps_that_are_not_known():
     one = answered([1, 1, 0])
-    one.overlaps[:] = np.nan, 0.6, 0.8
+    one.columns["overlap"][:] = np.nan, 0.6, 0.8
     assert numbers(one)[0]["visible_change"] == pytest.approx(0.3)
-    one.overlaps[:] = np.nan
+    one.columns["overlap"][:] = np.nan
     assert "visible_change" not in numbers(one)[0]
 
 
-def test_columns_hold_all_that_numbers_follow_from():
+@pytest.mark.parametrize("blocks", [None, np.arange(8) // 2])
+def test_columns_hold_all_that_numbers_follow_from(blocks):
     right = part(8, 5)
-    one = answered(right, np.linspace(1, 0, 8), blocks=np.arange(8) // 2)
-    found = one.columns()
-    assert {len(column) for column in found.values()} == {8}
-    assert np.mean(found["correct"]) == numbers(one)[0]["r1"]
-    np.testing.assert_array_equal(found["block"], np.arange(8) // 2)
-    np.testing.assert_allclose(
-        np.add(found["overlap"], found["visible_change"]), 1.0
+    # Query k finds place k; the last places are of another town.
+    scores = np.where(np.eye(8, 9) > 0, np.linspace(1, 0.1, 8)[:, None], np.nan)
+    retrieval = Retrieval(
+        query_frames=np.arange(8) * 10,
+        database_frames=np.arange(9) * 7,
+        scores=scores,
+        distances=np.ones((8, 9)),
+        matches=np.eye(8, 9, dtype=bool) & right[:, None],
+        pose_errors=PoseErrors.unknown(8),
+        is_known=np.ones((8, 9), bool),
+        query_blocks=blocks,
     )
-    assert [bool(why) for why in found["why"]] == [*~right]
+    one = PlaceOutcome.of(
+        "solid",
+        False,
+        retrieval,
+        (np.arange(8) * 50, np.arange(24.0).reshape(8, 3)),
+        ["town_01"] * 6 + ["town_02"] * 3,
+        np.linspace(0.2, 0.8, 8),
+        7.5,
+    )
+    found = one.columns
+    assert {len(column) for column in found.values()} == {8}
+    assert found["query_y"].tolist() == [1 + 3 * k for k in range(8)]
+    assert found["match_frame"].tolist() == [7 * k for k in range(8)]
+    assert found["match_drive"].tolist() == ["town_01"] * 6 + ["town_02"] * 2
+    assert np.isnan(found["distance"]).tolist() == [False] * 6 + [True] * 2
+    assert np.sum(found["correct"]) == 5
     # Without blocks each query is one.
     np.testing.assert_array_equal(
-        answered(right).columns()["block"], np.arange(8)
+        found["block"], np.arange(8) if blocks is None else blocks
     )
+    np.testing.assert_allclose(found["overlap"] + found["visible_change"], 1.0)
+    assert [bool(why) for why in found["why"]] == [*~right]

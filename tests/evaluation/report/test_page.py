@@ -92,11 +92,11 @@ def test_the_ranking_comes_first(text):
         ),
         (
             {"btc": [0.9, 0.8], "solid": [0.2, 0.1]},
-            "SOLiD follows with 0.150. Its lead is beyond chance (95 %).",
+            "SOLiD follows with 0.150. The difference is significant (95 %).",
         ),
         (
             {"btc": [0.9, 0.1], "solid": [0.2, 0.2]},
-            "follows with 0.200. With other pairs, the two might change",
+            "follows with 0.200. The difference is not significant",
         ),
     ],
 )

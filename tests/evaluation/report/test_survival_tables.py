@@ -89,8 +89,8 @@ def test_table_for_print():
 
 def test_summary():
     assert survival_summary(of(SOME)) == (
-        "Each method keeps part of its AUC without change (median of 2 pairs):"
-        " BTC 62 %, SOLiD 10 %."
+        "Share of its AUC without change that each method keeps (median of 2"
+        " pairs): BTC 62 %, SOLiD 10 %."
     )
     assert survival_summary(of(SOME[:9])).endswith("(one pair): BTC 50 %.")
     assert "For 1 of 3 pairs no control was" in (

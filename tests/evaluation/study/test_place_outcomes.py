@@ -123,7 +123,7 @@ def test_the_numbers_are_those_of_the_single_command(folder, tmp_path):
         )
         best = alone.retrieval.best_places
         np.testing.assert_array_equal(
-            one.match_frames,
+            one.columns["match_frame"],
             np.where(best < 0, -1, alone.retrieval.database_frames[best]),
         )
 
@@ -140,7 +140,7 @@ def test_the_best_match_agrees_with_the_matrix_of_overlaps(folder, tmp_path):
     assert matrix.shape == apart.shape
     expected = np.where(apart <= PROTOCOL.radius, matrix, 0.0).max(axis=1)
     for one in _done(pair(folder, tmp_path / "pair.data")):
-        np.testing.assert_allclose(one.overlaps, expected, atol=1e-4)
+        np.testing.assert_allclose(one.columns["overlap"], expected, atol=1e-4)
 
 
 @pytest.mark.slow
@@ -160,9 +160,9 @@ def test_places_of_other_cities_are_never_right(folder, tmp_path):
             np.testing.assert_array_equal(
                 before.outcomes.has_match, after.outcomes.has_match
             )
-            elsewhere = np.array(after.match_drives) == "suburbia_01"
+            elsewhere = after.columns["match_drive"] == "suburbia_01"
             assert not after.outcomes.is_right[elsewhere].any()
-            assert np.isnan(after.distances[elsewhere]).all()
+            assert np.isnan(after.columns["distance"][elsewhere]).all()
     # Stage 01 lacks the structures that the query sees; the other town has
     # them.
     assert elsewhere.any()
