@@ -30,8 +30,7 @@ class KnownPoses(NamedTuple):
     def find(
         self, frame: FrameId, calc_X_WF: Callable[[FrameId], RigidTransform]
     ) -> RigidTransform:
-        """Returns the stored pose of a frame; computes it if it is not stored.
-        """
+        """Returns the stored pose of a frame; computes it if not stored."""
         row = self.rows.get(frame)
         if row is None:
             return calc_X_WF(frame)

@@ -100,8 +100,7 @@ class RayCastingScene:
             self._group_of[[index for index, *_ in group.members]] = row
 
     def serves(self, p_WS: np.ndarray) -> bool:
-        """Returns whether this scene gives precise ranges for a sensor at p_WS.
-        """
+        """Returns whether ranges are precise for a sensor at p_WS (3,) [m]."""
         return serves(self._p_WO, self._groups, p_WS)
 
     def set_frame_poses(

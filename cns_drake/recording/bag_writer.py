@@ -54,8 +54,7 @@ _MOST_HELD = 64
 
 
 class RecordedMessage(NamedTuple):
-    """A message to be recorded; its fields are arguments of `BagWriter.write`.
-    """
+    """A message to record; its fields are arguments of `BagWriter.write`."""
 
     topic: str
     stamp_ns: int
@@ -221,7 +220,7 @@ class BagWriter:
     def write(
         self, topic: str, stamp_ns: int, data: bytes, sequence: int
     ) -> None:
-        """Appends one message, which must not be earlier than the last one.
+        """Appends one message; on each topic, times must increase.
 
         The message of a latched topic is skipped if it has already been taken
         over from an interrupted run.
@@ -234,7 +233,7 @@ class BagWriter:
 
         Raises:
             InputError: if the file cannot be written, e.g. on a full disk, or
-                the message is earlier than the one before.
+                the message is not later than the last one on its topic.
             RuntimeError: the recording is not open.
         """
         if not self._is_open:

@@ -154,7 +154,7 @@ def marked_detections(
 
 
 def marked_boxes(who: Sequence[tuple[int, str]], numbers: np.ndarray) -> Any:
-    """Returns a SceneUpdate that replaces all shown boxes by those of N objects.
+    """Returns a SceneUpdate that replaces all boxes by those of N objects.
 
     The arguments are as in `marked_detections`.
     """

@@ -45,8 +45,7 @@ def digest_inputs(
     the files that these meshes and models name.
 
     Args:
-        watch: called with each file before it is read, to note the file's
-            status.
+        watch: records the status of each file before the file is read.
 
     Returns:
         Kind of file -> hexadecimal digest. The kinds are `world` and `vehicle`
@@ -128,8 +127,7 @@ def digest_file(path: Path, watch: FileWatch | None = None) -> str:
     """Returns the SHA-256 digest of a model and of the files that it names.
 
     Args:
-        watch: called with each file before it is read, to note the file's
-            status.
+        watch: records the status of each file before the file is read.
 
     Raises:
         InputError: a file cannot be read.

@@ -46,8 +46,7 @@ class DriveSimulation:
         return SimulatedDrive(self.scenario)
 
     def identity(self) -> dict:
-        """Returns a key: the scenario, and digests of its files and the code.
-        """
+        """Returns a key: scenario, and digests of its files and the code."""
         return {
             "simulated": self.scenario.model_dump(mode="json"),
             "inputs": digest_inputs(self.scenario),

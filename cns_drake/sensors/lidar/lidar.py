@@ -673,7 +673,9 @@ class SeenGeometry:
         self._revision = revision
 
     def labels(self, moving: np.ndarray) -> np.ndarray:
-        """Returns the class of each geometry, given ids of moving structures.
+        """Returns the class of each geometry, given the moving structures.
+
+        `moving` contains the instance ids of the structures that are moving.
         """
         moves = np.zeros(MAX_INSTANCE + 1, bool)
         moves[moving] = True
