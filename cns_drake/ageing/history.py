@@ -244,9 +244,9 @@ class City:
     def near(
         self, area: BaseGeometry, ignored: Sequence[str] = ()
     ) -> list[str]:
-        """Returns the names of structures, except ground, that touch an area in W.
+        """Returns the names of structures, except ground, that touch an area.
 
-        Structures with the names `ignored` are left out.
+        The area is in W. Structures with the names `ignored` are left out.
         """
         rows = sorted(self._tree.query(area, predicate="intersects"))
         found = [

@@ -166,8 +166,7 @@ class OldWorld:
     def area(
         self, wanted: Callable[[world_structures.Structure], bool]
     ) -> BaseGeometry:
-        """Returns the area of the structures that `wanted` selects, in W [m].
-        """
+        """Returns the area in W [m] of all structures that `wanted` selects."""
         found = [
             from_above(world_structures.triangle_corners(part))
             for one in self._seen.values()

@@ -221,8 +221,7 @@ def building_plot(building: Structure) -> Plot:
 
 
 def site(plot: Plot, name: str, rng: np.random.Generator) -> list[Structure]:
-    """Returns the structures of a building site: fences, machines, materials.
-    """
+    """Returns the structures of a building site: fences, machines and so on."""
     inner = plot.inside(plot.area.buffer(-0.4))
     lot = largest_rectangle(max(polygons_of(inner), key=lambda one: one.area))
     x0, y0, x1, y1 = lot.bounds

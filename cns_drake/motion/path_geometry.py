@@ -185,8 +185,7 @@ class SmoothPath:
         )
 
     def tightest_bend(self) -> tuple[float, np.ndarray]:
-        """Returns the smallest radius [m] of the path and its place (3,) [m].
-        """
+        """Returns the path's smallest radius [m] and its place (3,) [m]."""
         jet = self.evaluate(self._places())
         curvature = np.abs(jet.turn) / jet.speed
         at = int(curvature.argmax())

@@ -63,8 +63,7 @@ class View(BaseModel):
     def project(
         self, p_WQset: np.ndarray, width: int, height: int
     ) -> tuple[np.ndarray, np.ndarray]:
-        """Projects points; returns pixels (M, 2) and indices (M,) of visible ones.
-        """
+        """Returns pixels (M, 2) of the visible points, and their indices."""
         scale = height / 2 / np.tan(np.deg2rad(self.fov_y) / 2)
         p_C = (self.pose().inverse() @ p_WQset.T).T
         ahead = np.flatnonzero(p_C[:, 0] > 0.1)
