@@ -65,8 +65,7 @@ def depart(
     """Returns the path of a driver who wanders and changes lanes.
 
     The car, including its mirrors, keeps 0.3 m from all obstacles, as seen from
-    above. Where an obstacle is closer than that to a car on the line itself,
-    the car stays on the line.
+    above. Where this is not possible, the car stays on the line.
 
     Args:
         path: the line, with points every `FINE_SPACING`.

@@ -57,8 +57,7 @@ class Mesh:
         return corners[begin + np.minimum(np.arange(4), last)]
 
     def with_vertices(self, vertices: np.ndarray) -> Mesh:
-        """Returns the mesh with the same faces but other vertices (N, 3) [m].
-        """
+        """Returns the mesh with the same faces, but vertices (N, 3) [m]."""
         mesh = Mesh(vertices, self.faces)
         mesh.__dict__["_corners"] = self._corners
         return mesh
