@@ -273,7 +273,10 @@ def scaffold_before(
 def storey_on(
     plot: Plot, triangles: np.ndarray, name: str, rng: np.random.Generator
 ) -> Structure | None:
-    """Returns an additional storey for a building; None without a flat roof."""
+    """Returns an additional storey for a building; None without a flat roof.
+
+    `triangles` (M, 3, 3) are those of the building on the plot, in W [m].
+    """
     inside = plot.triangles(triangles)
     flat = inside[np.abs(unit_normals(inside)[:, 2]) > 0.99]
     heights = flat[:, :, 2].mean(axis=1).round(1)

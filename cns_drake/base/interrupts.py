@@ -56,7 +56,12 @@ def _handled_by(handle: _Handler) -> Iterator[dict[int, _Handler]]:
 
 @contextlib.contextmanager
 def uninterrupted() -> Iterator[None]:
-    """Delays interrupts until the end of the block, for example an import."""
+    """Delays interrupts until the end of the block, for example an import.
+
+    An extension module that is interrupted while it is initialised fails with
+    another error, or crashes the process later. Blocking the signals would not
+    help: a library's threads can receive them as well.
+    """
     waiting: list[int] = []
     try:
         with _handled_by(lambda number, frame: waiting.append(number)):

@@ -1,4 +1,7 @@
-"""The file layouts of existing data sets, and what their exporters share."""
+"""The file layouts of existing data sets, and what their exporters share.
+
+Frames: world W, vehicle B on the ground, LiDAR S, IMU I.
+"""
 
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass

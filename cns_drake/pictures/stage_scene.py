@@ -63,7 +63,11 @@ class View(BaseModel):
     def project(
         self, p_WQset: np.ndarray, width: int, height: int
     ) -> tuple[np.ndarray, np.ndarray]:
-        """Returns pixels (M, 2) of the visible points, and their indices."""
+        """Returns pixels (M, 2) of the visible points, and their indices.
+
+        The points (N, 3) are in W [m]; the indices are (M,). Width and height
+        of the picture are in pixels.
+        """
         scale = height / 2 / np.tan(np.deg2rad(self.fov_y) / 2)
         p_C = (self.pose().inverse() @ p_WQset.T).T
         ahead = np.flatnonzero(p_C[:, 0] > 0.1)

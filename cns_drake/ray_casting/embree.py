@@ -1,4 +1,10 @@
-"""The functions of Embree's C interface that ray casting needs."""
+"""The functions of Embree's C interface that ray casting needs.
+
+Embree is the shared library in the `embreex` wheel.
+
+Formats and values of the C interface: Embree 4 manual,
+https://github.com/RenderKit/embree, headers `rtcore_*.h`.
+"""
 
 import ctypes
 from functools import lru_cache

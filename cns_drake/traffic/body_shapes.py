@@ -150,7 +150,11 @@ def _two_wheeler(
 
 
 def walker_limbs(rng: np.random.Generator) -> tuple[Limb, ...]:
-    """Returns the five limbs of a walker, which consist of ten capsules."""
+    """Returns the five limbs of a walker, which consist of ten capsules.
+
+    The body's frame is on the ground, with x in the walker's heading. An arm
+    swings together with the leg on the other side.
+    """
     h = float(rng.uniform(0.92, 1.06))
     coat, trousers = (
         _CLOTHES[int(k)] for k in rng.integers(len(_CLOTHES), size=2)

@@ -1,4 +1,7 @@
-"""Replays traffic from a SUMO trace: floating-car data at even times."""
+"""Replays traffic from a SUMO trace: floating-car data at even times.
+
+Format: https://sumo.dlr.de/docs/Simulation/Output/FCDOutput.html
+"""
 
 from collections.abc import Sequence
 from dataclasses import dataclass

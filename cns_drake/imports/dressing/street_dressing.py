@@ -198,7 +198,7 @@ class StreetRoom:
         return bool(shapely.dwithin(LineString(line), self.paths, distance))
 
     def keep_tree(self, tree: Imported) -> None:
-        """Marks the place of a tree's trunk as taken."""
+        """Marks the place of a tree's trunk as occupied."""
         x, y, _ = tree.structure.xyz
         self._taken.add(Point(x, y).buffer(_TRUNK, 4))
 

@@ -110,7 +110,11 @@ def target_snr(
 
 
 def detection_probability(snr: ArrayLike) -> np.ndarray:
-    """Returns the probability that an echo with a given SNR is detected."""
+    """Returns the probability that an echo with a given SNR is detected.
+
+    The model compares a photon count with a threshold. The mean of the count is
+    the SNR, and its standard deviation the root of the SNR (shot noise).
+    """
     snr = np.asarray(snr)
     deviation = (snr - THRESHOLD_SNR) / np.sqrt(np.maximum(snr, 1e-9))
     probability = 0.5 * (1.0 + erf(deviation / np.sqrt(2.0)))
