@@ -1,1 +1,1 @@
-"""Ages a city year by year, at the rates of change of real cities."""
+"""Ageing of cities year by year, at the rates of change of real cities."""

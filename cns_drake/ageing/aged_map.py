@@ -49,13 +49,13 @@ _GROWTH, _LEAST_TREE = 0.4, 2.0
 
 @dataclass(frozen=True)
 class AgedMap:
-    """The stages of an aged map, and what happened in between.
+    """The stages of an aged map, and the events between them.
 
     Attributes:
         years: stage -> its year; 0 is today.
         structures: stage -> number of structures.
         events: event -> how often it happened.
-        changed: (N, 3) places of changed buildings [m].
+        changed: (N, 3) places of changed buildings in W [m].
         trajectory: the trajectory of the map's last drive.
     """
 
@@ -75,21 +75,22 @@ def age_map(
     progress: Callable[[str], None] = lambda line: None,
     finish: Callable[[Path, AgedMap], None] = lambda folder, aged: None,
 ) -> AgedMap:
-    """Writes the map folder of a city after years of change.
+    """Writes a map folder in which a city ages by given numbers of years.
 
     Args:
         source: the folder of the map; its last stage is today.
-        years: ascending years from today, at most 200. Negative years, before
-            today, need the years in which buildings were built (column `built`
-            of `structures.csv`).
+        years: ascending years relative to today, from -200 to 200. Negative
+            years are before today; they need the buildings' years of
+            construction (column `built` of `structures.csv`).
         seed: the seed of all random draws, not negative.
-        rates: event -> rate per year, see `read_rates`.
+        rates: event -> rate per year; see `read_rates`.
         output: the folder to write, which must not exist yet.
-        progress: is called with one line at a time.
-        finish: completes the folder before it gets its final name.
+        progress: called with messages of one line on the progress.
+        finish: called with the folder and the result before the folder gets its
+            final name, to add files.
 
     Returns:
-        The aged stages and what happened.
+        The stages and the events.
 
     Raises:
         InputError: an argument or the map cannot be used.
@@ -167,10 +168,11 @@ def _swept(trajectory: Trajectory) -> BaseGeometry:
 def past(
     world: OldWorld, year: int
 ) -> tuple[dict[str, Structure | None], list[Event]]:
-    """Returns the structures in a year before today, and the events since.
+    """Returns a city in a year before today, and the events since then.
 
-    The year is negative. Buildings of later years did not exist, and their lots
-    had another use. Trees were younger.
+    The city is name -> structure; None stands for a structure that is the same
+    as today. `year` is negative. Buildings that were built later did not exist,
+    and their lots had another use. Trees were younger.
     """
     assert world.today is not None  # The caller has checked it.
     standing: dict[str, Structure | None] = dict.fromkeys(world.visuals)

@@ -1,4 +1,4 @@
-"""Draws pictures of an ageing city, from the air and from three streets."""
+"""Pictures of an ageing city, from the air and from three streets."""
 
 from collections.abc import Callable
 from pathlib import Path
@@ -24,7 +24,7 @@ _SEEN = 60.0
 
 
 def street_views(aged: AgedMap) -> dict[str, View]:
-    """Returns the views along the last drive where most has been built."""
+    """Returns views along the last drive, where most buildings have changed."""
     way = aged.trajectory
     times = np.linspace(0.0, way.duration, int(way.length / _SPACING) + 2)[:-1]
     R_WBs, p_WBs = way.poses(times)
@@ -51,7 +51,7 @@ def street_views(aged: AgedMap) -> dict[str, View]:
 
 
 def air_view(aged: AgedMap) -> View:
-    """Returns a view from the air, on the surroundings of the last drive."""
+    """Returns a view from the air on the surroundings of the last drive."""
     _, p = aged.trajectory.poses(np.linspace(0.0, aged.trajectory.duration, 99))
     x, y, z = (p.min(axis=0) + p.max(axis=0)) / 2
     half = float(np.ptp(p, axis=0)[:2].max()) / 2
@@ -66,7 +66,8 @@ def draw_pictures(
 ) -> None:
     """Writes a picture of each view for each year, and a film strip.
 
-    They are `pictures/year_<y>_<view>.jpg` and `film.jpg` in the map's folder.
+    The pictures are `pictures/year_<y>_<view>.jpg`, and the film strip is
+    `film.jpg`, both in the map's folder.
     """
     views = {"air": air_view(aged), **street_views(aged)}
     years = sorted(aged.years, key=lambda stage: aged.years[stage])

@@ -1,8 +1,8 @@
 """The history of a city: what happens to it, year after year.
 
-The city of a year follows from the city of the year before. Each object has
-random numbers of its own for each year and event, so that a longer history
-begins with the same events as a shorter one.
+The city in a year follows from the city in the year before. Each object has its
+own random numbers for each year and event, so that a longer history begins with
+the same events as a shorter one.
 """
 
 from collections.abc import Iterator, Mapping, Sequence
@@ -85,8 +85,8 @@ PUT_UP, TAKEN_DOWN = "put_up", "taken_down"
 class Event:
     """A row of `history.csv`: what happened to a structure in a year.
 
-    Year 0 is today. The successor is the structure that takes its place, if
-    any.
+    Year 0 is today. `successor` is the name of the structure that takes the
+    structure's place; "" if there is none.
     """
 
     year: int
@@ -141,9 +141,9 @@ class _Tree:
 class City:
     """A city at the end of a year.
 
-    `standing` maps names to structures; the value is None for a structure that
-    is the same as today. `new` has the structures that do not stand today, in
-    the order in which they were built.
+    `standing` maps the name of each existing structure to the structure, or to
+    None if it is the same as today. `new` contains the structures that do not
+    exist today, in the order in which they were built.
     """
 
     def __init__(
@@ -244,7 +244,10 @@ class City:
     def near(
         self, area: BaseGeometry, ignored: Sequence[str] = ()
     ) -> list[str]:
-        """Returns the names of structures on an area in W, without ground."""
+        """Returns the names of structures, except ground, that touch an area.
+
+        The area is in W. Structures with the names `ignored` are left out.
+        """
         rows = sorted(self._tree.query(area, predicate="intersects"))
         found = [
             name

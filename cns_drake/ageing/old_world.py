@@ -1,4 +1,4 @@
-"""The city of today: a stage of a map, read as ageing needs it."""
+"""The city of today: the last stage of a map, prepared for ageing."""
 
 from collections.abc import Callable, Sequence
 from functools import cached_property
@@ -40,10 +40,10 @@ class OldWorld:
     """The last stage of a map, which is today.
 
     `columns` and `rows` are those of the map's structure table. Three
-    dictionaries go by the name of a structure: `things` are the structures in
-    W, `visuals` the SDF texts of their visuals, and `built` the years in which
-    they were built, as far as the table has them. `today` is the year of the
-    stage; None if there are no such years.
+    dictionaries have the names of structures as keys: `things` contains the
+    structures in W, `visuals` the SDF texts of their visuals, and `built` the
+    years of construction, for structures whose year is in the table. `today` is
+    the calendar year of the stage; None if the table has no years.
     """
 
     def __init__(self, folder: MapFolder):
@@ -97,8 +97,8 @@ class OldWorld:
         Its footprint is the convex hull of its parts near the ground.
 
         Raises:
-            InputError: a shape or a mesh is of a kind that cannot be used, or
-                the table does not contain the structure.
+            InputError: a shape or a mesh of the structure is of an unsupported
+                kind, or the table does not contain the structure.
         """
         row = self.rows.get(name)
         if row is None:
@@ -153,20 +153,20 @@ class OldWorld:
 
     @cached_property
     def streets(self) -> BaseGeometry:
-        """Carriageways, car parks beside them and sidewalks, in W [m]."""
+        """Area of carriageways, adjacent car parks and sidewalks, in W [m]."""
         return shapely.union_all(
             [self.ground.carriageway, self.area(self._is_street)]
         )
 
     @cached_property
     def open_ground(self) -> BaseGeometry:
-        """Ground beside streets except parks and water, in W [m]."""
+        """Area of the ground outside streets, parks and water, in W [m]."""
         return self.area(_is_open).difference(self.streets)
 
     def area(
         self, wanted: Callable[[world_structures.Structure], bool]
     ) -> BaseGeometry:
-        """Returns the area in W of structures that `wanted` selects [m]."""
+        """Returns the area in W [m] of all structures that `wanted` selects."""
         found = [
             from_above(world_structures.triangle_corners(part))
             for one in self._seen.values()
@@ -182,7 +182,7 @@ class OldWorld:
         return one.semantic_class == "sidewalk" or is_bay
 
     def junctions(self) -> dict[str, BaseGeometry]:
-        """Returns the areas of junctions in W by name; none without roads."""
+        """Returns name -> area of each junction in W; empty without roads."""
         if not is_there(self.folder.roads):
             return {}
         network = load_road_network(self.folder.roads)

@@ -1,4 +1,4 @@
-"""Plots of ground, what is built on them, and additions to buildings."""
+"""Plots of land, the buildings on them, and additions to buildings."""
 
 from __future__ import annotations
 
@@ -87,8 +87,8 @@ _INSULATION = 0.15
 class Plot:
     """The ground of one building: its area in W and its height z [m].
 
-    Its frame S is at `xy` with the heading `yaw` [m, rad]. The x axis of S runs
-    along the street, and the y axis points away from it.
+    The plot's frame S is at `xy` [m] and has the heading `yaw` [rad]. The x
+    axis of S runs along the street, and the y axis points away from the street.
     """
 
     area: BaseGeometry
@@ -100,7 +100,7 @@ class Plot:
     def facing(
         cls, area: BaseGeometry, streets: BaseGeometry, z: float
     ) -> Plot:
-        """Returns the plot on an area, with its front to the nearest street."""
+        """Returns the plot with a given area, facing the nearest street."""
         rectangle = shapely.orient_polygons(area.minimum_rotated_rectangle)
         corners = shapely.get_coordinates(rectangle)
         middles = shapely.points((corners[:-1] + corners[1:]) / 2)
@@ -113,7 +113,7 @@ class Plot:
         return cls(area, xy, yaw, round(z, 3))
 
     def place(self, x: float, y: float) -> tuple[float, float]:
-        """Returns the place in W of a point in S, in whole millimetres [m]."""
+        """Converts a point in S to W, in whole millimetres [m]."""
         c, s = math.cos(self.yaw), math.sin(self.yaw)
         return (
             round(self.xy[0] + c * x - s * y, 3),
@@ -121,25 +121,28 @@ class Plot:
         )
 
     def inside(self, area: BaseGeometry) -> BaseGeometry:
-        """Returns an area in S that is given in W."""
+        """Converts an area in W to S."""
         moved = affinity.translate(area, -self.xy[0], -self.xy[1])
         return affinity.rotate(moved, -self.yaw, (0, 0), use_radians=True)
 
     def triangles(self, p_W: np.ndarray) -> np.ndarray:
-        """Returns triangles (M, 3, 3) in S that are given in W [m].
+        """Converts triangles (M, 3, 3) in W to S [m].
 
-        Heights are above the plot's ground.
+        Heights in S are above the plot's ground.
         """
         c, s = math.cos(self.yaw), math.sin(self.yaw)
         x, y, z = np.moveaxis(p_W - [*self.xy, self.z], -1, 0)
         return np.stack([c * x + s * y, c * y - s * x, z], axis=-1)
 
     def room(self) -> Polygon:
-        """Returns the large rectangle in S that a building may fill."""
+        """Returns a large rectangle in S that a building may fill."""
         return largest_rectangle(self.inside(self.area))
 
     def thing(self, name: str, kind: str, model: Model) -> Structure:
-        """Returns a structure on the plot; the frame of its model is S."""
+        """Returns a structure on the plot, given a model expressed in S.
+
+        `kind` is the semantic class of the structure.
+        """
         return Structure(name, kind, model, (*self.xy, self.z), self.yaw)
 
 
@@ -156,9 +159,9 @@ def new_building(
     Args:
         plot: plot on which the building stands.
         height: approximate height of the building [m].
-        banned: archetype that the building must not have.
-        neighbours: footprints of its neighbours in W.
-        rng: draws the building.
+        banned: archetype (kind of building) that must not be used.
+        neighbours: footprints of the neighbouring buildings in W.
+        rng: random generator for the choice of the building.
         ending: end of the building's name, after the archetype.
     """
     x0, y0, x1, y1 = plot.room().bounds
@@ -212,13 +215,13 @@ def _blind_edges(footprint: Polygon, near: Sequence[BaseGeometry]) -> set[int]:
 
 
 def building_plot(building: Structure) -> Plot:
-    """Returns the plot that a building needs."""
+    """Returns a plot with a building's footprint, place and heading."""
     area = building.footprint_W
     return Plot(area, building.xyz[:2], building.yaw, building.xyz[2])
 
 
 def site(plot: Plot, name: str, rng: np.random.Generator) -> list[Structure]:
-    """Returns a building site: fences, machines, cabins and materials."""
+    """Returns the structures of a building site: fences, machines and so on."""
     inner = plot.inside(plot.area.buffer(-0.4))
     lot = largest_rectangle(max(polygons_of(inner), key=lambda one: one.area))
     x0, y0, x1, y1 = lot.bounds
@@ -258,7 +261,7 @@ def frame(building: Structure, seed: int) -> Model:
 def scaffold_before(
     plot: Plot, height: float, name: str, rng: np.random.Generator
 ) -> Structure:
-    """Returns a scaffold in front of a building of some height [m]."""
+    """Returns a scaffold in front of a building with a given height [m]."""
     x0, y0, x1, _ = plot.inside(plot.area).bounds
     length = min(x1 - x0, _LONGEST)
     xy = plot.place((x0 + x1) / 2, y0)
@@ -270,9 +273,9 @@ def scaffold_before(
 def storey_on(
     plot: Plot, triangles: np.ndarray, name: str, rng: np.random.Generator
 ) -> Structure | None:
-    """Returns an additional storey; None if the roof is not flat.
+    """Returns an additional storey for a building; None without a flat roof.
 
-    The building on the plot has triangles (M, 3, 3) in W [m].
+    `triangles` (M, 3, 3) are those of the building on the plot, in W [m].
     """
     inside = plot.triangles(triangles)
     flat = inside[np.abs(unit_normals(inside)[:, 2]) > 0.99]
@@ -314,14 +317,14 @@ def annex_to(
     is_free: Callable[[BaseGeometry], bool],
     rng: np.random.Generator,
 ) -> Structure | None:
-    """Returns an annex of one storey behind a building; None without room.
+    """Returns a one-storey annex behind a building, or None without space.
 
     Args:
         plot: plot of the building.
         triangles: (M, 3, 3) triangles of the building in W [m].
         name: name of the annex.
-        is_free: returns whether an area in W may be built on.
-        rng: draws its size.
+        is_free: function that returns whether an area in W may be built on.
+        rng: random generator for the size of the annex.
     """
     cut = section(plot.triangles(triangles), 1.3)
     x0, _, x1, _ = plot.inside(plot.area).bounds
@@ -392,7 +395,7 @@ def balconies_on(
 def renewed(
     building: Structure, moves: bool, rng: np.random.Generator
 ) -> Structure:
-    """Returns a building with a new colour.
+    """Returns a building with new colours.
 
     If `moves`, new insulation also moves its walls outwards by 15 cm.
     """
@@ -426,7 +429,7 @@ def _widened(part: Part, middle: np.ndarray, share: float) -> Part:
 
 
 def section(triangles: np.ndarray, z: float) -> np.ndarray:
-    """Returns segments (N, 2, 2) in which triangles cut the height z [m]."""
+    """Returns segments (N, 2, 2) [m] where triangles cut the height z [m]."""
     z += 1e-4  # Not exactly at a vertex, whose heights are whole millimetres.
     a, b = triangles, np.roll(triangles, -1, axis=1)
     rise = b[..., 2] - a[..., 2]
@@ -438,7 +441,7 @@ def section(triangles: np.ndarray, z: float) -> np.ndarray:
 
 
 def last(segments: np.ndarray, x: float) -> float:
-    """Returns the greatest y of segments (N, 2, 2) at x; NaN if none."""
+    """Returns the greatest y of segments (N, 2, 2) at x; NaN without any."""
     a, b = segments[:, 0], segments[:, 1]
     meets = (a[:, 0] - x) * (b[:, 0] - x) < 0
     a, b = a[meets], b[meets]

@@ -1,4 +1,4 @@
-"""The rates of a city's events, and how often the events happened."""
+"""The yearly rates of events in a city, and counts of the events."""
 
 from collections import Counter, defaultdict
 from collections.abc import Iterable, Mapping
@@ -29,12 +29,13 @@ def read_rates(path: Path | None, factor: float = 1.0) -> dict[str, float]:
 
     Args:
         path: a YAML file that maps events to rates from 0 to 1, and `moved` to
-            metres. Events that it does not name keep their default rates.
+            a distance [m]. Events that are not in the file keep their default
+            rates; None for all default rates.
         factor: factor by which all rates are multiplied.
 
     Raises:
-        InputError: the file cannot be read; it names an unknown event; or a
-            rate or the factor is out of range.
+        InputError: the file cannot be read or names an unknown event, or a rate
+            or the factor is out of range.
     """
     found = check_rates({} if path is None else read_yaml(path), path)
     rates = {
@@ -51,7 +52,7 @@ def read_rates(path: Path | None, factor: float = 1.0) -> dict[str, float]:
 
 
 def check_rates(found: object, source: object) -> dict[str, float]:
-    """Returns rates by event, after checking them.
+    """Checks that events and their rates are valid; returns the rates.
 
     Raises:
         InputError: an event is unknown, or a rate is not from 0 to 1.
@@ -74,10 +75,11 @@ def check_rates(found: object, source: object) -> dict[str, float]:
 
 
 def check_years(years: Iterable[int]) -> tuple[int, ...]:
-    """Returns years, after checking that they ascend and are in range.
+    """Checks that years ascend and are at most 200 from today; returns them.
 
     Raises:
-        InputError: they do not ascend, or one is beyond 200.
+        InputError: the years do not ascend, or one is more than 200 years from
+            today.
     """
     found = tuple(years)
     text = " ".join(map(str, found))
@@ -94,9 +96,9 @@ def check_years(years: Iterable[int]) -> tuple[int, ...]:
 class Tally:
     """Counts how often events happened to the objects of a city.
 
-    For each event: `rates` has its rate per year, `expected` the expected
-    number of events, `number` the actual number, and `exposure` the number of
-    objects at risk, summed over the years.
+    Four mappings have an entry for each kind of event: `rates` the rate per
+    year, `expected` the expected number of events, `number` the actual number,
+    and `exposure` the number of objects at risk, summed over the years.
     """
 
     rates: Mapping[str, float]
@@ -107,16 +109,21 @@ class Tally:
     number: Counter[str] = field(default_factory=Counter)
 
     def count(self, event: str, share: float, hit: bool, things: int) -> None:
-        """Counts one random draw, and whether the event happened."""
+        """Counts one random draw for an event, and whether the event happened.
+
+        `share` is the probability of the event in this draw, and `things` the
+        number of objects at risk.
+        """
         self.expected[event] += share
         self.exposure[event] += things
         self.number[event] += hit
 
     def to_csv(self) -> str:
-        """Returns a CSV table of the wanted and the observed rates.
+        """Returns a CSV table of the specified and the observed rates.
 
-        `p` is the probability that a Poisson variable is at least as far from
-        its expectation as the observed number.
+        The column `p` is the two-sided p-value of the observed number of
+        events: the probability that a Poisson variable is at least as far from
+        its expectation.
         """
         lines = ["event,rate,exposure,expected,events,rate_came_about,p\n"]
         for event, rate in self.rates.items():
@@ -133,6 +140,6 @@ class Tally:
 
 
 def poisson_p(number: int, expected: float) -> float:
-    """Returns the two-sided p-value of a number of events (Poisson)."""
+    """Returns the two-sided p-value of a number of events, if Poisson."""
     tails = poisson.cdf(number, expected), poisson.sf(number - 1, expected)
     return min(1.0, 2.0 * float(min(tails)))

@@ -1,1 +1,1 @@
-"""Code that simulator and evaluation have in common: errors, files, jobs."""
+"""Code that the simulator and the evaluation share: errors, files, jobs."""

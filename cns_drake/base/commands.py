@@ -1,4 +1,4 @@
-"""Commands made from functions, and options that both programs share."""
+"""Commands made from functions, and options of both command-line programs."""
 
 from collections.abc import Callable, Mapping
 import functools
@@ -62,7 +62,7 @@ Options = Mapping[str, tuple[Any, Any]]
 
 
 class Command(TyperCommand):
-    """A command whose docstring explains its options to the user.
+    """A command-line command whose help comes from its function's docstring.
 
     The section `Args` of the docstring contains the help of options and
     arguments. An option without an entry there keeps the help of its own
@@ -101,9 +101,11 @@ def with_options(
     """Returns a decorator that adds a group of options to a command.
 
     Args:
-        keyword: parameter of the command that gets the options as one value.
+        keyword: name of the command's parameter that receives the options as
+            one value.
         options: the options.
-        make: function that makes this value from the values of the options.
+        make: function that takes the options' values and returns this one
+            value.
     """
     added = [
         inspect.Parameter(

@@ -21,9 +21,9 @@ def compiled(function: _Function) -> _Function:
     The machine code is kept between runs in the user's cache folder. If that
     folder cannot be written, each process compiles anew. Numba notices a change
     only in the file of the function itself. A compiled function may therefore
-    call compiled functions of its own folder and no others: a change in that
-    folder recompiles all of them. One of several processes side by side
-    compiles a function, and the others wait for it.
+    call only compiled functions of its own folder: a change in that folder
+    recompiles all of them. If several processes need the same function at once,
+    one of them compiles it and the others wait.
 
     In such functions, assign array elements one at a time. If an array is
     assigned to a slice of another, numba also compiles an error message about

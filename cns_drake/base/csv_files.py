@@ -23,7 +23,7 @@ _FORMER_COLUMNS = {
 def csv_text(header: Iterable[object], rows: Iterable[Iterable[object]]) -> str:
     """Returns a header and rows as CSV.
 
-    An unknown cell, None or NaN, is empty; truth values are 0 or 1.
+    None and NaN become empty cells; True and False become 1 and 0.
     """
     stream = io.StringIO()
     writer = csv.writer(stream, lineterminator="\n")
@@ -76,12 +76,12 @@ def read_records(
     """Returns the rows of a CSV file whose first line names the columns.
 
     Returns:
-        For each row the number of its line, and column -> cell. A column that
-        had another name in earlier versions has its present name.
+        For each row, its line number and a dictionary column -> cell. A column
+        that had another name in earlier versions has its present name.
 
     Raises:
-        InputError: `read_rows` raises it, a column is missing, or the number of
-            cells of a row differs from the number of columns.
+        InputError: the file cannot be read as CSV (see `read_rows`), a column
+            is missing, or a row has more or fewer cells than there are columns.
     """
     (_, names), *rows = read_rows(path) or [(1, [])]
     names = [

@@ -1,7 +1,7 @@
-"""Elementary functions and products with the same bits on every processor.
+"""Elementary functions, matrix products: equal bits on every processor.
 
-The last bits of NumPy's results depend on the vector instructions that a
-processor has, and those of matrix products on the order in which a library
+The last bits of NumPy's results depend on the vector instructions of the
+processor, and the last bits of matrix products on the order in which a library
 adds. The elementary functions here call the C library for each value, which
 takes about 0.1 us; the matrix product adds in a fixed order.
 """
@@ -34,7 +34,8 @@ def product(A: np.ndarray, B: np.ndarray) -> np.ndarray:
 def turns(rotvecs: np.ndarray) -> np.ndarray:
     """Returns the rotation matrices (N, 3, 3) of rotation vectors (N, 3).
 
-    By Rodrigues' formula; the length of a vector is its angle [rad].
+    The length of a rotation vector is its angle [rad]. The matrices follow from
+    Rodrigues' formula.
     """
     x, y, z = rotvecs.T
     half = np.sqrt(x * x + y * y + z * z) / 2.0

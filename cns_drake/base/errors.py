@@ -70,7 +70,9 @@ class FailedJobsError(InputError):
 
 @contextlib.contextmanager
 def value_errors(place: object) -> Iterator[None]:
-    """Turns a ValueError of the block into an InputError that names a place.
+    """Turns a ValueError of the `with` block into an InputError at a place.
+
+    The message then begins with the place: a file or field, for example.
 
     Raises:
         InputError: if the block raises ValueError.
@@ -83,11 +85,12 @@ def value_errors(place: object) -> Iterator[None]:
 
 @contextlib.contextmanager
 def errors_at(place: object, instead_of: str = "") -> Iterator[None]:
-    """Has an InputError of the block begin with a place.
+    """Puts a place in front of the message of an InputError of the block.
 
     Args:
         place: file, field or other place, in words.
-        instead_of: beginning of the error that the place replaces.
+        instead_of: text at the beginning of the message that the place
+            replaces.
 
     Raises:
         InputError: if the block raises it.
@@ -102,8 +105,8 @@ def errors_at(place: object, instead_of: str = "") -> Iterator[None]:
 def one_line(message: object) -> str:
     """Returns a message as one printable line of bounded length.
 
-    Text that the message quotes from a file may hold line breaks and control
-    characters of a terminal.
+    Line breaks and control characters, which can come from a quoted file, are
+    replaced.
     """
     text = str(message)
     shown = printable(text[:_LONGEST]).replace("\n", " ")
@@ -177,7 +180,8 @@ def nearest_field(
 ) -> str | None:
     """Returns the known field whose spelling is closest to an unknown one.
 
-    The place lists the keys and indices that lead to the field, then its name.
+    `place` lists the keys and indices that lead to the unknown field, and ends
+    with the field's name.
     """
     return _nearest(place[-1], sorted(set(_fields_at(model, place[:-1]))))
 
@@ -215,22 +219,22 @@ def _fields_at(kind: Any, place: Sequence[str | int]) -> Iterator[str]:
 def shows_traceback() -> bool:
     """Returns whether `--traceback` was given on the command line.
 
-    In the process of a job the answer is that of its parent, whose arguments it
-    has.
+    The process of a job has the arguments of its parent process, and so the
+    same answer.
     """
     return TRACEBACK_OPTION in sys.argv
 
 
 def has_utf8() -> bool:
-    """Returns whether the locale, or Python's UTF-8 mode, has UTF-8."""
+    """Returns whether Python runs in a UTF-8 locale or in its UTF-8 mode."""
     return sys.getfilesystemencoding() == "utf-8"
 
 
 def missing_library(error: ImportError) -> str | None:
-    """Returns a line that says what the system lacks for a failed import.
+    """Returns what the system lacks for a failed import, as one line.
 
-    The system may lack a shared library, or a locale with UTF-8. Returns None
-    if the import failed for another reason.
+    The system can lack a shared library, or a locale with UTF-8. The result is
+    None if the import failed for another reason.
     """
     if "initialization failed" in str(error) and not has_utf8():
         name = locale.setlocale(locale.LC_CTYPE)

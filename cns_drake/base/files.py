@@ -1,4 +1,4 @@
-"""Writing files that appear under their names only when they are whole."""
+"""Writing files that get their final names only when they are complete."""
 
 import codecs
 from collections.abc import Callable, Iterator
@@ -29,7 +29,7 @@ def cache_folder() -> Path:
 
 
 def part_path(path: Path) -> Path:
-    """Returns the name that a file has until it is complete."""
+    """Returns the temporary name that a file has until it is complete."""
     return path.with_name(f"{path.name}.part")
 
 
@@ -54,7 +54,7 @@ def completing(path: Path) -> Iterator[Path]:
     renamed to `path`. On an exception it is removed.
 
     Raises:
-        InputError: if it cannot be written, or the name is that of a folder, a
+        InputError: if the file cannot be written, or `path` is a folder, a
             link, a device or a pipe.
     """
     part = _new_part(path)
@@ -71,14 +71,16 @@ def completing(path: Path) -> Iterator[Path]:
 
 @contextlib.contextmanager
 def draft_folder(folder: Path, *, replaces: bool = False) -> Iterator[Path]:
-    """Yields a temporary folder that replaces `folder` at the end.
+    """Yields a temporary folder that becomes `folder` when the block ends.
 
-    The temporary folder has the same name but another parent folder, because
-    files written to it may contain its name. On an exception it is removed. If
-    `folder` exists and is not empty, `replaces` must be true.
+    The last part of its path is the same as in `folder`, because files written
+    to it may contain this name; only the parent folder differs. On an exception
+    the temporary folder is removed. If `folder` exists and is not empty, it is
+    replaced, for which `replaces` must be true.
 
     Raises:
-        InputError: if it cannot be written.
+        InputError: if `folder` cannot be written, or is not empty and
+            `replaces` is false.
     """
     # `.` has no name.
     place = Path(os.path.abspath(folder))
@@ -102,7 +104,8 @@ def draft_folder(folder: Path, *, replaces: bool = False) -> Iterator[Path]:
 def remove_folder(folder: Path) -> None:
     """Renames a folder, then removes it.
 
-    If the process is killed meanwhile, no incomplete folder keeps the name.
+    If the process is killed meanwhile, no incomplete folder is left under the
+    original name.
 
     Raises:
         InputError: if it cannot be removed.
@@ -116,10 +119,10 @@ def remove_folder(folder: Path) -> None:
 
 
 def check_new_folder(folder: Path) -> None:
-    """Raises an error if a folder to write exists and is not empty.
+    """Raises an error if a folder, to be written, exists and is not empty.
 
     Raises:
-        InputError: the folder holds files, or something else has its name.
+        InputError: the folder contains files, or the path is not a folder.
     """
     with user_errors(folder):
         if os.path.lexists(folder) and (
@@ -129,7 +132,7 @@ def check_new_folder(folder: Path) -> None:
 
 
 def check_regular(path: Path) -> None:
-    """Raises an error unless a path is that of a regular file.
+    """Raises an error unless a path is a regular file.
 
     Raises:
         InputError: the path does not exist, or is a folder, device or pipe.
@@ -146,7 +149,7 @@ def is_there(path: Path) -> bool:
     """Returns whether an optional file exists.
 
     Raises:
-        InputError: something else has the name: a folder, a pipe, a dead link.
+        InputError: the path is something else: a folder, a pipe, a dead link.
     """
     if not os.path.lexists(path):
         return False
@@ -171,7 +174,9 @@ def read_bytes(path: Path, limit: int = _WRITTEN_BYTES) -> bytes:
 
 
 def read_text(path: Path, limit: int = _WRITTEN_BYTES) -> str:
-    """Reads a text file of at most `limit` bytes; see `decode_text`.
+    """Returns the text of a file of at most `limit` bytes.
+
+    `decode_text` describes the possible encodings.
 
     Raises:
         InputError: if it cannot be read, or is no text.
@@ -197,9 +202,9 @@ def decode_text(data: bytes) -> str:
 def file_name(text: str) -> str:
     """Turns a text into a file name that cannot lead to another folder.
 
-    Names from a recording (its own, its map's, its stage's) pass through here
-    before they become parts of paths. Usual names stay as they are. Other names
-    keep their harmless characters, and different names stay different.
+    Use it for the names of the drive, map and stage in a recording before they
+    become parts of paths. Usual names stay as they are. In unusual names,
+    unsafe characters are replaced such that different names stay different.
     """
     name = "".join(
         c if c.isalnum() or c in "_-+ " or (c == "." and k) else _escaped(c)
@@ -239,17 +244,21 @@ def _new_part(path: Path) -> Path:
 
 
 def open_plain(path: Path, flags: int) -> int:
-    """Returns a descriptor of a file to write, which is created if needed.
+    """Opens a file for writing and returns its descriptor.
 
-    It follows no link, which may lead to another user's file, and does not wait
-    for the reader of a pipe.
+    The file is created if needed.
+
+    Links are not followed, since they may lead to another user's file. If the
+    path is a pipe, the function does not wait for a reader.
     """
     flags |= os.O_CREAT | os.O_NOFOLLOW | os.O_NONBLOCK
     return os.open(path, flags, 0o666)
 
 
 def write_part(path: Path, text: str) -> None:
-    """Writes text under the part name of `path`, and flushes it to disk.
+    """Writes text to the temporary file of `path`, and flushes it to disk.
+
+    `complete_part` then gives the file its final name.
 
     Raises:
         InputError: if that fails, e.g. on a full disk.
@@ -266,7 +275,7 @@ def write_part(path: Path, text: str) -> None:
 
 
 def complete_part(path: Path) -> None:
-    """Gives a file its final name, once all of it is on the disk.
+    """Renames the temporary file of `path` to `path`, once it is on the disk.
 
     An older file of that name is replaced.
 
@@ -281,7 +290,7 @@ def complete_part(path: Path) -> None:
 
 
 def write_text(path: Path, text: str) -> None:
-    """Writes a file that gets its name when it is complete.
+    """Writes a text file, which gets its name only when it is complete.
 
     Raises:
         InputError: if it cannot be written.
@@ -319,9 +328,10 @@ def make_folder(path: Path) -> None:
 def exclusive(path: Path, on_wait: Callable[[], None]) -> Iterator[None]:
     """Locks a file, so that one process at a time runs the block.
 
-    The file `<path>.lock` is locked meanwhile, also for other machines if the
-    file system has locks. It is unlocked however the process ends. Before
-    waiting for another process, `on_wait` is called.
+    During the block, `<path>.lock` is locked, also for other machines if the
+    file system supports locks. The lock is released even if the process
+    crashes. If another process holds the lock, `on_wait` is called before
+    waiting.
 
     Raises:
         InputError: if the lock cannot be written.

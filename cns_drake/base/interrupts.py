@@ -1,4 +1,4 @@
-"""Ctrl-C and SIGTERM: when they may interrupt, and how they end a process."""
+"""Ctrl-C and SIGTERM: when they may interrupt, how they end a process."""
 
 from collections.abc import Callable, Iterator
 import contextlib
@@ -17,10 +17,11 @@ _Handler = Callable[[int, FrameType | None], object]
 
 
 def interrupt_on_termination(once: bool = False) -> None:
-    """Turns SIGTERM into an exception, so that open files are closed.
+    """Makes SIGTERM raise KeyboardInterrupt, so that open files are closed.
 
-    Later signals may interrupt the closing, unless `once` is set. Set it only
-    in a process that another process can still kill.
+    By default a second SIGTERM interrupts the closing of files. If `once` is
+    set, it is ignored; only SIGKILL can then end a process that hangs.
+    Therefore set `once` only if a parent process can send SIGKILL.
     """
 
     def interrupt(signal_number: int, frame: FrameType | None) -> None:
@@ -55,7 +56,7 @@ def _handled_by(handle: _Handler) -> Iterator[dict[int, _Handler]]:
 
 @contextlib.contextmanager
 def uninterrupted() -> Iterator[None]:
-    """Delays interrupts until the block, such as an import, ends.
+    """Delays interrupts until the end of the block, for example an import.
 
     An extension module that is interrupted while it is initialised fails with
     another error, or crashes the process later. Blocking the signals would not
@@ -110,8 +111,8 @@ def ignore_interrupts() -> None:
 def end_interrupted() -> NoReturn:
     """Ends an interrupted process at once, without Python's shutdown.
 
-    The exception has closed all open files on its way. The shutdown can fail
-    after a library was interrupted in a computation.
+    By then, the exception KeyboardInterrupt has closed all open files. The
+    shutdown can fail after a library was interrupted in a computation.
     """
     for stream in (sys.stdout, sys.stderr):
         with contextlib.suppress(OSError, ValueError):

@@ -1,4 +1,4 @@
-"""Pictures as JPEG."""
+"""Encoding of pictures as JPEG."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ if TYPE_CHECKING:
 def to_jpeg(
     picture: Image, quality: int = 75, longest: int | None = None
 ) -> bytes:
-    """Returns a picture as a JPEG, reduced to `longest` pixels a side."""
+    """Returns a picture as JPEG, with sides of at most `longest` pixels."""
     if longest is not None:
         picture.thumbnail((longest, longest))
     stream = io.BytesIO()

@@ -21,19 +21,21 @@ def stage_name(stage: str) -> str:
 
 
 class MapFolder:
-    """The folder of a map, of which any file may be missing.
+    """The paths of the files of a map; any of the files may be missing.
 
     Attributes:
         path: the folder.
         name: the name of the map.
         roads: the road network.
         lanes: lanes and walkways of an imported map, for traffic.
-        plan: the plan from which the city is generated.
-        stage_plan: the table of the structures that each stage lacks.
+        plan: the generated city's plan, from which its stages are made.
+        stage_plan: the table that lists, for each stage, which structures are
+            missing.
         structures: the table of structures.
-        drive_table: the table of drives and their figures.
+        drive_table: the table of the drives, with their lengths and other
+            figures.
         meshes: the folder of the meshes that the stages name.
-        views: the views of which pictures are made.
+        views: the camera views from which pictures of the map are made.
     """
 
     def __init__(self, path: Path):
@@ -71,7 +73,7 @@ class MapFolder:
         return self.path / stage_name(stage)
 
     def stages(self) -> dict[str, Path]:
-        """Returns the SDF file of each existing stage, sorted."""
+        """Returns stage -> SDF file of all existing stages, sorted."""
         return {
             path.stem.removeprefix("stage_"): path
             for path in sorted(self.path.glob(stage_name("*")))
@@ -101,8 +103,8 @@ class MapFolder:
 def drive_name(path: Path) -> str:
     """Returns the name of the drive that a scenario file describes.
 
-    `<map>/sequence_04.yaml` is `<map>_04`; any other file has the name of
-    its stem.
+    For `<map>/sequence_04.yaml` it is `<map>_04`. For any other file it is the
+    file's name without the suffix.
     """
     if path.stem.startswith("sequence_"):
         number = path.stem.removeprefix("sequence_")

@@ -17,18 +17,19 @@ _COMPRESSIONS = (zipfile.ZIP_STORED, zipfile.ZIP_DEFLATED)
 def read_npz(
     path: Path, names: Iterable[str], most_bytes: int
 ) -> dict[str, np.ndarray]:
-    """Returns name -> array, of the wanted arrays that an .npz file has.
+    """Reads the named arrays of an .npz file, as name -> array.
 
-    The size is limited, and no code is run.
+    Names that the file lacks are left out. Sizes are limited, and no pickled
+    code is run.
 
     Args:
         path: the file.
-        names: names of the wanted arrays; no others are read.
+        names: names of the arrays to read.
         most_bytes: greatest size of the file, and of each array.
 
     Raises:
         InputError: the file cannot be read, or is too large.
-        ValueError: it is no such archive, or an array is too large.
+        ValueError: the file is not an .npz archive, or an array is too large.
     """
     content = read_bytes(path, most_bytes)
     found = {}

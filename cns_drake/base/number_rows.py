@@ -17,15 +17,18 @@ def parse_rows(
 
     Args:
         lines: N rows.
-        dtype: dtype of a row, with fields; or of each number.
+        dtype: dtype with fields, one per number of a row; or dtype of every
+            number.
         separator: text between numbers; None for white space.
-        first: the number of rows before these; error messages count from it.
+        first: how many rows of the file come before `lines`; used for the row
+            numbers in error messages.
 
     Returns:
         (N,) records, or (N, width) numbers.
 
     Raises:
-        ValueError: a row has another form; the message names the first one.
+        ValueError: a row does not fit the dtype; the message names the first
+            such row.
     """
     try:
         with warnings.catch_warnings():
@@ -68,7 +71,7 @@ def _fault(
 
 
 def is_number(word: str) -> bool:
-    """Returns whether a word is a number in decimal digits, NaN or infinite."""
+    """Returns whether a word is a decimal number, NaN or infinity."""
     try:
         float(word)
     except ValueError:

@@ -1,7 +1,7 @@
-"""Checks which package named `evaluation` a process imports.
+"""A check that `import evaluation` imports this project's package.
 
-Many projects have a folder `evaluation`. The simulator needs ours for studies
-only, and refuses another package in its place.
+Many projects have a folder `evaluation`. The simulator needs its own package
+`evaluation` only for studies, and refuses any other package of that name.
 """
 
 from importlib.util import find_spec
@@ -26,10 +26,11 @@ def leave_out_folder(search_path: list[str]) -> None:
 
 
 def check_evaluation() -> None:
-    """Raises an error if `import evaluation` gives another package.
+    """Raises an error if `import evaluation` finds another package.
 
     Raises:
-        InputError: names the other package, and what to do.
+        InputError: another package was found; the message names it and says
+            what to do.
     """
     spec = find_spec("evaluation")
     ours = os.path.join(_ROOT, "evaluation", "__init__.py")

@@ -23,9 +23,9 @@ def xyz(points: np.ndarray, dtype: DTypeLike = np.float64) -> np.ndarray:
 
 
 def check_range(points: np.ndarray, limit: float, first: int = 0) -> None:
-    """Raises an error for numbers that cannot be coordinates.
+    """Raises an error if a coordinate is too large to be real.
 
-    Such numbers come from misread bytes. Values that are not finite are
+    Such coordinates come from misread bytes. Values that are not finite are
     allowed, since many sensors store them for beams without a return.
 
     Args:
@@ -55,7 +55,8 @@ def from_xyz(coordinates: np.ndarray) -> np.ndarray:
             the intensity.
 
     Returns:
-        Structured array of shape (N,), a view where memory order allows.
+        Structured array of shape (N,): a view of `coordinates` if their order
+        in memory allows it, and a copy otherwise.
     """
     names = _XYZI[: coordinates.shape[1]]
     contiguous = np.ascontiguousarray(coordinates)
@@ -64,9 +65,9 @@ def from_xyz(coordinates: np.ndarray) -> np.ndarray:
 
 
 def store(points: np.ndarray, name: str, values: np.ndarray) -> None:
-    """Writes values from text, as float64, to a field of points.
+    """Writes float64 values to a field of points, checking that they fit.
 
-    The values are (N,) or (N, K).
+    The values are (N,), or (N, K) for a field of K numbers.
 
     Raises:
         ValueError: if a number does not fit the field's type.

@@ -16,9 +16,9 @@ def num_cores() -> int:
 
 
 def look_seldom() -> None:
-    """Makes Python collect garbage less often in this process.
+    """Makes Python's garbage collector run less often in this process.
 
-    Imports and compilation build up objects that stay. Looking through them
-    every few hundred objects takes up to a tenth of the time.
+    Imports and compilation create many objects that are never freed. At
+    Python's default, scanning them takes up to a tenth of the time.
     """
     gc.set_threshold(_OBJECTS, *gc.get_threshold()[1:])

@@ -10,5 +10,5 @@ Track = Callable[[Iterable[Any], str, int], Iterable[Any]]
 
 
 def silent(items: Iterable[Any], description: str, total: int) -> Iterable[Any]:
-    """The `Track` that reports nothing."""
+    """Returns `items`: a `Track` callback that shows no progress."""
     return items

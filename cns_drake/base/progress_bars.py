@@ -1,4 +1,4 @@
-"""Progress bars on stderr, one line each whatever the terminal's width."""
+"""Progress bars on stderr, one line per bar at any terminal width."""
 
 from collections.abc import Callable, Iterator
 import contextlib
@@ -32,10 +32,11 @@ def show_bars(
     """Shows progress bars, each one line.
 
     The field `note` of a task is shown behind its bar. Without a terminal no
-    bar is drawn: it would appear only once, at the end, beside an error's line.
+    bar is drawn: Rich would print it only once, at the end, next to a possible
+    error message.
 
     Args:
-        columns: shown between bar and note.
+        columns: columns that are shown between bar and note.
     """
     progress = Progress(
         TextColumn("{task.description}", table_column=fixed_column()),
@@ -69,7 +70,10 @@ def print_note(progress: Progress, text: str) -> None:
 
 
 def shown_times(elapsed: float, left: float | None) -> str:
-    """Returns elapsed time and, unless None, time left [s] as text."""
+    """Returns elapsed time and time left as text, both given in [s].
+
+    The time left is omitted if it is None.
+    """
     text = f"elapsed {_clock(elapsed)}"
     return text if left is None else f"{text}, about {_clock(left)} left"
 
@@ -91,7 +95,8 @@ def show_progress(
 ) -> contextlib.AbstractContextManager[Progress]:
     """Shows progress bars, each one line, with elapsed and remaining time.
 
-    See `show_bars`; without a terminal see `count_progress`.
+    `show_bars` describes the bars. Without a terminal, `count_progress` prints
+    lines instead.
     """
     return show_bars(_Times(table_column=fixed_column()), console=console)
 
@@ -99,11 +104,10 @@ def show_progress(
 def count_progress(
     progress: Progress, task: TaskID, unit: str = "frames", after: str = ""
 ) -> Callable[[int, int], None]:
-    """Returns a callback that shows how many frames of how many are done.
+    """Returns a callback `(done, total)` that shows the progress of a task.
 
     On a terminal the bar moves; elsewhere a line is printed every few seconds.
-    After the last frame, the text `after` is shown: it names the work that
-    follows.
+    When all is done, the text `after` is shown; it names the work that follows.
     """
     console = progress.console
     interval = 0.5 if console.is_terminal else LINE_INTERVAL

@@ -12,8 +12,8 @@ def attach(
 ) -> tuple[Callable[[str], Any], Callable[[], list[str]], list[str]]:
     """Returns `__getattr__`, `__dir__` and `__all__` of a package.
 
-    The stub `__init__.pyi`, which type checkers read, says which names there
-    are and where they are defined.
+    They follow the package's stub `__init__.pyi`, which lists the public names
+    and the modules that define them; type checkers read it as well.
     """
     stub = Path(file).with_suffix(".pyi").read_text(encoding="utf-8")
     homes = {

@@ -1,4 +1,4 @@
-"""Polyhedra in place of round shapes."""
+"""Polyhedra that approximate round shapes."""
 
 import numpy as np
 
@@ -6,7 +6,9 @@ import numpy as np
 def revolved(
     radius: np.ndarray, z: np.ndarray, sides: int
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Returns the convex hull of circles about z, mirrored at z = 0.
+    """Returns the convex hull of circles about the z axis.
+
+    The circles are approximated by polygons, and mirrored at z = 0.
 
     Args:
         radius, z: (N,) radii and heights of the circles, z >= 0 [m].

@@ -59,16 +59,15 @@ def make_program(
 ) -> typer.Typer:
     """Returns an empty program, to which commands are added.
 
-    It has `--version` and the options of shell completion, and shows its help
-    when called without arguments.
+    The program has the options `--version` and those for shell completion. It
+    shows its help when called without arguments.
 
     Args:
-        renamed: command of an earlier version -> command to use now. The new
-            command is given without the program's name, unless it belongs to
-            another program. Calling the old command is a usage error that names
-            the new one.
-        groups: heading in the help -> commands under it; by default all
-            commands are under one heading.
+        renamed: old command -> command that replaces it, without the program's
+            name unless it belongs to another program. Calling an old command is
+            a usage error whose message names the new command.
+        groups: heading -> commands that the help lists under it; by default
+            there is a single heading for all commands.
     """
 
     class Program(TyperGroup):
@@ -123,7 +122,7 @@ def make_program(
 
 
 def example(*lines: str) -> str:
-    """Returns the end of a command's help, with an example to type."""
+    """Returns text for the end of a command's help: an example to type."""
     # What follows \b is not wrapped.
     return "\n  ".join(("\b\nExample:", *lines))
 
@@ -247,7 +246,7 @@ def _forget_results() -> None:
 def track(items: Iterable[Any], description: str, total: int) -> Iterator[Any]:
     """Yields items and shows progress on stderr.
 
-    It is a bar on a terminal, and lines elsewhere.
+    On a terminal the progress is a bar; elsewhere it is printed as lines.
     """
     # Slow to import, and not needed to print help.
     from cns_drake.base.progress_bars import count_progress, show_progress
@@ -277,7 +276,10 @@ def check_finite(values: Mapping[str, object]) -> None:
 
 
 def note(message: str) -> None:
-    """Prints a note for the user on stderr; terminals break it at spaces."""
+    """Prints a note for the user on stderr.
+
+    On a terminal, long lines are broken at spaces.
+    """
     lines = printable(message).split("\n")
     if sys.stderr.isatty():
         wrap = textwrap.TextWrapper(
@@ -291,7 +293,7 @@ def note(message: str) -> None:
 
 @contextlib.contextmanager
 def resumable() -> Iterator[None]:
-    """Notes on an interrupt that the same command will resume the work."""
+    """If the block is interrupted, notes that the same command resumes it."""
     try:
         yield
     except KeyboardInterrupt as error:
@@ -313,7 +315,7 @@ def print_json(values: dict) -> None:
 
 
 def print_rows(rows: Iterable[tuple[str, str]]) -> None:
-    """Prints a result as lines of a name and a value."""
+    """Prints a result as lines, each with a name and a value."""
     rows = list(rows)
     width = max(len(name) for name, _ in rows)
     for name, value in rows:
@@ -321,7 +323,7 @@ def print_rows(rows: Iterable[tuple[str, str]]) -> None:
 
 
 def number(value: float | None) -> str:
-    """Returns a ratio as text with four decimals, as the paper prints them."""
+    """Returns a ratio as text with four decimals."""
     if value is None or math.isnan(value):
         return "undefined"
     return f"{value:.4f}"

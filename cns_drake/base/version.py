@@ -8,7 +8,7 @@ __version__ = "2.0.0"
 
 
 def installed_versions(packages: Iterable[str]) -> dict[str, str]:
-    """Returns package -> version, of the packages that are installed."""
+    """Returns package -> version for the given packages that are installed."""
     versions = {}
     for name in packages:
         with contextlib.suppress(importlib.metadata.PackageNotFoundError):

@@ -22,10 +22,10 @@ _LARGEST = 1e8
 
 
 class Element(ElementTree.Element):
-    """An element of a file.
+    """An element of an XML file.
 
     Attributes:
-        line: on which it begins.
+        line: number of the line on which the element begins.
     """
 
     line = 0
@@ -56,7 +56,7 @@ class Element(ElementTree.Element):
         """Returns an attribute as a number, or the default.
 
         Raises:
-            ValueError: if it is not a number, is too large for a road, or is
+            ValueError: if it is not a number, is implausibly large, or is
                 missing and has no default.
         """
         if default is not None and name not in self.attrib:
@@ -102,10 +102,10 @@ def read_elements(
 ) -> Element:
     """Returns the top element of an XML file.
 
-    Prefixes of names need not be declared.
+    Namespace prefixes need not be declared.
 
     Args:
-        root: tag of its outermost element; any if None.
+        root: required tag of the top element; None for any tag.
         encoding: encoding of the file; by default the one that it declares.
 
     Raises:

@@ -30,15 +30,16 @@ def read_yaml(path: Path) -> Any:
 def parse_yaml(text: str | bytes, loader: type = yaml.CSafeLoader) -> Any:
     """Returns the content of a YAML document.
 
-    Aliases are resolved within bounds: a few lines of them could expand to more
-    than memory holds, or contain themselves. A repeated key is an error; YAML's
-    libraries would silently use the last.
+    The number of values to which aliases expand is limited: a few lines of
+    aliases could otherwise fill the memory, or contain themselves. A repeated
+    key is an error; YAML libraries would silently use the last value.
 
     Returns:
-        Its value; None for an empty document.
+        The content as Python values; None for an empty document.
 
     Raises:
-        ValueError: in one line, if it is not YAML or out of bounds.
+        ValueError: if the text is not YAML or expands to too many values; the
+            message is one line.
     """
     try:
         _check_depth(text, loader)

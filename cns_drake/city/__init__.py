@@ -1,1 +1,1 @@
-"""The city generator: writes a city as SDF from roads, a plan and stages."""
+"""The city generator: makes a city in SDF from roads, a plan and stages."""

@@ -1,4 +1,4 @@
-"""Evaluates the formulas in the package's own YAML files."""
+"""Evaluates formulas in the YAML files of this package."""
 
 from collections.abc import Mapping
 from functools import cache

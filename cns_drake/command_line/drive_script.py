@@ -36,27 +36,30 @@ def run_drive(
 ) -> Run:
     """Simulates and records a drive, with a progress bar on stderr.
 
-    It uses all cores. `simulate` does the same with a loaded scenario and no
-    progress bar.
+    All cores are used. `simulate` does the same for a scenario that is already
+    loaded, without a progress bar.
 
     Args:
         name_or_file: name of a shipped drive, or a scenario file.
         output: folder for the recordings.
         frames: number of frames to record, from the start; by default all.
         lidar: preset that replaces the LiDARs of the scenario.
-        returns: `ideal` or `calibrated`; by default as the scenario says.
+        returns: `ideal` or `calibrated`, the model of the LiDARs' returns; by
+            default as the scenario says.
         weather: weather; by default that of the scenario.
         traffic: number of vehicles, and also of walkers; by default as the
             scenario says.
-        transient: switches of the section `transient`, and their values.
-        driver: `real` for a driver who wanders and changes lanes, or `none`; by
-            default as the scenario says.
-        ride: class of the road, A to E, or `none`; by default as the scenario
+        transient: switch -> value in the section `transient`; by default as the
+            scenario says.
+        driver: `real` for a driver who wanders and changes lanes, or `none` for
+            one who stays in the middle of the lane; by default as the scenario
             says.
+        ride: class of the road surface after ISO 8608, `A` to `E`, or `none`
+            for a car that stays steady; by default as the scenario says.
         imu_rate: samples of the IMU per second; by default as the scenario
             says.
         camera: fields of an additional camera, named `camera`, which also
-            records depths and labels.
+            records depth and label images; by default no camera is added.
         recording: file for a web page of the drive, if any.
         graphviz: file for the Diagram as Graphviz text, if any.
         overwrite: whether to replace an existing recording.
@@ -128,7 +131,7 @@ def run_drive(
 
 
 def run_script(name: str, description: str) -> None:
-    """Runs a diagram script's command line, which records one drive.
+    """Runs the command line of a diagram script: records one drive.
 
     Args:
         name: name of the drive.

@@ -1,4 +1,4 @@
-"""Commands with exact truth for methods: training, sets of scans, maps."""
+"""Commands that give methods exact truth: training, scan sets, changes."""
 
 from enum import Enum
 from pathlib import Path
@@ -21,7 +21,7 @@ _Recorded = Annotated[
 
 
 class Part(str, Enum):
-    """Kinds of variation that a training can leave out."""
+    """Kinds of variation that can be left out of a training."""
 
     CHANGE = "change"
     RETURNS = "returns"
@@ -43,18 +43,18 @@ def train(
 ) -> None:
     """Train the place-recognition method `learned`.
 
-    The training simulates drives through cities that are drawn at random along
-    the streets of Riverside, Suburbia and Downtown. The drives see different
-    stages and have different drivers; they are not recorded. On one machine,
-    the same command always gives the same weights. Needs the optional packages
-    of the extra `train` (JAX).
+    The training simulates drives through cities that are generated at random
+    along the streets of Riverside, Suburbia and Downtown. The drives differ in
+    the stage of the city and in the driver, and are not recorded. On one
+    machine, the same command always gives the same weights. Needs the optional
+    packages of the extra `train` (JAX).
 
     Args:
         output: File for the weights. The training curve goes to FILE.png.
             FILE.npz.training keeps the state, so that the same command resumes
             an interrupted training.
-        minutes: Approximate computing time on one core in minutes, which sets
-            the numbers of cities and steps. The training is not stopped when
+        minutes: Approximate computing time on one core in minutes. It only sets
+            the numbers of cities and steps: the training does not stop when
             this time is over.
         cities: Number of cities to train on; by default it follows from
             --minutes.
@@ -122,8 +122,8 @@ def export_pairs(
     Args:
         format: Kind of data to write: pointnetvlad (clouds and pickle files as
             PointNetVLAD reads them), overlap (scans and the exact overlap of
-            each pair), or overlap-table (only a table of overlaps of a database
-            and a query, for cns-eval pr --exact-overlaps).
+            each pair), or overlap-table (only a table of the overlaps between a
+            database and a query drive, for cns-eval pr --exact-overlaps).
         output: Folder for the data; created if it does not exist.
         vary: File of a family of drives (one drive and what varies in it),
             whose members are exported in addition to the named drives.

@@ -92,7 +92,7 @@ def list_drives(
 
     The columns are the length and duration of each drive, its number of frames,
     and the numbers of structures and triangles in its stage. A narrow terminal
-    shows fewer columns; a file or pipe gets all of them.
+    shows fewer columns; in a file or pipe, all columns are written.
 
     Args:
         folders: Folders of your own maps, whose drives to list; by default the
@@ -119,8 +119,8 @@ def table_lines(rows: list[DriveRow], width: int | None) -> Iterator[str]:
     """Yields the lines of a table of drives.
 
     Args:
-        width: the most characters of a line; columns other than the names are
-            dropped to keep it. None keeps all columns.
+        width: greatest number of characters of a line. Columns that do not fit
+            are dropped, except the names. None keeps all columns.
     """
     lines = [_HEADINGS] + [
         (
@@ -182,9 +182,10 @@ def import_city(
         years: Years for which to make stages. Each stage contains the buildings
             that were built by its year.
         year_attribute: Name of the attribute of the file that contains each
-            building's year of construction. By default one of the usual names.
-        undated: What to do with buildings without a year: they stand from the
-            first stage on, only in the last stage, or never.
+            building's year of construction. By default the usual names are
+            tried.
+        undated: Stages that contain the buildings without a year: all stages
+            (first), only the last stage (last), or no stage (never).
         lod: Level of detail (LoD) in which to read the buildings of CityJSON,
             such as 1.2; by default the highest that each building has.
         seed: Seed of the random draws: which buildings --grow removes or lowers
@@ -313,7 +314,7 @@ def city(
 ) -> None:
     """Build the stages of a city from its roads and plan.
 
-    You write the roads, and a plan of what stands along them; the command
+    You write the roads, and a plan of what stands along the roads; the command
     generates an SDF world for each stage.
 
     Args:
@@ -325,9 +326,10 @@ def city(
         seed: Seed of the random plan that --start writes.
         check: Write nothing. List the files that would change, and exit with
             status 1 if there are any.
-        repair_stages: Update the names in stages.yaml after you have added
-            something to the plan, which renumbers structures. Structures are
-            recognised by their place in structures.csv.
+        repair_stages: Update the names of structures in stages.yaml. Use it
+            after you have added something to the plan, since this renumbers
+            structures. Structures are recognised by their positions in
+            structures.csv.
     """
     with uninterrupted():
         from cns_drake.city.generation.generate import (
@@ -355,9 +357,10 @@ def city(
 def maps_and_years(
     words: list[str], first: list[int]
 ) -> tuple[list[str], tuple[int, ...]]:
-    """Returns the maps and the years among a command's arguments.
+    """Separates the maps from the years among a command's arguments.
 
-    The years after the first one of --years come as arguments.
+    On the command line only the first year belongs to the option --years; all
+    further years arrive as arguments, after the names of the maps.
 
     Raises:
         InputError: a word begins like an option.

@@ -1,4 +1,4 @@
-"""Commands that simulate, and those on recordings."""
+"""Commands that simulate drives, and commands on recordings."""
 
 from __future__ import annotations
 
@@ -70,10 +70,10 @@ Snowfall = Annotated[
 def family_members(
     vary: Path, output: Path, cluster: Cluster
 ) -> list[Scenario]:
-    """Returns the members of a family.
+    """Returns the scenarios of a family, and writes their files.
 
-    Their scenario files are written to `<output>/scenarios`, and cities drawn
-    for them to `<output>/cities`.
+    The scenario files are written to `<output>/scenarios`, and cities that are
+    generated for the family to `<output>/cities`.
 
     Raises:
         InputError: the family cannot be used.
@@ -96,7 +96,9 @@ def family_members(
 def choose_returns(
     returns: Kind | None, fog: float | None, rain: float, snowfall: float
 ) -> tuple[Kind | None, WeatherConfig | None]:
-    """Returns the LiDAR returns and the weather that options name, or None.
+    """Returns the model of LiDAR returns and the weather, from options.
+
+    Each is None if the options leave it as the scenario says.
 
     Raises:
         InputError: a value is out of range; the message names its option.
@@ -160,7 +162,7 @@ def simulate(
             changes lanes, as drivers of published data sets do; with none it
             keeps to the middle of the lane. By default as the scenario says.
         ride: Class of the road surface after ISO 8608, from A (new) to E (very
-            poor), which shakes the car on its springs. With none the car is
+            poor). The road shakes the car on its springs. With none the car is
             steady. By default as the scenario says.
         imu_rate: Samples of the IMU per second [Hz]; by default as the scenario
             says.
@@ -246,8 +248,9 @@ def film(
         start: Time in the drive at which the stretch begins [s]. By default,
             it begins where the road ahead is straightest.
         traffic: Number of moving vehicles. The same number of walkers is added.
-            By default as the scenario says; if it has no traffic, 60 of each,
-            provided that the streets have room.
+            By default as the scenario says; if the scenario has no traffic, 60
+            vehicles and 60 walkers are added, provided that the streets have
+            room.
     """
     with uninterrupted():
         from cns_drake.scenarios.scenario_files import load_scenario
@@ -309,7 +312,7 @@ def scan(
             [m, rad].
         output: File for the scan; its name ends in .pcd, .bin or .npy.
         seed: Seed of the random noise and weather. Another seed gives other
-            errors of the same size.
+            random errors with the same statistics.
         model_path: Folder in which to look for model:// files of the world. It
             is searched before the folders of GZ_SIM_RESOURCE_PATH and SDF_PATH.
             May be repeated.
@@ -367,8 +370,8 @@ def generate(
     Args:
         vary: File of a family of drives (one drive and what varies in it),
             whose members are recorded in addition to the named drives. Their
-            scenario files go to <output>/scenarios, and the cities drawn for
-            them to <output>/cities.
+            scenario files are written to <output>/scenarios, and cities that
+            are generated for them to <output>/cities.
     """
     with uninterrupted():
         from cns_drake.base.jobs.cluster import choose_cluster
@@ -412,8 +415,9 @@ def export(
             contain earlier exports.
         sensor: Name of the LiDAR to export, if the recording has several.
         absent_in: Another stage of the map, such as 01. Points on structures
-            that this stage lacks get SemanticKITTI's labels of moving objects
-            (252 to 259), as if they had moved. Only with --format kitti.
+            that do not exist in this other stage get SemanticKITTI's labels of
+            moving objects (252 to 259), as if these structures had moved. Only
+            with --format kitti.
         sequence: Number of the exported drive, which names its folder
             sequences/NN. By default the digits at the end of the drive's name.
             Only with --format kitti.

@@ -1,4 +1,4 @@
-"""The commands that run studies: what change costs each method."""
+"""The commands that run studies: how change affects each method."""
 
 from pathlib import Path
 from typing import Annotated, Any
@@ -34,8 +34,8 @@ def reproduce(
     change between them, and writes a report.
 
     Args:
-        pages: Write a web page of each drive as well. Pages are the default,
-            except with --quick.
+        pages: Also write a web page of each drive. This is the default, except
+            with --quick.
         quick: Write only the report: the drives are simulated but not recorded,
             which saves time and disk space.
     """
@@ -82,7 +82,7 @@ def study(
     list_all: Annotated[bool, typer.Option("--list")] = False,
     show: Annotated[bool, typer.Option("--show")] = False,
 ) -> None:
-    """Measure what a change costs each method.
+    """Measure how a change affects each method.
 
     An experiment is a file. It describes two drives, of which one makes the
     database and the other the queries, what differs between them, and which
@@ -94,8 +94,8 @@ def study(
     Args:
         name: Name of a shipped experiment, as --list shows it, or an experiment
             file of your own.
-        maps: Maps to use instead of the experiment's: names of shipped maps, or
-            folders of your own.
+        maps: Maps to use instead of the experiment's maps: names of shipped
+            maps, or folders of your own maps.
         output: Folder for the results; created if it does not exist.
         quick: Measure less and finish sooner. The section `quick` of the
             experiment says what is left out.

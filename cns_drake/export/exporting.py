@@ -1,9 +1,9 @@
 """Exports one recording into a folder of drives.
 
-The folder may contain several drives of one format. The file `export.yaml`,
-which describes its files, marks it as written by an export. A drive's own
-folder is written under a name ending in `.part`, and gets its final name when
-it is complete.
+The folder can contain several drives of one format. In it, the file
+`export.yaml` lists the exported files and shows that the folder was written by
+an export. The subfolder of a drive is written under a name ending in `.part`,
+and gets its final name when it is complete.
 """
 
 from collections.abc import Callable, Iterator
@@ -45,23 +45,24 @@ def export_drive(
 
     Args:
         recording: path of the recording.
-        format_name: name of the format.
+        format_name: name of the format: `cns`, `kitti`, `mulran` or `tum`.
         output: the folder of drives: a new or empty folder, or one to which
             this function has already written drives of the same format.
         lidar: name of the LiDAR to export, if the recording has several.
-        absent_in: another stage of the recording's map; points on structures
-            that are absent there get the labels of `MarkedDrive`.
+        absent_in: another stage of the recording's map. Points on structures
+            that are absent in this other stage get SemanticKITTI's labels of
+            moving objects (see `MarkedDrive`). None keeps the recorded labels.
         sequence: number of the drive in KITTI's layout; by default the digits
             at the end of its name.
-        on_note: is called with notes about how the recording was read and
-            written.
-        on_frame: is called with the number of written frames, and of all
+        on_note: called with notes about how the recording was read and written.
+        on_frame: called with the number of written frames and the number of all
             frames.
 
     Raises:
-        InputError: if the recording cannot be read, the folder was not written
-            by an export or has this drive already, the files cannot be written,
-            or labels are requested but not possible.
+        InputError: if the recording cannot be read; if the folder has other
+            content than exports of this format, or already contains this drive;
+            if the files cannot be written; or if `absent_in` is given and
+            labels are not possible.
     """
     layout = _LAYOUTS[format_name]
     if absent_in is not None and not layout.has_labels:

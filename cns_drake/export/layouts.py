@@ -1,4 +1,4 @@
-"""The layouts of existing data sets, and what their exporters share.
+"""The file layouts of existing data sets, and what their exporters share.
 
 Frames: world W, vehicle B on the ground, LiDAR S, IMU I.
 """
@@ -37,18 +37,19 @@ _PROJECTION = np.eye(4)
 
 @dataclass(frozen=True)
 class Layout:
-    """How one format arranges the files of a drive.
+    """The files that one export format has for a drive.
 
     Paths are relative to the folder of all drives.
 
     Attributes:
         drive_folder: drive -> folder of the drive.
-        inner_files: drive -> texts of the files inside that folder by their
-            paths in it, without the scans.
-        outer_files: drive -> texts of the files outside that folder by path.
+        inner_files: drive -> texts of the files inside this folder, except
+            scans, by their paths in the folder.
+        outer_files: drive -> texts of the files outside this folder, by their
+            paths.
         scan_files: drive, frame number, stamp [ns] and scan -> contents of the
-            scan's files by their paths in the drive's folder. None for layouts
-            without scans.
+            files of the scan, by their paths in the drive's folder. None for
+            layouts without scans.
         shared_outer_files: whether all drives share the outer files, which must
             then be the same.
         has_labels: whether points have labels.
@@ -65,7 +66,7 @@ class Layout:
 
 
 def checked_name(drive: McapDrive, text: str) -> str:
-    """Returns a name in a recording if it is safe as part of a path.
+    """Returns a name from a recording, after checking that it fits in a path.
 
     Raises:
         InputError: if the name could lead to another folder.
@@ -78,7 +79,11 @@ def checked_name(drive: McapDrive, text: str) -> str:
 
 
 def scenario_files(drive: McapDrive, name: str | None = None) -> dict[str, str]:
-    """Returns `scenario.yaml` with the drive's name, if it was recorded."""
+    """Returns `scenario.yaml` -> its text, with the name of the drive.
+
+    The result is empty if the recording contains no scenario. `name` replaces
+    the drive's name.
+    """
     if drive.scenario is None:
         return {}
     scenario = {**drive.scenario, "name": name or drive.name}
@@ -86,12 +91,12 @@ def scenario_files(drive: McapDrive, name: str | None = None) -> dict[str, str]:
 
 
 def imu_files(drive: McapDrive) -> dict[str, str]:
-    """Returns `imu.yaml`, the IMU's noise for Kalibr, if it has noise."""
+    """Returns `imu.yaml` -> the IMU's noise in Kalibr's format, if any."""
     return {} if drive.kalibr is None else {"imu.yaml": drive.kalibr}
 
 
 def structure_files(drive: McapDrive) -> dict[str, str]:
-    """Returns `structures.json`, the structure table, if it was recorded."""
+    """Returns `structures.json` -> the structure table, if it was recorded."""
     if drive.instances is None:
         return {}
     table = list(drive.instances.values())
@@ -127,14 +132,17 @@ def unit_quaternions(drive: McapDrive) -> np.ndarray:
 
 
 def seconds(stamp_ns: int) -> str:
-    """Returns a stamp as text in seconds, with all its nanoseconds."""
+    """Returns a time stamp [ns] as text in seconds with nine decimals."""
     return f"{stamp_ns // 10**9}.{stamp_ns % 10**9:09d}"
 
 
 def stamped_rows(
     stamps: Iterable[object], columns: Sequence[np.ndarray], separator: str
 ) -> str:
-    """Returns N times and numbers (N, K) as rows of text, with all digits."""
+    """Returns rows of text, each with a time and K numbers, with all digits.
+
+    `stamps` contains the N times as text, and `columns` the arrays of numbers.
+    """
     rows = zip(stamps, np.hstack(columns).tolist(), strict=True)
     return "".join(
         f"{separator.join([str(stamp), *map(repr, row)])}\n"

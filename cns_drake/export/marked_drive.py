@@ -1,4 +1,4 @@
-"""Reads a recording, and marks points on what another stage lacks."""
+"""Reads a recording and marks points that another stage would not have."""
 
 from collections import defaultdict
 from collections.abc import Mapping
@@ -18,13 +18,13 @@ from cns_drake.scene.world import load_world, structures_in
 
 
 class MarkedDrive(McapDrive):
-    """A recording compared with another stage of its map.
+    """A recording whose points are marked if absent in another stage.
 
-    A structure is absent in that stage if none of the stage's visuals is part
-    of it; a lower building is not absent. Points on absent structures get
-    SemanticKITTI's labels of moving objects, and all other labels are as
-    recorded. In the structure table, absent structures get `"absent_in":
-    <stage>`.
+    A structure is absent in the other stage if this stage has no visual that
+    belongs to the structure. A building that is lower there is not absent.
+    Points on absent structures get SemanticKITTI's labels of moving objects,
+    and all other labels are as recorded. In the structure table, absent
+    structures get `"absent_in": <stage>`.
     """
 
     def __init__(self, path: Path, lidar: str | None, stage: str):
@@ -66,7 +66,7 @@ class MarkedDrive(McapDrive):
         }
 
     def scan(self, index: int) -> np.ndarray:
-        """Returns the scan with this index; its labels are uint16."""
+        """Returns scan `index` with marked labels; labels are uint16."""
         recorded = super().scan(index)
         names = recorded.dtype.names or ()
         if not {"label", "instance"} <= set(names):

@@ -1,1 +1,1 @@
-"""Imports: makes maps with drives from real cities and road networks."""
+"""Imports real cities and road networks as maps with drives."""

@@ -1,6 +1,6 @@
-"""Years in which a city's objects were built and demolished.
+"""Years in which the objects of a city were built and demolished.
 
-Dates have the formats of OpenStreetMap:
+Dates in files have the formats of OpenStreetMap:
 https://wiki.openstreetmap.org/wiki/Key:start_date
 """
 
@@ -45,11 +45,12 @@ _DUTCH = ("oorspronkelijkbouwjaar", "bouwjaar")
 
 
 def year_of_date(text: str) -> int | None:
-    """Returns the year that a text means; None if it means none.
+    """Returns the year that a text states; None if it states none.
 
-    For a period, the result is the year in its middle, or an earlier or later
-    year if the text says "early" or "late". For a range (`1914..1918`), it is
-    the last year. For `before 1910` and `~1855`, it is the year in the text.
+    For a period such as a century, the result is the year in the middle of the
+    period, or an earlier or later year if the text says "early" or "late". For
+    a range (`1914..1918`), it is the last year. For `before 1910` and `~1855`,
+    it is the year in the text.
     """
     text = text.strip().lower()[:255].split("..")[-1].strip()
     day = _DAY.fullmatch(text)
@@ -80,9 +81,9 @@ def construction_year(
 
     Args:
         attributes: attributes of the object, as in its file.
-        attribute: the attribute that has the year; if None, the usual
+        attribute: name of the attribute with the year; if None, the usual
             attributes are tried.
-        name: name of the object, for the faults.
+        name: name of the object, as an example in `faults`.
         faults: counts values that are not years, and years in the future.
     """
     faults = faults or ImportFaults()
@@ -114,8 +115,8 @@ def _year(value: object) -> int | None:
 
 
 def stands_today(until: int | None) -> bool:
-    """Returns whether an object demolished in the year `until` still stands.
+    """Returns whether an object still stands, given its year of demolition.
 
-    It does if the year is None or in the future.
+    It stands if this year, `until`, is None or in the future.
     """
     return until is None or until > datetime.date.today().year

@@ -1,9 +1,9 @@
 """Reads CityJSON 1.0 to 2.0 and CityJSONSeq files as structures.
 
 https://www.cityjson.org/specs/2.0.1/. A file of type CityJSON holds all
-objects. In a sequence (.jsonl), a first line of that type is followed by one
-feature per line, each with vertices of its own. The order, direction and units
-of the axes are those of the file's reference system, as pyproj defines it.
+objects. In a sequence (.jsonl), the first line is of type CityJSON, and each
+further line is a feature with its own vertices. pyproj defines the order,
+direction and units of the axes of the file's reference system.
 """
 
 from __future__ import annotations
@@ -49,10 +49,10 @@ _PLAIN = ("east [metre]", "north [metre]", "up [metre]")
 class ReferenceSystem:
     """The meaning of a file's three coordinates.
 
-    `axes` describes each coordinate in words. The matrix (3, 3) converts
-    coordinates to metres east, north and up. The name is that in the file; ""
-    if it has none. If the system defines no heights, they are assumed to have
-    the unit of the other coordinates.
+    `axes` describes each coordinate in words. `matrix` (3, 3) converts
+    coordinates to metres east, north and up. `name` is the name of the system
+    in the file, or "". If the system defines no heights, their unit is assumed
+    to be that of the first two coordinates.
     """
 
     name: str = ""
@@ -62,7 +62,7 @@ class ReferenceSystem:
 
     @property
     def is_plain(self) -> bool:
-        """Whether the coordinates are metres east, north and up already."""
+        """Whether the file's coordinates are already metres east, north, up."""
         return self.axes == _PLAIN
 
     @property
@@ -71,7 +71,7 @@ class ReferenceSystem:
         return self.axes[0].startswith(("north", "south"))
 
     def to_metres(self, points: np.ndarray) -> np.ndarray:
-        """Returns coordinates (N, 3) converted to metres east, north and up."""
+        """Converts coordinates (N, 3) to metres east, north and up."""
         if self.is_plain:
             return points
         return points @ self.matrix.T
@@ -88,8 +88,8 @@ class ReferenceSystem:
     def has_place(self, first: float, second: float) -> bool:
         """Returns whether a place is in or near the system's area of use.
 
-        `first` and `second` are its first two coordinates. The result is False
-        for a system without an area of use.
+        `first` and `second` are the first two coordinates of the place. The
+        result is False for a system without an area of use.
         """
         system = pyproj.CRS.from_user_input(self.name)
         if system.area_of_use is None:
@@ -107,8 +107,8 @@ class ReferenceSystem:
 def reference_system(name: str, where: str) -> ReferenceSystem:
     """Returns the axes and units of a reference system.
 
-    The name is an EPSG code, or a URL or URN of one, as in the file. `where`
-    names the place in the file.
+    `name` is an EPSG code, or the URL or URN of an EPSG code. `where` names the
+    place in the file, for error messages.
 
     Raises:
         InputError: naming the place and the system, if the system is unknown,
@@ -202,10 +202,10 @@ _LONGEST_NAME = 80
 
 
 class CityGeometry(NamedTuple):
-    """One geometry of an object; its level of detail is 0 if unknown.
+    """One geometry of an object; the level of detail is 0 if unknown.
 
-    `kinds` has the type of each face, such as RoofSurface; "" if unknown. If
-    the geometry is a solid, its faces enclose it.
+    `kinds` contains the type of each face, such as RoofSurface, or "" if
+    unknown. The faces of a solid enclose it.
     """
 
     lod: float
@@ -236,9 +236,9 @@ class CityFile:
         objects: id -> object.
         system: reference system of the coordinates.
         faults: counts of faulty parts.
-        order_is_open: whether the order of the first two coordinates is
-            uncertain, because both orders lead to places in the system's area
-            of use.
+        order_is_open: whether it is uncertain if the first coordinate is east
+            or north, because both orders lead to places in the reference
+            system's area of use.
     """
 
     objects: dict[str, CityObject] = field(default_factory=dict)
@@ -249,7 +249,7 @@ class CityFile:
     def bounds(self) -> tuple[np.ndarray, np.ndarray]:
         """Returns the least and the greatest coordinates, (3,) each [m].
 
-        At least one object must have a face.
+        At least one object must have at least one face.
         """
         points = np.concatenate(
             [ring for face in self.faces() for ring in face]
@@ -264,7 +264,7 @@ class CityFile:
 
 
 def read_cityjson(path: Path) -> CityFile:
-    """Returns the content of a CityJSON file.
+    """Reads a CityJSON file.
 
     Raises:
         InputError: if it cannot be read, is not CityJSON, or its coordinates
@@ -651,7 +651,11 @@ def _surface_kinds(semantics: Any, nesting: int, number: int) -> Sequence[str]:
 def import_cityjson(
     path: Path, lod: float | None, year_attribute: str | None
 ) -> ForeignCity:
-    """Returns the city in a CityJSON file; its origin is in its middle.
+    """Imports a city from a CityJSON file; the origin is its centre.
+
+    `lod` is the level of detail to read; None for the highest of each object.
+    `year_attribute` is the attribute with the year of construction; None for
+    the usual names.
 
     Raises:
         InputError: if the file cannot be used.
@@ -676,9 +680,9 @@ def import_structures(
 ) -> list[Imported]:
     """Returns a structure for each object that has a surface.
 
-    A building with its parts is one structure. The origin (3,) of the world is
-    given in the file's coordinates [m]. If the level of detail `lod` is None,
-    each object has its highest one.
+    A building with its parts is one structure. `origin` (3,) is the origin of
+    the world in the file's coordinates [m]. `lod` is the level of detail to
+    read; None for the highest of each object.
     """
     groups = _families(city)
     names = _unique_names(groups)

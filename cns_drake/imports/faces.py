@@ -1,6 +1,6 @@
 """Converts polygons to triangles: faces in space, level areas and solids.
 
-Solids may have the roofs that OpenStreetMap describes.
+Solids can have the roof shapes that OpenStreetMap describes.
 """
 
 from collections.abc import Iterable, Iterator, Sequence
@@ -28,7 +28,7 @@ _CORNERS_OF_FOUR = np.array([(3, 0, 1), (0, 1, 2), (1, 2, 3), (0, 2, 3)])
 
 
 def joined(some: Iterable[np.ndarray]) -> np.ndarray:
-    """Returns several arrays of triangles (M, 3, 3) as one array."""
+    """Concatenates arrays of triangles (M, 3, 3)."""
     return np.concatenate([np.zeros((0, 3, 3)), *some])
 
 
@@ -37,9 +37,10 @@ def face_triangles(
 ) -> np.ndarray:
     """Returns the triangles (M, 3, 3) of a face [m].
 
-    They have the orientation of the outer ring. `rings` has the outer ring (N,
-    3) and then the holes [m]; the first corner of a ring is not repeated at its
-    end. Faces that are repaired or left out are counted as faults.
+    The triangles have the orientation of the outer ring. `rings` contains the
+    outer ring (N, 3) and then the holes [m]; the first corner of a ring is not
+    repeated at its end. Faces that are repaired or left out are counted in
+    `faults`, with `name` as the name of the object.
     """
     rings = [_cleaned(ring, name, faults) for ring in rings]
     if len(rings[0]) < 3:
@@ -133,7 +134,7 @@ def _filled(
 def flat_surface(
     polygon: Polygon, z: float, name: str, faults: ImportFaults
 ) -> np.ndarray:
-    """Returns a level area as triangles (M, 3, 3) that look upwards [m]."""
+    """Returns a level area as triangles (M, 3, 3) that face upwards [m]."""
     return face_triangles(_rings(polygon, z), name, faults)
 
 
@@ -146,16 +147,16 @@ def extruded(
     roof: str = "flat",
     roof_height: float = 0.0,
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Returns the walls and the roof above a footprint, (M, 3, 3) each [m].
+    """Returns walls and roof above a footprint, each (M, 3, 3) [m].
 
-    A roof that the footprint does not allow is replaced by a flat one, and
+    A roof that is impossible on the footprint is replaced by a flat roof, and
     counted as a fault.
 
     Args:
         polygon: the footprint.
         low, high: heights of the lowest and the highest point [m].
-        name: name of the object, for faults.
-        faults: counts what could not be made as described.
+        name: name of the object, as an example in `faults`.
+        faults: counts roofs and areas that were replaced or left out.
         roof: `flat`; `pyramidal`, on any footprint; `gabled` or `hipped`, on a
             footprint with four corners.
         roof_height: height of the roof above the eaves [m].
@@ -267,8 +268,9 @@ def surface_samples(
 ) -> Iterator[np.ndarray]:
     """Yields points (N, 3) on triangles (M, 3, 3), edges included [m].
 
-    Every place on a triangle is within `spacing` of a point. Points outside of
-    a window (least and greatest x and y, (2,) each) are left out.
+    Every place on a triangle is at most `spacing` from one of the points.
+    Points outside of a window (least and greatest x and y, (2,) each) are left
+    out.
     """
     while len(triangles):
         if window is not None:

@@ -29,12 +29,12 @@ LAWN: Rgb = (0.42, 0.55, 0.30)
 
 
 def random_share(seed: int, purpose: str, name: str) -> float:
-    """Returns a random number from 0 to 1 that is fixed by the arguments."""
+    """Returns a random number from 0 to 1 that depends on the arguments."""
     return _number(seed, purpose, name) / 2.0**64
 
 
 def random_generator(seed: int, purpose: str, name: str) -> np.random.Generator:
-    """Returns a random generator whose seed is fixed by the arguments."""
+    """Returns a random generator whose seed depends only on the arguments."""
     return np.random.default_rng(_number(seed, purpose, name))
 
 
@@ -53,15 +53,15 @@ class Imported:
     Attributes:
         structure: the structure.
         kind: type of the object in its file, such as Building.
-        year: year in which it was built; None if unknown.
+        year: year in which the structure was built; None if unknown.
         triangles: (M, 3, 3) all surfaces that a car could hit or drive over, in
             W [m].
-        until: year in which it was demolished; None if unknown.
+        until: year in which the structure was demolished; None if unknown.
         tags: tags of the object in its file.
         lod: level of detail; 0 if unknown.
-        original: name of the structure of which it is a variant; "" if it is
-            none.
-        is_gone: whether it was demolished at an unknown date.
+        original: name of the structure of which this one is a variant; "" if
+            this one is not a variant.
+        is_gone: whether the structure was demolished at an unknown date.
     """
 
     structure: Structure
@@ -76,22 +76,25 @@ class Imported:
 
     @property
     def draw_name(self) -> str:
-        """Name that seeds the random draws for the object."""
+        """Name on which the random draws for the structure depend."""
         return self.original or self.structure.name
 
     @property
     def is_ground(self) -> bool:
-        """Whether a car could drive on the object, if it is flat."""
+        """Whether the structure is ground on which a car could drive.
+
+        This only concerns its class: it may be too steep.
+        """
         return self.structure.semantic_class in _GROUND_CLASSES
 
 
 @dataclass(frozen=True)
 class Thing:
-    """A small object of a file, such as a bench, at a place [m].
+    """A small object from a city's file, such as a bench.
 
-    `source` is its id in the file, and `element` its kind there. `kind` is a
-    key of `cns_drake.city.placement.objects.OBJECTS`. The heading `yaw` is None
-    if unknown [rad].
+    `source` is the object's id in the file, and `element` its type in the file.
+    `kind` is a key of `cns_drake.city.placement.objects.OBJECTS`. The position
+    is in [m]. The heading `yaw` [rad] is None if unknown.
     """
 
     source: str
@@ -103,12 +106,12 @@ class Thing:
 
 @dataclass(frozen=True)
 class Street:
-    """A street of a map, on which cars drive forwards, backwards or both.
+    """A street, on which cars drive forwards, backwards or both.
 
-    The line (N, 2) is its middle, with one node at each place; streets with a
-    common node meet there. `aside` is the distance of the outermost lane from
-    the middle. The width is 0 if unknown [m]. Name and tags are those in the
-    file.
+    `line` (N, 2) is the middle of the street [m]. Each of its points has a
+    node; streets with a common node meet there. `aside` is the distance from
+    the middle to the outermost lane [m]. `width` [m] is 0 if unknown. Name and
+    tags come from the file.
     """
 
     line: np.ndarray
@@ -137,9 +140,10 @@ def ends_at_nodes(streets: Iterable[Street]) -> Counter[int]:
 def cut_at_nodes(
     streets: Sequence[Street], also: AbstractSet[int] = frozenset()
 ) -> Iterator[tuple[Street, np.ndarray, tuple[int, int]]]:
-    """Yields pieces of streets: street, line (N, 2), first and last node.
+    """Cuts streets; yields for each piece: street, line (N, 2), end nodes.
 
-    Streets are cut where they meet, and at the nodes in `also`.
+    Streets are cut where they meet and at the nodes in `also`. The end nodes
+    are the first and the last node of the piece.
     """
     uses = Counter(node for street in streets for node in street.nodes)
     for street in streets:
@@ -156,11 +160,11 @@ def cut_at_nodes(
 
 @dataclass(frozen=True)
 class StreetPlaces:
-    """Places on and beside streets that matter for traffic.
+    """Crossings, traffic signals and footpaths of a city.
 
-    `crossed` are nodes of streets at which people cross. `signals` (N, 2) are
-    the places of traffic signals, and `paths` the middle lines (M, 2) of ways
-    for people [m].
+    `crossed` contains the nodes of streets at which people cross, `signals` (N,
+    2) the places of traffic signals [m], and `paths` the middle lines (M, 2) of
+    ways for people [m].
     """
 
     crossed: AbstractSet[int] = frozenset()
@@ -173,17 +177,17 @@ class ForeignCity:
     """The content of a city's file.
 
     Attributes:
-        structures: its structures.
+        structures: the structures of the city.
         origin: origin of the map in the file's coordinates: metres east, north
             and up, or latitude and longitude [deg].
-        reference_system: name of these coordinates.
+        reference_system: name of the reference system of these coordinates.
         faults: counts of parts that were repaired or left out. Small objects
-            count as left out until they get a place in a dressed city.
+            count as left out, until a dressed city places them.
         streets: streets with known lanes, in which drives are searched.
-        street_places: places for traffic.
+        street_places: crossings, traffic signals and footpaths.
         keeps_left: whether traffic keeps left.
-        axes: the coordinates in words, if they are not metres east, north and
-            up.
+        axes: description of the coordinates, if they are not metres east, north
+            and up.
         things: small objects, which are placed in a dressed city only.
     """
 
@@ -212,14 +216,15 @@ def make_imported(
     """Returns a structure made of triangles in the world.
 
     Args:
-        name: unique in the city.
+        name: name of the structure, unique in the city.
         semantic_class: a key of `scene.semantics.CLASS_IDS`.
         kind: type of the object in its file.
-        surfaces: part of its surface -> triangles (M, 3, 3) [m]; empty parts
-            are left out, and at least one is not empty.
-        colours: part -> its colour. Other parts have the colour of the class.
+        surfaces: part of the surface -> triangles (M, 3, 3) [m]. Empty parts
+            are left out; at least one part must not be empty.
+        colours: part -> colour. Parts without an entry have the colour of the
+            class.
         year: year in which it was built; None if unknown.
-        until: year until which it stands; None if unknown.
+        until: year in which it was demolished; None if unknown.
         tags: tags of the object in its file.
         lod: level of detail of the object.
     """
@@ -248,6 +253,6 @@ def boxes_of(structures: Sequence[Imported]) -> np.ndarray:
 
 
 def to_mesh(triangles: np.ndarray) -> Mesh:
-    """Returns triangles (M, 3, 3) as a mesh [m]."""
+    """Converts triangles (M, 3, 3) [m] to a mesh."""
     corners = np.arange(3 * len(triangles)).reshape(-1, 3)
     return Mesh(triangles.reshape(-1, 3), tuple(map(tuple, corners.tolist())))

@@ -1,4 +1,4 @@
-"""The height of an imported city's ground, from its file or guessed."""
+"""The height of the ground in an imported city, from its file or guessed."""
 
 from __future__ import annotations
 
@@ -38,7 +38,7 @@ _EVERY_CORNER = 7
 
 
 class Ground:
-    """The ground: heights z (R, C) on a grid of xs (C,) and ys (R,) [m].
+    """The ground as heights z (R, C) on a grid of xs (C,) and ys (R,) [m].
 
     The grid is evenly spaced.
     """
@@ -69,9 +69,9 @@ class Ground:
         )
 
     def below(self, places: Iterable[np.ndarray]) -> Ground:
-        """Returns the ground, lowered until it is below all given places.
+        """Returns the ground, lowered where needed to be below given places.
 
-        The places come in arrays (N, 3) [m].
+        Each array contains places (N, 3) [m].
         """
         z = self.z.copy()
         for points in places:
@@ -96,7 +96,7 @@ class Ground:
 def guess_ground(feet: np.ndarray, corners: np.ndarray) -> Ground:
     """Returns a smooth ground through the feet (N, 3) of structures [m].
 
-    It extends beyond the corners (M, 3) of all structures [m].
+    The ground extends beyond the corners (M, 3) of all structures [m].
     """
     low, high = corners[:, :2].min(axis=0), corners[:, :2].max(axis=0)
     cell = CELL * np.ceil(max(1.0, (high - low).max() / CELL / _MOST_CELLS))
@@ -120,7 +120,10 @@ def guess_ground(feet: np.ndarray, corners: np.ndarray) -> Ground:
 
 
 def feet_of(solids: Sequence[np.ndarray]) -> np.ndarray:
-    """Returns (N, 3) the lowest corner of each solid of triangles (M, 3, 3)."""
+    """Returns the lowest corner (N, 3) of each of N solids [m].
+
+    Each solid consists of triangles (M, 3, 3).
+    """
     corners = [triangles.reshape(-1, 3) for triangles in solids]
     feet = [some[some[:, 2].argmin()] for some in corners]
     return np.array(feet).reshape(-1, 3)
@@ -129,10 +132,11 @@ def feet_of(solids: Sequence[np.ndarray]) -> np.ndarray:
 def ground_of(
     structures: Sequence[Imported], below_bridges: bool = False
 ) -> Ground:
-    """Returns the ground of a city: its terrain, or one guessed from feet.
+    """Returns the ground of a city: its terrain, or else a guessed ground.
 
-    With `below_bridges`, the feet of bridges and tunnels do not count, unless
-    there are no others.
+    The guess follows the lowest points ("feet") of the structures. With
+    `below_bridges`, the feet of bridges and tunnels do not count, unless the
+    city has no other structures.
     """
     corners = joined(one.triangles for one in structures).reshape(-1, 3)
     terrain = [one for one in structures if one.kind == "TINRelief"]
@@ -156,7 +160,10 @@ def ground_of(
 def bottom_of(
     structures: Sequence[Imported], ground: Ground
 ) -> list[Structure]:
-    """Returns the guessed ground as structures; none if there is a terrain."""
+    """Returns structures for the ground, if it is guessed; none otherwise.
+
+    A terrain from the file is already among `structures`.
+    """
     if any(one.kind == "TINRelief" for one in structures):
         return []
     taken = {one.structure.name for one in structures}

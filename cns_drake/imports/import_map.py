@@ -49,12 +49,13 @@ def import_city(
     Args:
         source: CityJSON (.json, .jsonl), OpenStreetMap (.osm, .pbf) or
             OpenDRIVE (.xodr).
-        output: the folder, which must not exist yet.
-        options: what the user has chosen.
-        progress: is called with one line at a time.
-        finish: adds files to the folder. At this time the folder has all other
-            files and its final name, but is not at its final place. If `finish`
-            fails, nothing is left.
+        output: the folder to write, which must not exist yet.
+        options: the options of the import.
+        progress: called with messages of one line on the progress.
+        finish: called with the folder and the sizes of its stages (see
+            `write_world`), to add files. By then the folder contains all other
+            files and has its final name, but is still in a temporary place. If
+            `finish` fails, nothing is left.
 
     Returns:
         Counts of what was imported.
@@ -205,7 +206,7 @@ def _read(source: Path, options: ImportOptions) -> ForeignCity:
 
 
 def drive_along(path: Path) -> WaypointDrive:
-    """Returns the drive along the waypoints in a file, without heights.
+    """Returns the drive along the waypoints in a CSV file; heights are ignored.
 
     Raises:
         InputError: if the file cannot be used, or a bend is too tight.

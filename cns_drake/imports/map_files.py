@@ -54,13 +54,13 @@ def write_world(
 
     Args:
         draft: folder of the map.
-        source: file that is imported, which errors name.
+        source: imported file, named in error messages.
         city: the structures of each stage.
-        bottom: structures of the ground, which are in all stages.
+        bottom: structures of the guessed ground, which are in all stages.
         dressing: what was added to buildings and streets.
 
     Returns:
-        Stage -> its numbers of structures and triangles.
+        Stage -> numbers of its structures and triangles.
     """
     structures = [*bottom, *(one.structure for one in city.kept)]
     table = structure_table(structures)
@@ -96,7 +96,7 @@ def write_world(
 
 
 def triangles_in(obj: str) -> int:
-    """Returns the number of triangles in the faces of an OBJ text."""
+    """Returns the number of triangles in the text of an OBJ file."""
     faces = obj[obj.find("\nf ") :]
     # A face with three corners has three spaces; each further corner adds one.
     return faces.count(" ") - 2 * faces.count("f")
@@ -127,7 +127,8 @@ def city_facts(
         city: the city as in its file.
         options: options of the import.
         stages: names of the stages.
-        changes: what the first stage changes, if it was drawn at random.
+        changes: changes in an additional first stage drawn at random, if there
+            is one.
         dressing: what was added to buildings and streets.
     """
     facts: dict[str, object] = {
@@ -180,7 +181,7 @@ def write_facts(
 
 
 def write_report(draft: Path, report: ImportReport) -> None:
-    """Writes all counts of an import, of which the command prints only some."""
+    """Writes all counts of an import; the command prints only some of them."""
     lines = [f"{kind}: {number}" for kind, number in report.kinds.items()]
     lines += [
         f"{kind}: {number}, such as {example}"
@@ -204,9 +205,9 @@ def write_drives(
 ) -> None:
     """Writes the routes of a map, and a scenario for each route and stage.
 
-    `stages` maps the name of a stage to words for its time, with which the
-    titles of drives end. There are at most two routes; each has waypoints (N,
-    3) [m], and a speed in `cruise` [m/s].
+    `stages` maps the name of a stage to words for its time, which end the
+    titles of drives. There are at most two routes. Each route consists of
+    waypoints (N, 3) [m]; `cruise` contains its speed [m/s].
     """
     for letter, waypoints in zip("ab", routes, strict=False):
         rows = [f"{x:.3f},{y:.3f},{z:.3f}" for x, y, z in waypoints]
@@ -237,10 +238,10 @@ def draw_overview(
     space: FreeSpace | None,
     drives: Sequence[WaypointDrive],
 ) -> None:
-    """Draws a map's structures, the room for a car and the drives.
+    """Draws a map's structures, the free space for a car and the drives.
 
-    Where both drives share a street, the second one is a thinner line on the
-    first, so that both can be seen.
+    Where two drives share a street, the second drive is a thinner line on top
+    of the first, so that both can be seen.
     """
     corners = joined(one.triangles for one in structures).reshape(-1, 3)
     low, high = corners[:, :2].min(axis=0), corners[:, :2].max(axis=0)

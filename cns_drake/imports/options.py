@@ -15,7 +15,10 @@ _LONGEST = 100
 
 
 class ImportFaults:
-    """Counts of repaired and omitted parts, with one example of each kind."""
+    """Counts of repaired and omitted parts of a file, by kind of fault.
+
+    Each kind has the name of one object as an example.
+    """
 
     def __init__(self) -> None:
         self._counts: Counter[str] = Counter()
@@ -59,23 +62,25 @@ class ImportOptions:
     """The options of an import.
 
     Attributes:
-        years: years of the stages, increasing; without any there is one stage,
-            of today.
-        year_attribute: attribute that has the year of construction; if None,
-            the usual attributes.
-        undated: first stage in which buildings without a year stand.
-        lod: level of detail; if None, the highest of each object.
+        years: years of the stages, increasing. Without years there is one
+            stage: today.
+        year_attribute: attribute with the year of construction; None for the
+            usual attributes.
+        undated: first stage with the buildings whose year is unknown: `first`,
+            `last` or `never`.
+        lod: level of detail to read; None for the highest of each object.
         seed: seed of the random draws of `grow`, and of buildings along a
             file's roads.
         along: file with the waypoints of a drive that replaces the two proposed
-            ones.
+            drives.
         within: greatest distance of structures from the drives [m]; no limit if
             None.
         drive_on: side of the street on which traffic keeps; if None, the side
             in the file, or right if it has none.
         grow: share of the buildings that are missing or lower in an additional
             first stage, drawn at random; no such stage if None.
-        dressed: whether looks that the file does not give are drawn at random.
+        dressed: whether to add details, such as windows and parked cars, that
+            are not in the file.
     """
 
     years: tuple[int, ...] = ()
@@ -95,9 +100,9 @@ class ImportReport:
     """The result of an import.
 
     Attributes:
-        kinds: number of structures by type of object.
+        kinds: type of object -> number of structures.
         triangles: number of triangles.
-        stages: number of structures by stage.
+        stages: stage -> number of structures.
         undated, dated: numbers of buildings without a year, and with one.
         drives: lengths of the proposed drives [m].
         faults: kind, number and example of faults.

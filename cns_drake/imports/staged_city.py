@@ -1,4 +1,4 @@
-"""The structures of an imported city at each stage."""
+"""The structures of an imported city in each stage."""
 
 from __future__ import annotations
 
@@ -83,11 +83,13 @@ def _cropped(one: Imported, ways: BaseGeometry, distance: float) -> Imported:
 def with_gone(
     gone: Sequence[Imported], others: Iterable[Imported]
 ) -> list[Imported]:
-    """Returns former structures of a city and those that stood with them.
+    """Returns the city of the past: former buildings, and what stood then.
 
-    If a former and a present building have the same place, the present one's
-    year decides. If it has a year, it already stood, and the former building
-    did not. If it has none, it was built later, and the former building stood.
+    `gone` contains buildings that were demolished at an unknown date, and
+    `others` the structures of today. Where a building of today stands in the
+    place of a former building, the result contains only one of the two: the
+    building of today if its year of construction is known, and otherwise the
+    former building.
     """
     others = list(others)
     later = [one for one in others if one.kind.startswith("Building")]
@@ -118,10 +120,11 @@ class StagedCity:
     """The structures of a city, by stage.
 
     Attributes:
-        standing: stage -> structures that stand at it.
-        kept: structures that stand at any stage.
+        standing: stage -> structures that exist in it.
+        kept: structures that exist in at least one stage.
         undated, dated: numbers of buildings without a year, and with one.
-        gone: buildings that no longer stand, if the only stage is today.
+        gone: buildings that no longer exist; empty unless the only stage is
+            today.
     """
 
     standing: dict[str, list[Imported]]
@@ -138,8 +141,9 @@ class StagedCity:
     ) -> StagedCity:
         """Returns the city without structures far from drives.
 
-        A structure is kept if its bounding box is within the distance [m]; all
-        others are counted. Of a terrain, the near part is kept.
+        A structure is kept if its bounding box is within `distance` [m] of a
+        drive; all other structures are counted in `faults`. Terrain is cut to
+        the part near the drives.
 
         Raises:
             InputError: if no structure is near, or there is no drive.
@@ -189,13 +193,13 @@ class StagedCity:
 def stage_city(
     source: object, city: ForeignCity, options: ImportOptions
 ) -> StagedCity:
-    """Returns the structures that stand at the wanted stages.
+    """Assigns the structures of a city to the stages of the options.
 
-    Structures that stand at no stage are counted in the faults of the city.
-    Errors name the source.
+    Structures that exist in no stage are counted in the faults of the city.
+    Error messages name `source`.
 
     Raises:
-        InputError: if no structure, or too many, stand at any stage.
+        InputError: if all stages together have no structure, or too many.
     """
     found = _together(city)
     if not found:
@@ -269,7 +273,9 @@ def _stands(one: Imported, stage: int, options: ImportOptions) -> bool:
 
 
 def stage_names(years: Sequence[int]) -> list[str]:
-    """Returns the name of each stage, from 01 on; one stage without years.
+    """Returns the name of each year's stage, from 01 on.
+
+    Without years there is one stage.
 
     Raises:
         InputError: if years do not increase.
@@ -327,17 +333,17 @@ def _has_years(one: Imported) -> bool:
 def grow(
     city: StagedCity, part: float, seed: int
 ) -> tuple[StagedCity, dict[str, Any]]:
-    """Returns a city with an additional first stage, and what it changes.
+    """Adds a first stage with fewer buildings; returns it and its changes.
 
     In the first stage, the share `part` of the buildings is missing or lower.
-    The random draws depend on the names of buildings, so that a change
-    elsewhere in the file does not affect them. Buildings of the file that are
-    gone today stand in the first stage, in place of structures that came after
+    The random draws depend on the names of buildings, so that changes elsewhere
+    in the file do not affect them. Buildings in the file that no longer exist
+    today exist in the first stage, in place of the structures that replaced
     them.
 
-    The changes are the names of the buildings that are `missing`, the
-    `part_of_height` of lower buildings, and the buildings that are
-    `gone_since`, if there are any.
+    The changes are a mapping: `missing` contains the names of missing
+    buildings, `part_of_height` the relative heights of lower buildings, and
+    `gone_since`, if there are any, the buildings that no longer exist today.
     """
     (last,) = city.standing.values()
     buildings = [one for one in last if one.kind.startswith("Building")]

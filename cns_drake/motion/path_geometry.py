@@ -28,14 +28,15 @@ def make_uniform_spline(
 ) -> BsplineTrajectory:
     """Returns a quintic spline with one control point per knot.
 
-    Bounds on the control points are also bounds on the curve: the spline never
-    leaves the convex hull of ORDER neighbouring control points, and its
-    derivatives never leave that of their difference quotients. A straight line
-    stays a straight line.
+    Bounds on the control points are also bounds on the curve: each point of the
+    spline lies in the convex hull of ORDER neighbouring control points, and
+    each value of a derivative in the convex hull of the control points'
+    difference quotients. Control points on a straight line give a straight
+    line.
 
-    The parameter starts at 0, and the i-th knot is at i * spacing. At each end,
-    the control points (N, D), N > REACH, are mirrored at the outermost one, so
-    that the curve ends there.
+    The parameter starts at 0, and the i-th knot is at i * spacing. There are N
+    > REACH control points, (N, D). At each end they are mirrored at the
+    outermost control point, so that the curve ends in this point.
     """
     points = np.asarray(control_points, dtype=float)
     points = np.concatenate(
@@ -61,7 +62,7 @@ class SplineDerivatives:
         self.end = spline.end_time()
 
     def evaluate(self, parameter: ArrayLike) -> list[np.ndarray]:
-        """Returns value and derivatives, each (N, D), at parameters (N,)."""
+        """Returns value and derivatives, each (N, D), at N parameters."""
         parameter = np.clip(parameter, 0.0, self.end)
         return [spline.vector_values(parameter).T for spline in self._splines]
 
@@ -75,16 +76,17 @@ _STEP = 0.1
 class PathJet:
     """The path and its derivatives with respect to the path parameter u.
 
-    A name with n leading `d` is an n-th derivative. All are arrays over N
-    parameters.
+    A name with n leading letters `d` is an n-th derivative with respect to u.
+    All attributes are arrays over N parameters.
 
     Attributes:
         p, dp, ddp: (N, 3) position in W [m].
         yaw, dyaw, ddyaw: heading about the z axis of W, without jumps [rad].
         climb, dclimb, ddclimb: angle of the tangent above the horizon [rad].
-        speed, dspeed, ddspeed: arc length per parameter, about 1.
-        turn, dturn, ddturn: rate of rotation about the vehicle's z axis, per
-            parameter [rad].
+        speed, dspeed, ddspeed: derivative of the arc length with respect to u,
+            about 1.
+        turn, dturn, ddturn: rate of rotation about the vehicle's z axis with
+            respect to u [rad/m].
     """
 
     p: np.ndarray
@@ -107,9 +109,10 @@ class PathJet:
 class SmoothPath:
     """A quintic B-spline along the points of a lane path.
 
-    The points are control points, not points on the curve: in a bend of radius
-    r, the curve runs spacing^2 / (4 r) inside of them, and its curvature has no
-    steps. The parameter u runs from 0 to `end`, in metres along the points.
+    The points are control points: the curve does not pass through them. In a
+    bend of radius r, the curve runs spacing^2 / (4 r) inside the points. Its
+    curvature has no steps. The parameter u runs from 0 to `end`, in metres
+    along the points.
     """
 
     def __init__(self, points: np.ndarray, spacing: float):
@@ -182,16 +185,17 @@ class SmoothPath:
         )
 
     def tightest_bend(self) -> tuple[float, np.ndarray]:
-        """Returns the least radius of the path, and where it is (3,) [m]."""
+        """Returns the path's smallest radius [m] and its place (3,) [m]."""
         jet = self.evaluate(self._places())
         curvature = np.abs(jet.turn) / jet.speed
         at = int(curvature.argmax())
         return float(1 / max(curvature[at], 1e-12)), jet.p[at]
 
     def integral(self, integrand: Callable[[PathJet], np.ndarray]) -> PPoly:
-        """Returns the integral of a function along the path, from 0 to u.
+        """Returns the integral of a function over u, from 0 to any u.
 
-        Its error is far below a micrometre if the function is as smooth as the
+        `integrand` takes the path at N parameters and returns N values. The
+        error is far below a micrometre if the function is as smooth as the
         path.
         """
         # This import is slow.

@@ -1,4 +1,4 @@
-"""The roughness of roads: random heights of a class of ISO 8608."""
+"""The roughness of roads: random heights of a class in ISO 8608."""
 
 import math
 from typing import Literal
@@ -31,20 +31,20 @@ _OVER_LAYERS = 0.03611499185872766
 
 
 class RoadProfile:
-    """Random heights of a road's surface, as a function of place and seed only.
+    """Random heights of road surfaces, determined by place and seed.
 
     The heights are a sum of layers. A layer is a cubic B-spline over a square
-    lattice, whose coefficients are independent normal numbers of variance s^2.
-    With the lattice spacing h, its spectrum along any line is nearly 2 s^2 h
-    sinc(n h)^8 151/315: flat up to n = 0.2 / h, and then falling steeply. From
-    layer to layer, the spacing doubles and the variance s^2 grows like h. The
-    levels of the spectra then grow like h^2, and the spectrum of the sum falls
-    like n^-2: this is G_d(n) = G_d(n0) (n / n0)^-2 of ISO 8608, with ripples of
-    1.5 %.
+    lattice; its coefficients are independent normal numbers of variance s^2. If
+    the lattice has the spacing h, the spectrum of the layer along any line, at
+    the spatial frequency n [1/m], is nearly 2 s^2 h sinc(n h)^8 151/315: flat
+    up to n = 0.2 / h, and then falling steeply. From layer to layer, the
+    spacing doubles and the variance s^2 grows like h. The levels of the spectra
+    then grow like h^2, and the spectrum of the sum falls like n^-2: this is
+    G_d(n) = G_d(n0) (n / n0)^-2 of ISO 8608, with ripples of 1.5 %.
 
     Each lattice is rotated and shifted at random, so that no street runs along
-    all of them. A layer repeats after 512 nodes; only a street along its
-    lattice would notice this.
+    all lattices. A layer repeats after 512 nodes; this shows only on a street
+    along the layer's lattice.
     """
 
     def __init__(self, roughness: RoughnessClass, seed: int):
@@ -53,7 +53,7 @@ class RoadProfile:
         self._seed = seed
 
     def heights(self, p_WQset: np.ndarray) -> np.ndarray:
-        """Returns the heights (N,) at places (N, 2) in W [m]."""
+        """Returns the heights (N,) of the surface at places (N, 2) in W [m]."""
         # This import is slow, and not needed to describe a scenario.
         from scipy.ndimage import map_coordinates
 

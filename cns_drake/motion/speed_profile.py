@@ -20,7 +20,7 @@ _SMOOTHING_SLACK = 0.2
 
 
 class SpeedProfile(NamedTuple):
-    """The fastest drive along a path, from rest to rest.
+    """The speeds of the fastest drive along a path, from rest to rest.
 
     Attributes:
         u: (N,) evenly spaced places on the path [m].
@@ -36,8 +36,8 @@ class SpeedProfile(NamedTuple):
 def make_time_scaling(positions: np.ndarray) -> BsplineTrajectory:
     """Returns a smooth path parameter u(t) from the places of a drive.
 
-    The places (N,) are those at multiples of `KNOT_PERIOD` [m]. At both ends,
-    the drive must be at rest for REACH periods.
+    The places (N,) are path parameters at multiples of `KNOT_PERIOD` [m]. At
+    both ends, the drive must be at rest for REACH of these periods.
     """
     return path_geometry.make_uniform_spline(positions[:, None], KNOT_PERIOD)
 
@@ -50,16 +50,17 @@ def find_speed_profile(
     The drive has piecewise constant acceleration. It is found by a forward and
     a backward pass over v^2.
 
-    Later, the positions of the drive at even times become the control points of
-    a quintic B-spline u(t). At each time, u' is a weighted mean of the drive's
-    speed, and u'' one of its acceleration, over at most REACH + 1 knot periods
-    before and after. A bound on the drive's acceleration is therefore a bound
-    on u'', too. A bound on its speed is a bound on u' only if the drive keeps
-    it for that long before and after, which `_early_and_late` ensures.
+    Later, the positions of the drive at evenly spaced times become the control
+    points of a quintic B-spline u(t). At each time, u' is a weighted mean of
+    the drive's speed, and u'' a weighted mean of its acceleration, over at most
+    REACH + 1 knot periods before and after. A limit on the drive's acceleration
+    therefore also limits u''. A limit on the drive's speed limits u' only if
+    the drive keeps this limit for REACH + 1 periods before and after, which
+    `_early_and_late` ensures.
 
     The path parameter u and the arc length differ by less than a percent. Since
-    |p'| <= 1, a bound on u' is also a bound on the speed. For the acceleration,
-    the term by which both differ is subtracted from the bound.
+    |p'| <= 1, a limit on u' also limits the speed. The acceleration differs
+    from u'' by a term that is subtracted from the limit.
     """
     u = np.linspace(0.0, path.end, max(2, int(np.ceil(path.end / _STEP)) + 1))
     jet = path.evaluate(u)
@@ -81,7 +82,7 @@ def find_speed_profile(
 
 
 def drive_positions(profile: SpeedProfile) -> np.ndarray:
-    """Returns the places of the fastest drive at each `KNOT_PERIOD` [m]."""
+    """Returns the fastest drive's path parameters at each `KNOT_PERIOD` [m]."""
     u, speed, _ = profile
     times = np.concatenate(
         [[0.0], np.cumsum(2 * np.diff(u) / (speed[1:] + speed[:-1]))]

@@ -28,7 +28,7 @@ _GRAVITY = 9.81
 
 
 class AxleRates(BaseModel):
-    """A rate, as of a spring, for each of the two axles."""
+    """A rate, for example of a spring, on each of the two axles."""
 
     model_config = ConfigDict(extra="forbid", frozen=True, strict=True)
 
@@ -37,7 +37,7 @@ class AxleRates(BaseModel):
 
 
 class SuspensionRates(BaseModel):
-    """Rates of springs, dampers and tyres.
+    """Rates (stiffness, damping) of springs, dampers, tyres and roll bars.
 
     Attributes:
         spring_rate: rate of one wheel's spring [N/m].
@@ -55,7 +55,7 @@ class SuspensionRates(BaseModel):
 
 
 def load_suspension_rates(path: Path) -> SuspensionRates:
-    """Returns the rates in a YAML file.
+    """Reads the rates of a suspension from a YAML file.
 
     Raises:
         InputError: the file cannot be used.
@@ -65,7 +65,7 @@ def load_suspension_rates(path: Path) -> SuspensionRates:
 
 @dataclass(frozen=True)
 class CarMasses:
-    """The masses of a car's body and W wheels, and where they are.
+    """The masses of a car's body and its W wheels, and their positions.
 
     Attributes:
         body: mass of the body [kg].
@@ -85,9 +85,10 @@ class CarMasses:
 
 
 def load_car_masses(vehicle: Path) -> CarMasses:
-    """Returns the masses in an SDF model.
+    """Reads the masses of a car from an SDF model.
 
-    Its floating base is the body, and a link on a joint along z is a wheel.
+    The floating base of the model is the car's body, and each link on a joint
+    along z is a wheel.
 
     Raises:
         RuntimeError: the model cannot be used.
@@ -122,16 +123,17 @@ class Suspension:
     """The linear full-car model of vehicle dynamics.
 
     The body heaves, rolls and pitches. Each wheel moves up and down between its
-    spring and its tyre. The coordinates are the heave of the body, upwards; its
-    roll and pitch about x and y of B (right side down, nose down); and the
-    heights of the wheels. All are relative to rest on a level road. The body
-    rotates about the point on the ground below its centre of mass, because the
-    source of the shipped rates has its roll axis at ground level. The model has
-    no anti-dive or anti-squat geometry.
+    spring and its tyre. The coordinates are the heave of the body, positive
+    upwards; its roll and pitch about x and y of B (positive with the right side
+    down and the nose down); and the heights of the wheels. All coordinates are
+    zero at rest on a level road. The body rotates about the point on the ground
+    below its centre of mass, because the source of the shipped rates has its
+    roll axis at ground level. The model has no anti-dive or anti-squat
+    geometry.
 
-    If g q is the stretch of a spring with the rate k at the coordinates q, the
-    stiffness matrix K is the sum of k g' g over all springs. The damping matrix
-    C is the corresponding sum over all dampers.
+    A spring with the rate k is stretched by g q at the coordinates q, where g
+    is a row vector. The stiffness matrix K is the sum of k g' g over all
+    springs, and the damping matrix C the corresponding sum over all dampers.
     """
 
     def __init__(self, masses: CarMasses, rates: SuspensionRates):
@@ -185,20 +187,21 @@ class Suspension:
         self._loads[NUM_COORDINATES:, count + 2] = -masses.wheels
 
     def at_rest(self, inputs: np.ndarray) -> np.ndarray:
-        """Returns the body's coordinates at rest, under inputs (W + 3,).
+        """Returns the body's heave, roll and pitch at rest, (3,) [m, rad].
 
-        The inputs are those of `respond`.
+        The inputs (W + 3,) are constant, and as in `respond`.
         """
         return rotated(inv(self._stiffness), rotated(self._loads, inputs))
 
     def respond(
         self, inputs: np.ndarray, step: float
     ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        """Returns the motion of the body, from rest under the first inputs.
+        """Returns the motion of the body, which starts at rest.
 
-        The solution is exact for inputs that change linearly within a step [s].
-        The inputs (N, W + 3) are heights of the road below the wheels [m], and
-        specific force along x, y, z of B minus its value at rest [m/s^2].
+        The inputs (N, W + 3), one row every `step` [s], are heights of the road
+        below the W wheels [m], and the specific force along x, y, z of B minus
+        its value at rest [m/s^2]. The body starts at rest under the first row.
+        The solution is exact for inputs that change linearly within a step.
 
         Returns:
             (N, 3) heave [m], roll and pitch [rad], and their first and second
@@ -261,7 +264,8 @@ def ride_on_springs(
 
     The vehicle follows the same path at the same speed. Its springs react to
     the acceleration of the body's centre of mass, to gravity on slopes, and to
-    the profile below each wheel, which falls to the right by the crossfall.
+    the road profile below each wheel. The road also falls to the right with the
+    slope `crossfall` [m/m].
     """
     masses = suspension.masses
     end = trajectory.duration + _AFTERWARDS

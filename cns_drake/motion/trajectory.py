@@ -21,8 +21,10 @@ class FrameMotion(NamedTuple):
     Attributes:
         R: (N, 3, 3) rotations R_EF.
         p: (N, 3) positions of F's origin in E [m].
-        w, v: (N, 3) angular and linear velocity, in E [rad/s, m/s].
-        alpha, a: (N, 3) angular and linear acceleration, in E [rad/s^2, m/s^2].
+        w, v: (N, 3) angular and linear velocity of F in E, expressed in E
+            [rad/s, m/s].
+        alpha, a: (N, 3) angular and linear acceleration of F in E, expressed in
+            E [rad/s^2, m/s^2].
     """
 
     R: np.ndarray
@@ -33,7 +35,7 @@ class FrameMotion(NamedTuple):
     a: np.ndarray
 
     def acceleration_at(self, p_FQ: np.ndarray) -> np.ndarray:
-        """Returns accelerations (N, 3) of a point Q fixed in F [m/s^2]."""
+        """Returns accelerations (N, 3) in E of a point Q fixed in F [m/s^2]."""
         r = rotated(self.R, p_FQ[None])
         return self.a + cross(self.alpha, r) + cross(self.w, cross(self.w, r))
 
@@ -83,8 +85,8 @@ class RideMoments(NamedTuple):
 class BodyRide:
     """The motion X_FB(t) of a body B relative to the frame F of its path.
 
-    At rest on a level road, B equals F. Heave, roll and pitch and two of their
-    derivatives are given at evenly spaced times. In between they are
+    At rest on a level road, B equals F. Heave, roll and pitch and their first
+    and second derivatives are given at evenly spaced times. In between they are
     polynomials of degree 5, so that accelerations have no jumps. The body
     rotates about a point on the ground, by its pitch and then by its roll.
     """
@@ -176,11 +178,12 @@ _UP = np.array([[0.0, 0.0, 1.0]])
 
 
 class Moments(NamedTuple):
-    """The state of the path at N times, from which all motion is computed.
+    """The state of a drive at N times, from which all motion is computed.
 
-    `u` are the path parameters (N,); `rate` and `acceleration` are their
-    derivatives [1/s, 1/s^2]; `jet` is the path at these parameters. `ride` is
-    the motion of the body relative to the path; None if the vehicle is rigid.
+    `u` contains the path parameters (N,) [m]; `rate` and `acceleration` are
+    their first and second time derivatives [m/s, m/s^2]; `jet` is the path at
+    these parameters. `ride` is the motion of the body relative to the path;
+    None if the vehicle is rigid.
     """
 
     u: np.ndarray
@@ -194,10 +197,11 @@ class Trajectory:
     """The motion X_WB(t) of a vehicle along a lane path.
 
     F is the frame of the path: its origin on the ground follows the path, with
-    x along the tangent, and y horizontal to the left. On a slope, the pitch
-    follows the road; there is no roll. The vehicle frame B equals F, unless a
-    ride on springs moves it relative to F. The motion is exact: derivatives are
-    those of the splines, not of samples. It starts and ends at rest.
+    x along the tangent, and y horizontal to the left. On a slope, F pitches
+    with the road; F never rolls. The vehicle frame B equals F, unless the body
+    moves on springs relative to F. Velocities and accelerations are exact
+    derivatives of splines, and not differences of samples. The motion starts
+    and ends at rest.
     """
 
     def __init__(self, lane_path: LanePath, speeds: Speeds):
@@ -219,7 +223,7 @@ class Trajectory:
     def with_positions(self, positions: np.ndarray) -> Trajectory:
         """Returns a drive along the same path with another timing.
 
-        For the positions, see `make_time_scaling`.
+        `make_time_scaling` describes the positions.
         """
         drive = copy.copy(self)
         drive._time_scaling = path_geometry.SplineDerivatives(
@@ -249,7 +253,7 @@ class Trajectory:
         return [value[:, 0] for value in values]
 
     def at(self, t: ArrayLike) -> Moments:
-        """Returns the state of the path at times (N,)."""
+        """Returns the state of the drive at times (N,) [s]."""
         u, rate, acceleration = self.path_parameter(t)
         ride = None if self._ride is None else self._ride.at(t)
         return Moments(u, rate, acceleration, self.path.evaluate(u), ride)
@@ -289,7 +293,7 @@ class Trajectory:
 
 
 def pose_at(moments: Moments, row: int = 0) -> RigidTransform:
-    """Returns X_WB at one of several times, given by its row."""
+    """Returns X_WB at one of the N times, given the number of its row."""
     jet = moments.jet
     X_WF = RigidTransform(
         RollPitchYaw(0.0, -jet.climb[row], jet.yaw[row]), jet.p[row]

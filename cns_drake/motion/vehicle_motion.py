@@ -44,19 +44,20 @@ class JointMotion(NamedTuple):
 
 
 class WheelMotion:
-    """Steering, rolling and travel of one wheel that does not slip.
+    """Steering, rolling and suspension travel of a wheel without slip.
 
     The wheel's centre is at p_BC = (x, y, r) in the vehicle frame, where r is
-    its radius. Let s be the path speed, m the turn rate about the vehicle's z,
-    and d the steering angle (all per path parameter). The ground below the
-    wheel then passes with the velocity (s - m y, m x). Therefore tan(d) = m x /
-    (s - m y), so that a wheel on the rear axle (x = 0) needs no steering. The
-    wheel rolls by the length of that vector divided by r.
+    its radius. Let s be the speed and m the turn rate about the vehicle's z
+    axis, both with respect to the path parameter. The ground below the wheel
+    then moves relative to the vehicle with a velocity of direction (s - m y, m
+    x). The steering angle d is therefore given by tan(d) = m x / (s - m y), so
+    that a wheel on the rear axle (x = 0) is not steered. The rolling rate is
+    the length of this vector divided by r.
 
-    While a ride moves the body, the wheel stays on the drawn ground: it moves
-    up relative to the body by as much as the body comes down there. This is
-    exact for small angles, and within a millimetre for 3 degrees. Steering and
-    rolling are the same as without a ride.
+    While the body moves on its springs, the wheel stays on the road's surface
+    in the world: relative to the body, it moves up by as much as the body moves
+    down at the wheel. This is exact for small angles, and within a millimetre
+    for 3 degrees. Steering and rolling do not depend on the motion on springs.
     """
 
     def __init__(self, trajectory: Trajectory, p_BC: np.ndarray):
@@ -99,7 +100,7 @@ class WheelMotion:
         )
 
     def travel(self, moments: Moments) -> JointMotion:
-        """Returns how far the wheel has moved up in the body at N times [m]."""
+        """Returns the upward travel of the wheel in the body at N times [m]."""
         ride = moments.ride
         if ride is None:
             still = np.zeros_like(moments.u)
@@ -138,14 +139,14 @@ class _State(NamedTuple):
 class VehicleMotion(LeafSystem):
     """A system that moves a vehicle along a trajectory, wheels included.
 
-    It has the kinematic output ports of a MultibodyPlant. It can feed sensors
-    and a SceneGraph in place of a plant, which has no port for prescribed
-    motion.
+    It has the kinematic output ports of a MultibodyPlant and can replace a
+    plant as input of sensors and a SceneGraph, since a plant cannot have a
+    prescribed motion.
 
     The vehicle's floating base B follows the trajectory. Revolute joints about
-    B's y roll, and those about B's z steer, so that no wheel slips. Prismatic
-    joints along B's z keep their wheels on the ground. All other joints keep
-    their default positions.
+    the y axis of B roll the wheels and revolute joints about z steer them, so
+    that no wheel slips. Prismatic joints along z of B keep their wheels on the
+    ground. All other joints keep their default positions.
 
     .. pydrake_system::
 
@@ -156,8 +157,9 @@ class VehicleMotion(LeafSystem):
         - body_spatial_velocities
         - body_spatial_accelerations
 
-    `position` is the plant's q; the others are lists over its bodies of X_WB,
-    V_WB and A_WB, expressed in W. All depend on time only.
+    `position` is the plant's q. The three other outputs are lists, over the
+    plant's bodies B, of X_WB, V_WB and A_WB, expressed in W. All outputs depend
+    only on time.
 
     Example:
         from cns_drake import VehicleMotion
@@ -308,7 +310,7 @@ class VehicleMotion(LeafSystem):
 class Sweep(NamedTuple):
     """Poses of a frame P in W at N times.
 
-    They are rotations (N, 3, 3) and positions (N, 3) [m].
+    The poses are given as rotations (N, 3, 3) and positions (N, 3) [m].
     """
 
     R_WPset: np.ndarray
@@ -323,7 +325,7 @@ class Sweep(NamedTuple):
 
 
 class VehicleSweep(LeafSystem):
-    """A system that returns poses of a vehicle shortly after the present time.
+    """A system that returns poses of a vehicle just after the current time.
 
     A LiDAR keeps turning during a frame. Its output at a time needs poses at
     later times, which the SceneGraph does not have.
@@ -334,8 +336,9 @@ class VehicleSweep(LeafSystem):
         output_ports:
         - sweep
 
-    `sweep` is abstract: a `Sweep` of the vehicle frame B at the present time
-    plus each offset. After the end of the trajectory, B rests there.
+    `sweep` is abstract: a `Sweep` of the vehicle frame B at the current time
+    plus each of the given offsets. After the end of the trajectory, B stays at
+    its last pose.
     """
 
     def __init__(self, trajectory: Trajectory, offsets: np.ndarray):

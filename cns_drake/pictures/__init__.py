@@ -1,1 +1,1 @@
-"""Draws pictures of stages, and web pages of drives."""
+"""Pictures of a map's stages, and web pages of drives."""

@@ -1,4 +1,4 @@
-"""The static structures of a stage, and how they differ from another stage."""
+"""The static structures of a stage, and their differences to another stage."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
@@ -22,7 +22,7 @@ _HEIGHT_TOLERANCE = 0.5
 class Part:
     """A part of a structure that has one colour.
 
-    The colour is sRGB, each value from 0 to 1; the surface is in W.
+    The colour is sRGB, each value from 0 to 1; the surface is expressed in W.
     """
 
     semantic_class: str
@@ -36,15 +36,15 @@ class Part:
 
 @dataclass(frozen=True)
 class StageDifference:
-    """The differences between a stage and another one.
+    """The differences between two stages: "this stage" and "the other stage".
 
     Attributes:
-        common: parts of this stage that the other one has as well.
-        additional: structures of this stage that the other one lacks, and parts
-            of structures above their height in the other one.
-        absent: structures of the other stage that this one lacks.
-        lower: parts of structures of the other stage above their height in this
-            one.
+        common: parts of structures that exist in both stages.
+        additional: structures that exist only in this stage, and the upper
+            parts of structures that are lower in the other stage.
+        absent: structures that exist only in the other stage.
+        lower: the upper parts, in the other stage, of structures that are lower
+            in this stage.
     """
 
     common: list[Part] = field(default_factory=list)
@@ -86,10 +86,11 @@ def read_parts(world: World) -> dict[str, list[Part]]:
 def compare_parts(
     own: Mapping[str, Sequence[Part]], other: Mapping[str, Sequence[Part]]
 ) -> StageDifference:
-    """Returns how a stage differs from another one, structure by structure.
+    """Returns the difference between two stages, structure by structure.
 
-    A structure that was moved, or has another shape of the same height, is
-    common to both.
+    `own` contains the parts of this stage, and `other` those of the other
+    stage. A structure that was moved, or has another shape of the same height,
+    counts as common to both stages.
     """
     difference = StageDifference()
     for name, parts in own.items():

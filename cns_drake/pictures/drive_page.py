@@ -1,4 +1,4 @@
-"""Makes one web page of a drive through a city, which needs no server."""
+"""Makes a web page of a drive through a city, which needs no server."""
 
 from __future__ import annotations
 
@@ -88,9 +88,9 @@ class DriveRecord:
         specific_forces_I: specific force in the IMU's frame I [m/s^2].
         angular_velocities_I: angular velocity w_WI_I [rad/s].
         num_points: number of points in each scan as measured.
-        limbs: leading frame F -> the poses in F of all frames that move
-            together with it, including F itself.
-        names: leading frame -> its name in the page.
+        limbs: leading frame F of an object -> frame -> its constant pose in F,
+            for F itself and all frames that move together with F.
+        names: leading frame -> name of the object in the page.
         images: camera -> frame index and JPEG of each image to show.
     """
 
@@ -111,11 +111,12 @@ class DriveRecord:
 
 @dataclass(frozen=True)
 class ShownStages:
-    """The stage of a drive and other stages, as the page shows them.
+    """The stages that the page of a drive shows.
 
-    The page shows the difference to the stage `other`, if any. If the drive is
-    in a stage of a map, `stage` is the name of this stage, and `stages` are the
-    names of all stages of the map, the earliest first.
+    If `other` is given, the page shows the difference between the stage of the
+    drive and this other stage. If the drive is in a stage of a map, `stage` is
+    the name of this stage, and `stages` are the names of all stages of the map,
+    the earliest first.
     """
 
     other: World | None = None
@@ -140,15 +141,17 @@ def make_drive_page(
     - `/city/<class>`: the structures of the stage in their own colours,
     - `/vehicle/<body>`, `/moving/<body>`: the moving bodies,
     - `/route`: a ribbon from red (start) to blue (end),
-    - `/scans/<k>`: LiDAR points coloured by height, as soon as measured,
-    - `/stage_difference/additional/<class>`: parts of the city that the other
-      stage lacks or has lower; they are not in `/city`,
-    - `/stage_difference/absent/<class>`: structures of the other stage that
-      this one lacks, translucent red, off when the page opens,
-    - `/stage_difference/lower/<class>`: parts of the other stage above their
-      height here, translucent orange, off when the page opens.
+    - `/scans/<k>`: LiDAR points coloured by height; each appears when it was
+      measured,
+    - `/stage_difference/additional/<class>`: parts of the city that are missing
+      or lower in the other stage; they are not in `/city`,
+    - `/stage_difference/absent/<class>`: structures that exist only in the
+      other stage, translucent red, off when the page opens,
+    - `/stage_difference/lower/<class>`: upper parts, in the other stage, of
+      structures that are lower in this stage, translucent orange, off when the
+      page opens.
 
-    A panel shows the title, the stage and the switches, which also are the
+    A panel shows the title, the stage and the switches, which are also the
     legend. The switches let the camera follow the car, hide layers, and show
     the change (additional parts in violet). Other panels show the images of
     cameras. Below the time line are plots of the speed and the IMU. On a phone,
@@ -175,8 +178,8 @@ def make_panel(
 ) -> str:
     """Returns the HTML of the page's title, switches, legend and plots.
 
-    `changes` are the kinds of change in the page, for which the legend has the
-    colours of `CHANGE_RGB`.
+    `changes` contains the kinds of change that the page shows: keys of
+    `CHANGE_RGB`, whose colours the legend explains.
     """
     # Only pages need templates, and the import takes a moment.
     from jinja2 import Environment, StrictUndefined
@@ -229,10 +232,10 @@ class Plot:
     Attributes:
         name: title of the plot.
         unit: a key of `_LEAST_RANGE`.
-        values: values to display, evenly spread over the drive, as text.
-        points: the curve as SVG has it.
-        ticks: texts on the scale, and their places as shares of the height from
-            the top.
+        values: values to display as text, at evenly spaced times of the drive.
+        points: the points of the curve, in the format of SVG.
+        ticks: labels of the scale, and their positions from the top, as shares
+            of the height.
     """
 
     name: str
@@ -304,7 +307,7 @@ def _shown_points(drive: DriveRecord) -> str:
 def motion_plots(drive: DriveRecord) -> list[Plot]:
     """Returns the plots of the speed and the IMU.
 
-    A drive of less than two frames has no plots.
+    A drive with fewer than two frames has no plots.
     """
     if len(drive.speeds) < 2:
         return []
@@ -440,7 +443,7 @@ def _hex(rgb: Rgb | np.ndarray) -> str:
 
 
 class MeshcatRecorder(LeafSystem):
-    """A system that records a drive and saves it as a page.
+    """A system that records a drive and saves it as a web page.
 
     See `make_drive_page` for the page.
 
@@ -528,8 +531,9 @@ class MeshcatRecorder(LeafSystem):
     def show_too(self, name: str, frames: Sequence[FrameId]) -> None:
         """Adds a moving object, with a unique name, to the page.
 
-        The first of its frames leads: the others keep the poses relative to it
-        that they have at the first frame of the drive.
+        The first of the object's geometry frames is its leading frame. All
+        others keep the poses relative to it that they have at the start of the
+        drive.
         """
         leading = frames[0]
         self.drive.X_WFs[leading] = []
@@ -537,7 +541,7 @@ class MeshcatRecorder(LeafSystem):
         self.drive.limbs[leading] = dict.fromkeys(frames, RigidTransform())
 
     def save(self, path: Path, *, title: str = "cns-drake") -> None:
-        """Writes the page of the drive so far.
+        """Writes the web page of the drive as recorded so far.
 
         Raises:
             InputError: if the file cannot be written.

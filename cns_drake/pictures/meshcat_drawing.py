@@ -1,4 +1,4 @@
-"""Draws a city by day, a route and scans into a Meshcat scene."""
+"""Draws a city in daylight, a route and scans into a Meshcat scene."""
 
 from collections.abc import Iterable, Sequence
 
@@ -134,7 +134,7 @@ def height_rgb(z: np.ndarray) -> np.ndarray:
 def draw_points(meshcat: Meshcat, path: str, p_WRset: np.ndarray) -> None:
     """Draws points (N, 3) in W [m], coloured by height.
 
-    They have the same size on the screen, near and far.
+    All points have the same size on the screen, whatever their distance.
     """
     cloud = PointCloud(len(p_WRset), Fields(BaseField.kXYZs | BaseField.kRGBs))
     cloud.mutable_xyzs()[:] = _on_grid(p_WRset).T
@@ -146,7 +146,7 @@ def draw_points(meshcat: Meshcat, path: str, p_WRset: np.ndarray) -> None:
 
 
 def set_view(meshcat: Meshcat, lower: np.ndarray, upper: np.ndarray) -> None:
-    """Lights a scene as by day, and views it from the air and the south.
+    """Lights a scene as in daylight; sets a view from the south and above.
 
     The view covers the coordinates from `lower` (3,) to `upper` (3,) [m].
     """

@@ -1,4 +1,4 @@
-"""Draws pictures of a map: a view of its stages, and its drives from above."""
+"""Draws pictures of a map: its stages in one view, its drives from above."""
 
 from collections.abc import Mapping
 from pathlib import Path
@@ -37,7 +37,7 @@ _PANEL_INCHES = 4.0
 
 
 def load_views(path: Path) -> dict[str, View]:
-    """Returns the views in a file, by name.
+    """Returns name -> view, from a YAML file.
 
     Raises:
         InputError: the file is missing or not a mapping of views.
@@ -50,11 +50,11 @@ def load_views(path: Path) -> dict[str, View]:
 
 
 def draw_stages(stages: dict[str, Path], view: View, path: Path) -> None:
-    """Draws a view of stages side by side, above the scans taken there.
+    """Draws stages side by side as seen in a view, with a scan of each below.
 
-    `stages` maps titles to worlds, from left to right. The LiDAR stands below
+    `stages` maps titles to SDF files, from left to right. The LiDAR is below
     the camera; its points are drawn as the camera sees them, coloured by
-    distance. The ending of the path gives the format.
+    distance. The ending of `path` sets the format of the picture.
 
     Raises:
         InputError: a world cannot be loaded, or the picture cannot be written.
@@ -85,8 +85,8 @@ def draw_drives(scenarios: Mapping[str, Scenario], path: Path) -> None:
     """Draws drives side by side, seen from above, with north up.
 
     `scenarios` maps titles to drives. All panels show the same part of the
-    world, so that they can be compared. The ending of the path gives the
-    format.
+    world, so that they can be compared. The ending of `path` sets the format of
+    the picture.
 
     Raises:
         InputError: a drive cannot be planned, a world cannot be loaded, or the

@@ -1,6 +1,6 @@
-"""A stage of a city, to be photographed and scanned.
+"""A stage of a city, of which images and scans can be made.
 
-Photographs are made by casting rays, without a GPU or a display.
+Images are rendered by casting rays, without a GPU or a display.
 """
 
 from __future__ import annotations
@@ -36,11 +36,11 @@ _DEFAULT_RGB = (0.7, 0.7, 0.7)
 
 
 class View(BaseModel):
-    """A camera.
+    """The position and direction of a camera.
 
     Attributes:
         position: position of the camera in W [m].
-        target: point in W in the middle of the picture [m].
+        target: point in W that is in the centre of the picture [m].
         fov_y: vertical field of view [deg].
     """
 
@@ -63,10 +63,10 @@ class View(BaseModel):
     def project(
         self, p_WQset: np.ndarray, width: int, height: int
     ) -> tuple[np.ndarray, np.ndarray]:
-        """Returns pixels (M, 2) of the visible points, and their indices (M,).
+        """Returns pixels (M, 2) of the visible points, and their indices.
 
-        The points (N, 3) are in W [m]; width and height of the picture are in
-        pixels.
+        The points (N, 3) are in W [m]; the indices are (M,). Width and height
+        of the picture are in pixels.
         """
         scale = height / 2 / np.tan(np.deg2rad(self.fov_y) / 2)
         p_C = (self.pose().inverse() @ p_WQset.T).T
@@ -78,7 +78,7 @@ class View(BaseModel):
 
 
 class StageScene:
-    """The geometry of a stage, ready for pictures; `scene` is for scans."""
+    """The geometry of a stage, for pictures; rays can be cast on `scene`."""
 
     def __init__(self, path: Path, without: Collection[str] = ()):
         """Loads an SDF world.
@@ -103,7 +103,7 @@ class StageScene:
         height: int,
         haze_length: float = HAZE_LENGTH,
     ) -> np.ndarray:
-        """Returns a rendered picture (height, width, 3)."""
+        """Returns a rendered picture (height, width, 3) uint8 of a view."""
         return render(
             self.scene,
             self._geometries,
@@ -116,7 +116,7 @@ class StageScene:
 
 
 def look_at(p_WC: ArrayLike, p_WT: ArrayLike) -> RigidTransform:
-    """Returns X_WC of an upright camera at C that looks at T.
+    """Returns the pose X_WC of an upright camera at C that looks at T.
 
     The camera frame is x forward, y left, z up.
     """
@@ -145,11 +145,11 @@ def render(
     """Returns an image of a scene with sun, shadows, sky light and haze.
 
     Args:
-        scene: the scene of the geometries, for rays.
-        geometries: what is drawn, with colours.
+        scene: scene with the same geometries, on which rays are cast.
+        geometries: the geometries of the scene, with their colours.
         X_WC: pose of the camera: x forward, y left, z up.
         width, height: size of the image in pixels.
-        fov_y_deg: vertical field of view.
+        fov_y_deg: vertical field of view [deg].
         samples: number of rays per pixel along each axis.
         haze_length: distance at which haze has removed two thirds of the
             contrast [m]; infinite for clear air.

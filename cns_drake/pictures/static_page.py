@@ -56,17 +56,17 @@ _QUEUE = """
 def make_static_page(
     meshcat: Meshcat, title: str, *, body: str = "", script: str = ""
 ) -> str:
-    """Returns the scene as the HTML of a page that needs no server.
+    """Returns a Meshcat scene as a web page that needs no server.
 
-    It is Drake's page with compressed commands, so that a city takes a third of
-    the space. Browsers since 2023 can decompress them.
+    It is the page that Drake makes, but with compressed commands, so that a
+    city takes a third of the space. Browsers can decompress them since 2023.
 
     Args:
         meshcat: the server with the scene.
         title: title of the page, plain text.
-        body: HTML before the scene, which is visible while the scene loads.
+        body: HTML that precedes the scene and is visible while the scene loads.
         script: JavaScript module that runs when the page is ready. In it,
-            `commands` is a promise of the scene.
+            `commands` is a JavaScript promise of the scene's commands.
     """
     html = meshcat.StaticHtml()
     first = _COMMAND.search(html)
@@ -113,9 +113,10 @@ def save_meshcat_page(
 def filter_rows(data: bytes) -> bytes:
     """Returns bytes rearranged so that they compress better.
 
-    Each byte is replaced by its difference from the byte in the row before.
-    Then come all first bytes of rows, all second ones, and so on. The last row
-    is filled up with zeros.
+    The bytes are taken as rows of equal length; the last row is padded with
+    zeros. Each byte is replaced by its difference from the byte above. The
+    result contains the first bytes of all rows, then the second bytes, and so
+    on.
     """
     padded = np.frombuffer(data + bytes(-len(data) % _ROW), np.uint8)
     rows = padded.reshape(-1, _ROW)

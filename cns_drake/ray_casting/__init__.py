@@ -1,1 +1,1 @@
-"""Ray casting on SceneGraph's geometry."""
+"""Ray casting on the geometry of a SceneGraph."""

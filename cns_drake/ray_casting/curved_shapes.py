@@ -1,8 +1,8 @@
 """Polyhedra around curved shapes, and capsules in closed form.
 
-A ray that misses the polyhedron around a shape misses the shape as well, unless
-it starts between the two. Casting on the polyhedra first leaves few rays to be
-cast on the shapes themselves.
+A ray that misses the polyhedron around a shape also misses the shape, unless
+the ray starts between polyhedron and shape. Rays are therefore cast on the
+polyhedra first, and only the few that hit are cast on the shapes themselves.
 
 Rays that run along the axis of a capsule are cast in closed form, because
 Embree's rounded segments lose most rays within 1e-3 rad of their axis. Only
@@ -46,7 +46,8 @@ _SAME = 1e-4
 def circumscribe(surface: CurvedSurface) -> TriangleSurface:
     """Returns a polyhedron that contains a curved shape.
 
-    The polyhedron lies within 1.1 radii + 2 mm of the shape's axis or centre.
+    No point of the polyhedron is farther than 1.1 radii + 2 mm from the shape's
+    axis or centre.
     """
     # The faces of an inscribed ball are nearest to its centre at the equator.
     side = np.cos(np.pi / _SIDES)
@@ -62,7 +63,7 @@ def circumscribe(surface: CurvedSurface) -> TriangleSurface:
 
 
 class NearCurvedShapes:
-    """Finds rays that start near curved shapes of groups that never move."""
+    """Finds rays that start near the curved shapes of fixed groups."""
 
     def __init__(self, groups: Sequence[RayGroup]):
         """Takes the curved shapes of groups; the groups must have poses."""
@@ -104,9 +105,9 @@ class NearCurvedShapes:
         )
 
     def contain(self, p_OSset: np.ndarray) -> np.ndarray:
-        """Returns which of K places lie in a polyhedron, (K,) bool.
+        """Returns which of K points lie in a polyhedron around a shape.
 
-        The places are (K, 3) [m].
+        The points are (K, 3) [m] in O; the result is (K,) bool.
         """
         result = np.zeros(len(p_OSset), bool)
         _find_near(self._near, p_OSset, result)
@@ -162,7 +163,7 @@ def _find_near(near: _Sorted, p_OSset: np.ndarray, result: np.ndarray) -> None:
 
 
 class CapsuleAxes:
-    """The capsules of groups, to cast rays along their axes."""
+    """Casts rays along the axes of the capsules of groups."""
 
     def __init__(self, groups: Sequence[RayGroup]):
         """Takes groups; the groups must have poses."""
@@ -188,7 +189,7 @@ class CapsuleAxes:
         )
 
     def place(self, placed: Placed) -> None:
-        """Moves the capsules' groups to their present places."""
+        """Moves the groups with capsules to their current poses."""
         self._X_OLs[placed.rows] = placed.X_OLs
         self._is_still[placed.rows] = placed.in_sight & ~placed.moves
 

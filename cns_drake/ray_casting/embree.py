@@ -1,6 +1,6 @@
-"""The part of Embree's C interface that casting rays needs.
+"""The functions of Embree's C interface that ray casting needs.
 
-Embree comes as the shared object inside the `embreex` wheel.
+Embree is the shared library in the `embreex` wheel.
 
 Formats and values of the C interface: Embree 4 manual,
 https://github.com/RenderKit/embree, headers `rtcore_*.h`.
@@ -42,7 +42,7 @@ _PACKET_TYPE = types.FunctionType(
 
 
 class IntersectArguments(ctypes.Structure):
-    """RTCIntersectArguments."""
+    """Embree's C struct RTCIntersectArguments."""
 
     _fields_ = (
         ("flags", ctypes.c_uint),
@@ -55,7 +55,7 @@ class IntersectArguments(ctypes.Structure):
 
 @lru_cache(maxsize=1)
 def load() -> ctypes.CDLL:
-    """Returns Embree's C interface with typed signatures."""
+    """Loads Embree; returns its C interface with typed signatures."""
     package = importlib.util.find_spec("embreex")
     assert package is not None
     assert package.origin is not None
@@ -104,9 +104,9 @@ def load() -> ctypes.CDLL:
 class PacketFunction(types.WrapperAddressProtocol):
     """A C function that casts a packet of rays, for compiled code.
 
-    It takes the addresses of the mask of lanes, of the scene, of the packet and
-    of the arguments. Unlike a ctypes function, it can be an argument of a
-    compiled function whose machine code numba keeps on disk.
+    The function takes four addresses: those of the mask of active rays, the
+    scene, the packet and the arguments. Unlike a ctypes function, it can be an
+    argument of a compiled function whose machine code numba keeps on disk.
     """
 
     def __init__(self, function: object):
@@ -131,9 +131,8 @@ def native_packet(
 ) -> tuple[int, PacketFunction]:
     """Returns the number of rays in a packet, and the function that casts it.
 
-    The packet is the largest that fills the processor's vectors, such as 16
-    rays with AVX-512 and 8 with AVX2: Embree casts the rays of a larger one
-    one by one.
+    The number is that of the processor's vector units, such as 16 with AVX-512
+    and 8 with AVX2. In a larger packet, Embree would cast the rays one by one.
     """
     lanes = 4
     for more, supported in _NATIVE_PACKETS:

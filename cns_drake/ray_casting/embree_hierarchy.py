@@ -4,11 +4,11 @@ Curved shapes are not tessellated: Embree intersects spheres, cones, discs and
 rounded segments exactly (in float32), and an ellipsoid is an instance of the
 unit sphere. A curved shape in a scene slows down all rays of the scene by a
 third (measured), even rays that meet only triangles. Curved shapes that never
-move are therefore in a second hierarchy. Polyhedra around them in the first
-hierarchy select the few rays to cast on the second. Curved shapes that move are
-instances, which few rays enter; they are in the first hierarchy directly.
-Embree loses rays along the axis of a rounded segment, which are therefore cast
-in closed form (`CapsuleAxes`).
+move are therefore in a second hierarchy. The first hierarchy contains polyhedra
+around these shapes; only the few rays that hit a polyhedron are cast on the
+second hierarchy. Curved shapes that move are in the first hierarchy themselves,
+as instances, which few rays enter. Embree loses rays along the axis of a
+rounded segment, which are therefore cast in closed form (`CapsuleAxes`).
 """
 
 from __future__ import annotations
@@ -59,8 +59,9 @@ _MOST_PIECES = 1000
 class Primitives(NamedTuple):
     """The data of one Embree geometry, and its type number in Embree.
 
-    Buffers are (slot, format, array) each. `owners` has the (P,) int32 number
-    of each primitive's member in its group, and `mask` is `SOLID` or `PROXY`.
+    Each buffer is (slot, format, array). `owners` contains for each primitive,
+    (P,) int32, the number of its member in the group. `mask` is `SOLID`, or
+    `PROXY` for polyhedra around curved shapes.
     """
 
     kind: int
@@ -96,9 +97,10 @@ def merge_first(group: RayGroup) -> Iterator[Primitives]:
 
 
 def merge_second(group: RayGroup) -> Iterator[Primitives]:
-    """Yields the primitives that only few rays need: fixed curved shapes.
+    """Yields the primitives on which only few rays are cast.
 
-    `merge_first` yields polyhedra that contain these shapes.
+    These are the curved shapes of groups that cannot move. `merge_first` yields
+    polyhedra that contain them.
     """
     if group.frame_id is None:
         yield from merge_curved(_numbered(group))
@@ -127,7 +129,7 @@ def _as_primitives(
 
 
 def merge_curved(members: Sequence[Member]) -> Iterator[Primitives]:
-    """Yields one geometry for each kind of curved primitive.
+    """Yields one Embree geometry for each kind of curved shape in a group.
 
     Embree intersects spheres, cones, discs and rounded segments exactly (in
     single precision).
@@ -252,10 +254,10 @@ class _Tree(NamedTuple):
 class EmbreeHierarchy:
     """A bounding volume hierarchy over the primitives of groups.
 
-    Rays are cast in packets marked as coherent, which makes a LiDAR's
-    neighbouring beams cheap. Scenes are built robust, so that no ray passes
-    through an edge that two triangles share. `rows` contains the rows of the
-    groups whose primitives are in the hierarchy.
+    Rays are cast in packets marked as coherent, which is fast for neighbouring
+    beams of a LiDAR. Embree's robust mode is on, so that no ray passes through
+    an edge that two triangles share. `rows` contains the rows of the groups
+    whose primitives are in the hierarchy.
     """
 
     def __init__(
@@ -341,9 +343,9 @@ class EmbreeHierarchy:
         )
 
     def place(self, placed: Placed) -> None:
-        """Moves instances in sight to their places, and disables the others.
+        """Moves instances in sight to their poses, and disables all others.
 
-        Fewer instances are faster to build and to cast on.
+        Fewer instances are faster to build and to cast rays on.
         """
         lib = self._lib
         places = np.ascontiguousarray(placed.X_OLs, np.float32)
@@ -445,7 +447,7 @@ class EmbreeHierarchy:
 
 
 class EmbreeScene:
-    """A bounding volume hierarchy over groups; see `RayCastingScene`."""
+    """Casts rays on groups of geometry with Embree; see `RayCastingScene`."""
 
     def __init__(
         self,
@@ -473,7 +475,7 @@ class EmbreeScene:
         self._axes = CapsuleAxes(groups)
 
     def place(self, placed: Placed) -> None:
-        """Moves all groups to their present places."""
+        """Moves all groups to their current poses."""
         self._first.place(placed)
         self._axes.place(placed)
 

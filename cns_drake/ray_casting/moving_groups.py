@@ -1,4 +1,4 @@
-"""Groups that move, and the choice of groups whose poses must be updated."""
+"""Groups of geometry that move, and which of their poses to update."""
 
 from __future__ import annotations
 
@@ -14,9 +14,9 @@ from cns_drake.scene import surfaces
 
 
 class KnownPoses(NamedTuple):
-    """Poses X_WF (M, 4, 4) of M frames, and the row of each frame.
+    """Poses X_WF (M, 4, 4) of M frames F, and `rows`: frame -> row.
 
-    The mapping `rows` is always the same object.
+    All KnownPoses of a simulation share one object `rows`.
     """
 
     rows: Mapping[FrameId, int]
@@ -30,7 +30,7 @@ class KnownPoses(NamedTuple):
     def find(
         self, frame: FrameId, calc_X_WF: Callable[[FrameId], RigidTransform]
     ) -> RigidTransform:
-        """Returns the pose of a frame, computed only if it is not stored."""
+        """Returns the stored pose of a frame; computes it if not stored."""
         row = self.rows.get(frame)
         if row is None:
             return calc_X_WF(frame)
@@ -61,7 +61,7 @@ class Placed(NamedTuple):
 
     @classmethod
     def of(cls, groups: Sequence[RayGroup], rows: Sequence[int]) -> Placed:
-        """Returns groups with their present poses."""
+        """Returns groups with their current poses."""
         chosen = [groups[row] for row in rows]
         return cls(
             np.array(rows, int),
@@ -122,8 +122,9 @@ class MovingGroups:
         """Updates the poses, motions and visibility of moving groups.
 
         Sets `X_OL`, `motion` and `in_sight` of each group, except of groups
-        whose frames have not moved. Groups beyond the ball `seen` are out of
-        sight and keep their poses. Known poses replace calls of `calc_X_WF`.
+        whose frames have not moved. Groups outside the ball `seen` are marked
+        as out of sight and keep their old poses. Poses are taken from `known`,
+        where it has them, instead of calling `calc_X_WF`.
 
         Returns:
             The groups whose poses were updated.

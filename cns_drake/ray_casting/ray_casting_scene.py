@@ -1,4 +1,4 @@
-"""Casting rays on a SceneGraph's geometry."""
+"""Ray casting on a SceneGraph's geometry."""
 
 from __future__ import annotations
 
@@ -33,8 +33,9 @@ class RayHits:
         geometry: (N,) int32 index into the scene's geometries, -1 for a miss.
         normals_W: (N, 3) float32 unit normal in the world, facing the ray's
             origin, zero for a miss; (N, 0) unless requested.
-        is_outside: (N,) whether the ray met the outside of a surface, by its
-            winding; (0,) unless normals are requested.
+        is_outside: (N,) bool, whether the ray hit the outside of a surface,
+            according to the winding of its triangles; (0,) unless normals are
+            requested.
     """
 
     ranges: np.ndarray
@@ -44,16 +45,16 @@ class RayHits:
 
 
 class RayCastingScene:
-    """A bounding volume hierarchy over geometry.
+    """Geometry on which rays can be cast, in a bounding volume hierarchy.
 
     Geometry on frames that never move is merged, in world coordinates. The
-    geometry of every other frame is an instance, which `set_frame_poses`
-    places. Half spaces are planes in closed form.
+    geometry of every other frame is an instance, which `set_frame_poses` moves.
+    Rays on half spaces are computed in closed form.
 
     Coordinates are relative to a point O in the middle of the merged geometry,
-    so that float32 resolves 1e-5 m within 200 m of it, for any origin of the
-    world. If the sensor is more than 1 km from that point, O is near the sensor
-    instead.
+    so that float32 resolves 1e-5 m within 200 m of O, wherever the world's
+    origin is. If the sensor is more than 1 km from that middle, O is near the
+    sensor instead.
     """
 
     def __init__(
@@ -99,7 +100,7 @@ class RayCastingScene:
             self._group_of[[index for index, *_ in group.members]] = row
 
     def serves(self, p_WS: np.ndarray) -> bool:
-        """Returns whether ranges are precise for a sensor at p_WS [m]."""
+        """Returns whether ranges are precise for a sensor at p_WS (3,) [m]."""
         return serves(self._p_WO, self._groups, p_WS)
 
     def set_frame_poses(
@@ -112,11 +113,12 @@ class RayCastingScene:
         """Moves the geometry of the frames that are not anchored.
 
         Args:
-            calc_X_WF: returns the pose of a frame.
+            calc_X_WF: function that returns the pose of a frame in the world.
             motions: motions of frames that move during the turn.
-            known: poses to use instead of calls of `calc_X_WF`.
-            seen: ball outside of which no ray reaches, so that geometry there
-                need not move.
+            known: poses that are used, where they exist, instead of calling
+                `calc_X_WF`.
+            seen: ball that contains all rays; geometry outside of it is not
+                moved.
         """
         placed = self._moving.place(calc_X_WF, motions, known, seen)
         if len(placed.rows):
@@ -131,8 +133,9 @@ class RayCastingScene:
         For merged geometry L is the world, otherwise the geometry's own frame.
 
         Returns:
-            The (G,) row of each geometry's frame, the (R, 3, 3) inverse
-            transpose of the linear part of each X_WL, and the (R, 3) p_WL.
+            (G,) for each geometry the row of its frame L in the next two
+            arrays; (R, 3, 3) the inverse transpose of the linear part of each
+            X_WL; (R, 3) each p_WL [m].
         """
         p_WLset = [
             np.zeros(3) if g.is_merged_world else g.X_OL[:, 3] + self._p_WO
@@ -153,15 +156,16 @@ class RayCastingScene:
     ) -> RayHits:
         """Casts N rays from one or several poses of a sensor S.
 
-        Ray i uses entry i mod length of all arrays except the directions.
+        Ray i has direction i. From every other array of length n it uses entry
+        i mod n.
 
         Args:
             p_WSset: (3,) or (K, 3) origins in the world [m].
             d_Sset: (N, 3) unit directions, expressed in S.
-            max_range: greatest range [m], one for all or (M,).
+            max_range: greatest range [m], one for all rays or (M,).
             R_WSset: (3, 3) or (L, 3, 3) orientations of S in the world.
-            times: (T,) when rays are cast, as fractions of the turn from 0 to
-                1.
+            times: (T,) times at which rays are cast, as fractions of the turn,
+                from 0 to 1.
             with_normals: also return the normals of the surfaces, as they
                 are at the start of the turn.
 

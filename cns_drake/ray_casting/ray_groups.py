@@ -1,4 +1,4 @@
-"""Groups of geometry that moves rigidly together, for ray casters."""
+"""Groups of geometry that moves together rigidly, for ray casting."""
 
 from collections import Counter
 from collections.abc import Callable, Collection, Iterable, Sequence
@@ -31,9 +31,9 @@ Member = tuple[int, RigidTransform, surfaces.Surface]
 
 
 class Motion(NamedTuple):
-    """The motion of a frame F in the frame O during one turn of a LiDAR.
+    """The motion of a frame F in the scene's frame O during a LiDAR's turn.
 
-    F keeps its velocities during the turn.
+    The velocities are constant during the turn.
 
     Attributes:
         w: angular velocity of F [rad/s].
@@ -77,12 +77,13 @@ class RayGroup:
     """Geometry that moves as one, in a local frame L.
 
     Attributes:
-        frame_id: the frame F it is fixed to; None for the world.
-        X_FL: (4, 4) affine map from L to F; not rigid for an ellipsoid,
-            which in L is the unit sphere.
-        members: the geometry of the group, posed in L. A half space has a group
-            of its own; its surface is z = 0 in L.
-        is_merged_world: whether L is the world, moved to O.
+        frame_id: the frame F to which the group is fixed; None for the world.
+        X_FL: (4, 4) affine map from L to F. It is not rigid for an ellipsoid,
+            since an ellipsoid is the unit sphere in L.
+        members: the geometry of the group, expressed in L. A half space has a
+            group of its own; its surface is z = 0 in L.
+        is_merged_world: whether the group is the merged geometry that never
+            moves; L then has the axes of the world and the origin of O.
         X_OL: (3, 4) affine map from L to the scene's frame O, at the start of a
             turn; it does not exist before `place` is called.
         motion: motion of F during the turn; None if F does not move.
@@ -126,9 +127,9 @@ class RayGroup:
         return X_OL
 
     def content(self) -> tuple:
-        """Returns a key that is equal only for groups of the same shapes.
+        """Returns a key that is equal for two groups only if their shapes are.
 
-        It is valid as long as the surfaces of both groups exist.
+        The key is valid as long as the surfaces of both groups exist in memory.
         """
         shapes = tuple(
             (
@@ -150,13 +151,14 @@ def group_geometries(
     *,
     p_WS: np.ndarray | None = None,
 ) -> tuple[np.ndarray, list[RayGroup]]:
-    """Returns the origin p_WO and the groups of geometries.
+    """Groups geometries; returns the scene's origin p_WO and the groups.
 
-    Geometries come with their indices. The world's group is the first, if there
-    is one; half spaces are the last groups. A large surface with many copies
-    gets a group for each copy, and these groups share the surface. O is the
-    middle of the world's geometry. If the sensor at p_WS is far from there, O
-    is the middle of the cube that contains the sensor.
+    Each geometry comes with its index. Geometry that never moves is in the
+    first group (if there is any); half spaces are the last groups. A large
+    surface with many copies gets a group for each copy, and these groups share
+    the surface. O is the middle of the geometry that never moves. If the sensor
+    at p_WS is far from that middle, O is the centre of that cell of a coarse
+    grid of cubes in which the sensor lies.
     """
     geometries = list(geometries)
     shared = _find_shared(geometries)

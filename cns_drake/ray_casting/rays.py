@@ -15,15 +15,16 @@ from cns_drake.base.compiled import compiled
 class Rays(NamedTuple):
     """N rays from one pose of a sensor S or from several.
 
-    Ray i takes entry i mod n of each array of length n, except the directions.
+    Ray i has direction i. From every other array of length n it uses entry i
+    mod n.
 
     Attributes:
         p_OSset: (K, 3) float32 origins [m].
-        R_OSset: (L, 3, 3) float64 orientations of S.
+        R_OSset: (L, 3, 3) float64 orientations of S in O.
         max_ranges: (M,) float32 greatest ranges [m].
-        d_Sset: (N, 3) float64 unit directions.
-        times: (T,) float32 when each ray is cast, as a fraction of the turn
-            from 0 to 1.
+        d_Sset: (N, 3) float64 unit directions, expressed in S.
+        times: (T,) float32 times at which rays are cast, as fractions of the
+            turn, from 0 to 1.
     """
 
     p_OSset: np.ndarray
@@ -58,11 +59,11 @@ class Rays(NamedTuple):
 
 @compiled
 def rotate(R_FSset: np.ndarray, d_Sset: np.ndarray) -> np.ndarray:
-    """Returns directions (N, 3) in F of directions in S.
+    """Returns directions (N, 3), given in S, as expressed in a frame F.
 
-    Direction i takes orientation i mod L of the (L, 3, 3) orientations.
-    Products are added in a fixed order: the result of a matrix library depends
-    on the processor.
+    Direction i is rotated by orientation i mod L of the (L, 3, 3) orientations.
+    Products are added in a fixed order, because the results of a matrix library
+    depend on the processor.
     """
     d_Fset, turn = np.empty((len(d_Sset), 3)), -1
     for ray in range(len(d_Sset)):
@@ -77,11 +78,11 @@ class Hits(NamedTuple):
     """The first hits of N rays.
 
     Attributes:
-        ranges: (N,) float32 [m], inf for a miss.
+        ranges: (N,) float32 ranges [m], inf for a miss.
         owner: (N,) int32 index of the geometry, -1 for a miss.
-        group: (N,) int32 row of its group, -1 for a miss.
+        group: (N,) int32 row of the geometry's group, -1 for a miss.
         normals: (N, 3) float32 normal of the surface, in the group's frame L
-            and of any length, zero for a miss; (N, 0) if none are wanted.
+            and of any length, zero for a miss; (N, 0) unless requested.
     """
 
     ranges: np.ndarray
@@ -91,7 +92,7 @@ class Hits(NamedTuple):
 
     @classmethod
     def misses(cls, num_rays: int, with_normals: bool) -> Hits:
-        """Returns hits of rays that all missed."""
+        """Returns hits for rays that all missed."""
         return cls(
             np.full(num_rays, np.inf, np.float32),
             np.full(num_rays, -1, np.int32),

@@ -1,1 +1,1 @@
-"""Frames as ROS 2 messages in MCAP files that survive a crash."""
+"""Recording of sensor data as ROS 2 messages in MCAP files."""

@@ -1,11 +1,11 @@
 """Writes a rosbag2 folder with one MCAP file that survives interruptions.
 
-The recording grows in `<folder>/<name>_0.mcap.part`. It gets its final name
-when it is whole, and `metadata.yaml` is written last: a folder with that file
-is complete and consistent.
+The recording grows in `<folder>/<name>_0.mcap.part`. The file gets its final
+name when it is complete, and `metadata.yaml` is written last. A folder with
+`metadata.yaml` is therefore complete and consistent.
 
 An interrupted run leaves a part file. A later run of the same recording takes
-over its messages by writing them again; see PartFile.
+over the messages in this file by writing them again; see `PartFile`.
 
 Messages are written in a thread, while the next frame is computed: compression
 takes half of a frame's time, during which other Python code can run.
@@ -54,7 +54,7 @@ _MOST_HELD = 64
 
 
 class RecordedMessage(NamedTuple):
-    """A message with the arguments of `BagWriter.write`."""
+    """A message to record; its fields are arguments of `BagWriter.write`."""
 
     topic: str
     stamp_ns: int
@@ -67,8 +67,8 @@ class BagWriter:
 
     Leaving the context normally completes the recording. Leaving it by an
     exception closes the file as a shorter but valid MCAP file under its `.part`
-    name. The same calls give the same bytes, whether or not the run was
-    interrupted in between.
+    name. Equal calls produce equal bytes, even if the first run was interrupted
+    and a second run continued it.
 
     Example:
         from cns_drake import BagWriter, recording_topics
@@ -185,9 +185,9 @@ class BagWriter:
             self._close_stream()
 
     def follows_interruption(self) -> bool:
-        """Whether messages of an interrupted run can still be taken over.
+        """Whether messages of an interrupted run can be taken over now.
 
-        It is True until another message is written.
+        This is possible only before any other message is written.
         """
         return self._stream.replaying
 
@@ -220,9 +220,10 @@ class BagWriter:
     def write(
         self, topic: str, stamp_ns: int, data: bytes, sequence: int
     ) -> None:
-        """Appends one message; messages must come in the order of time.
+        """Appends one message; on each topic, times must increase.
 
-        A latched message is skipped if the recording already has it.
+        The message of a latched topic is skipped if it has already been taken
+        over from an interrupted run.
 
         Args:
             topic: name of one of the topics.
@@ -232,7 +233,7 @@ class BagWriter:
 
         Raises:
             InputError: if the file cannot be written, e.g. on a full disk, or
-                the message is earlier than the one before.
+                the message is not later than the last one on its topic.
             RuntimeError: the recording is not open.
         """
         if not self._is_open:
@@ -443,15 +444,16 @@ def take_over_frames(
     schedule: Schedule,
     frame_topic: str,
 ) -> int:
-    """Copies the complete frames of an interrupted run to its successor.
+    """Copies the complete frames of an interrupted run to the new run.
 
-    A frame consists of all messages from one message on `frame_topic` until the
-    next. A latched topic has a single message, at tick 0.
+    A frame consists of a message on `frame_topic` and all messages until the
+    next message on this topic. A latched topic has a single message, at tick 0.
 
     Args:
         bag: open bag of the new run, to which nothing has been written yet.
         topics: topics of the recording.
-        schedule: schedule of the topics that are not latched, by their names.
+        schedule: schedule of the topics that are not latched; its streams have
+            the names of the topics.
         frame_topic: name of the topic on which each frame begins.
 
     Returns:
@@ -493,11 +495,12 @@ def take_over_frames(
 
 
 class BackgroundWriter:
-    """A context manager that passes messages on, in order, in a thread.
+    """A context manager that writes messages to a BagWriter in a thread.
 
-    Leaving it waits until everything is written; leaving it by an exception
-    drops waiting messages. An error of the thread is raised by a later `write`,
-    or on leaving; nothing is written after it.
+    Messages are written in order. Leaving the context waits until all are
+    written; leaving it by an exception drops the messages that are still
+    waiting. If writing fails, nothing more is written, and the error is raised
+    by a later `write` or on leaving.
     """
 
     def __init__(self, write: Callable[..., None]):
@@ -521,7 +524,8 @@ class BackgroundWriter:
         """Queues a message for writing; waits while too many are queued.
 
         Raises:
-            Whatever writing an earlier message raised.
+            Exception: the error that occurred while an earlier message was
+                written.
         """
         self._held.append(message)
         size = sum([len(one) for one in message if isinstance(one, bytes)])

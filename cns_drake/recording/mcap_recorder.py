@@ -44,8 +44,8 @@ _IMAGES = {"color": ImageRgba8U, "depth": ImageDepth32F, "label": ImageLabel16I}
 class RecordedCamera(NamedTuple):
     """A camera of a recording, with its intrinsics.
 
-    X_BC is the pose of its optical frame C (z ahead, y down) in the sensor's
-    frame B, whose pose is on the port `<camera>_pose`.
+    X_BC is the pose of the camera's optical frame C (z ahead, y down) in the
+    frame B of Drake's RgbdSensor. The pose of B is on the port `<camera>_pose`.
     """
 
     info: CameraInfo
@@ -53,15 +53,16 @@ class RecordedCamera(NamedTuple):
 
 
 class RecordedSensor(NamedTuple):
-    """A further sensor of a recording, with a port of its name.
+    """A sensor of a user-defined kind; the recorder's port has its name.
 
     Attributes:
         topic: topic of its messages.
         X_BC: pose of the sensor's frame C in the vehicle's frame B.
-        make_message: returns a message, given the value of the port, the name
-            of the frame C and the time [ns].
-        frame: name of the frame C; by default that of the sensor.
-        example: a value of the port's type, if that is no Python object.
+        make_message: function that returns a message, given the value of the
+            port, the name of the frame C and the time [ns].
+        frame: name of the frame C; by default the name of the sensor.
+        example: a value of the port's type, needed if this type is not a Python
+            object.
     """
 
     topic: Topic
@@ -81,15 +82,15 @@ class McapRecorder(LeafSystem):
         - odometry
         - specific_force
         - angular_velocity
-        - imu_samples (in place of these two)
+        - imu_samples (instead of specific_force and angular_velocity)
         - objects (if it is declared)
         - <lidar>_scan (one for each LiDAR)
-        - <lidar>_pose (for each LiDAR without a fixed place)
+        - <lidar>_pose (for each LiDAR that is not fixed on B)
         - <camera>_color (one for each camera)
         - <camera>_depth
         - <camera>_label
         - <camera>_pose
-        - <sensor> (one for each further sensor)
+        - <sensor> (one for each sensor of another kind)
 
     Frames: map W, vehicle B (`base_link`), imu I, LiDAR S, camera C.
 
@@ -97,26 +98,27 @@ class McapRecorder(LeafSystem):
       `V_WB_B` (SpatialVelocity expressed in B).
     - `specific_force`: of I, expressed in I, vector of size 3 [m/s^2].
     - `angular_velocity`: w_WI_I, vector of size 3 [rad/s].
-    - `imu_samples`: abstract, `ImuSamples`, the last ones up to now; without
-      this port the orientation of I is that of the odometry.
+    - `imu_samples`: abstract, `ImuSamples`, the latest samples up to the
+      current time. Without this port, the orientation of I comes from the
+      odometry.
     - `objects`: abstract, `RecordedObjects`.
     - `<lidar>_scan`: abstract, structured array of points expressed in S.
     - `<lidar>_pose`: abstract, X_WS.
     - `<camera>_color`, `_depth`, `_label`: images as Drake's RgbdSensor gives
       them; `<camera>_pose`: abstract, the pose of that sensor.
 
-    A port that is not connected is not recorded.
+    Ports that are not connected are not recorded.
 
     Messages are due at ticks; tick i is at the time i * period of the schedule.
     At a tick, a periodic publish event (from time zero on) or a forced publish
-    writes all messages that are due, from the present inputs. A port
-    `imu_samples` needs no event of its own: the next event writes its samples
-    of several ticks. A simulation that starts before time zero causes a
-    warning.
+    writes all messages that are due, from the current inputs. The samples on a
+    port `imu_samples` need no events of their own: each event writes all
+    samples since the last event. A simulation that starts before time zero
+    causes a warning.
 
     Connect the inputs directly to continuous outputs. A publish event sees the
-    state before any update at the same time, so with a hold in between every
-    message would be one period old.
+    state before any update at the same time, so with a zero-order hold in
+    between, every message would be one period old.
 
     Example:
         from cns_drake import McapRecorder

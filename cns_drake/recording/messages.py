@@ -1,7 +1,8 @@
-"""ROS 2 messages of a recording, made from values.
+"""ROS 2 messages of a recording, made from Python values.
 
-Poses go in as Drake types; stamps are whole nanoseconds, so that no rounding
-happens here. Quaternions leave in ROS order (x, y, z, w)."""
+Poses are given as Drake types, and time stamps in whole nanoseconds, so that
+nothing is rounded here. Quaternions in messages have ROS order (x, y, z, w).
+"""
 
 from collections.abc import Sequence
 import functools
@@ -41,7 +42,7 @@ ENCODINGS = {"color": "rgba8", "depth": "32FC1", "label": "16SC1"}
 def encode_point_cloud(
     points: np.ndarray, frame_id: str, stamp_ns: int
 ) -> bytes:
-    """Returns the CDR form of a PointCloud2 whose records are `points`.
+    """Returns a PointCloud2 whose records are `points`, serialised as CDR.
 
     The cloud is unordered (height 1) and dense: rays without a return have no
     record.
@@ -120,8 +121,9 @@ def make_imu(
             the angular velocity [rad^2/s^2].
 
     Returns:
-        The message. A value without noise has a standard deviation of 1e-6.
-        The covariance of a value that is None begins with -1 (REP 145).
+        The message. In its covariances, the standard deviation of a value
+        without noise is 1e-6, and the covariance of a value that is None begins
+        with -1 (REP 145).
     """
     force_variance, turn_variance = variances
     return ros_types.make_message(
@@ -171,7 +173,7 @@ def make_odometry(
 def make_tf(
     parent: str, X_PCs: dict[str, RigidTransform], stamp_ns: int
 ) -> Any:
-    """Returns a TFMessage with the poses of child frames C in one parent P."""
+    """Returns a TFMessage with the poses X_PC of frames C in one parent P."""
     header = make_header(parent, stamp_ns)
     return ros_types.make_message(
         ros_types.TF,

@@ -31,17 +31,18 @@ _OPACITY = 0.45
 
 
 class RecordedObjects(NamedTuple):
-    """The N vehicles and walkers at one time.
+    """The motion of N vehicles and walkers at one time, in the world W.
 
     Attributes:
-        instance: (N,) uint16 ids in points and tables.
+        instance: (N,) uint16 instance ids, as in points and structure tables.
         names: N names of their structures.
-        semantic_classes: N keys of `CLASS_IDS`.
-        p_WO: (N, 3) middles of their boxes [m].
-        quat_xyzw: (N, 4) orientations of their boxes.
+        semantic_classes: N names of classes, keys of `CLASS_IDS`.
+        p_WO: (N, 3) centres of their boxes [m].
+        quat_xyzw: (N, 4) orientations of their boxes, as quaternions (x, y, z,
+            w).
         sizes: (N, 3) length, width, height of their boxes [m].
         v_WO: (N, 3) velocities [m/s].
-        yaw_rate: (N,) [rad/s].
+        yaw_rate: (N,) rates of turning about z [rad/s].
         is_moving: (N,) whether each is labelled as moving.
     """
 
@@ -57,7 +58,7 @@ class RecordedObjects(NamedTuple):
 
 
 class BoxMessages:
-    """Makes messages that contain all boxes of a time.
+    """Makes messages that contain the boxes of all objects at one time.
 
     For each set of objects, a message is made only once, with placeholders for
     its float64 numbers and its stamp. Later messages fill in these numbers,
@@ -73,7 +74,7 @@ class BoxMessages:
         self._who: tuple[bytes, tuple[str, ...]] | None = None
 
     def encode(self, objects: RecordedObjects, stamp_ns: int) -> bytes:
-        """Returns the CDR message of objects, all with one stamp [ns]."""
+        """Returns the message of objects, all with one stamp [ns], as CDR."""
         who = (objects.instance.tobytes(), objects.semantic_classes)
         if who != self._who:
             self._prepare(objects)
@@ -129,10 +130,10 @@ def _views(data: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
 def marked_detections(
     who: Sequence[tuple[int, str]], numbers: np.ndarray
 ) -> Any:
-    """Returns a Detection3DArray in the map, whose stamp is a placeholder.
+    """Returns a Detection3DArray in the map frame with a placeholder stamp.
 
-    `who` has id and class of N objects; `numbers` has (N, 10) position,
-    orientation (x, y, z, w) and size.
+    `who` contains the instance id and class of N objects; `numbers` contains
+    (N, 10): position, orientation (x, y, z, w) and size.
     """
     header = messages.make_header(messages.MAP_FRAME, _STAMP_MARK_NS)
     detections = []
@@ -153,7 +154,10 @@ def marked_detections(
 
 
 def marked_boxes(who: Sequence[tuple[int, str]], numbers: np.ndarray) -> Any:
-    """Returns a SceneUpdate that replaces all boxes by those of N objects."""
+    """Returns a SceneUpdate that replaces all boxes by those of N objects.
+
+    The arguments are as in `marked_detections`.
+    """
     stamp = messages.make_header(messages.MAP_FRAME, _STAMP_MARK_NS).stamp
     entities = []
     for (instance, semantic_class), row in zip(who, numbers, strict=True):

@@ -33,8 +33,8 @@ def recording_topics(
 
     Args:
         layouts: LiDAR name -> layout of its points, if not `cns`.
-        with_objects: whether it has boxes of moving objects.
-        further: topics of further sensors.
+        with_objects: whether boxes of moving objects are recorded.
+        further: topics of sensors of other kinds.
 
     Example:
         from cns_drake import recording_topics
@@ -59,10 +59,11 @@ def recording_topics(
 def make_calibration(
     X_BSs: Mapping[str, RigidTransform], X_BI: RigidTransform | None
 ) -> dict:
-    """Returns the poses of LiDARs S and the IMU I, ready for JSON.
+    """Returns the poses of LiDARs S and the IMU I on the vehicle, for JSON.
 
     Returns:
-        Frame name -> parent frame, `translation` [m] and `quat_xyzw`.
+        Frame name -> mapping with the parent frame, `translation` [m] and
+        `quat_xyzw`.
     """
     X_BCs = dict(X_BSs)
     if X_BI is not None:
@@ -90,7 +91,7 @@ def image_topic(camera_name: str, kind: str) -> Topic:
 
 
 def camera_topic(camera_name: str, kind: str) -> Topic:
-    """Returns a topic of a vehicle's camera.
+    """Returns the topic of a kind of a camera's messages.
 
     The kind is `image`, `depth`, `label` or `camera_info`.
     """

@@ -11,11 +11,12 @@ from cns_drake.base.files import open_plain, part_path, user_errors
 
 
 class RecordingFolder:
-    """A rosbag2 folder with one MCAP file; its last part names the recording.
+    """The files of a recording: a rosbag2 folder with one MCAP file.
 
-    The fingerprint covers all inputs; see `cns_drake.scenarios.provenance`.
-    `metadata.yaml` gets its name last, so a folder with this file holds a
-    finished recording.
+    The name of the folder is the name of the recording. `fingerprint.txt`
+    contains a hash of everything that determines the recording; see
+    `cns_drake.scenarios.provenance`. `metadata.yaml` is completed last, so a
+    folder with this file contains a finished recording.
     """
 
     def __init__(self, path: Path):
@@ -26,15 +27,15 @@ class RecordingFolder:
         self.metadata = self.path / "metadata.yaml"
 
     def is_finished(self) -> bool:
-        """Whether the folder holds a finished recording."""
+        """Whether the folder contains a finished recording."""
         return self.metadata.is_file()
 
     def check(self, overwrite: bool) -> None:
         """Raises an error if a recording must not be written to the folder.
 
-        Without `overwrite`, the folder must not hold a finished recording. It
-        must also not hold other files, unless there is a recording of this
-        name.
+        Without `overwrite`, it must not be written if the folder contains a
+        finished recording, or only files that do not belong to a recording of
+        this name.
 
         Raises:
             InputError: the folder must not be used, or cannot be read.
@@ -66,15 +67,17 @@ class RecordingFolder:
 
 
 class PartFile(io.BufferedRandom):
-    """A binary file for one writer at a time.
+    """A binary file that a process can resume by writing it again.
 
-    A process that resumes an interrupted file writes it again from its start.
-    As long as the bytes equal those in the file, nothing is written. At the
-    first different byte the file is cut off, and the rest is written. The
-    result is the same as in an empty file. The common part of the two runs is
-    never lost, and no second copy takes up disk space.
+    A process that resumes an interrupted file writes all bytes again from the
+    start of the file. As long as these bytes equal those in the file, nothing
+    changes on the disk. At the first different byte the file is cut off, and
+    the rest is written. The result is the same as if the file had been empty.
+    The part that both runs have in common is never lost, and there is no second
+    copy on the disk.
 
-    The file is locked until it is closed or its process ends in any way.
+    Only one process can write the file at a time. The file is locked until it
+    is closed or its process ends in any way.
 
     Attributes:
         replaying: whether all bytes written so far were there already.
@@ -99,7 +102,7 @@ class PartFile(io.BufferedRandom):
     def starts_like(self, content: bytes) -> bool:
         """Returns whether the existing file starts with this content.
 
-        A file that ends within the content counts, too.
+        A shorter file must be equal to the beginning of the content.
         """
         self.seek(0)
         found = self.read(len(content))

@@ -1,4 +1,4 @@
-"""Repair: writes the readable part of a damaged MCAP file as a whole file."""
+"""Repair of damaged MCAP files: the readable part becomes a whole file."""
 
 from collections import Counter
 from collections.abc import Callable, Iterable, Iterator
@@ -35,9 +35,9 @@ BytesCallback = Callable[[int, int], None]
 class Repair:
     """The result of a repair: the new file, and the messages recovered.
 
-    `seconds` is the time between the earliest and the latest of these messages.
-    Faults are places that could not be read; their number is 0 if the file was
-    whole. The first fault is described in words.
+    `seconds` is the time between the earliest and the latest recovered message.
+    Faults are parts of the file that could not be read; there are none if the
+    file was whole. The first fault is described in words.
     """
 
     output: Path
@@ -55,15 +55,16 @@ def repair_mcap(
     """Writes the readable part of an MCAP file as a whole, indexed file.
 
     Messages keep their order, times, numbers and bytes; attachments and
-    metadata are kept as well. A file of ROS 2 gets a `rosbag2` record with its
-    counts, so that it opens without a folder around it.
+    metadata are kept as well. A file of ROS 2 also gets a metadata record
+    `rosbag2` with its message counts, so that ROS 2 can open the file without a
+    rosbag2 folder.
 
     Args:
         path: any MCAP file, whole or damaged; it is only read.
-        output: the new file; by default `<name>_repaired.mcap` beside it.
+        output: the new file; by default `<name>_repaired.mcap` next to `path`.
 
     Raises:
-        InputError: nothing can be read, or the new file exists already, or
+        InputError: nothing can be read, or the new file already exists or
             cannot be written.
     """
     if output is None:

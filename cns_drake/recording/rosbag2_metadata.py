@@ -1,7 +1,7 @@
 """The metadata of a recording for rosbag2.
 
-Metadata version 8 is the newest that ROS 2 Humble reads. Conventions are
-those of rosbag2's own MCAP files.
+Metadata version 8 is the newest that ROS 2 Humble reads. The conventions are
+the same as in the MCAP files that rosbag2 writes.
 """
 
 from collections.abc import Mapping, Sequence
@@ -32,7 +32,7 @@ class Topic:
 
 
 def channel_metadata(topic: Topic) -> dict[str, str]:
-    """Returns rosbag2's metadata of a channel: QoS and the type's hash."""
+    """Returns a channel's metadata for rosbag2: QoS and the type's hash."""
     return {
         "offered_qos_profiles": _qos_yaml(topic),
         "topic_type_hash": ros_types.message_hash(topic.message_type),
@@ -46,13 +46,13 @@ def describe_topic(
     metadata: Mapping[str, str],
     encoding: str = "cdr",
 ) -> dict:
-    """Returns the description of a topic and its messages.
+    """Returns the entry of a topic for rosbag2's `metadata.yaml`.
 
     Args:
         name: name of the topic.
         message_type: ROS type, such as `sensor_msgs/msg/Imu`.
         count: number of messages.
-        metadata: metadata of its channel in the MCAP.
+        metadata: metadata of the topic's channel in the MCAP file.
         encoding: encoding of the messages.
     """
     return {
@@ -75,12 +75,12 @@ def make_bag_information(
     end_ns: int,
     custom_data: Mapping[str, str] | None = None,
 ) -> dict:
-    """Returns the description of a recording of one file in its folder.
+    """Returns the content of `metadata.yaml` for a recording of one file.
 
     Args:
-        file_name: file name of the MCAP.
-        topics: descriptions of topics, from `describe_topic`.
-        start_ns, end_ns: times of the first and the last message.
+        file_name: name of the MCAP file.
+        topics: entries of the topics, from `describe_topic`.
+        start_ns, end_ns: times of the first and the last message [ns].
         custom_data: key -> text, which `ros2 bag info` shows as well.
     """
     count = sum(topic["message_count"] for topic in topics)

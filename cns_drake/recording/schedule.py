@@ -24,20 +24,23 @@ def frame_stamp_ns(
 
 
 def frames_within(duration: float, period: float = FRAME_PERIOD) -> int:
-    """Returns the number of frames of a drive; the first is at its start."""
+    """Returns the number of frames of a drive, given its duration [s].
+
+    The first frame is at the start of the drive.
+    """
     return math.floor(duration / period) + 1
 
 
 @dataclass(frozen=True)
 class Schedule:
-    """A clock of even ticks, and the ticks of each stream.
+    """The times of several streams of messages, as ticks of one clock.
 
     Attributes:
         tick: time between ticks [s].
-        steps: name of a stream -> ticks from one of its messages to the next.
-            All are due at tick 0.
-        ends: name of a stream -> the last tick at which it may be due; other
-            streams have no end.
+        steps: name of a stream -> number of ticks from one of its messages to
+            the next. The first message of every stream is due at tick 0.
+        ends: name of a stream -> the last tick at which it can have a message;
+            streams without an entry have no end.
     """
 
     tick: Fraction
@@ -68,7 +71,7 @@ class Schedule:
 def make_schedule(
     periods: Mapping[str, float], until: Mapping[str, float] | None = None
 ) -> Schedule:
-    """Returns the schedule of streams with periods of their own.
+    """Returns the schedule of streams, given the period of each stream.
 
     Args:
         periods: name of a stream -> time between its messages [s].

@@ -37,10 +37,11 @@ class Areas:
     Attributes:
         carriageway: the area between the kerbs, where vehicles drive or park.
         lane_area: the carriageway without parking bays.
-        sidewalks: areas beside the roads and around all corners, at the height
-            of the kerb.
+        sidewalks: areas beside the roads and around all corners, at kerb
+            height.
         medians: strips with kerbs between the two directions.
-        parking_bays: (road, "left" or "right" of `forward`) -> bays.
+        parking_bays: (name of the road, side) -> area of the bays. The side,
+            "left" or "right", is as seen in the road's direction `forward`.
     """
 
     carriageway: MultiPolygon
@@ -57,11 +58,11 @@ def corner_setback(
 ) -> float:
     """Returns the distance from a junction at which a road must end [m].
 
-    There, the rounded kerb (radius r) between the road and a neighbouring one
-    touches the road's edge. Along the road, the edges meet at (b + a
-    cos(angle)) / sin(angle), where a and b are half the widths of the road and
-    its neighbour. The arc of the kerb begins r / tan(angle / 2) behind this
-    point.
+    At this distance, the rounded kerb (radius r) between the road and a
+    neighbouring road touches the road's edge. The edges of both roads meet at
+    the distance (b + a cos(angle)) / sin(angle) along the road, where a and b
+    are half the widths of the road and its neighbour. The arc of the kerb
+    begins r / tan(angle / 2) beyond this point.
     """
     # Roads on top of one another never separate.
     if angle < 1e-6:
@@ -74,7 +75,7 @@ def corner_setback(
 
 
 def road_strip(road: Road) -> BaseGeometry:
-    """Returns a road's carriageway between its junctions, without bays."""
+    """Returns a road's carriageway, without junctions and parking bays."""
     return _band(road, -road.half_width, road.half_width)
 
 
@@ -95,10 +96,10 @@ def junction_area(
 ) -> BaseGeometry:
     """Returns the area between the ends of a junction's roads.
 
-    The roads are continued to the junction's position and united, and the
-    corners between them are filled up to a kerb of the junction's radius. The
-    roads themselves are then cut off. At a dead end, a disc takes the place of
-    the other roads.
+    The area is made in three steps. All roads are extended to the junction's
+    position and united; the corners between them are filled, so that kerbs have
+    the junction's radius; the roads outside the junction are cut off. At a dead
+    end, the area is a disc with the end of the road.
     """
     stubs = [_stub(roads[arm.road], arm) for arm in junction.arms]
     parts = [

@@ -131,9 +131,9 @@ def blend(
     """Returns a smooth curve (N, 2) from one directed point to another [m].
 
     Both points are included. If the line straight ahead of the start meets the
-    line behind the end, the curve consists of lines and the widest allowed arc
-    that touches both, as a driver turns. Otherwise (parallel lanes that are
-    offset, S-bends) it is a cubic Hermite curve.
+    line behind the end, the curve consists of these two lines and the widest
+    allowed arc that touches both lines, as a driver turns. Otherwise (parallel
+    lanes that are offset, S-bends) it is a cubic Hermite curve.
 
     Args:
         p_start, p_end: the points [m].

@@ -1,9 +1,9 @@
-"""How a driver departs from the line that a route or waypoints give.
+"""How a driver departs from the line of a route or of waypoints.
 
-Two people who drive along the same route differ by about half a metre for some
-50 m at a time, and sometimes by a lane. Here, the offset from the line is an
-Ornstein-Uhlenbeck process over the distance, smoothed so that a driver can
-steer it. Changes of lane are added to it.
+The paths of two people who drive along the same route differ by about half a
+metre for some 50 m at a time, and sometimes by a lane. Here, the offset from
+the line is an Ornstein-Uhlenbeck process over the distance, smoothed so that a
+car can be steered along it. Lane changes are added to this offset.
 """
 
 import math
@@ -43,7 +43,7 @@ _ITERATIONS = 40
 def kerbs(network: RoadNetwork) -> STRtree:
     """Returns the edges of lanes: kerbs, medians and bays of parked cars.
 
-    They are divided into pieces of a few metres.
+    The edges are divided into pieces of a few metres.
     """
     outline = np.asarray(shapely.get_parts(network.areas.lane_area.boundary))
     corners, line = shapely.get_coordinates(outline, return_index=True)
@@ -64,19 +64,19 @@ def depart(
 ) -> LanePath:
     """Returns the path of a driver who wanders and changes lanes.
 
-    Near the line, obstacles seen from above keep the car on the line.
-    Elsewhere, the car keeps 0.3 m from all obstacles, mirrors included.
+    The car, including its mirrors, keeps 0.3 m from all obstacles, as seen from
+    above. Where this is not possible, the car stays on the line.
 
     Args:
         path: the line, with points every `FINE_SPACING`.
         spacing: distance between the points of the result [m].
-        obstacles: kerbs, walls and the like.
-        source: the beginning of an error's message.
+        obstacles: index of the edges of obstacles, such as kerbs and walls.
+        source: text with which error messages begin.
         wander: standard deviation of the offset in the lane [m].
         wander_length: distance after which the correlation of the offset is 1/e
             [m].
         lane_changes: number of changes to another lane and back per km.
-        rng: the only source of variation.
+        rng: random generator for all decisions of the driver.
 
     Raises:
         InputError: the path is too short or too long for a drive.

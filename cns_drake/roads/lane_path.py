@@ -21,7 +21,7 @@ Acceleration = Annotated[float, Field(ge=0.05, le=9.81, allow_inf_nan=False)]
 
 
 class Speeds(BaseModel):
-    """The limits of speed and acceleration, which the car always keeps.
+    """Limits of speed and acceleration, which the car never exceeds.
 
     Attributes:
         cruise: highest speed of the car [m/s]. The speed limits of the roads
@@ -40,16 +40,16 @@ class Speeds(BaseModel):
 
 @dataclass(frozen=True)
 class LanePath:
-    """The path of a drive along the middle of lanes, evenly sampled.
+    """The path of a drive along lanes or waypoints, evenly sampled.
 
     Attributes:
         points: (N, 3) positions in the world, first and last included [m].
         spacing: distance between neighbouring points along the path [m].
         speed_limits: (N,) speed limits at the points; infinite where there is
             none [m/s].
-        beside: (N, 2) distances to the middle of the next lane on the left and
-            on the right in the same direction; 0 where there is none [m]. None
-            along waypoints.
+        beside: (N, 2) distances to the middle of the neighbouring lanes on the
+            left and on the right with the same direction [m]; 0 where there is
+            no such lane. None for a path along waypoints.
     """
 
     points: np.ndarray
@@ -89,7 +89,7 @@ def sample_lane_path(
     source: object,
     beside: np.ndarray | None = None,
 ) -> LanePath:
-    """Returns evenly spaced points along a polyline as a path.
+    """Returns the path along a polyline, with evenly spaced points.
 
     Args:
         points: (N, 3) corners of the polyline [m].
@@ -97,8 +97,9 @@ def sample_lane_path(
             limit of its two corners holds.
         spacing: distance between the points, rounded so that it divides the
             length of the polyline [m].
-        source: the beginning of an error's message.
-        beside: (N, 2) distances of the lanes beside each corner [m].
+        source: text with which error messages begin.
+        beside: (N, 2) distances to the neighbouring lanes on the left and right
+            of each corner [m]; see `LanePath`.
 
     Raises:
         InputError: the polyline is too short or too long for a drive.

@@ -44,7 +44,7 @@ _CROSSING_TOLERANCE = 1.0
 class Connection:
     """A path through a junction from one lane to another.
 
-    Its points (N, 3) include the ends of both lanes [m].
+    The points (N, 3) of the path include the ends of both lanes [m].
     """
 
     junction: str
@@ -75,9 +75,9 @@ class RoadNetwork:
     def connection(
         self, incoming: LaneRef, outgoing: LaneRef, spacing: float = 1.0
     ) -> Connection:
-        """Returns the path from one lane to another, whether legal or not.
+        """Returns the path through a junction from one lane to another.
 
-        Its points are about `spacing` apart [m].
+        The path need not be legal. Its points are about `spacing` apart [m].
 
         Raises:
             ValueError: a lane does not exist, the lanes do not meet in a
@@ -141,10 +141,10 @@ class RoadNetwork:
         """Returns whether traffic may take a path through a junction.
 
         A left turn leads from the innermost lane to the innermost lane, and a
-        right turn from the outermost to the outermost. Straight on, the lane
-        keeps its number, counted from the middle of the road. Between one-way
-        roads, such as those of a roundabout, the lane keeps its number on any
-        turn, counted from the kerb on the right.
+        right turn from the outermost to the outermost. A path straight on leads
+        to the lane with the same number, counted from the middle of the road.
+        Between one-way roads, such as those of a roundabout, every path leads
+        to the lane with the same number, counted from the kerb on the right.
         """
         incoming, outgoing = connection.incoming, connection.outgoing
         if all(self._is_one_way(lane) for lane in (incoming, outgoing)):
@@ -176,7 +176,7 @@ class RoadNetwork:
 
     @cached_property
     def junction_areas(self) -> dict[str, BaseGeometry]:
-        """Areas of junctions by name, up to the ends of roads and kerbs."""
+        """Name -> area of each junction, bounded by road ends and kerbs."""
         return {
             name: carriageway.junction_area(self.roads, junction)
             for name, junction in self.junctions.items()
@@ -205,13 +205,13 @@ def _classify(angle_deg: float, num_arms: int) -> Turn:
 
 
 def load_road_network(path: Path | str) -> RoadNetwork:
-    """Returns the road network of a `roads.yaml`, after checking it.
+    """Reads and checks the road network in a `roads.yaml`.
 
     Raises:
-        InputError: naming the file, the field and the fault. Faults are those
-            of form, a road to an unknown junction, a junction with fewer than
-            two roads, a road without lanes, a corner or junction that does not
-            fit, and roads that cross without a junction.
+        InputError: the file has a wrong form, a road leads to an unknown
+            junction, a junction has fewer than two roads, a road has no lanes,
+            a corner or junction does not fit, or roads cross without a
+            junction. The message names file, field and fault.
     """
     path = Path(path)
     file = read_roads_file(path)

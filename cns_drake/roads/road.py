@@ -154,7 +154,7 @@ DIRECTIONS: tuple[Direction, Direction] = ("forward", "backward")
 
 
 class LaneRef(NamedTuple):
-    """A lane of a road; number 1 is next to the middle of the road."""
+    """Identifies a lane of a road; lane 1 is next to the middle of the road."""
 
     road: str
     direction: Direction
@@ -162,7 +162,7 @@ class LaneRef(NamedTuple):
 
 
 class Road:
-    """A road between two junctions, cut off where the junctions' areas begin.
+    """A road between two junctions, which ends at the junctions' areas.
 
     The centreline is the middle of the carriageway, also for a one-way road or
     one with more lanes in one direction. Arc lengths ("stations") are measured
@@ -245,8 +245,9 @@ class Road:
     ) -> np.ndarray:
         """Returns (N, 4): x, y, z [m] and heading of `forward` [rad].
 
-        Stations are (N,) arc lengths along the whole centreline. The offset is
-        positive to the left; it is a number or (N,) [m].
+        `stations` are (N,) arc lengths along the whole centreline [m]. `offset`
+        is the distance from the centreline, positive to the left, one for all
+        stations or (N,) [m].
         """
         stations = np.asarray(stations, dtype=float)
         x, y, heading = self._curve.evaluate(stations).T
@@ -261,9 +262,10 @@ class Road:
     def stations(
         self, spacing: float = 1.0, clearance: float = 0.0
     ) -> np.ndarray:
-        """Returns evenly spaced stations (N,) on the road itself [m].
+        """Returns evenly spaced stations (N,) between the junctions' areas [m].
 
-        They are at most `spacing` apart, and `clearance` away from both ends.
+        They are at most `spacing` apart. The first and the last station are
+        `clearance` away from the ends of the road.
         """
         first = self.first_station + clearance
         last = self.last_station - clearance
@@ -304,7 +306,8 @@ class Road:
     ) -> tuple[float, float, float, float]:
         """Returns x, y, z [m] and the driving direction [rad] at a lane's end.
 
-        The end is "entry" (where traffic enters the lane) or "exit".
+        `end` is "entry", where traffic enters the lane, or "exit", where it
+        leaves the lane.
         """
         at_first = (direction == "forward") == (end == "entry")
         station = self.first_station if at_first else self.last_station
@@ -317,9 +320,9 @@ class Road:
 class Arm:
     """One end of a road at a junction.
 
-    `heading` leads away from the junction [rad]. `half_width` is that of the
-    carriageway, and `setback` the distance from the junction's position to the
-    road [m].
+    `heading` points away from the junction [rad]. `half_width` is half the
+    width of the carriageway, and `setback` the distance from the junction's
+    position to the end of the road [m].
     """
 
     road: str

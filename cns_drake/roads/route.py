@@ -46,9 +46,9 @@ class RouteLeg(BaseModel):
             lane to the second.
         start: where the drive starts: the distance from the point where the
             first leg enters its road [m]. Only in the first leg.
-        end: where the drive ends, or the car turns round: the distance from the
-            point where the leg enters the road [m]. Only in the last leg, or in
-            a leg after which the next one leads back along the same road.
+        end: where the drive ends, or where the car turns round: the distance
+            from the point where the leg enters the road [m]. Only in the last
+            leg, and in a leg whose next leg leads back along the same road.
     """
 
     model_config = ConfigDict(extra="forbid", frozen=True, strict=True)
@@ -73,7 +73,7 @@ class RouteLeg(BaseModel):
 
 
 class Route(RootModel[list[RouteLeg]]):
-    """The roads of a drive, in order."""
+    """The legs of a drive along lanes, in order."""
 
     root: list[RouteLeg] = Field(min_length=1)
 
@@ -88,28 +88,28 @@ def make_lane_path(
 ) -> LanePath:
     """Returns the path along the lanes of a route, joined at junctions.
 
-    Consecutive legs must meet in a junction, and the way through it must be
-    legal: a left turn from the innermost lane to the innermost, a right turn
-    from the outermost lane to the outermost, and straight on without a change
-    of lane (`RoadNetwork.is_legal`). Lanes change only along a leg. Within a
-    junction, the lower speed limit of the two roads holds. If the next leg
-    leads back on the same road, the car turns round in a loop to the left: at
-    the leg's end, or as near to the junction as there is room.
+    Consecutive legs must meet in a junction, and the path through this junction
+    must be legal: a left turn from the innermost lane to the innermost, a right
+    turn from the outermost lane to the outermost, and straight on without a
+    change of lane (`RoadNetwork.is_legal`). Lanes change only along a leg.
+    Within a junction, the lower speed limit of the two roads holds. If the next
+    leg leads back on the same road, the car turns round in a loop to the left:
+    at the leg's end, or as near to the junction as there is room.
 
     Args:
         network: the road network.
         route: the legs of the route.
         spacing: distance between the points, rounded so that it divides the
             length of the route [m].
-        source: the file that errors name.
+        source: file or other source, named in error messages.
         aside: offset of the path to the right of the lanes' middle [m]. It
             applies along each road between its junctions, as far as the road
             has room.
 
     Raises:
-        InputError: a leg names no lane of the network, does not follow from the
-            one before it, is too short for its lane change or has no room for
-            turning round; or the whole route is too short.
+        InputError: a leg names an unknown lane, does not follow from the leg
+            before, is too short for its lane change or has no room for turning
+            round; or the whole route is too short.
     """
     pieces: list[np.ndarray] = []
     limits: list[np.ndarray] = []
@@ -310,7 +310,10 @@ def _moved_right(
 
 
 def smooth_step(u: np.ndarray) -> np.ndarray:
-    """Returns a quintic from 0 to 1; two derivatives are zero at both ends."""
+    """Returns a quintic from 0 at u = 0 to 1 at u = 1.
+
+    Its first and second derivatives are zero at both ends.
+    """
     return power(u, 3) * (10 - 15 * u + 6 * u**2)
 
 
@@ -361,7 +364,7 @@ _WEIGHT_OF_NEW = 6.0
 def draw_route(
     network: RoadNetwork, length: float, rng: np.random.Generator
 ) -> Route:
-    """Returns a random legal route that prefers roads not driven before.
+    """Returns a random legal route, preferably along roads not yet driven.
 
     The total length of its roads is at least `length` [m].
 

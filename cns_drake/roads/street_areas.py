@@ -1,4 +1,4 @@
-"""The height of the surface of streets at any place."""
+"""The height of the street surface at any place."""
 
 from collections.abc import Callable
 from typing import Protocol
@@ -31,9 +31,9 @@ _SPACING = 0.5
 class RoadSurface:
     """The height of carriageways, continued beyond their edges.
 
-    A road is level across, so the height at a place is that of the nearest
-    point on a centreline. Away from the roads, the height has a step where the
-    nearest road changes.
+    Roads are level across. The height at a place is therefore that of the
+    nearest point on a centreline. Away from the roads, the height has a step
+    where the nearest road changes.
     """
 
     def __init__(self, network: RoadNetwork):
@@ -53,7 +53,7 @@ class RoadSurface:
 
     @property
     def is_level(self) -> bool:
-        """Whether all roads are at z = 0 everywhere."""
+        """Whether all roads are at z = 0."""
         return not self._places[:, 2].any()
 
     def heights(self, xy: ArrayLike) -> np.ndarray:

@@ -43,10 +43,11 @@ def loop_corners(
 ) -> np.ndarray:
     """Returns the corners of a loop to the left, in which a car turns round.
 
-    Rounded with the loop's radius, the corners make a smooth path. The car
-    leaves the line on which it comes to the right, goes around the centre to
-    the left by more than 90 degrees, and joins the line on which it leaves,
-    again from its right. The bends at both ends have the loop's radius, too.
+    If the corners are rounded with the loop's radius, the path is smooth. The
+    car first swings out to the right of the line on which it arrives. It then
+    turns left around the centre, by more than 90 degrees, and joins the line on
+    which it leaves from this line's right side. The bends at both ends have the
+    loop's radius, too.
 
     Args:
         centre: centre of the loop [m].
@@ -84,8 +85,8 @@ def loop_corners(
 class Loop(NamedTuple):
     """A car's U-turn, which begins at a distance along its lane [m].
 
-    The points (N, 2) lead from there to the opposite place in the other lane
-    [m].
+    The points (N, 2) lead from this distance to the opposite place in the other
+    lane [m].
     """
 
     begin: float
@@ -97,7 +98,7 @@ def find_loop(
     centres: np.ndarray,
     area: BaseGeometry,
 ) -> Loop:
-    """Returns the first loop for which there is room.
+    """Returns the first loop that fits into an area.
 
     Args:
         lanes_at: distance travelled [m] -> x, y and heading of the car, and the
@@ -162,8 +163,8 @@ def _loop(start: np.ndarray, heading: float, width: float) -> np.ndarray:
 def swept_area(points: ArrayLike) -> BaseGeometry:
     """Returns the area that a car covers while its rear axle follows points.
 
-    The points (N, 2) are of the middle of the axle, and close to one another
-    [m].
+    The points (N, 2) are positions of the axle's middle and close to one
+    another [m].
     """
     points = np.asarray(points, dtype=float)
     along = directions(points)

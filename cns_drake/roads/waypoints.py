@@ -34,8 +34,9 @@ def load_waypoint_path(
     """Returns the path along the waypoints in a file.
 
     The file is CSV with one waypoint per line: x, y, z or x, y of the vehicle
-    frame (on the ground, in the world, in metres). Without z it is 0. A first
-    line with names may give the columns in another order, and more columns.
+    frame, on the ground in the world [m]. Without z, z is 0. If the first line
+    contains names, the columns can be in another order, and there can be more
+    columns.
 
     The path is the line from waypoint to waypoint. Its corners are rounded by
     arcs of 8 m radius, or less if half of the shorter neighbouring segment is
@@ -43,12 +44,13 @@ def load_waypoint_path(
     corner. The height follows a monotone cubic over the distance travelled.
 
     The points of the path are about `spacing` apart [m]. With `u_turns`, the
-    car turns round in its tightest loop where waypoints double back. The far
-    end of the loop is the waypoint.
+    car turns round in its tightest loop where the waypoints lead back. The far
+    end of the loop is at the waypoint.
 
     Raises:
-        InputError: naming file, line and fault, or that the file is too short
-            for a drive.
+        InputError: a line of the file is not usable, or the path is too short
+            for a drive. The message names the file and, where there is one, the
+            line.
     """
     path = Path(path)
     points, lines = read_waypoints(path)
@@ -69,8 +71,8 @@ def make_waypoint_path(
     Args:
         waypoints: (N, 3) positions of the vehicle frame [m].
         spacing: distance between the points of the path [m].
-        names: N names of the waypoints in errors.
-        source: name of all waypoints in errors.
+        names: N names of the waypoints, for error messages.
+        source: name of the list of waypoints, for error messages.
         u_turns: whether turns by more than 150 degrees are driven as loops.
 
     Raises:
@@ -183,7 +185,7 @@ def _loop(place: np.ndarray, heading: float, turn: float) -> np.ndarray:
 
 
 def read_waypoints(path: Path) -> tuple[np.ndarray, list[int]]:
-    """Returns the waypoints (N, 3) of a file, and their line numbers.
+    """Reads waypoints (N, 3) from a file; returns them and line numbers.
 
     Raises:
         InputError: naming file, line and fault.

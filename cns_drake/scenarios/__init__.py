@@ -1,1 +1,1 @@
-"""Scenario files, which describe drives, and families of them."""
+"""Scenario files, which describe drives, and families of scenarios."""

@@ -1,8 +1,8 @@
-"""The table of a map's drives and their figures, a CSV file.
+"""The table of a map's drives and their figures: `sequences.csv`.
 
-Planning a drive and reading a stage take seconds; a listing should not. Each
-row of `sequences.csv` therefore has a checksum of its input files; if these
-change, the figures are computed again.
+Planning a drive and reading a stage take seconds, which is too slow for a list
+of drives. Each row of the table therefore contains a checksum of its input
+files. If a checksum changes, the figures of the row are computed again.
 """
 
 from collections.abc import Callable, Mapping
@@ -22,7 +22,7 @@ from cns_drake.scenarios.scenario import Scenario
 
 @dataclass(frozen=True)
 class DriveRow:
-    """A drive and its figures; `sequence` is its name.
+    """A drive and its figures; `sequence` is the name of the drive.
 
     Attributes:
         checksum: checksum of the files on which the figures depend.
@@ -48,11 +48,12 @@ def drive_rows(
     progress: Callable[[str], None] = lambda line: None,
     sizes: Mapping[str, tuple[int, int]] | None = None,
 ) -> list[DriveRow]:
-    """Returns the rows of a map's drives whose stage is there.
+    """Returns the table rows of those drives of a map whose stage exists.
 
     Args:
-        sizes: stage -> its numbers of structures and triangles. For other
-            stages, the world is loaded to count them, which takes long.
+        sizes: stage -> its numbers of structures and triangles, if known. For a
+            stage without an entry, the world is loaded to count them, which
+            takes long.
 
     Raises:
         InputError: if a drive cannot be read or planned, or its stage cannot

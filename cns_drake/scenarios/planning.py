@@ -49,8 +49,8 @@ def plan_drive(
 
     Args:
         positions: (N,) distances along the path at evenly spaced times [m], for
-            a car that follows others; see `TrafficPlan`. By default the car
-            drives as fast as the limits allow.
+            a car that keeps its distance to other vehicles; see `TrafficPlan`.
+            By default the car drives as fast as the limits allow.
 
     Raises:
         InputError: the roads, the waypoints or the vehicle's springs cannot
@@ -153,10 +153,11 @@ def _things_beside(scenario: Scenario, points: np.ndarray) -> STRtree:
 
 
 def count_frames(scenario: Scenario, trajectory: Trajectory) -> int:
-    """Returns the number of frames of a scenario's drive.
+    """Returns the number of frames that a scenario's drive records.
 
     Raises:
-        InputError: `frames` is greater than the drive has.
+        InputError: the field `frames` exceeds the number of frames of the whole
+            drive.
     """
     available = frames_within(trajectory.duration, scenario.frame_period)
     if scenario.frames is not None and scenario.frames > available:
@@ -168,15 +169,15 @@ def count_frames(scenario: Scenario, trajectory: Trajectory) -> int:
 
 
 def shown_beside(scenario: Scenario) -> tuple[Scenario | None, str]:
-    """Returns the stage with which a drive's page compares its own stage.
+    """Returns the other stage that a drive's web page shows for comparison.
 
-    It is the last stage, or the first stage if the drive is in the last one. If
-    the drive leaves out structures, it is the drive's own stage including those
-    structures.
+    This is the map's last stage or, for a drive in the last stage, the first
+    stage. If the drive leaves out structures (`without`), it is the drive's own
+    stage with these structures.
 
     Returns:
-        The scenario in that stage, None if there is no other stage; and the
-        name of the stage.
+        The scenario in the other stage, and the stage's name for the page; None
+        and "" if there is no other stage.
     """
     if scenario.without:
         return scenario.replaced(without=()), "the whole city"

@@ -1,4 +1,4 @@
-"""The inputs and libraries of a recording, besides its scenario."""
+"""All inputs of a recording except its scenario: files, code, libraries."""
 
 import hashlib
 import json
@@ -25,7 +25,7 @@ INPUTS_KEY = "inputs_sha256"
 
 
 def dependency_versions() -> dict[str, str]:
-    """Returns package -> version, of cns-drake and its numerical libraries.
+    """Returns package -> version for cns-drake and its numerical libraries.
 
     Missing packages are left out: not all platforms have Embree's wheel.
     """
@@ -41,17 +41,17 @@ def digest_inputs(
 ) -> dict[str, str]:
     """Returns SHA-256 digests of the files that a scenario reads.
 
-    The digest of a world includes the meshes and models that it names, and the
-    files that these name.
+    The digest of a world covers the meshes and models that the world names, and
+    the files that these meshes and models name.
 
     Args:
-        watch: notes the status of each file before it is read.
+        watch: records the status of each file before the file is read.
 
     Returns:
-        `world`, `vehicle`, and `structures`, `suspension`, `roads`, `lanes`,
-        `waypoints`, `fcd` or `kalibr`, if used -> hexadecimal digest. It
-        depends only on contents and relative names, not on the folder of the
-        files.
+        Kind of file -> hexadecimal digest. The kinds are `world` and `vehicle`
+        and, if used, `structures`, `suspension`, `roads`, `lanes`, `waypoints`,
+        `fcd` and `kalibr`. The digests depend only on contents and relative
+        names, not on the folder of the files.
 
     Raises:
         InputError: a file cannot be read.
@@ -92,8 +92,8 @@ def combined_digest(inputs: dict[str, str]) -> str:
 def recording_fingerprint(scenario: Scenario, inputs: dict[str, str]) -> str:
     """Returns a hash of everything that determines a scenario's recording.
 
-    The hash depends neither on the folder of the files nor on the settings of
-    the drive's page.
+    The hash does not depend on the folder of the files or on settings that
+    affect only the drive's web page.
     """
     places: dict[str, object] = {
         field: Path(place).name
@@ -127,7 +127,7 @@ def digest_file(path: Path, watch: FileWatch | None = None) -> str:
     """Returns the SHA-256 digest of a model and of the files that it names.
 
     Args:
-        watch: notes the status of each file before it is read.
+        watch: records the status of each file before the file is read.
 
     Raises:
         InputError: a file cannot be read.

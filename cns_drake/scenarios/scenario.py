@@ -109,7 +109,7 @@ class RideConfig(Section):
         return self
 
     def profile(self) -> RoadProfile | None:
-        """Returns the road's profile; None if the vehicle is rigid."""
+        """Returns the road surface profile; None if the car stays steady."""
         if self.roughness == "none":
             return None
         return RoadProfile(self.roughness, self.seed)
@@ -120,9 +120,9 @@ class DriverConfig(Section):
 
     Attributes:
         wander: standard deviation of the car's sideways distance from the
-            middle of its lane [m], where the road has room for it. Between two
-            drives with this value, the standard deviation is 1.4 times as
-            large.
+            middle of its lane [m], where the road has room for it. The sideways
+            distance between the paths of two drives with this value has a
+            standard deviation that is 1.4 times as large.
         wander_length: distance along the road after which the autocorrelation
             of this sideways distance has fallen to 1/e [m].
         lane_changes: average number of changes to a neighbouring lane per
@@ -179,8 +179,8 @@ class TrafficConfig(Section):
         vehicles: number of cars, vans, trucks, buses, motorcycles and bicycles
             that drive along the map's roads.
         walkers: number of people who walk on the map's sidewalks and crossings.
-        seed: seed of the kinds, starting places and routes of vehicles and
-            walkers.
+        seed: seed of the random kinds, starting places and routes of vehicles
+            and walkers.
         fcd: file of a SUMO trace (floating-car data) to replay instead of
             planned traffic; `vehicles` and `walkers` must then be 0.
         queues: whether vehicles stand in queues in all lanes, as in a rush
@@ -221,9 +221,9 @@ class TrafficConfig(Section):
 class TransientConfig(Section):
     """Temporary changes to a city, such as snow, that no stage contains.
 
-    `roadsides` is applied first, so the other switches change the objects that
-    it adds, too. Otherwise the switches do not depend on each other: the effect
-    of each depends only on the seed and on the names of structures.
+    `roadsides` is applied first, so all other switches also change the objects
+    that `roadsides` adds. Apart from that, the switches are independent: the
+    effect of each depends only on the seed and on the names of structures.
 
     Attributes:
         seed: seed of all random draws.
@@ -274,13 +274,13 @@ class Scenario(Section):
         name: name of the drive and its files, from letters, digits and
             underscores.
         base: name or file of another drive. Fields that you leave out here have
-            the values of that drive.
+            the values of this base drive.
         map: name of a shipped map, or a folder with the same layout.
         stage: stage of the map, such as `"01"`.
         world: SDF file of a world to drive in, instead of `map` and `stage`. It
             needs `waypoints`.
-        without: names of structures to leave out of the world, as in the map's
-            `structures.csv`.
+        without: names of structures to leave out of the world; the names are in
+            the map's `structures.csv`.
         title: one line for readers that says what the drive shows.
         route: lanes to follow, road by road. Give either `route` or
             `waypoints`.
@@ -289,7 +289,7 @@ class Scenario(Section):
         u_turns: whether the car turns round where the waypoints lead straight
             back.
         aside: distance by which the car drives to the right of the middle of
-            its lane [m]; a negative one is to the left. It applies between
+            its lane [m]; negative values are to the left. It applies between
             junctions, as far as the road has room.
         speeds: limits of speed and acceleration.
         driver: how the driver leaves the middle of the lane.
@@ -297,11 +297,11 @@ class Scenario(Section):
         traffic: vehicles and walkers that move.
         transient: temporary changes to the city, such as other parked cars, or
             snow.
-        lidars: LiDARs by name. The name of a LiDAR is also that of its frame
-            and its topic. By default there is one, named `lidar`.
-        cameras: cameras by name. The name of a camera is also that of its
-            optical frame (x right, y down, z ahead) and its topics. By default
-            there is none.
+        lidars: LiDARs by name. The frame and the topic of a LiDAR have its
+            name. By default there is one LiDAR, named `lidar`.
+        cameras: cameras by name. The optical frame (x right, y down, z ahead)
+            and the topics of a camera have its name. By default there is no
+            camera.
         imu: the inertial measurement unit.
         weather: fog, rain and snowfall for calibrated returns.
         odometry: how often the true motion of the vehicle is recorded.
@@ -443,12 +443,12 @@ class Scenario(Section):
 
     @property
     def source(self) -> str:
-        """The scenario's file, or else its name, for error messages."""
+        """The scenario's file, or else its name; used in error messages."""
         return str(self._files[0] if self._files else self.name)
 
     @property
     def files(self) -> tuple[Path, ...]:
-        """Files from which the scenario was read, its bases included."""
+        """Files from which the scenario was read: its own and its bases'."""
         return self._files
 
     @property
@@ -463,7 +463,7 @@ class Scenario(Section):
 
     @property
     def further_sensors(self) -> dict[str, SensorConfig]:
-        """Field -> sensor, for all sensors but LiDARs, IMU and odometry."""
+        """Field -> sensor, for sensors of user-defined kinds."""
         return {n: one for n, one in self if isinstance(one, SensorConfig)}
 
     def with_returns(
@@ -474,8 +474,9 @@ class Scenario(Section):
         """Returns the scenario with another model of every LiDAR's returns.
 
         Args:
-            returns: `ideal` or `calibrated`. Calibrated returns drop the noise
-                and losses of ideal ones; ideal returns drop the weather.
+            returns: `ideal` or `calibrated`. With `calibrated`, the settings
+                for noise and losses of ideal returns are removed; with `ideal`,
+                the weather is removed.
             weather: the weather; by default that of the scenario.
         """
         if returns == "ideal":
@@ -492,14 +493,14 @@ class Scenario(Section):
     ) -> Scenario:
         """Returns the scenario with other values of some fields.
 
-        The fields of a section, and LiDARs by their names, change one by one. A
-        list is replaced as a whole. None stands for the default.
+        In a section, and among the LiDARs, only the given entries change. A
+        list is replaced as a whole. The value None restores the default.
 
         Args:
-            changes: field -> its new value, or a mapping of the fields in it.
-                Setting a world removes the map and its route, setting a route
-                removes the waypoints, and vice versa.
-            source: the file or argument that errors name.
+            changes: field -> new value, or a mapping of the changes in a
+                section. Setting `world` removes `map` and `route`, setting
+                `route` removes `waypoints`, and vice versa.
+            source: the file or argument that error messages name.
 
         Raises:
             InputError: a field is unknown, or its value is not usable.
@@ -511,7 +512,7 @@ class Scenario(Section):
         return scenario
 
     def with_traffic(self, number: int) -> Scenario:
-        """Returns the scenario with this many vehicles, and as many walkers."""
+        """Returns the scenario with this number of vehicles and of walkers."""
         seed = self.traffic.seed
         return self.replaced(
             traffic=TrafficConfig(vehicles=number, walkers=number, seed=seed)
@@ -530,8 +531,9 @@ class Scenario(Section):
 
         Args:
             driver: `real` for a driver who wanders and changes lanes as in
-                published drives; along waypoints, which have no lanes, he only
-                wanders. `none` for the middle of the lane.
+                published drives (along waypoints, which have no lanes, the
+                driver only wanders); `none` for a driver who stays in the
+                middle of the lane.
         """
         if driver == "none":
             return self.replaced(driver=DriverConfig())

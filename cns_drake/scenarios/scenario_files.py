@@ -34,7 +34,7 @@ def make_scenario(values: dict, source: object) -> Scenario:
 
 
 def load_scenario(name_or_file: str | Path) -> Scenario:
-    """Returns a shipped drive's scenario by its name, or one from a file.
+    """Returns the scenario of a shipped drive, or from a file.
 
     Raises:
         InputError: there is no such drive or file, or the file is not a
@@ -79,11 +79,10 @@ def _name_drives(given: str | Path, folder: MapFolder) -> str:
 
 
 def read_scenario_file(path: Path) -> Scenario:
-    """Reads a scenario whose map, world and waypoints may be missing.
+    """Reads a scenario; its map, world and waypoints need not exist.
 
     Raises:
-        InputError: the file, or one that it has as base, is not a usable
-            scenario.
+        InputError: the scenario in the file, or its `base`, is not usable.
     """
     files: dict[Path, dict] = {}
     file: Path | None = path
@@ -133,7 +132,7 @@ def _find_base(
 
 
 def find_files(values: dict, path: Path) -> None:
-    """Returns a scenario's or a family's fields with absolute paths.
+    """Makes the paths among the fields of a scenario or family absolute.
 
     Args:
         path: the file that contains the fields; relative paths start at its
@@ -160,7 +159,8 @@ def find_files(values: dict, path: Path) -> None:
 def map_folder(scenario: Scenario) -> MapFolder:
     """Returns the folder of a scenario's map.
 
-    For a scenario of a world it is the folder of the world's file.
+    If the scenario has a `world` instead of a map, this is the folder of the
+    world's file.
     """
     if scenario.world is not None:
         return MapFolder(Path(scenario.world).parent)
@@ -176,10 +176,10 @@ def world_file(scenario: Scenario) -> Path:
 
 
 def check_files(scenario: Scenario, source: object = None) -> None:
-    """Checks that the map and its stage, or the other files, exist.
+    """Checks that a scenario's map, stage, world and waypoints exist.
 
-    With traffic the map needs roads. Errors name the source, by default the
-    scenario's file.
+    With traffic, the roads of the map must exist, too. Error messages begin
+    with `source`, by default the scenario's file.
 
     Raises:
         InputError: one of these files does not exist.
@@ -224,16 +224,15 @@ def check_files(scenario: Scenario, source: object = None) -> None:
 
 
 def describe_scenario(scenario: Scenario, folder: Path | None = None) -> dict:
-    """Returns the fields of a scenario that are given, ready for JSON.
+    """Returns the scenario's fields that are set, ready for JSON.
 
-    The locations of map, world and waypoints are not part of the drive's
-    description: digests identify the content of these files (see `provenance`).
-    The noise of an IMU is described in a file with a fixed name next to the
-    scenario.
+    The folders of map, world and waypoints are left out, because digests
+    identify the content of these files (see `provenance`). The noise of an IMU
+    is in a separate file of a fixed name next to the scenario.
 
     Args:
-        folder: folder to which paths of files are relative. Without it, paths
-            are reduced to the names of the files.
+        folder: folder to which the paths of files are made relative. By
+            default, paths are reduced to the names of the files.
     """
     values = scenario.model_dump(mode="json", exclude_none=True)
     for fields, field in (

@@ -1,4 +1,7 @@
-"""Finds the shipped worlds, which a wheel contains as one archive."""
+"""Finds the worlds that ship with cns-drake.
+
+A wheel contains them as one archive.
+"""
 
 import functools
 import hashlib
@@ -16,8 +19,8 @@ from cns_drake.base.map_folder import MapFolder, drive_name
 def worlds_folder() -> Path:
     """Returns the folder of shipped maps.
 
-    In a checkout it is beside the package. A wheel has an archive of it, which
-    is unpacked to the user's cache.
+    In a source checkout it is the folder next to the package. In a wheel it is
+    an archive, which is unpacked to the user's cache.
 
     Raises:
         InputError: if the cache cannot be written.
@@ -38,7 +41,7 @@ def suspension_file() -> Path:
 
 
 def shipped_maps() -> dict[str, Path]:
-    """Returns the folder of each shipped map, by name."""
+    """Returns name -> folder of each shipped map."""
     return {
         path.name: path
         for path in sorted(worlds_folder().iterdir())
@@ -47,7 +50,7 @@ def shipped_maps() -> dict[str, Path]:
 
 
 def recordable_maps() -> list[str]:
-    """Returns the shipped maps with drives whose stage is shipped as well."""
+    """Returns the shipped maps that have a drive whose stage ships as well."""
     return [
         name
         for name, folder in shipped_maps().items()
@@ -62,7 +65,8 @@ def recordable_map(name: str) -> Path:
         name: a shipped map, or a folder.
 
     Raises:
-        InputError: there is no such map, or no such drive in it.
+        InputError: there is no such map, or the map has no drive that can be
+            recorded.
     """
     folder = shipped_maps().get(name, Path(name))
     if not folder.is_dir():
@@ -79,7 +83,7 @@ def recordable_map(name: str) -> Path:
 
 
 def shipped_drives() -> dict[str, Path]:
-    """Returns the file of each shipped drive, by name (`<map>_<NN>`)."""
+    """Returns name (`<map>_<NN>`) -> file of each shipped drive."""
     return {
         drive_name(path): path
         for folder in shipped_maps().values()
@@ -88,7 +92,7 @@ def shipped_drives() -> dict[str, Path]:
 
 
 def recordable_drives() -> dict[str, Path]:
-    """Returns the shipped drives whose stage is shipped as well, by name."""
+    """Returns name -> file of the shipped drives whose stage ships as well."""
     return {
         drive_name(path): path
         for folder in shipped_maps().values()
@@ -97,10 +101,11 @@ def recordable_drives() -> dict[str, Path]:
 
 
 def unpacked(archive: Path) -> Path:
-    """Returns a folder with the files of an archive; it is unpacked once.
+    """Returns a folder with the files of an archive, unpacked only once.
 
-    The folder is in the user's cache. Its name has a digest of the archive, so
-    that each release has its own. Processes may call this side by side.
+    The folder is in the user's cache. Its name contains a digest of the
+    archive, so that each release has a folder of its own. Several processes may
+    call the function at the same time.
 
     Args:
         archive: a tar file, compressed by any method.

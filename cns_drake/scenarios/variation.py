@@ -1,12 +1,13 @@
-"""Families of scenarios, described by one small file.
+"""Families of scenarios, each described by one small file.
 
 Every member of a family is a scenario. The members differ in how much of the
 city is missing: each lacks a given share of the buildings and plants, namely
 those nearest to a random place. A member with a greater share lacks everything
-that a member with a smaller share lacks. The share can also be one of only
-those structures that an earlier stage lacks; the members are then stages in
-between. In addition, structures of chosen classes can be missing at random.
-Several draws of the city, random routes and other LiDARs multiply the members.
+that a member with a smaller share lacks. The removed structures can also be
+limited to those that an earlier stage lacks; the members are then between the
+two stages. In addition, structures of chosen classes can be missing at random.
+A family can also combine these shares with several random seeds, redrawn
+cities, random routes and other LiDARs.
 """
 
 from collections.abc import Callable, Mapping, Sequence, Set
@@ -89,22 +90,22 @@ class Family(Section):
         base: name or file of the drive that provides the map, route, speeds and
             sensors of all members.
         stage: stage through which the members drive, and from which structures
-            are removed. By default the map's last one.
-        towards: another stage, usually an earlier one. Only structures that
-            this stage lacks are removed, and structures that are lower in it
-            keep their height.
+            are removed. By default the map's last stage.
+        towards: another stage of the map, usually an earlier one. Only
+            structures that do not exist in this other stage are removed.
+            Structures that are lower there keep their height.
         missing: shares of the structures to remove. Each share makes a member:
             give numbers from 0 to 1, or `{from: 0, to: 0.6, count: 20}` for
             evenly spaced ones.
-        scattered: shares of single classes to remove at random in addition, by
-            the name of the class, such as `{pole: 0.3}`.
+        scattered: name of a class -> share of its structures to remove at
+            random in addition, such as `{pole: 0.3}`.
         seeds: seeds of the random draws. Each seed makes a member, and begins
             to remove structures at another place.
-        city_seeds: seeds of other cities along the same streets, each of which
-            makes a member.
+        city_seeds: seeds of cities that are generated anew along the same
+            streets. Each seed makes a member.
         routes: random routes for the members, instead of the base's route.
-        lidars: presets of LiDARs that replace those of the base, such as `[cns,
-            os1-64]`. Each preset makes a member.
+        lidars: presets of LiDARs, such as `[cns, os1-64]`, that replace the
+            LiDARs of the base. Each preset makes a member.
         ride: ride of all members, instead of the base's.
         imu: IMU of all members, instead of the base's.
     """
@@ -129,18 +130,19 @@ class Family(Section):
 def load_family(path: Path, redraw: Redraw | None = None) -> list[Scenario]:
     """Reads a family's file and returns its members.
 
-    The name of a member consists of the base, the seed of the city if it
-    varies, the missing part in per mille, the seed, and the route and the LiDAR
-    if they vary.
+    The name of a member consists of the name of the base, the city's seed if it
+    varies, the missing share in per mille, the seed, and the route and LiDAR if
+    they vary.
 
     Args:
-        redraw: function that draws cities, which only a family with
-            `city_seeds` needs. The function is called last, after all checks.
+        redraw: function that generates a city from a seed; only a family with
+            `city_seeds` needs it. It is called last, after all checks.
 
     Raises:
-        InputError: the file, or one that it names, cannot be used, the base has
-            no map, or a stage, class or LiDAR of the family does not exist.
-        ValueError: it has `city_seeds`, and there is no `redraw`.
+        InputError: the family's file or a file that it names cannot be used,
+            the base has no map, or a stage, class or LiDAR of the family does
+            not exist.
+        ValueError: the family has `city_seeds`, but `redraw` is None.
     """
     values = read_yaml(path)
     if isinstance(values, dict):
@@ -235,8 +237,8 @@ def vary(
 def write_scenarios(scenarios: Sequence[Scenario], folder: Path) -> list[Path]:
     """Writes scenarios as `<folder>/<name>.yaml`.
 
-    The path of a map that lies next to the folder is written as a relative one,
-    so that both can be moved together.
+    If a map lies next to `folder`, its path is written as a relative path, so
+    that map and folder can be moved together.
 
     Raises:
         InputError: if a file cannot be written.

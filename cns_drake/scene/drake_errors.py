@@ -19,10 +19,11 @@ PARSER_ERRORS = (
 
 @contextlib.contextmanager
 def collected_errors() -> Iterator[list[str]]:
-    """Collects errors that Drake would otherwise print to its log.
+    """Collects the error messages that Drake logs during the block.
 
-    Warnings are passed on at the end, but not after an exception, since an
-    error message must be a single line.
+    They are not printed. Drake's warnings are printed at the end of the block,
+    but not after an exception, since a command prints only one line for an
+    error.
     """
     errors: list[str] = []
     records: list[logging.LogRecord] = []

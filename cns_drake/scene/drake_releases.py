@@ -12,11 +12,11 @@ from cns_drake.base.version import installed_versions
 def find_bus(
     builder: DiagramBuilder, lcm_buses: LcmBuses, caller: str, bus: str
 ) -> Any:
-    """Returns the interface of an LCM bus, like `LcmBuses.Find`.
+    """Returns the LCM interface of a bus; replaces `LcmBuses.Find`.
 
-    With the bindings of Drake 1.58, `Find` returns an unusable system: any use
-    of it ends the process. This function takes the system from the builder
-    instead.
+    In Python with Drake 1.58, `Find` returns an unusable system: any use of
+    this system crashes the process. This function takes the system from the
+    builder instead.
 
     Raises:
         RuntimeError: there is no such bus; the message names the caller.
@@ -29,10 +29,10 @@ def find_bus(
 
 
 def takes_screen_colours() -> bool:
-    """Returns whether the renderer takes vertex colours as sRGB, not linear.
+    """Returns whether Drake's renderer reads vertex colours as sRGB.
 
-    Up to Drake 1.53 it takes them as linear. A Drake that was not installed as
-    a package counts as newer.
+    Up to Drake 1.53 the renderer reads them as linear colours. If Drake was not
+    installed as a Python package, its version is assumed to be newer.
     """
     version = installed_versions(["drake"]).get("drake", "1.54")
     return tuple(map(int, re.findall(r"\d+", version)[:2])) >= (1, 54)

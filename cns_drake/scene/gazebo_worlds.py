@@ -1,9 +1,9 @@
 """Reduces Gazebo worlds to their visuals, as SDF that Drake can read.
 
 Drake rejects many elements of such worlds, and crashes on an infinite collision
-plane if there are many others. Only the visuals are kept, at their initial
-places: nothing in such a world moves here. Models and files to which a world
-refers are searched in the folders that Gazebo searches.
+plane if there are many other collision shapes. Only the visuals are kept, at
+their initial places, and nothing in such a world moves. Models and files to
+which a world refers are searched in the same folders as by Gazebo.
 """
 
 from collections import Counter
@@ -52,8 +52,8 @@ class ModelFinder:
     def find(self, uri: str, folder: Path) -> Path | None:
         """Returns the file or folder of a URI; None if it does not exist.
 
-        The URI is an absolute path, `model://<name>/...`, or relative to the
-        folder.
+        The URI is `model://<name>/...`, an absolute path, or a path relative to
+        `folder`.
         """
         rest = uri
         for scheme in _SCHEMES:
@@ -76,7 +76,9 @@ class ModelFinder:
 
 
 def model_file(path: Path) -> Path:
-    """Returns the SDF file of a model, given this file or its folder.
+    """Returns the SDF file of a model.
+
+    `path` is this file, or the folder of the model.
 
     Raises:
         InputError: the folder has no SDF file.
@@ -185,7 +187,7 @@ _EVERY_FLAG = 0xFFFFFFFF
 
 
 def is_gazebo_world(path: Path, root: Element) -> bool:
-    """Returns whether a world or model has elements that Drake misreads."""
+    """Returns whether a world or model has elements that Drake cannot read."""
     if root.find("world") is None and root.find("model") is None:
         return False
     return (
@@ -205,7 +207,9 @@ def is_gazebo_world(path: Path, root: Element) -> bool:
 def simplify_world(
     path: Path, root: Element, model_paths: Iterable[Path] = ()
 ) -> tuple[str, tuple[str, ...]]:
-    """Returns a world with static models and visuals only, and notes.
+    """Returns a world with only static models and their visuals, as SDF.
+
+    The second result is notes for the user on what was left out.
 
     Raises:
         InputError: a model that was found cannot be read, or something would be

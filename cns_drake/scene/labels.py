@@ -1,4 +1,4 @@
-"""Labels and instance ids that points on geometries get."""
+"""Labels and instance ids of points, by the geometry that was hit."""
 
 from collections.abc import Sequence
 from typing import NamedTuple
@@ -15,7 +15,7 @@ OTHER_MOVING_ID = 259
 
 
 class Labels(NamedTuple):
-    """Labels of points on each of G geometries.
+    """The labels that points on each of G geometries get.
 
     Attributes:
         label: (G,) uint16 class.
@@ -29,9 +29,10 @@ class Labels(NamedTuple):
 
 
 def number_structures(names: Sequence[str]) -> Labels:
-    """Returns labels for structures without classes, by their names.
+    """Returns labels for structures whose classes are unknown.
 
-    Instance ids count from 1, in alphabetical order of the names.
+    `names` contains the structure's name for each geometry. Instance ids count
+    from 1, in alphabetical order of the names.
 
     Raises:
         InputError: there are more structures than instance ids.

@@ -1,7 +1,8 @@
 """Reads the surfaces of meshes, from files or from memory.
 
-glTF and COLLADA files are checked for content that Open3D, which reads them,
-would misread: https://registry.khronos.org/glTF/specs/2.0/glTF-2.0.html
+Open3D reads glTF and COLLADA files. They are first checked for content that
+Open3D would misread. Specification of glTF:
+https://registry.khronos.org/glTF/specs/2.0/glTF-2.0.html
 """
 
 from collections import Counter
@@ -58,11 +59,11 @@ _JSON = 0x4E4F534A
 
 
 def unread_parts(path: Path) -> tuple[str, ...]:
-    """Returns one line for each kind of content of a mesh that is ignored.
+    """Returns one line for each kind of content that is ignored in a mesh file.
 
     Raises:
-        ValueError: its shapes would be misread.
-        InputError: it cannot be read.
+        ValueError: the shapes in the file would be misread.
+        InputError: the file cannot be read.
     """
     ending = path.suffix.lower()
     if ending in GLTF:
@@ -80,9 +81,9 @@ def check_gltf(path: Path) -> tuple[str, ...]:
     The file is text or binary.
 
     Raises:
-        ValueError: it is not glTF, or its shapes would be misread; the message
-            names what the file needs.
-        InputError: it cannot be read.
+        ValueError: the file is not glTF, or its shapes would be misread; the
+            message names the required features.
+        InputError: the file cannot be read.
     """
     content = read_bytes(path, _LIMIT_BYTES)
     try:
@@ -166,7 +167,7 @@ def check_obj(path: Path) -> None:
     """Checks that faces of an OBJ file only use vertices that exist.
 
     Raises:
-        ValueError: one does not; the message names the line.
+        ValueError: a vertex does not exist; the message names the line.
         InputError: the file cannot be read.
     """
     # Drake accepts both as line ends.
@@ -241,9 +242,9 @@ _SMALL_BYTES = 1 << 18
 
 
 class MeshFiles:
-    """Reads meshes, each only once for all geometries that use it.
+    """Reads mesh files; each is read only once for all geometries with it.
 
-    A mesh at a given scale has one surface.
+    All geometries with the same mesh at the same scale share one surface.
     """
 
     def __init__(self, foreign: ForeignMeshes):
@@ -333,7 +334,7 @@ class MeshFiles:
 
 
 def mesh_shape_key(shape: Mesh | Convex) -> tuple:
-    """Returns a key that is equal only for equal meshes or hulls."""
+    """Returns a key that is equal only for equal meshes or convex hulls."""
     return type(shape), _source_key(shape.source()), tuple(shape.scale3())
 
 

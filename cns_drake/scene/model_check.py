@@ -1,7 +1,8 @@
 """Checks models before Drake parses them.
 
-For a text that is not a number or a valid size, libsdformat uses only a part of
-it or the value 1, or Drake ends the program. Long names end the process, too.
+Without these checks, a text that is not a number or a valid size is used only
+in part or replaced by 1 (by libsdformat), or crashes the process (in Drake).
+Long names crash the process, too.
 """
 
 import math
@@ -41,7 +42,7 @@ _OTHER_NUMBERS = {
 
 
 def lacks_size(shape: ElementTree.Element) -> bool:
-    """Returns whether an SDF shape has no size of its own."""
+    """Returns whether an SDF shape lacks the element with its size."""
     if shape.tag == "plane" or shape.tag.startswith("drake:"):
         return False
     return any(shape.find(name) is None for name in SIZES.get(shape.tag, ()))
@@ -51,9 +52,9 @@ def check_model(path: Path) -> None:
     """Checks an SDF or URDF file, and the SDF files that it includes.
 
     Raises:
-        InputError: it cannot be read, is not XML, or has an invalid number, an
-            impossible size, two values for one element, a name that is too
-            long, or an invalid face in a collision's mesh.
+        InputError: a file cannot be read, is not XML, or has an invalid number,
+            an impossible size, two values for one element, a name that is too
+            long, or an invalid face in the mesh of a collision.
     """
     seen: set[Path] = set()
     waiting = [path]

@@ -1,4 +1,4 @@
-"""The geometry of one role in a SceneGraph, as a LiDAR sees it."""
+"""Reads the geometry with a given Drake role, as a LiDAR sees it."""
 
 from collections.abc import Callable, Collection, Iterable, Sequence
 from dataclasses import dataclass
@@ -46,12 +46,12 @@ class PerceptionGeometry:
     Attributes:
         geometry_id: id of the geometry in the SceneGraph.
         name: scoped name, `<model>::<visual>`.
-        frame_id: the frame F to which it is fixed.
+        frame_id: the frame F to which the geometry is fixed.
         X_FG: pose of the geometry G in F.
         surface: shape of the geometry, in G.
         rgb: diffuse colour; None if the model has none.
         reflectivity: the property ("lidar", "reflectivity"), from 0 to 1; None
-            without it.
+            if the geometry does not have it.
     """
 
     geometry_id: GeometryId
@@ -81,10 +81,12 @@ def structure_name(geometry_name: str) -> str:
 
 
 def check_shape(name: str, shape: Shape) -> None:
-    """Checks the size of a shape; for a mesh, its file gives the size.
+    """Checks that a shape is not too large.
+
+    Meshes are not checked, since only their files contain their size.
 
     Raises:
-        InputError: it is too large; the message names the geometry.
+        InputError: the shape is too large; the message names the geometry.
     """
     if isinstance(shape, shapes.Mesh | shapes.Convex | shapes.HalfSpace):
         return
@@ -103,10 +105,12 @@ def read_perception_geometry(
     inspector: SceneGraphInspector,
     keep_frame: Callable[[FrameId], bool] = lambda frame_id: True,
 ) -> tuple[PerceptionGeometry, ...]:
-    """Returns every geometry with `Role.kPerception` on the wanted frames.
+    """Returns every geometry with `Role.kPerception` on selected frames.
+
+    `keep_frame` selects the frames; by default all.
 
     Raises:
-        InputError: see `GeometryReader.read`.
+        InputError: a geometry cannot be read; see `GeometryReader.read`.
     """
     reader = GeometryReader(Role.kPerception)
     hidden = {
@@ -138,7 +142,10 @@ def merge_surfaces(
 
 
 class GeometryReader:
-    """Reads the geometry of a role, and then only what has changed."""
+    """Reads all geometry with a given Drake role.
+
+    Later calls read only what has changed since the call before.
+    """
 
     def __init__(self, role: Role):
         """Takes the role, and reads nothing yet."""
@@ -282,19 +289,20 @@ _revisions = itertools.count(1)
 def geometry_revision_port(scene_graph: SceneGraph) -> OutputPort:
     """Returns a port whose value changes when, and only when, geometry does.
 
-    There are two other ways to notice changes, with drawbacks: SceneGraph's own
+    Two other ways to notice changes have drawbacks: SceneGraph's own
     `geometry_version` only covers perception geometry that a render engine has
     accepted, and comparing all geometries takes longer than a scan.
 
     A Context holds the geometry as a parameter, which Drake's cache tracks. The
-    port depends only on this parameter. It is therefore computed again whenever
-    geometry was added, removed, replaced, reshaped, renamed or given another
-    role, in any way. The first call adds the port to the SceneGraph, and must
-    come before a Diagram is built from it.
+    port depends only on this parameter. Its value is therefore computed again
+    whenever geometry was added, removed, replaced, reshaped, renamed or given
+    another role. The first call adds the port to the SceneGraph, and must come
+    before a Diagram is built from it.
 
     Returns:
-        An abstract port. Its value is an int, which is different for any other
-        geometry in this process, even in another Context.
+        An abstract port with an int as its value. Within this process, two
+        values are equal only if the geometry is the same, even in different
+        Contexts.
 
     Raises:
         RuntimeError: the SceneGraph is already part of a Diagram.

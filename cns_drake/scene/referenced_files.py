@@ -23,10 +23,10 @@ _NAMING = {
 
 
 class FileWatch:
-    """Notices whether any of some files have changed.
+    """Notices whether any of a number of files has changed.
 
-    Contents are not compared: a file counts as changed if its size, its times
-    or its inode have changed.
+    Contents are not compared: a file counts as changed if its size, its time
+    stamps or its inode have changed.
     """
 
     def __init__(self) -> None:
@@ -38,14 +38,14 @@ class FileWatch:
         If this is called again for the same file, the first status is kept.
 
         Returns:
-            The present status; None if the file does not exist.
+            The current status; None if the file does not exist.
         """
         status = _status(path)
         self._states.setdefault(path, _state(status))
         return status
 
     def changed(self) -> str | None:
-        """Returns the first file that has changed since `take_down`.
+        """Returns a file that has changed since `take_down` was called for it.
 
         It is None if no file has changed.
         """
@@ -71,11 +71,11 @@ def _state(status: os.stat_result | None) -> tuple[int, ...]:
 def referenced_files(
     model: Path, watch: FileWatch
 ) -> dict[str, tuple[str, int]]:
-    """Returns the files to which a model refers, and those to which they refer.
+    """Returns the files to which a model refers, directly or indirectly.
 
     Returns:
-        Path relative to the model's folder, or URI of a file elsewhere -> file,
-        and its size.
+        Name -> path of the file and its size [bytes]. The name is the path
+        relative to the model's folder or, for a file elsewhere, its URI.
 
     Raises:
         InputError: a file cannot be read.

@@ -48,5 +48,5 @@ MOVING_IDS = {
 
 
 def moving_id(semantic_class: str) -> int:
-    """Returns SemanticKITTI's id for a class while it moves."""
+    """Returns SemanticKITTI's id for objects of a class that are moving."""
     return MOVING_IDS.get(semantic_class, OTHER_MOVING_ID)

@@ -1,4 +1,4 @@
-"""Classes and instance ids of a world's structures."""
+"""The table of a world's structures, with classes and instance ids."""
 
 from __future__ import annotations
 
@@ -17,14 +17,15 @@ from cns_drake.scene.semantics import CLASS_IDS, moving_id
 
 @dataclass(frozen=True)
 class StructureEntry:
-    """A structure's entry in a table, to which a LiDAR return refers by its id.
+    """The entry of one structure in the structure table of a world.
 
     Attributes:
-        instance: instance id, from 1 to 65535; 0 stands for no structure.
+        instance: instance id of the structure, as in LiDAR points, from 1 to
+            65535; 0 stands for no structure.
         name: name of the structure.
         semantic_class: a key of `CLASS_IDS`.
-        reflectivity: reflectivity of its surfaces near 900 nm, from 0 to 1;
-            None if it follows from class and colours.
+        reflectivity: reflectivity of the structure's surfaces near 900 nm, from
+            0 to 1; None if it follows from class and colours.
         causes: the switches of a scenario's `transient` that changed the
             structure relative to the stage's file.
     """
@@ -65,11 +66,11 @@ class StructureTable:
         return max((entry.instance for entry in self), default=0)
 
     def joined(self, other: StructureTable) -> StructureTable:
-        """Returns the table with the entries of another table added."""
+        """Returns a table with the entries of this and of another table."""
         return StructureTable([*self, *other])
 
     def completed(self, names: Iterable[str]) -> StructureTable:
-        """Returns the table with additional entries for names that it lacks."""
+        """Returns the table, with entries added for the names that it lacks."""
         entries = list(self)
         free = self.last_instance + 1
         for name in sorted(set(names) - self._by_name.keys()):
@@ -95,7 +96,7 @@ class StructureTable:
 
 
 def load_structure_table(path: Path) -> StructureTable:
-    """Returns the table in a CSV file with columns `instance`, `name`, `class`.
+    """Reads a structure table: CSV with columns `instance`, `name`, `class`.
 
     The column `reflectivity` is optional, and its cells may be empty.
 

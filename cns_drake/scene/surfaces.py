@@ -29,7 +29,7 @@ class TriangleSurface:
 
 @dataclass(frozen=True)
 class EllipsoidSurface:
-    """An ellipsoid (or sphere) centred on G; its axes are those of G."""
+    """An ellipsoid (or sphere) centred on G, with its axes along those of G."""
 
     semi_axes: tuple[float, float, float]
 
@@ -48,7 +48,7 @@ class CylinderSurface:
 
 @dataclass(frozen=True)
 class CapsuleSurface:
-    """A capsule centred on G; `length` is only that of its cylinder."""
+    """A capsule centred on G; `length` excludes its two half spheres."""
 
     radius: float
     length: float
@@ -86,8 +86,8 @@ def merge_triangles(
     Each member consists of an index, a pose X_TG and a surface.
 
     Returns:
-        The surface in T, and (M,) int32 the index of the member of each
-        triangle.
+        The surface in T, and for each triangle, (M,) int32, the index given
+        with its member.
     """
     vertices: list[np.ndarray] = [np.zeros((0, 3))]
     triangles: list[np.ndarray] = [np.zeros((0, 3), np.int32)]
@@ -107,7 +107,7 @@ def merge_triangles(
 
 
 def tessellate(surface: Surface, sides: int = _SIDES) -> TriangleSurface:
-    """Returns triangles for any surface, inscribed where it is curved.
+    """Returns triangles for any surface; curved ones are inscribed.
 
     A plane becomes a square of 200 m centred on G. A circle around the z axis
     of G has `sides` sides; a half sphere has half as many circles of latitude.

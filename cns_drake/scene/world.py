@@ -160,10 +160,10 @@ class World:
     """The parsed models of a world and its vehicle, ready for a diagram.
 
     Attributes:
-        scene_graph: the SceneGraph with their geometry; add it to a
+        scene_graph: the SceneGraph with the geometry of the models; add it to a
             DiagramBuilder.
-        plant: the plant with their bodies and frames. It is finalized, and not
-            meant to be part of a Diagram.
+        plant: the plant with the bodies and frames of the models. It is
+            finalized, and not meant to be part of a Diagram.
         vehicle: model instance of the vehicle; None without one.
         structures: class and instance id of every structure in the world,
             whether or not a table lists it.
@@ -195,16 +195,16 @@ def load_world(
     without: Collection[str] = (),
     model_paths: Collection[Path | str] = (),
 ) -> World:
-    """Returns the parsed models of an SDF world and, if given, of a vehicle.
+    """Parses an SDF world and, if given, a vehicle.
 
-    Of a world made for Gazebo, only the visuals are kept, at their initial
-    places; the notes list the parts that are left out.
+    From a world made for Gazebo, only the visuals are kept, at their initial
+    places; the notes list what is left out.
 
     Args:
         sdf: SDF file of the world or model.
         vehicle: file of the vehicle's model; None for no vehicle.
-        structures: structure table; by default `structures.csv` beside the
-            world, if there is one.
+        structures: structure table; by default `structures.csv` in the world's
+            folder, if it exists.
         without: names of structures to leave out.
         model_paths: folders in which `model://` is searched, before those of
             GZ_SIM_RESOURCE_PATH and SDF_PATH.

@@ -1,1 +1,1 @@
-"""The LiDAR, the IMU and the odometry as Drake systems."""
+"""The sensors of a vehicle: LiDARs, cameras, IMU and odometry."""

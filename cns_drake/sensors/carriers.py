@@ -18,9 +18,10 @@ def sensor_pose(mount: Mount) -> RigidTransform:
 def body_and_pose(
     place: RigidBody | Frame, X_PS: RigidTransform
 ) -> tuple[RigidBody, RigidTransform]:
-    """Returns the body B of a frame P, and the pose X_BS of a sensor.
+    """Returns the body B that carries a frame P, and a sensor's pose X_BS.
 
-    P is a body or a frame fixed on one, of a finalized plant.
+    P is a body of a finalized plant, or a frame that is fixed on such a body.
+    X_PS is the pose of the sensor S in P.
 
     Raises:
         RuntimeError: the plant is not finalized.
@@ -48,11 +49,11 @@ def connect_motion(
     body: RigidBody,
     inputs: dict[str, InputPort],
 ) -> None:
-    """Connects inputs of a system to the motion of a plant's bodies.
+    """Connects a system's inputs to the motion of the bodies of a plant.
 
-    The keys of `inputs` are names of output ports of `motion`, which has the
-    kinematic output ports of a MultibodyPlant. By default, `motion` is the
-    body's plant.
+    `motion` has the kinematic output ports of a MultibodyPlant, such as
+    `body_poses`; by default it is the plant of `body`. `inputs` maps the name
+    of an output port of `motion` to the input port that is connected to it.
     """
     source = body.GetParentPlant() if motion is None else motion
     for name, port in inputs.items():

@@ -1,9 +1,9 @@
-"""Sensors described as Drake describes its cameras.
+"""Sensors configured in YAML, in the same way as Drake's cameras.
 
-For each sensor there is a struct that `pydrake.common.yaml` reads and writes,
-and a function that adds the described sensor to a diagram and publishes its
-output on LCM. The fields of a struct are taken from the sensor's section of a
-scenario, so that they are defined only once.
+For each kind of sensor there is a config class that `pydrake.common.yaml` reads
+and writes, and a function that adds the configured sensor to a diagram and
+publishes its output on LCM. The config classes share their field definitions
+with the sensor sections of scenarios.
 """
 
 from collections.abc import Callable
@@ -52,14 +52,14 @@ _RATE = 20
 class LidarConfig:
     """A LiDAR, as YAML describes it to Drake.
 
-    Its fields are those of a LiDAR in a scenario, except its place and layout,
-    and some of its own. Unlike in a scenario, coordinates are not rounded by
-    default, and the LiDAR turns at the rate of its data sheet.
+    Most fields are the same as those of a LiDAR in a scenario. Unlike in a
+    scenario, coordinates are not rounded by default, and the default rate is
+    that of the data sheet.
 
     Attributes:
-        name: name of the system, and end of the channel's name.
-        X_PB: pose of the sensor in the frame P, which `base_frame` names: a
-            frame of the plant, by default the world's.
+        name: name of the system; the channel is `DRAKE_POINT_CLOUD_<name>`.
+        X_PB: pose of the sensor B in a frame P of the plant. The field
+            `base_frame` of this pose names P; by default P is the world frame.
         preset: name of the unit, from the table of presets.
         rate: turns per second, at most 1000; by default that of the data sheet.
         columns: columns in a turn; by default those of the preset.
@@ -68,8 +68,8 @@ class LidarConfig:
         resolution: step of the coordinates; 0 for exact values [m].
         range_noise: standard deviation of a Gaussian error of ranges [m].
         dropout: probability that a return is lost.
-        faint_dropout: factor of a further loss: a return of intensity I is also
-            lost with this probability times (1 - I).
+        faint_dropout: additional loss of faint returns: a return of intensity I
+            is also lost with this probability times (1 - I).
         motion_distortion: whether beams are cast at their own firing times.
         causal: whether a scan covers the turn that ends at its time, so that a
             controller can use it at once.
@@ -113,9 +113,10 @@ class LidarConfig:
 class ImuConfig:
     """An IMU, as YAML describes it to Drake.
 
-    Its fields are those of the IMU in a scenario, and `name`, `X_PB`, `seed`
-    and `lcm_bus` as in `LidarConfig`. It publishes 20 messages a second unless
-    it, or its file for Kalibr, gives a rate.
+    The fields are the same as those of the IMU in a scenario, plus `name`,
+    `X_PB`, `seed` and `lcm_bus`, which are as in `LidarConfig`. The rate is
+    that of the field `rate`, or else that in the file `kalibr`, or else 20
+    messages a second.
 
     Example:
         from cns_drake import ImuConfig
@@ -139,8 +140,8 @@ class ImuConfig:
 class OdometryConfig:
     """Exact odometry of a frame, as YAML describes it to Drake.
 
-    Its `name`, `X_PB` and `lcm_bus` are as in `LidarConfig`. Without a rate it
-    publishes 20 messages a second.
+    The fields `name`, `X_PB` and `lcm_bus` are as in `LidarConfig`. The default
+    rate is 20 messages a second.
 
     Example:
         from cns_drake import OdometryConfig
@@ -170,8 +171,8 @@ def ApplyLidarConfig(
 
     The messages are `lcmt_point_cloud` on the channel
     `DRAKE_POINT_CLOUD_<name>`, one per turn, with points expressed in the
-    world. Meldis shows them. Their `rgb` are greys: the intensities, as in the
-    port `point_cloud_W` of a `Lidar`.
+    world. Meldis shows them. The field `rgb` contains the intensities as greys,
+    as in the port `point_cloud_W` of a `Lidar`.
 
     Args:
         config: description of the LiDAR.
@@ -179,12 +180,12 @@ def ApplyLidarConfig(
         plant: finalized plant; by default the system named `plant`.
         scene_graph: SceneGraph to scan; by default the system named
             `scene_graph`.
-        lcm_buses: the buses of which the config names one.
-        lcm: interface to publish on, instead of a bus. Without buses and
-            interface, one to the default URL is added.
+        lcm_buses: the available buses; `config.lcm_bus` names one of them.
+        lcm: interface to publish on, instead of a bus. If both `lcm_buses` and
+            `lcm` are None, an interface to the default URL is added.
 
     Returns:
-        The system, as `add_lidar` does.
+        The LiDAR system that was added.
 
     Raises:
         RuntimeError: there is no such plant, SceneGraph, frame or bus, or the
@@ -245,9 +246,9 @@ def ApplyImuConfig(
         builder: builder of the diagram.
         plant: finalized plant; by default the system named `plant`.
         scene_graph: not used.
-        lcm_buses: the buses of which the config names one.
-        lcm: interface to publish on, instead of a bus. Without buses and
-            interface, one to the default URL is added.
+        lcm_buses: the available buses; `config.lcm_bus` names one of them.
+        lcm: interface to publish on, instead of a bus. If both `lcm_buses` and
+            `lcm` are None, an interface to the default URL is added.
 
     Raises:
         InputError: Kalibr's file cannot be used.
@@ -296,9 +297,9 @@ def ApplyOdometryConfig(
         builder: builder of the diagram.
         plant: finalized plant; by default the system named `plant`.
         scene_graph: not used.
-        lcm_buses: the buses of which the config names one.
-        lcm: interface to publish on, instead of a bus. Without buses and
-            interface, one to the default URL is added.
+        lcm_buses: the available buses; `config.lcm_bus` names one of them.
+        lcm: interface to publish on, instead of a bus. If both `lcm_buses` and
+            `lcm` are None, an interface to the default URL is added.
 
     Raises:
         RuntimeError: there is no such plant, frame or bus, or the plant is not

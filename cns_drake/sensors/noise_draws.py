@@ -6,11 +6,12 @@ import numpy as np
 def noise_generator(
     seed: int, sensor_name: str, purpose: int, index: int
 ) -> np.random.Generator:
-    """Returns the random generator for one piece of a sensor's noise.
+    """Returns the random generator for one part of a sensor's noise.
 
-    A piece is, for example, a frame or a block of samples. Equal arguments give
-    equal numbers; sensors with different names get different numbers. `purpose`
-    is 0 or greater.
+    A part is the noise of a frame or of a block of samples, for example;
+    `index` is its number. `purpose` (0 or greater) distinguishes different
+    kinds of noise. Equal arguments give equal numbers; sensors with different
+    names get different numbers.
     """
     # Keys are never negative: pieces before time zero have other streams.
     stream = purpose if index >= 0 else 2**32 - 1 - purpose

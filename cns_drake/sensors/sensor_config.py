@@ -1,6 +1,6 @@
 """Base classes and checks for the descriptions of all sensors.
 
-These descriptions are the sections of a scenario. Reading them needs no Drake,
+The descriptions are sections of a scenario. This module does not import Drake,
 which is slow to import.
 """
 
@@ -36,7 +36,11 @@ Angle = Annotated[float, Field(ge=-3600.0, le=3600.0)]
 
 
 class Section(BaseModel):
-    """A section of a scenario file: known fields, finite values, immutable."""
+    """A section of a scenario file.
+
+    Unknown fields and numbers that are not finite are errors. A section cannot
+    be changed after it was made.
+    """
 
     model_config = ConfigDict(extra="forbid", frozen=True, allow_inf_nan=False)
 
@@ -57,9 +61,10 @@ class Section(BaseModel):
 
 
 def field_off_by_default(default: Any, **constraints: Any) -> Any:
-    """Returns a field that is written only if it differs from the default.
+    """Defines a field that is written only if it differs from its default.
 
-    Adding such a field does not change the text of scenarios without it.
+    A new field of this kind does not change the text of scenarios that do not
+    use it.
     """
     return Field(
         default=default,
@@ -83,9 +88,9 @@ class Mount(Section):
 class SensorConfig(Mount, abc.ABC):
     """A sensor that publishes one message at a time on one topic.
 
-    Derive a class from this one for each kind of sensor. A sensor in a field of
-    a scenario is added to the Diagram and recorded; its frame has the name of
-    the field.
+    For your own kind of sensor, derive a class from this one. A sensor in a
+    field of a scenario is added to the Diagram and recorded; its frame has the
+    name of the field.
 
     Attributes:
         xyz: position in base_link [m].
@@ -99,7 +104,7 @@ class SensorConfig(Mount, abc.ABC):
 
     @abc.abstractmethod
     def topic(self, name: str) -> Topic:
-        """Returns the topic of a sensor: `/<name>/...`."""
+        """Returns the topic of the sensor `name`: `/<name>/...`."""
 
     @abc.abstractmethod
     def add(
@@ -122,16 +127,17 @@ class SensorConfig(Mount, abc.ABC):
 
     @abc.abstractmethod
     def make_message(self, value: Any, frame_id: str, stamp_ns: int) -> Any:
-        """Converts a value of the port to a ROS 2 message."""
+        """Converts a value of the recorded port to a ROS 2 message."""
 
 
 def check_rate(
     rate: float, lowest: int, name: str = "rate", *, multiple_of: int = 1
 ) -> None:
-    """Checks that a rate of samples is possible.
+    """Checks that a sensor can have a rate [Hz].
 
-    Stamps are whole nanoseconds, so the rate must divide a billion. Messages
-    name the field `name`.
+    Time stamps are whole nanoseconds, so the rate must divide a billion. It
+    must also be at least `lowest` and a multiple of `multiple_of`. Error
+    messages call the field `name`.
 
     Raises:
         ValueError: the rate is not allowed; the message gives the nearest

@@ -1,1 +1,1 @@
-"""A scenario as a Drake Diagram, and its simulation."""
+"""Simulation of a scenario with a Drake Diagram."""

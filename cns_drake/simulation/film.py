@@ -1,4 +1,4 @@
-"""A film of a drive through all stages of its city."""
+"""A film of one drive, repeated in every stage of its city."""
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
@@ -53,7 +53,11 @@ _TRAFFIC = 60
 
 
 def with_some_traffic(scenario: Scenario) -> Scenario:
-    """Returns a scenario with traffic, if its streets have room for it."""
+    """Adds 60 vehicles and 60 walkers to a scenario without traffic.
+
+    A scenario that already has traffic, or whose streets have no room for so
+    many, is returned unchanged.
+    """
     folder = map_folder(scenario)
     is_possible = folder.roads.is_file() or folder.lanes.is_file()
     if scenario.map is None or not is_possible or not scenario.traffic.is_off:
@@ -97,24 +101,25 @@ def make_film(
 ) -> int:
     """Films a drive, and what its LiDARs measure, in all stages of its city.
 
-    The film shows the same place from behind the car in each stage, then from
-    above.
+    The film shows the same stretch of the drive once in each stage, as seen
+    from behind the car, and then once more in each stage, as seen from above.
 
     Args:
         scenario: the drive.
         path: file to write, .webp or .mp4.
         seconds: length of the film [s].
         size: width and height of its images [pixels].
-        start: time of the drive at which each shot begins [s]; by default where
-            the road ahead is straightest.
-        on_frame: called with the progress.
+        start: time of the drive at which the stretch begins [s]; by default the
+            time at which the road ahead is straightest.
+        on_frame: called with the number of images taken and the number of all
+            images.
         on_note: called with notes for the user.
 
     Returns:
         The number of images.
 
     Raises:
-        InputError: the drive cannot be run, or the film not be written.
+        InputError: the drive cannot be run, or the film cannot be written.
     """
     check_film(path, size)
     views = {
@@ -155,12 +160,12 @@ def make_film(
 
 @dataclass(frozen=True)
 class FilmStage(Step):
-    """Takes the images of one stage, as `<number>.png`.
+    """Takes the images of one stage of a film, as files `<number>.png`.
 
     Attributes:
         scenario: the drive in that stage, with the cameras of the film.
         times: times at which images are taken [s].
-        folder: folder to which they are written.
+        folder: folder to which the images are written.
         first: number of each camera's first image in the film.
     """
 

@@ -1,4 +1,4 @@
-"""A scenario with the inputs of its simulation: plan, stage, traffic."""
+"""A scenario with all inputs of its simulation: path, stage, traffic."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
@@ -50,13 +50,14 @@ class LoadedDrive:
     """A scenario with all inputs of its simulation.
 
     Attributes:
-        scenario: the scenario, whose field `frames` is always given.
+        scenario: the scenario; its field `frames` is never None.
         inputs: file -> digest of its content.
         fingerprint: fingerprint of the recording, for `fingerprint.txt`.
         trajectory: motion of the vehicle.
-        world: stage with the vehicle.
+        world: world of the stage, with the vehicle in it.
         num_frames: number of frames to record.
-        traffic: motion of all other vehicles and of walkers, if any.
+        traffic: motion of all other vehicles and of walkers; None without
+            traffic.
     """
 
     scenario: Scenario
@@ -118,7 +119,8 @@ def load_stage_and_traffic(
 ) -> tuple[World, traffic_plan.TrafficPlan | None, Trajectory]:
     """Returns the stage of a scenario, its traffic, and the trajectory.
 
-    The trajectory differs from the given one if the vehicle follows others.
+    If the vehicle keeps its distance to vehicles of the traffic
+    (`driver.follows`), the returned trajectory is slower than the given one.
 
     Raises:
         InputError: the scenario cannot be run.
@@ -194,12 +196,12 @@ def plan_scenario_traffic(
     Args:
         scenario: scenario with traffic.
         trajectory: motion of the scenario's vehicle.
-        world: stage of the scenario, if already loaded; not yet a part of a
-            diagram.
+        world: world of the scenario's stage, if already loaded; it must not be
+            part of a diagram yet.
 
     Raises:
-        InputError: the map has no roads or sidewalks, or no room for that many;
-            or the trace cannot be played here.
+        InputError: the map has no roads or sidewalks, or no room for so many
+            vehicles or walkers, or a SUMO trace cannot be replayed on this map.
 
     Example:
         from cns_drake import load_scenario, plan_drive, plan_scenario_traffic
@@ -349,7 +351,7 @@ def with_traffic(world: World, plan: traffic_plan.TrafficPlan) -> World:
 
 
 def structure_list(world: World) -> list[dict]:
-    """Returns an entry for each structure of a world, ready for JSON."""
+    """Returns a description of each structure of a world, ready for JSON."""
     return [
         {
             "instance": entry.instance,

@@ -16,7 +16,7 @@ _TOLERANCE = 1e-6
 
 
 def point_layouts(scenario: Scenario) -> dict[str, str]:
-    """Returns LiDAR name -> layout of its points."""
+    """Returns LiDAR name -> name of the layout of its recorded points."""
     return {name: one.layout for name, one in scenario.lidars.items()}
 
 
@@ -52,17 +52,18 @@ def _camera_rates(scenario: Scenario) -> dict[Topic, int]:
 
 
 def first_points_topic(scenario: Scenario) -> str:
-    """Returns the topic of the first LiDAR, whose scans are the frames."""
+    """Returns the topic of the first LiDAR, each of whose scans is a frame."""
     return scenario_topics(scenario)[0].name
 
 
 def drive_schedule(scenario: Scenario) -> Schedule:
     """Returns the schedule of a scenario's topics.
 
-    If the scenario gives a number of frames, LiDARs end with the last frame.
-    Topics with a rate of their own, such as that of the IMU, continue until its
-    scan is complete, so that their samples enclose every scan. With motion
-    distortion this also holds for `/tf`, by which scans can be corrected.
+    If the scenario gives a number of frames, the LiDARs end with the last
+    frame. Topics with a rate of their own, such as the IMU's, continue until
+    the last scan is complete, so that every scan has samples before and after
+    it. With motion distortion, this also applies to `/tf`, with which scans can
+    be corrected.
 
     Raises:
         InputError: Kalibr's file cannot be used.

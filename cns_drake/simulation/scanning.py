@@ -38,16 +38,16 @@ def scan_world(
 def still_scene(
     world: World, X_WS: RigidTransform, pattern: BeamPattern
 ) -> RayCastingScene:
-    """Returns the world's models in their initial state, to cast rays on.
+    """Returns a scene of the world's models in their initial state.
 
-    Rays must start within some kilometres of S.
+    Rays can be cast on the scene; they must start within a few kilometres of S.
     """
     lidar, context = _stand(world, X_WS, pattern)
     return lidar.EvalScene(context)
 
 
 def check_ending(path: Path) -> None:
-    """Checks that `save_scan` can write the format of a file.
+    """Checks that `save_scan` knows the format of a file from its ending.
 
     Raises:
         InputError: the ending is not .pcd, .bin or .npy.
@@ -60,14 +60,13 @@ def check_ending(path: Path) -> None:
 
 
 def save_scan(scan: np.ndarray, path: Path) -> None:
-    """Saves a scan's x, y, z and intensity; the ending chooses the format.
+    """Saves x, y, z and intensity of a scan; the ending sets the format.
 
-    `.bin` is KITTI's float32 x y z intensity, `.npy` the same numbers as an
-    N x 4 array, `.pcd` a binary PCD file.
+    `.bin` is KITTI's format (float32 x y z intensity), `.npy` the same numbers
+    as an N x 4 array, and `.pcd` a binary PCD file.
 
     Raises:
-        InputError: the ending is none of these, or the file cannot be
-            written.
+        InputError: the file has another ending or cannot be written.
     """
     check_ending(path)
     make_folder(path.parent)

@@ -35,21 +35,23 @@ def add_mcap_recorder(
     overwrite: bool = False,
     name: str = "mcap_recorder",
 ) -> BagWriter:
-    """Adds a system to a diagram that records its sensors as a rosbag2 folder.
+    """Adds a recorder of a diagram's sensors, as a rosbag2 folder.
 
-    Every LiDAR has a topic `/<name of the system>/points`; every camera
-    `/<name>/color`, `depth`, `label` and `camera_info`; an IMU `/imu/data`,
-    odometry `/odometry`. The poses of sensors on the same body as the odometry
-    are in `/tf_static`; those of all other sensors are in `/tf`.
+    The topics are `/<name of the system>/points` for every LiDAR;
+    `/<name>/color`, `depth`, `label` and `camera_info` for every camera;
+    `/imu/data` for an IMU; and `/odometry` for odometry. The poses of sensors
+    on the same body as the odometry are in `/tf_static`; those of all other
+    sensors are in `/tf`.
 
-    `rates` sets the rates of single sensors; an IMU may already have a rate.
-    Without a period, each LiDAR is recorded once for each of its turns.
+    `rates` sets the rates of single sensors. Without `period`, each LiDAR is
+    recorded once per turn. An IMU that was added with a rate is recorded at
+    this rate.
 
     Args:
         builder: builder of a diagram with the sensors.
         folder: the rosbag2 folder to write.
-        period: time between frames of all other sensors [s]; by default a
-            turn of the first LiDAR.
+        period: time between two messages of a sensor without an entry in
+            `rates` [s]; by default the duration of a turn of the first LiDAR.
         rates: name of a LiDAR or a camera, `imu` or `odometry` -> messages
             per second.
         lidars: LiDARs to record; each needs a different name.
@@ -61,13 +63,13 @@ def add_mcap_recorder(
         name: name of the system.
 
     Returns:
-        The recording, a context manager that is open while the diagram is
-        simulated.
+        The recording: a context manager. Simulate the diagram inside its
+        context.
 
     Raises:
-        InputError: the folder must not be used.
-        ValueError: a rate names no sensor, there is no period, or a LiDAR is
-            causal.
+        InputError: the folder contains a finished recording or other files.
+        ValueError: `rates` names an unknown sensor, neither a period nor a
+            LiDAR is given, or a LiDAR is causal.
 
     Example:
         from cns_drake import add_mcap_recorder

@@ -1,7 +1,7 @@
 """Drives that are simulated while the evaluation reads them.
 
-Nothing is written: scans go straight into maps and descriptions, in about half
-the time.
+No recording is written: scans are used directly to make maps and place
+descriptors, in about half the time.
 """
 
 from __future__ import annotations
@@ -35,7 +35,10 @@ from cns_drake.simulation.station import make_station
 
 @dataclass(frozen=True)
 class DriveSimulation:
-    """Calling it simulates a scenario's drive for its first LiDAR."""
+    """A function object: when called, it simulates a scenario's drive.
+
+    The call returns a `SimulatedDrive` of the scenario's first LiDAR.
+    """
 
     scenario: Scenario
 
@@ -43,7 +46,7 @@ class DriveSimulation:
         return SimulatedDrive(self.scenario)
 
     def identity(self) -> dict:
-        """Returns scenario, digests of files and digest of code as a key."""
+        """Returns a key: scenario, and digests of its files and the code."""
         return {
             "simulated": self.scenario.model_dump(mode="json"),
             "inputs": digest_inputs(self.scenario),
@@ -52,11 +55,11 @@ class DriveSimulation:
 
 
 class SimulatedDrive(Drive):
-    """The scans of a scenario, as in its recording.
+    """A drive whose scans are simulated; they equal those of a recording.
 
-    A scan is simulated on each access. Frames are `period` apart [s]. X_BS is
-    the pose of the first LiDAR in base_link. `structures` contains the names of
-    all structures in the world.
+    Each access to a scan simulates it. `period` is the time between two frames
+    [s]. X_BS is the pose of the first LiDAR in base_link. `structures` contains
+    the names of all structures in the world.
     """
 
     def __init__(self, scenario: Scenario):
@@ -151,10 +154,10 @@ class SimulatedDrive(Drive):
         return self._lidar.GetOutputPort("scan").Eval(self._at(index))
 
     def look(self, index: int) -> tuple[RayCastingScene, RigidTransform]:
-        """Returns the scene to cast rays on, and the LiDAR's pose X_WS.
+        """Returns a scene on which rays can be cast, and the pose X_WS.
 
-        Both are those at the stamp of scan `index`. The scene is valid until
-        the next call of `look` or `scan`.
+        The scene is that at the stamp of scan `index`, and X_WS the pose of the
+        LiDAR then. The scene is valid until the next call of `look` or `scan`.
         """
         scene = self._lidar.EvalScene(self._at(index))
         return scene, self.X_WBs[index] @ self.X_BS

@@ -1,4 +1,4 @@
-"""Running a scenario from its first frame to its last."""
+"""Running a scenario from its first to its last frame."""
 
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -48,8 +48,8 @@ class Run:
         folder: folder of the recording.
         num_frames: number of frames in the recording.
         resumed_frames: number of frames taken over from an interrupted run.
-        simulated_s: simulated time from the first frame simulated to the
-            last [s].
+        simulated_s: simulated time from the first to the last frame of this run
+            [s]; frames taken over do not count.
         wall_s: wall time of the simulation, without loading [s].
         loading_s: time to load the stage and plan the drive [s].
 
@@ -70,7 +70,7 @@ class Run:
 
     @property
     def real_time_factor(self) -> float:
-        """Simulated seconds per second of computing."""
+        """Simulated seconds per second of wall time."""
         return self.simulated_s / self.wall_s if self.wall_s > 0 else math.inf
 
 
@@ -87,9 +87,10 @@ def simulate(
 ) -> Run:
     """Simulates a scenario and records it in the folder `<output>/<name>`.
 
-    If an interrupted run of the same scenario, world and version has left
-    frames there, they are kept and the simulation starts with the next one; the
-    result is the same. For a web page of the drive, all frames are simulated.
+    If this folder contains frames of an interrupted run of the same scenario,
+    world and version, these frames are kept, and the simulation starts with the
+    next frame; the recording is the same as without an interruption. If a web
+    page is requested, all frames are simulated again.
 
     Args:
         scenario: the scenario to run.
@@ -99,9 +100,10 @@ def simulate(
         overwrite: whether to replace an existing recording of that name.
         num_threads: number of threads that cast the rays of a LiDAR; the
             recording does not depend on it.
-        on_frame: called with the progress.
-        on_note: called with notes for the user, on an interrupted run or on the
-            world's table of structures.
+        on_frame: called with the number of finished frames and the number of
+            all frames.
+        on_note: called with notes for the user, for example about an
+            interrupted run or the world's table of structures.
 
     Raises:
         InputError: the scenario cannot be run, or its output cannot be written.

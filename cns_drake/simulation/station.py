@@ -53,16 +53,16 @@ def make_station(
 ) -> Diagram:
     """Makes the Diagram of a scenario.
 
-    These systems move objects: `scene_graph` holds the stage and the vehicle,
-    `vehicle_motion` prescribes the vehicle's pose, and `geometry_pose` passes
-    it on to the SceneGraph. `traffic` moves other objects, and `frame_poses`
-    has the poses of all frames.
+    Systems for the scene and its motion: `scene_graph` contains the stage and
+    the vehicle, `vehicle_motion` prescribes the vehicle's pose, and
+    `geometry_pose` passes this pose to the SceneGraph. `traffic` moves all
+    other objects, and `frame_poses` collects the poses of all frames.
 
-    These systems measure: a `Lidar` for each entry of `scenario.lidars`, under
-    its name (with a `<lidar>_sweep` if it moves while it turns); an
-    accelerometer and a gyroscope, or `imu` if the IMU has a rate or errors of
-    its own; and `odometry`. `mcap_recorder` and `meshcat_recorder` record the
-    measurements.
+    Systems that measure: a `Lidar` for each entry of `scenario.lidars`, with
+    the same name, and a system `<lidar>_sweep` if the LiDAR has motion
+    distortion; an accelerometer and a gyroscope or, if the IMU has a rate or
+    errors, the system `imu`; and `odometry`. `mcap_recorder` and
+    `meshcat_recorder` record the measurements.
 
     The exported output ports are `<lidar>_scan`, `specific_force`,
     `angular_velocity`, `odometry` and `geometry_query`. The system `imu` adds
@@ -75,8 +75,8 @@ def make_station(
         world: the stage with the vehicle, if already loaded; its SceneGraph
             passes to the Diagram.
         trajectory: the drive, if already planned.
-        traffic: the scenario's traffic, if already planned; the structures of
-            the world then include it (see `with_traffic`).
+        traffic: the scenario's traffic, if already planned. The structure table
+            of `world` must then include the traffic (see `with_traffic`).
         bag: open recording with the scenario's topics, if any.
         page: recorder of a web page of the same world, if any.
         num_threads: number of threads that cast the rays of a LiDAR.

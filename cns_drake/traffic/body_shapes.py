@@ -37,8 +37,9 @@ class BodyShape(NamedTuple):
 class Limb(NamedTuple):
     """A rigid part of a body, which swings about its y axis.
 
-    Its origin in the body's frame is the joint [m]. `swing` is the amplitude of
-    its swing at walking speed, negative if it first swings backwards [rad].
+    `origin` is the position of the limb's joint in the body's frame [m].
+    `swing` is the amplitude of its swing at walking speed [rad], negative if it
+    first swings backwards.
     """
 
     name: str
@@ -74,9 +75,10 @@ def _round(
 def vehicle_limbs(
     kind: VehicleKind, rng: np.random.Generator
 ) -> tuple[Limb, ...]:
-    """Returns the only limb of a vehicle.
+    """Returns the shapes of a vehicle, as its only limb.
 
-    Its frame is on the ground below the middle of the vehicle's box.
+    The frame of the limb is on the ground below the middle of the vehicle's
+    box.
     """
     paint = PAINTS[int(rng.integers(len(PAINTS)))]
     if kind.name in ("bicycle", "motorcycle"):
@@ -148,7 +150,7 @@ def _two_wheeler(
 
 
 def walker_limbs(rng: np.random.Generator) -> tuple[Limb, ...]:
-    """Returns the five limbs of a walker, which have ten capsules.
+    """Returns the five limbs of a walker, which consist of ten capsules.
 
     The body's frame is on the ground, with x in the walker's heading. An arm
     swings together with the leg on the other side.

@@ -1,4 +1,4 @@
-"""Plays traffic from a trace of SUMO: floating-car data at even times.
+"""Replays traffic from a SUMO trace: floating-car data at even times.
 
 Format: https://sumo.dlr.de/docs/Simulation/Output/FCDOutput.html
 """
@@ -55,13 +55,13 @@ class TracedObject:
     """A vehicle or a person in a trace.
 
     Attributes:
-        name: its id.
-        type_name: its type; "" if it has none.
-        steps: (M,) numbers of the times at which it is there, ascending.
+        name: id of the object.
+        type_name: type of the object; "" if the trace has none.
+        steps: (M,) numbers of the times at which the object exists, ascending.
         xy: (M, 2) position of a vehicle's front, or of a person's middle [m].
         yaw: (M,) heading, from x towards y [rad].
         slope: (M,) slope of the road, positive upwards [rad].
-        z: (M,) heights in the trace [m]; NaN if it has none.
+        z: (M,) heights in the trace [m]; NaN without heights.
     """
 
     name: str
@@ -79,10 +79,10 @@ class FcdTrace:
 
     Attributes:
         begin: the first time [s].
-        dt: distance from one time to the next [s].
+        dt: time between two entries [s].
         num_steps: number of times.
         vehicles, persons: in the order in which they appear.
-        notes: what is left out, for the user.
+        notes: notes for the user on what is left out.
     """
 
     begin: float
@@ -99,7 +99,7 @@ class FcdTrace:
 
 
 def read_fcd(path: Path) -> FcdTrace:
-    """Returns the trace in a file.
+    """Reads a SUMO trace from a file.
 
     Raises:
         InputError: the file cannot be read or is not a trace, its times are not
@@ -225,17 +225,17 @@ def play_trace(
     ego: EgoPath,
     ego_box: EgoBox,
 ) -> TrafficPlan:
-    """Returns the traffic in a trace, whose first time is that of the drive.
+    """Returns the traffic in a SUMO trace, which starts with the drive.
 
     SUMO's simulation does not contain the ego car. Road users that would
-    collide with it are left out.
+    collide with the ego car are left out.
 
     Args:
         trace: the trace that SUMO wrote.
-        path: file of the trace, for errors.
-        graph, walkways: lanes and walkways of the map, from which heights
-            follow.
-        seed: seed that draws kinds of cars.
+        path: file of the trace, for error messages.
+        graph, walkways: lanes and walkways of the map, from which the heights
+            of road users follow.
+        seed: seed of the random kinds of cars.
         duration: time of the last frame [s].
         end: time at which the ego car arrives [s].
         ego: motion of the ego car.
@@ -305,7 +305,7 @@ def _extent(places: np.ndarray) -> str:
 
 
 class Heights:
-    """Returns heights of the ground, interpolated between points on lanes.
+    """Heights of the ground, interpolated between points on lanes.
 
     Attributes:
         zero: height of the ground where a trace has z = 0 [m].
@@ -336,10 +336,10 @@ class Heights:
     ) -> np.ndarray:
         """Returns the heights (M,) of a road user along places (M, 2) [m].
 
-        Where roads cross at two heights, the heights `z` in the trace show on
-        which road the road user is. If the trace has none (NaN), it is the road
-        on which the road user came, or the one with a lane in the direction
-        `yaw` [rad].
+        Where two roads cross at different heights, the heights `z` in the trace
+        decide on which of them the road user is. If the trace has no heights
+        (NaN), it is the road on which the road user arrived, or else the road
+        with a lane in the direction `yaw` [rad].
         """
         found = self.at(xy)
         count = min(_CANDIDATES, len(self._z))

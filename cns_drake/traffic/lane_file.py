@@ -64,10 +64,10 @@ class _File(_Model):
 
 
 class LaneFile(NamedTuple):
-    """The content of a lane file.
+    """The content of a lane file: lanes and walkways for traffic.
 
     `in_the_way` names structures, such as parked cars, that stand where
-    vehicles drive. A drive with traffic leaves them out.
+    vehicles drive. A drive with traffic leaves out these structures.
     """
 
     graph: LaneGraph
@@ -80,7 +80,10 @@ def lane_text(
     walkways: Sequence[Walkway],
     in_the_way: Sequence[str] = (),
 ) -> str:
-    """Returns the text of a lane file; see `LaneFile` for its content."""
+    """Returns the text of a lane file with the given content.
+
+    `LaneFile` describes the content.
+    """
     content: dict[str, Any] = {
         "lanes": [
             {
@@ -127,7 +130,7 @@ def _known(one: Piece | Walkway, *names: str) -> dict[str, int]:
 
 
 def read_lanes(path: Path) -> LaneFile:
-    """Returns the content of a file that `lane_text` wrote.
+    """Reads a lane file.
 
     Raises:
         InputError: the file cannot be read or is not a lane file.

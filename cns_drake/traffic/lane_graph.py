@@ -1,4 +1,4 @@
-"""Lanes for vehicles, ways through junctions, crossings and walkways."""
+"""Lanes for vehicles, paths through junctions, crossings and walkways."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
@@ -35,19 +35,20 @@ _WIDTH, _HALF_WAY, _HALF_LANE, _REACH, _TRIED = 2.4, 0.5, 1.75, 20.0, 2.0
 
 @dataclass(frozen=True)
 class Piece:
-    """A piece of a vehicle's path: part of a lane, or a way through a junction.
+    """A piece of a vehicle's path: part of a lane, or a path in a junction.
 
-    A vehicle enters a way only if it can drive through all of it: it waits in
-    the lane before the way until all crossing ways are free.
+    A path through a junction is called a way. A vehicle enters a way only if it
+    can drive to its end: it waits in the lane before the way until all
+    conflicting ways are free.
 
     Attributes:
-        points: (N, 3) points on its middle in driving direction, evenly spaced
-            [m].
+        points: (N, 3) points along the middle of the piece, in driving
+            direction, evenly spaced [m].
         limit: speed limit [m/s].
-        is_way: whether it is a way; otherwise it is a lane.
-        after: numbers of the pieces that follow it.
-        left, right: numbers of the lanes beside it in the same direction; -1
-            for none.
+        is_way: whether the piece is a way; otherwise it is part of a lane.
+        after: numbers of the pieces that can follow this piece.
+        left, right: numbers of the neighbouring lanes with the same direction;
+            -1 for none.
         junction: number of the junction in which a way is, or to which a lane
             leads.
         phase: signal phase in which a way has green; -1 without a signal.
@@ -73,9 +74,10 @@ class Crossing:
 
     Attributes:
         line: (2, 3) from kerb to kerb, or from sidewalk to sidewalk [m].
-        area: where walkers are while they cross.
-        marked: whether vehicles give way to waiting walkers. A crossing without
-            marks is not at the end of a road; walkers wait there for a gap.
+        area: area where walkers are while they cross.
+        marked: whether vehicles give way to waiting walkers. At a crossing
+            without marks, which is never at the end of a road, walkers wait for
+            a gap in the traffic.
     """
 
     line: np.ndarray
@@ -93,17 +95,17 @@ def make_crossing(
 
 @dataclass(frozen=True)
 class Walkway:
-    """A strip on which people walk, between two places where others begin.
+    """A strip on which people walk, between two places where walkways meet.
 
     Attributes:
-        points: (N, 3) points along its middle, evenly spaced [m].
+        points: (N, 3) points along the middle of the strip, evenly spaced [m].
         half_width: greatest distance of a walker from the middle [m].
-        start, end: numbers of the places at its ends.
-        crossing: number of the crossing over which it leads; -1 for none.
-        free: (N, 2) least and greatest offset to the right, between which no
-            objects stand, at each point [m]; None if the whole width is free.
-        narrow: (N,) whether there is only room for walkers who face along the
-            walkway; None if there is more room everywhere.
+        start, end: numbers of the places at the ends of the strip.
+        crossing: number of the crossing on which the walkway lies; -1 for none.
+        free: (N, 2) for each point, the least and greatest offset to the right
+            between which no objects stand [m]; None if the whole width is free.
+        narrow: (N,) for each point, whether walkers fit only if they face along
+            the walkway; None if they always fit.
     """
 
     points: np.ndarray
@@ -124,7 +126,7 @@ class Walkway:
 
     @property
     def is_narrow(self) -> np.ndarray:
-        """Where (N,) walkers only have room if they face along the walkway."""
+        """(N,) bool: whether walkers fit only if facing along the walkway."""
         if self.narrow is not None:
             return self.narrow
         return np.zeros(len(self.points), bool)
@@ -133,10 +135,10 @@ class Walkway:
 def kept_clear(
     walkways: Sequence[Walkway], things: Sequence[BaseGeometry]
 ) -> list[Walkway]:
-    """Returns walkways that lead around objects, or end at them.
+    """Returns the walkways, led around objects or ending in front of them.
 
-    The objects are seen from above [m]. Crossings that do not have a walkway at
-    both ends are left out.
+    `things` contains the outlines of the objects as seen from above [m].
+    Crossings without a walkway at each end are left out.
     """
     tree, found = shapely.STRtree(things), []
     node = 1 + max((max(way.start, way.end) for way in walkways), default=0)
@@ -218,7 +220,7 @@ def _lengthened(points: np.ndarray, count: int) -> np.ndarray:
 
 @dataclass(frozen=True)
 class LaneGraph:
-    """The pieces of vehicles' paths by number, and the crossings over them."""
+    """All pieces of vehicles' paths, and the crossings over these pieces."""
 
     pieces: tuple[Piece, ...]
     crossings: tuple[Crossing, ...] = ()
@@ -234,15 +236,16 @@ def with_unmarked_crossings(
     walkways: Sequence[Walkway],
     things: Sequence[BaseGeometry] = (),
 ) -> tuple[LaneGraph, list[Walkway]]:
-    """Returns a graph with places where walkers may cross narrow streets.
+    """Adds crossings without marks, where walkers may cross narrow streets.
 
-    Each place is as near to the middle of a lane as possible. There must be a
-    walkway on both sides, and nothing may stand in between, seen from above. A
-    walkway has at most one such place.
+    Each of these crossings is as near to the middle of a lane as possible.
+    There must be a walkway on both sides of the street, and none of the objects
+    `things`, seen from above, in between. A walkway has at most one such
+    crossing.
 
     Returns:
-        The graph with the additional crossings. The walkways, which are cut at
-        these places, and additional ones over the crossings.
+        The graph with the additional crossings, and the walkways, which are cut
+        at these crossings, together with new walkways over the crossings.
     """
     sides = [k for k, way in enumerate(walkways) if way.crossing < 0]
     lines = [LineString(walkways[k].points[:, :2]) for k in sides]
@@ -343,7 +346,7 @@ def resampled(points: np.ndarray, spacing: float = SPACING) -> np.ndarray:
     """Returns evenly spaced points (N, 3) along a polyline (M, 3) [m].
 
     Neighbouring points are at most `spacing` apart [m]. A corner that coincides
-    with the one before it is dropped.
+    with the corner before is dropped.
     """
     steps = np.linalg.norm(np.diff(points, axis=0), axis=1)
     points = points[np.append(True, steps > 1e-6)]
@@ -365,10 +368,10 @@ def distances_along(points: np.ndarray) -> np.ndarray:
 
 
 def without_dead_ends(pieces: Sequence[Piece]) -> list[Piece]:
-    """Returns the pieces on which a vehicle can drive forever.
+    """Returns the pieces from which a vehicle never reaches a dead end.
 
-    Removed are lanes that lead nowhere, the pieces that lead only to them, and
-    lanes to which no piece leads.
+    Three kinds of pieces are removed: lanes that lead nowhere, pieces that lead
+    only to such lanes, and lanes to which no piece leads.
     """
     alive = set(range(len(pieces)))
     while True:

@@ -18,10 +18,10 @@ _MOST_SHORT, _MOST_WAYS = 8, 12
 
 
 class DirectedLane(NamedTuple):
-    """A lane in one direction, by the points (N, 3) of its middle [m].
+    """A lane in one direction, given by points (N, 3) along its middle [m].
 
-    `limit` is its speed limit [m/s]. `connects` says whether it is in a
-    junction, where it connects lanes.
+    `limit` is the speed limit of the lane [m/s]. `connects` says whether the
+    lane is in a junction, where it connects two lanes.
     """
 
     points: np.ndarray
@@ -34,12 +34,12 @@ def join_lanes(
     links: Iterable[tuple[int, int]],
     right_of: Mapping[int, int] | None = None,
 ) -> LaneGraph:
-    """Returns the graph of lanes of a map, cut into pieces for traffic.
+    """Returns the lane graph of a map's lanes, cut into pieces for traffic.
 
-    The second lane of a link follows the first. `right_of` maps the number of a
-    lane to that of the lane on its right in the same direction; without it,
-    vehicles do not change lanes. The graph has no signals and no crossings. It
-    is empty if vehicles cannot drive forever anywhere.
+    In each link, the second lane follows the first. `right_of` maps the number
+    of a lane to the number of the next lane on its right with the same
+    direction; without it, vehicles do not change lanes. The graph has no
+    signals and no crossings. It is empty if all lanes lead to dead ends.
     """
     merged, after, beside = _merge(lanes, links, right_of or {})
     points = [resampled(lane.points) for lane in merged]

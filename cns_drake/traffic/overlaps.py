@@ -11,9 +11,9 @@ from cns_drake.base.compiled import compiled
 def boxes_overlap(a: Any, b: Any, half_a: Any, half_b: Any) -> bool:
     """Returns whether two rectangles overlap.
 
-    They do if their projections on the axes of both rectangles overlap. A
-    rectangle is given by x, y of its middle [m] and its heading [rad], (3,),
-    and by half its length and half its width (2,) [m].
+    They overlap if their projections on the axes of both rectangles overlap. A
+    rectangle is given by x, y of its centre [m] and its heading [rad], (3,),
+    and by half its length and half its width, (2,) [m].
     """
     dx, dy = b[0] - a[0], b[1] - a[1]
     square = (half_a[0] + half_b[0]) ** 2 + (half_a[1] + half_b[1]) ** 2
@@ -42,8 +42,9 @@ def find_overlaps(
 ) -> None:
     """Marks in `found` (N, N) which pairs of bodies overlap at any time.
 
-    Poses (K, N, 3) are x, y [m] and heading [rad]; NaN while a body is absent.
-    `half` (N, 2) has half lengths and half widths [m].
+    `poses` (K, N, 3) contains x, y [m] and heading [rad] of N bodies at K
+    times; NaN while a body is absent. `half` (N, 2) contains half lengths and
+    half widths [m].
     """
     reach = np.sqrt(half[:, 0] ** 2 + half[:, 1] ** 2)
     for k in range(len(poses)):

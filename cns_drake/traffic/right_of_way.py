@@ -1,11 +1,11 @@
-"""Who may enter a junction: first come, first served.
+"""Rules for who may enter a junction: first come, first served.
 
-A vehicle may enter its way through a junction under three conditions: vehicles
-on conflicting ways will have passed when it gets there; there is room for it
-behind the way; and its signal is green or, without a signal, it has stopped at
-the line. If a vehicle with the right of way is slower than expected, later
-vehicles wait for it on their ways. Earlier ones never wait for later ones, so
-no vehicle waits forever.
+A vehicle may enter its path ("way") through a junction under three conditions:
+vehicles on conflicting ways will have passed when it gets there; there is room
+for it behind the way; and its signal is green or, without a signal, it has
+stopped at the line. If a vehicle with the right of way is slower than expected,
+later vehicles wait for it on their ways. Earlier vehicles never wait for later
+ones, so no vehicle waits forever.
 """
 
 from typing import Any
@@ -76,10 +76,10 @@ _WALKERS_GAP = 6.0
 
 @compiled
 def grant_ways(traffic: Traffic, k: int) -> None:
-    """Gives vehicles permission for their ways: first come, first served.
+    """Permits vehicles to enter junctions, in the order of their arrival.
 
-    Walkers get permission for crossings in the same way. The present time step
-    is the k-th.
+    Walkers are permitted to enter crossings by the same rule. `k` is the number
+    of the current time step.
     """
     streets, cars, crossings = traffic.streets, traffic.cars, traffic.crossings
     t, pieces, num_cars = k * STEP, streets.pieces, len(cars)

@@ -1,9 +1,9 @@
 """Lanes, signal programs and the ego car's path, as arrays for fast loops.
 
-All signals have the same cycle. Its green is divided among the phases of a
-junction by the incoming flow. The offsets of the junctions are chosen so that
-vehicles that leave one junction on green wait little at the next one (a green
-wave, where possible).
+All signals have the same cycle. The green time of a junction is divided among
+its phases in proportion to the incoming flow. The offsets of the junctions are
+chosen so that vehicles that leave one junction on green wait little at the next
+one (a green wave, where possible).
 """
 
 import math
@@ -41,8 +41,8 @@ class Signals(NamedTuple):
     Attributes:
         cycle: duration of a cycle [s].
         green_from, green_for: (P + C,) time in the cycle at which green begins,
-            for vehicles or for walkers, and its duration [s]. Without a signal,
-            green lasts the whole cycle.
+            and its duration [s], for vehicles on pieces and for walkers on
+            crossings. Without a signal, green lasts the whole cycle.
     """
 
     cycle: float
@@ -53,8 +53,8 @@ class Signals(NamedTuple):
 def make_signals(graph: LaneGraph, begin: np.ndarray) -> Signals:
     """Returns the program of all traffic lights.
 
-    `begin` (P + C, P + C) says where ways begin to meet crossings; see
-    `find_conflicts`.
+    `begin` (P + C, P + C) contains the places at which paths through junctions
+    begin to meet crossings; see `find_conflicts`.
     """
     pieces = graph.pieces
     flow = _flows(graph)
@@ -103,7 +103,10 @@ def make_signals(graph: LaneGraph, begin: np.ndarray) -> Signals:
 
 
 def way_shares(graph: LaneGraph, lane: int) -> np.ndarray:
-    """Returns the share of drivers that takes each way behind a lane."""
+    """Returns the share of drivers that takes each path after a lane.
+
+    These are the paths through the junction to which the lane leads.
+    """
     after = graph.pieces[lane].after
     likes = []
     for way in after:
@@ -222,20 +225,20 @@ class Streets(NamedTuple):
     Attributes:
         pieces: (P,) records `PIECE`.
         points: (M, 3) points of all pieces [m].
-        speed: (M,) allowed speed there, bends included [m/s].
+        speed: (M,) allowed speed at each point, reduced in bends [m/s].
         after: numbers of the pieces that follow each piece.
-        liked: for each entry of `after`, the cumulated share of drivers that
-            take it or an earlier one.
-        signals: their program.
+        liked: for each entry of `after`, the cumulative share of drivers that
+            take this piece or an earlier entry.
+        signals: program of all signals.
         begin, clear, joint: (2, P + C, P + C) see `find_conflicts`.
-        over: (P, C) place on a crossing's line where a way leads over it; NaN
-            if it does not [m].
-        until: (K, P + C) float32 time until the ego car is there; 0 while it
-            is, inf if it never will be [s].
-        ego_rear, ego_front: (K, P) float32 distances of the ego car's ends
-            along a piece while it is there [m].
-        ego_speed: (K, P) float32 its speed along the piece; negative against it
-            [m/s].
+        over: (P, C) place on a crossing's line where a path through a junction
+            leads over the crossing [m]; NaN if it does not.
+        until: (K, P + C) float32 time until the ego car reaches the piece or
+            crossing [s]; 0 while it is there, inf if it never comes.
+        ego_rear, ego_front: (K, P) float32 distances along a piece of the ego
+            car's rear and front while it is on the piece [m].
+        ego_speed: (K, P) float32 speed of the ego car along the piece [m/s];
+            negative against its direction.
     """
 
     pieces: np.ndarray
@@ -266,13 +269,14 @@ class EgoBox(NamedTuple):
 
     @property
     def half_size(self) -> tuple[float, float]:
-        """Half its length and half its width [m]."""
+        """Half the length and half the width of the box [m]."""
         return (self.front - self.rear) / 2, self.half_width
 
     def middles(self, xy: np.ndarray, yaw: np.ndarray) -> np.ndarray:
-        """Returns x, y [m] and yaw (N, 3) of the box's middle.
+        """Returns x, y [m] and yaw [rad] of the box's centre, (N, 3).
 
-        The car's frame is at places `xy` (N, 2) with headings `yaw` (N,).
+        The car's frame is at places `xy` (N, 2) [m] with headings `yaw` (N,)
+        [rad].
         """
         ahead = np.column_stack([cos(yaw), sin(yaw)])
         middle = (self.rear + self.front) / 2
@@ -281,7 +285,8 @@ class EgoBox(NamedTuple):
     def corners(self, xy: np.ndarray, yaw: np.ndarray) -> np.ndarray:
         """Returns the corners (N, 4, 2) of the box [m].
 
-        The car's frame is at places `xy` (N, 2) with headings `yaw` (N,).
+        The car's frame is at places `xy` (N, 2) [m] with headings `yaw` (N,)
+        [rad].
         """
         ahead = np.column_stack([cos(yaw), sin(yaw)])
         return outlines(xy, ahead, -self.rear, self.front, self.half_width)
@@ -296,7 +301,7 @@ def make_streets(
         graph: the lanes.
         box: the ego car's box.
         xy: (K, 2) positions of the ego car's frame [m].
-        yaw: (K,) its headings [rad].
+        yaw: (K,) headings of the ego car [rad].
     """
     pieces = graph.pieces
     rows = np.zeros(len(pieces), PIECE)
@@ -365,19 +370,20 @@ def find_conflicts(
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Returns where pieces and crossings exclude each other.
 
-    Two different ways exclude each other if the areas that vehicles sweep on
-    them meet. Lanes exclude nothing except crossings without marks. Rows and
-    columns of the matrices are the pieces and then the crossings. The first
-    matrix is for small vehicles only; in the second one, at least one vehicle
-    is large.
+    Two different paths through a junction ("ways") exclude each other if the
+    areas that vehicles sweep on them meet. Lanes exclude only crossings without
+    marks. The results are pairs of matrices, whose rows and columns are the
+    pieces and then the crossings. The first matrix of a pair is for two small
+    vehicles; in the second, at least one vehicle is large.
 
     Returns:
-        Three arrays (2, P + C, P + C) for a row a and a column b. First, the
-        place of a front along a at which the area of a begins to meet that of
-        b; inf if they never meet [m]. Second, the place of a rear along a from
-        which on b is free again; 0 if they never meet, or if a is a crossing
-        [m]. Third, `SPLIT` or `MERGE` where two ways meet only at their
-        beginning or end, in a lane that they share.
+        Three arrays (2, P + C, P + C), whose entries are for a row a and a
+        column b. The first is the distance of a vehicle's front along a at
+        which its area begins to meet that of b [m]; inf if they never meet. The
+        second is the distance of a vehicle's rear along a from which on b is
+        free again [m]; 0 if they never meet, or if a is a crossing. The third
+        is `SPLIT` or `MERGE` where two ways meet only at their beginning or
+        end, in a lane that they share.
     """
     small_axles = (-1.6, 1.75)
     num_pieces = len(graph.pieces)
@@ -431,11 +437,12 @@ def find_conflicts(
 def swept_hulls(
     piece: Piece, size: tuple[float, float], axles: tuple[float, float]
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Returns the areas that a vehicle sweeps on a way, step by step.
+    """Returns the areas that a vehicle sweeps on a piece, step by step.
 
     `size` is the vehicle's length and width; `axles` are x of its rear and
-    front axle from its middle [m]. The result has places (N + 1,) of its front
-    bumper [m], and the areas (N,) between two of these.
+    front axle from its middle [m]. The result is N + 1 distances of the front
+    bumper along the piece [m], and the N areas swept from each distance to the
+    next.
     """
     line = piece.points[:, :2]
     along = distances_along(line)
@@ -544,10 +551,10 @@ def is_ego_far(
 
     Args:
         streets: arrays of all lanes, with the times of the ego car.
-        k: number of the time.
+        k: number of the time step.
         lane: number of the lane.
         s: distance of the vehicle along the lane [m].
-        wait: time that it may have to wait at the lane's end [s].
+        wait: time that the vehicle may have to wait at the lane's end [s].
     """
     until = streets.until[k, lane]
     if until == 0.0:

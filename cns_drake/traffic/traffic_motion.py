@@ -1,4 +1,4 @@
-"""Traffic in a diagram: moves vehicles and walkers as planned."""
+"""Traffic in a diagram: a system that moves vehicles and walkers."""
 
 from collections.abc import Sequence
 from typing import Any, NamedTuple
@@ -36,14 +36,14 @@ _AWAY = np.array([0.0, 0.0, -10_000.0])
 
 
 class BodyStates(NamedTuple):
-    """The states of N bodies at a time: vehicles, then walkers.
+    """The states of N bodies at one time: first vehicles, then walkers.
 
     Attributes:
-        p_WB: (N, 3) middle of each body's box on the ground [m].
+        p_WB: (N, 3) centre of the base of each body's box, on the ground [m].
         v_WB: (N, 3) velocity [m/s].
-        yaw, pitch: (N,) [rad].
-        yaw_rate: (N,) [rad/s].
-        present: (N,) whether the body is there.
+        yaw, pitch: (N,) yaw and pitch [rad].
+        yaw_rate: (N,) yaw rate [rad/s].
+        present: (N,) bool, whether the body exists at this time.
         swing: (N,) position of a walker in its gait, from -1 to 1.
     """
 
@@ -71,7 +71,7 @@ class BodyStates(NamedTuple):
 
     @property
     def is_moving(self) -> np.ndarray:
-        """Which bodies (N,) are labelled as moving."""
+        """(N,) bool: which bodies are labelled as moving."""
         return np.linalg.norm(self.v_WB, axis=-1) > MOVING_SPEED
 
 
@@ -97,7 +97,7 @@ def bodies_at(plan: TrafficPlan, t: float) -> BodyStates:
 
 
 class LimbTable:
-    """The M limbs of N bodies, in the order of the bodies.
+    """The M rigid limbs of N bodies, in the order of the bodies.
 
     Attributes:
         body: (M,) number of the body to which each limb belongs.
@@ -158,12 +158,12 @@ class TrafficMotion(LeafSystem):
         - objects
 
     All outputs depend only on time. `geometry_pose` is for the SceneGraph in
-    which the bodies are registered. The others are abstract. `frame_poses` is a
-    `KnownPoses`: the same poses X_WL in one array over all limbs.
-    `body_spatial_velocities` is a list over all limbs of V_WL, expressed in W;
-    from it, a LiDAR computes where a limb is later in its turn.
-    `moving_instances` has the instance ids (N,) of bodies faster than
-    `MOVING_SPEED`, and `objects` is the `RecordedObjects`.
+    which the bodies are registered. The four other outputs are abstract.
+    `frame_poses` is a `KnownPoses`: the same poses X_WL in one array over all
+    limbs. `body_spatial_velocities` is a list over all limbs of V_WL, expressed
+    in W; from it, a LiDAR computes where a limb is later in its turn.
+    `moving_instances` contains the instance ids (N,) of bodies that are faster
+    than `MOVING_SPEED`, and `objects` a `RecordedObjects` for recorders.
     """
 
     def __init__(
@@ -300,12 +300,13 @@ def make_traffic(
     turn: float = 0.05,
     name: str = "traffic",
 ) -> TrafficMotion:
-    """Adds vehicles and walkers to a SceneGraph; returns their system.
+    """Adds vehicles and walkers to a SceneGraph; returns a system for them.
 
-    The system, which moves them, is not yet part of a diagram.
+    The system moves the vehicles and walkers. It is not yet part of a diagram.
 
     Args:
-        scene_graph: gets the geometry, on frames of a source of its own.
+        scene_graph: SceneGraph to which the geometry is added, under a source
+            of its own.
         plan: the planned traffic.
         seed: seed of colours and sizes.
         structures: table with an instance id for each body; by default
@@ -341,11 +342,11 @@ def add_traffic(
     name: str = "traffic",
     **options: Any,
 ) -> TrafficMotion:
-    """Adds moving vehicles and walkers to a diagram; returns their system.
+    """Adds moving vehicles and walkers to a diagram.
 
-    `options` are further arguments of `make_traffic`. The system has the name
-    of the geometry source. Its port `geometry_pose` is connected to the
-    SceneGraph.
+    Returns the system that moves them. `options` are further arguments of
+    `make_traffic`. The system has the name of the geometry source. Its port
+    `geometry_pose` is connected to the SceneGraph.
 
     Example:
         from cns_drake import add_traffic

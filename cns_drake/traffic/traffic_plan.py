@@ -1,4 +1,7 @@
-"""Plans the motion of all traffic before a drive, also that of the ego car."""
+"""Plans the motion of all traffic before a drive.
+
+This includes the ego car, if it follows other vehicles.
+"""
 
 from __future__ import annotations
 
@@ -69,7 +72,7 @@ class _Run(NamedTuple):
 
 
 def find_runs(graph: LaneGraph, points: np.ndarray) -> list[_Run]:
-    """Returns the pieces of lanes that fit a car's path best.
+    """Returns the pieces that fit a car's path best, in driving order.
 
     The path leads through points (N, 2), `_STEP` apart [m].
     """
@@ -149,9 +152,10 @@ def find_runs(graph: LaneGraph, points: np.ndarray) -> list[_Run]:
 class Follower:
     """The ego car in a simulation of traffic, which follows other vehicles.
 
-    It follows its path by the Intelligent Driver Model, requests its ways like
-    other vehicles, and keeps the bounds of its drive. `u` has its place on the
-    path at each step so far [m]. It has arrived when it stands at the end.
+    The car follows its path by the Intelligent Driver Model, asks for the right
+    of way like other vehicles, and keeps the speed limits of its drive. `u`
+    contains its distances along the path at all steps so far [m]. It has
+    arrived when it stands at the end of the path.
     """
 
     def __init__(
@@ -178,7 +182,7 @@ class Follower:
         self.arrived = False
 
     def record(self, streets: Streets) -> np.ndarray:
-        """Returns the record `VEHICLE` (1,) of the car at its start."""
+        """Returns the car at its start as a record `VEHICLE`, (1,)."""
         car = np.zeros(1, motion.VEHICLE)
         bound = _PART_OF_BOUND * self._profile.acceleration
         for name, value in (
@@ -198,7 +202,7 @@ class Follower:
         return car
 
     def step(self, traffic: Traffic, k: int) -> None:
-        """Moves the car, the last of the vehicles, by the k-th step."""
+        """Moves the car in the k-th step; it is the last of the vehicles."""
         car, u = traffic.cars[-1], self.u[-1]
         if k < self._leaves or self.arrived:
             self.u.append(u)
@@ -300,13 +304,16 @@ class Follower:
         path[CURRENT + 1 + (not is_way)] = streets.after[first]
 
     def poses(self, steps: np.ndarray) -> np.ndarray:
-        """Returns x, y [m], yaw (N, 3) of the box's middle at steps (N,)."""
+        """Returns x, y [m] and yaw [rad], (N, 3), of the box's centre.
+
+        `steps` (N,) contains the numbers of the time steps.
+        """
         u = np.interp(steps, np.arange(len(self.u)), self.u)
         jet = self._path.evaluate(u)
         return self._box.middles(jet.p[:, :2], jet.yaw)
 
     def positions(self) -> np.ndarray:
-        """Returns places on the path at each `KNOT_PERIOD` of the drive [m]."""
+        """Returns distances along the path at each `KNOT_PERIOD` [m]."""
         every = round(KNOT_PERIOD / STEP)
         u = np.array(self.u[self._start :: every])
         return u[: np.count_nonzero(u < self._path.end) + REACH + 1]
@@ -353,10 +360,11 @@ class Tracks:
     a straight line.
 
     Attributes:
-        dt: distance between the times [s].
+        dt: time between two of the times [s].
         values: (K, N, D) coordinates; angles have no jumps.
-        present: (K, N) whether a body is there; None if all bodies always are.
-            Between two times, a body is there if it is there at both.
+        present: (K, N) bool, whether a body exists at each time; None if all
+            bodies always exist. Between two times, a body exists if it exists
+            at both times.
     """
 
     dt: float
@@ -364,9 +372,9 @@ class Tracks:
     present: np.ndarray | None = None
 
     def at(self, t: float | np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Returns coordinates and their rates at a time, (N, D) each.
+        """Returns coordinates and their rates, (N, D) each, at a time [s].
 
-        At several times (T,), they are (T, N, D) [s].
+        For several times (T,), both results are (T, N, D).
         """
         k, u, beyond = self._interval(t)
         p0, p1 = self.values[k], self.values[k + 1]
@@ -394,7 +402,10 @@ class Tracks:
         return self.values[row], there[..., None]
 
     def is_present(self, t: float | np.ndarray) -> np.ndarray:
-        """Returns which bodies are there at a time (N,), or at times (T, N)."""
+        """Returns which bodies exist, (N,) bool, at a time [s].
+
+        For several times (T,), the result is (T, N).
+        """
         k, *_ = self._interval(t)
         if self.present is None:
             return np.ones((*k.shape, self.values.shape[1]), bool)
@@ -431,10 +442,10 @@ class TrafficPlan:
         vehicles: x, y, z of the middle of each vehicle's box on the ground [m],
             yaw and pitch [rad].
         walkers: x, y, z on the ground [m], yaw and phase of the gait [rad].
-        left_out: number of wanted bodies that are left out because they would
-            collide.
-        positions: places of the ego car on its path at each `KNOT_PERIOD` [m],
-            if it follows other vehicles; else None.
+        left_out: number of requested bodies that are left out because they
+            would collide.
+        positions: distances of the ego car along its path at each `KNOT_PERIOD`
+            [m], if the ego car follows other vehicles; otherwise None.
         notes: notes for the user.
     """
 
@@ -480,22 +491,23 @@ def plan_traffic(
     ego_box: EgoBox,
     drive: Trajectory | None = None,
 ) -> TrafficPlan:
-    """Returns planned traffic for a drive, with the wanted numbers if possible.
+    """Plans the traffic of a drive, with the requested numbers if possible.
 
     Equal arguments give an equal plan. The plan has no collisions, but may have
-    fewer bodies than wanted.
+    fewer vehicles and walkers than requested.
 
     Args:
         graph: lanes and crossings.
         walkways: sidewalks on which walkers walk, and crossings.
-        vehicles, walkers: wanted numbers.
-        seed: seed of kinds, places and ways.
-        duration: duration of the drive [s]; the longest one if the ego car
-            follows others.
-        ego: motion of the ego car; it stays at its first place if it follows
-            others.
+        vehicles, walkers: requested numbers.
+        seed: seed of the random kinds, places and routes.
+        duration: duration of the drive [s]; the greatest possible one if the
+            ego car follows other vehicles.
+        ego: motion of the ego car; its first place only, if the ego car follows
+            other vehicles.
         ego_box: size of the ego car.
-        drive: path and speeds of the ego car if it follows others; else None.
+        drive: path and speeds of the ego car if it follows other vehicles;
+            otherwise None.
     """
     # Traffic continues after the drive, for a LiDAR that is still turning.
     num_steps = _FIRST + int(np.ceil(duration / STEP)) + 4
@@ -545,7 +557,7 @@ def _try(
 
 
 class Trial:
-    """One trial of a plan; it knows which bodies it must leave out so far."""
+    """One simulation of a plan; records which bodies must be left out."""
 
     def __init__(self, task: _Task, rng: np.random.Generator):
         """Places vehicles and walkers for the first time."""
@@ -587,7 +599,7 @@ class Trial:
         self._overlaps = np.zeros((len(self._half_sizes),) * 2, bool)
 
     def run(self, steps: range) -> None:
-        """Moves all bodies by the next steps; notes which of them overlap."""
+        """Moves all bodies by the given time steps; notes which overlap."""
         traffic, crowd = self._traffic, self._crowd
         cars = traffic.cars
         past_cars = np.empty((len(steps), len(self._kinds)), cars.dtype)
@@ -625,7 +637,10 @@ class Trial:
         self._num_steps = steps.stop
 
     def is_over(self, num_steps: int) -> bool:
-        """Returns whether the ego car arrived some time ago."""
+        """Returns whether the ego car arrived some time ago.
+
+        `num_steps` is the number of time steps simulated so far.
+        """
         if self._follower is None:
             return False
         u = self._follower.u
@@ -642,13 +657,13 @@ class Trial:
         return vehicles[: self._task.vehicles], walkers[: self._task.walkers]
 
     def left_out(self) -> int:
-        """Returns how many of the wanted bodies have to be left out."""
+        """Returns how many of the requested bodies must be left out."""
         vehicles, walkers = self._kept()
         wanted = self._task.vehicles + self._task.walkers
         return wanted - len(vehicles) - len(walkers)
 
     def plan(self) -> TrafficPlan:
-        """Returns the plan, after the last step."""
+        """Returns the plan, once the last step was simulated."""
         vehicles_at = self._vehicles[: self._num_steps]
         walkers_at = self._walkers[: self._num_steps]
         yaw = vehicles_at[:, :, 3]
@@ -695,8 +710,9 @@ def _at_half_steps(values: np.ndarray) -> np.ndarray:
 def whom_to_leave_out(overlaps: np.ndarray, kept: int) -> list[int]:
     """Returns the bodies to remove until none overlap.
 
-    Those with most overlaps are removed first. `overlaps` (N, N), symmetric,
-    says which bodies overlap. The first `kept` bodies are never removed.
+    Bodies with the most overlaps are removed first. `overlaps` (N, N) is
+    symmetric and says which bodies overlap. The first `kept` bodies are never
+    removed.
     """
     overlaps = overlaps.copy()
     out: list[int] = []
@@ -718,7 +734,7 @@ def plan_queues(
     ego: EgoPath,
     ego_box: EgoBox,
 ) -> TrafficPlan:
-    """Returns vehicles that stand in queues in all lanes between junctions.
+    """Plans vehicles that stand in queues in all lanes between junctions.
 
     A vehicle is absent while the ego car is at its place.
 

@@ -27,7 +27,7 @@ class VehicleKind:
         speed_factor: speed on a free road, as a share of the limit.
         top_speed: greatest speed of the kind [m/s].
         acceleration: a_max of the model [m/s^2].
-        deceleration: b of the model, the comfortable one [m/s^2].
+        deceleration: b of the model, the comfortable deceleration [m/s^2].
         headway: T of the model [s].
     """
 
@@ -44,7 +44,7 @@ class VehicleKind:
 
     @property
     def is_large(self) -> bool:
-        """Whether it needs more than the width of its lane in a turn."""
+        """Whether the vehicle needs more than its lane's width in a turn."""
         return self.size[0] > 5.8
 
 

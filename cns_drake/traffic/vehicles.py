@@ -1,9 +1,9 @@
-"""Vehicles in lanes: car following, lane changes, and choice of ways.
+"""Vehicles in lanes: car following, lane changes, choice of directions.
 
 Vehicles follow each other by the Intelligent Driver Model of Treiber, Hennecke,
 Helbing (see `VehicleKind`). They change lanes by MOBIL of Kesting, Treiber,
-Helbing (2007): a driver changes lanes if this gains more acceleration than it
-costs others, and no other vehicle has to brake hard.
+Helbing (2007): a driver changes lanes if the gain in acceleration exceeds what
+other drivers lose, and no other vehicle has to brake hard.
 """
 
 from collections.abc import Sequence
@@ -129,10 +129,11 @@ CROSSING = np.dtype(
 class Traffic(NamedTuple):
     """Vehicles and crossings while they are simulated.
 
-    There are N `cars`, records `VEHICLE`, and C `crossings`, records
-    `CROSSING`. `head` (P,) is the first entry in the list of vehicles on each
-    piece; -1 for none. `entries` are all records `_ENTRY`; see
-    `find_occupants`. `seed` draws ways.
+    `cars` (N,) contains records `VEHICLE`, and `crossings` (C,) records
+    `CROSSING`. Each piece has a list of the vehicles on it: `head` (P,) is the
+    number of its first entry (-1 for none), and `entries` contains the entries
+    of all lists; see `find_occupants`. `seed` is the seed of the random
+    directions at junctions.
     """
 
     streets: Streets
@@ -146,7 +147,7 @@ class Traffic(NamedTuple):
 def begin_traffic(
     streets: Streets, cars: np.ndarray, crossings: np.ndarray, seed: int
 ) -> Traffic:
-    """Returns the traffic at the start, with room for all entries."""
+    """Returns the traffic at the start of a simulation."""
     num_pieces = len(streets.pieces)
     entries = np.zeros(_MOST_ENTRIES * len(cars) + num_pieces, _ENTRY)
     head = np.full(num_pieces, -1)
@@ -154,7 +155,10 @@ def begin_traffic(
 
 
 def make_crossings(graph: LaneGraph) -> np.ndarray:
-    """Returns the records `CROSSING` (C,) of a graph, without walkers."""
+    """Returns the crossings of a graph as records `CROSSING` (C,).
+
+    No walkers are on them.
+    """
     crossings = np.zeros(len(graph.crossings), CROSSING)
     crossings["waits"] = np.inf
     crossings["opened"] = crossings["closed"] = -np.inf
@@ -180,11 +184,11 @@ def room_for_vehicles(graph: LaneGraph) -> int:
 def place_vehicles(
     kinds: Sequence[VehicleKind], streets: Streets, rng: np.random.Generator
 ) -> tuple[np.ndarray, list[int]]:
-    """Places vehicles of N kinds in lanes, away from the ego car's first place.
+    """Places N vehicles in lanes, away from the first place of the ego car.
 
     Returns:
-        Records `VEHICLE` of the vehicles for which a place was found, and the
-        numbers of their kinds.
+        Records `VEHICLE` of the vehicles for which a place was found, and their
+        indices in `kinds`.
     """
     free = np.flatnonzero(~streets.pieces["is_way"])
     lengths = streets.pieces["length"]
@@ -234,10 +238,10 @@ def place_vehicles(
 
 
 def vehicle_poses(streets: Streets, cars: np.ndarray) -> np.ndarray:
-    """Returns the poses (..., 5) of records `VEHICLE` (...).
+    """Returns the poses (..., 5) of vehicles, given as records `VEHICLE`.
 
-    They are x, y, z of the middle of each box on the ground [m], yaw and pitch
-    [rad].
+    A pose consists of x, y, z of the centre of the box's base on the ground
+    [m], yaw and pitch [rad].
     """
     half = 0.5 * cars["length"]
     front = _places(streets, cars, half - cars["front_axle"])
@@ -288,8 +292,8 @@ def _places(
 def find_occupants(traffic: Traffic, k: int) -> None:
     """Makes the list of vehicles on each piece, at the k-th time step.
 
-    The lists begin in `traffic.head`. A vehicle is in the lists of all pieces
-    that it is on.
+    The first entries of the lists are in `traffic.head`. A vehicle is in the
+    list of each piece on which it stands.
     """
     streets, cars = traffic.streets, traffic.cars
     pieces = streets.pieces
@@ -348,8 +352,8 @@ def find_ahead(
 ) -> tuple[float, float]:
     """Returns the gap to the next vehicle ahead [m], and its speed [m/s].
 
-    The vehicle ahead is on the same piece. The vehicle behind it has the number
-    `who`, and its front bumper is at `s` [m].
+    Only vehicles on the same piece count. The result is for the vehicle with
+    the number `who`, whose front bumper is at `s` along the piece [m].
     """
     gap, speed = np.inf, 0.0
     at = traffic.head[piece]
@@ -366,7 +370,8 @@ def find_ahead(
 def free_acceleration(car: Any, v0: float) -> float:
     """Returns a vehicle's acceleration on a free road [m/s^2].
 
-    Above the wanted speed v0 [m/s], the vehicle brakes comfortably at most.
+    Above the desired speed v0 [m/s], the vehicle brakes no harder than is
+    comfortable.
     """
     if v0 < 0.01:
         return -car.b
@@ -378,8 +383,8 @@ def interaction(car: Any, gap: float, approach: float) -> float:
     """Returns by how much a vehicle ahead reduces the acceleration [m/s^2].
 
     This is a (s* / gap)^2 with s* = s0 + max(0, v T + v dv / (2 sqrt(a b))).
-    The gap is from bumper to bumper [m], and dv (`approach`) is the speed minus
-    that of the vehicle ahead [m/s].
+    The gap is from bumper to bumper [m]. dv (`approach`) is the vehicle's speed
+    minus the speed of the vehicle ahead [m/s].
     """
     wanted = STANDSTILL_GAP + max(
         0.0,
@@ -390,9 +395,10 @@ def interaction(car: Any, gap: float, approach: float) -> float:
 
 @compiled
 def is_walked(traffic: Traffic, c: int, way: int, is_large: bool) -> bool:
-    """Returns whether walkers on the c-th crossing have yet to pass a way.
+    """Returns whether walkers on a crossing have yet to cross a vehicle's path.
 
-    It depends on whether the vehicle on the way is large.
+    `c` is the number of the crossing, and `way` that of the path through the
+    junction. `is_large` says whether the vehicle is large.
     """
     one, place = traffic.crossings[c], traffic.streets.over[way, c]
     passed = _PASSED[int(is_large)]
@@ -403,12 +409,14 @@ def is_walked(traffic: Traffic, c: int, way: int, is_large: bool) -> bool:
 
 @compiled
 def lane_over(streets: Streets, car: Any, c: int) -> tuple[int, float, float]:
-    """Returns where a vehicle's lane meets the c-th crossing, without marks.
+    """Returns where a vehicle's lane meets the c-th crossing.
+
+    This concerns crossings without marks, which lead over lanes.
 
     Returns:
-        The lane that leads over it, -1 if the vehicle's path has none; and the
-        distances to the places where the vehicle enters the crossing and leaves
-        it, inf for none [m].
+        The lane on the vehicle's path that meets the crossing, -1 for none; and
+        the distances to the places where the vehicle enters and leaves the
+        crossing [m], inf for none.
     """
     begin, number = -car.s, len(streets.pieces) + c
     for column in range(CURRENT, NUM_PIECES):
@@ -426,18 +434,19 @@ def lane_over(streets: Streets, car: Any, c: int) -> tuple[int, float, float]:
 
 @compiled
 def find_prior(traffic: Traffic, i: int) -> tuple[float, float, float]:
-    """Returns what the i-th vehicle has to wait for on the way it holds.
+    """Returns what the i-th vehicle must wait for on its way in a junction.
 
-    It stops before a crossing that walkers use, also in lanes. It stops before
-    the place where its way meets that of a vehicle which got its way earlier
-    and has not passed this place yet. If both vehicles leave or enter the same
-    lane, it follows the other one. Vehicles thus wait only for vehicles with a
-    lower `order`, and the first one waits for none: no vehicle waits forever.
+    The vehicle stops before a crossing that walkers use, in junctions and in
+    lanes. It also stops where its way (the path through the junction) meets the
+    way of a vehicle that was permitted to enter earlier and has not yet passed
+    this place. If the two vehicles leave or enter the same lane, it follows the
+    earlier vehicle instead. Vehicles therefore wait only for vehicles with a
+    lower `order`, and the first vehicle never waits: no vehicle waits forever.
 
     Returns:
-        The distance to the place where the vehicle has to stop, inf for none
-        [m]; the gap to a vehicle that it follows, inf for none [m]; and the
-        speed of that vehicle [m/s].
+        The distance to the place where the vehicle must stop [m], inf for none;
+        the gap to the vehicle that it must follow [m], inf for none; and the
+        speed of the followed vehicle [m/s].
     """
     line, gap, speed = np.inf, np.inf, 0.0
     streets, cars, crossings = traffic.streets, traffic.cars, traffic.crossings
@@ -486,7 +495,7 @@ def find_prior(traffic: Traffic, i: int) -> tuple[float, float, float]:
 
 @compiled
 def rear_on_way(streets: Streets, car: Any) -> float:
-    """Returns the place of a vehicle's rear along the way that it holds [m]."""
+    """Returns the place of a vehicle's rear along its way in a junction [m]."""
     rear = car.s - car.length
     if car.path[CURRENT] == car.held:
         return rear
@@ -550,7 +559,7 @@ def accelerations(traffic: Traffic) -> np.ndarray:
 
 @compiled
 def change_lanes(traffic: Traffic, k: int) -> None:
-    """Lets at most one vehicle begin to change lanes in the k-th step."""
+    """Starts a lane change of at most one vehicle in the k-th time step."""
     cars, pieces = traffic.cars, traffic.streets.pieces
     for i in range(len(cars)):
         car = cars[i]
@@ -669,10 +678,11 @@ def advance(traffic: Traffic, accelerations: np.ndarray) -> None:
 
 @compiled
 def choose_way(traffic: Traffic, i: int) -> None:
-    """Draws the next way of the i-th vehicle, which is in a lane.
+    """Chooses at random the direction of the i-th vehicle at a junction.
 
-    It draws two ways and takes the one to the emptier lane, so that no street
-    stays empty while vehicles queue in others.
+    Of two directions that are drawn, the one that leads to the emptier lane is
+    chosen, so that no street stays empty while vehicles queue in other streets.
+    The vehicle is still in a lane.
     """
     streets, cars = traffic.streets, traffic.cars
     car = cars[i]
@@ -703,8 +713,8 @@ def choose_way(traffic: Traffic, i: int) -> None:
 def uniform(seed: int, who: int, draw: int) -> float:
     """Returns the `draw`-th random number of a road user, from 0 to 1.
 
-    It is SplitMix64's finalizer (Steele, Lea, Flood, OOPSLA 2014) of the seed,
-    the number of the road user and `draw`.
+    The number is the result of SplitMix64's finalizer (Steele, Lea, Flood,
+    OOPSLA 2014) for the seed, the number `who` of the road user, and `draw`.
     """
     z = np.uint64(seed) * np.uint64(0x9E3779B97F4A7C15)
     z += np.uint64(who) * np.uint64(0xD1B54A32D192ED03)

@@ -1,8 +1,8 @@
 """Moves walkers along walkways by the social force model.
 
-Helbing, Molnar, "Social force model for pedestrian dynamics", Phys. Rev. E 51
-(1995): walkers approach their wanted speed, and keep away from each other and
-from the edges of their walkway.
+Walkers approach their desired speed, and keep away from each other and from the
+edges of their walkway: Helbing, Molnar, "Social force model for pedestrian
+dynamics", Phys. Rev. E 51 (1995).
 """
 
 from collections.abc import Sequence
@@ -97,10 +97,10 @@ class Paths(NamedTuple):
     Attributes:
         paths: (2 W,) records `_PATH`.
         points: (M, 3) points in walking direction [m].
-        tangents: (M, 2) unit vectors from each point to the next; the last
-            point of a path has that of the point before.
+        tangents: (M, 2) unit vectors from each point to the next. The vector of
+            a path's last point is that of the point before.
         limits: (M, 2) least and greatest offset to the right [m].
-        narrow: (M,) where walkers must face along their path.
+        narrow: (M,) bool, where walkers must face along their path to fit.
     """
 
     paths: np.ndarray
@@ -111,7 +111,7 @@ class Paths(NamedTuple):
 
 
 def room_for_walkers(walkways: Sequence[Walkway]) -> int:
-    """Returns the number of walkers for whom there is room on sidewalks."""
+    """Returns how many walkers have room on the sidewalks."""
     length = sum(length_of(way.points) for way in walkways if way.crossing < 0)
     return int(length // _WALKER_SPACE)
 
@@ -119,16 +119,17 @@ def room_for_walkers(walkways: Sequence[Walkway]) -> int:
 def gait_rate(speed: np.ndarray) -> np.ndarray:
     """Returns the rate at which the phase of walkers' gait changes [rad/s].
 
-    A stride, of two steps, is 0.4 m longer than the distance walked in 0.7 s.
+    A stride consists of two steps; its length is 0.4 m plus the distance that
+    is walked in 0.7 s.
     """
     return 2.0 * np.pi * speed / (0.7 * speed + 0.4)
 
 
 class Crowd:
-    """All walkers while they are planned.
+    """All walkers during the planning of their motion.
 
-    `walkers` (N,) are records. There are fewer than wanted if there is no room
-    for all.
+    `walkers` (N,) contains records of walkers: fewer than requested if there is
+    not enough room.
     """
 
     def __init__(
@@ -153,9 +154,9 @@ class Crowd:
         self.walkers = _place_walkers(count, walkways, rng)
 
     def step(self, t: float, seed: int) -> None:
-        """Moves all walkers by one step from a time [s].
+        """Moves all walkers by one time step, which begins at the time `t` [s].
 
-        The seed draws their next paths.
+        `seed` is the seed of their random next paths.
         """
         crossings, walkers = self._crossings, self.walkers
         opened = crossings["opened"]
@@ -287,9 +288,10 @@ class Crowd:
         return path ^ 1 if other // 2 == path // 2 else other
 
     def poses(self, walkers: np.ndarray) -> np.ndarray:
-        """Returns the poses (..., 5) of records (...), e.g. of several times.
+        """Returns the poses (..., 5) of records of walkers (...).
 
-        They are x, y, z on the ground [m], yaw, and phase of the gait [rad].
+        A pose consists of x, y, z on the ground [m], yaw and phase of the gait
+        [rad]. The records can be those of several times.
         """
         paths, points, *_ = self._paths
         path = paths[walkers["path"]]

@@ -1,4 +1,4 @@
 """Temporary changes between drives: parked cars, leaves, snow, roadworks.
 
-A loaded world is changed before it becomes part of a diagram.
+The changes are made in a loaded world, before it becomes part of a diagram.
 """

@@ -1,4 +1,4 @@
-"""Applies all temporary changes to a world: cars, snow, furniture, leaves."""
+"""Temporary changes to a world: parked cars, snow, furniture, leaves."""
 
 from dataclasses import replace
 import math
@@ -66,11 +66,11 @@ _FORMS = {
 
 
 class Bay:
-    """The room of a parked car, which does not overlap other bays.
+    """The free rectangle around a parked car; bays do not overlap.
 
     Attributes:
         middle: (2,) middle of the car [m].
-        yaw: heading of its long axis [rad].
+        yaw: heading of the bay's long axis [rad].
         reach: (4,) distances from the middle to the front, back, left and right
             end of the bay [m].
     """
@@ -89,8 +89,8 @@ class Bay:
     def box(self, beyond: np.ndarray | float = 0.0) -> Polygon:
         """Returns the bay, enlarged on each side, as seen from above [m].
 
-        `beyond` has the lengths by which it grows at the front, back, left and
-        right [m].
+        `beyond` contains the lengths by which the bay is enlarged at the front,
+        back, left and right [m], or one length for all sides.
         """
         front, back, left, right = self.reach + beyond
         c, s = math.cos(self.yaw), math.sin(self.yaw)
@@ -102,7 +102,7 @@ class Bay:
         )
 
     def grow(self, car: Structure, cars: Obstacles, others: Obstacles) -> None:
-        """Enlarges the bay up to other objects, and halfway to other cars."""
+        """Enlarges the bay up to other objects and halfway to other cars."""
         own = (car.name,)
         box = self.box()
         growth = np.zeros(4)
@@ -141,7 +141,7 @@ class Bay:
 
 
 def make_bays(around: Surroundings) -> dict[str, Bay]:
-    """Returns the bays of all parked cars, by the name of the car."""
+    """Returns name of the car -> its bay, for all parked cars."""
     cars = {car.name: car for car in around.of_classes(_PARKED)}
     bays = {name: Bay(car) for name, car in cars.items()}
     if not bays:
@@ -163,7 +163,10 @@ def make_bays(around: Surroundings) -> dict[str, Bay]:
 
 
 def change_parked_cars(around: Surroundings, share: float) -> None:
-    """Changes a share (from 0 to 1) of the parked cars."""
+    """Changes a share (from 0 to 1) of the parked cars.
+
+    A changed car is removed, moved in its bay, or replaced by another car.
+    """
     editing, bays = around.editing, make_bays(around)
     if not bays:
         editing.note("parked_cars: the world has no car, truck or bus")
@@ -262,10 +265,11 @@ _WAVES = (9.0, 3.7)
 
 
 def lay_snow(around: Surroundings, ground: GroundSurface, depth: float) -> None:
-    """Lays snow of a depth [m], except on roads, plants and thin objects.
+    """Covers surfaces with snow, except roads, plants and thin objects.
 
-    The snow raises `ground`, the surface before all other changes. Roads are
-    cleared, and have banks of snow along their kerbs.
+    The snow is `depth` [m] deep and raises `ground`, which is the ground before
+    all other changes. Roads are cleared, and get banks of snow along their
+    kerbs.
     """
     editing = around.editing
     for thing in around.things.values():
@@ -455,11 +459,11 @@ def change_world(
     drive: BaseGeometry,
     kept_free: BaseGeometry,
 ) -> World:
-    """Returns a world in which time has passed.
+    """Applies the temporary changes of a scenario to a world.
 
     Args:
         world: the world, not yet part of a diagram; its SceneGraph is changed.
-        config: the changes.
+        config: the section `transient` of the scenario.
         drive, kept_free: the path of the vehicle, and the area that must stay
             free of new objects, seen from above [m].
 

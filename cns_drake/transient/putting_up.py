@@ -50,7 +50,7 @@ _NOT_THROUGH = frozenset({"building", "car", "truck", "bus", "other-structure"})
 def put_up_scaffolds(around: Surroundings, share: float) -> None:
     """Puts up scaffolds in front of a share of the buildings along a drive.
 
-    A front without room gets no scaffold.
+    A building without free space in front of it gets no scaffold.
     """
     fronts = [
         thing
@@ -113,7 +113,10 @@ def _front(
 
 
 def scaffold(length: float, height: float, rng: np.random.Generator) -> Model:
-    """Returns a scaffold along x: uprights, ledgers, decks, perhaps a net."""
+    """Returns a scaffold along x: uprights, ledgers, decks, sometimes a net.
+
+    `length` and `height` are in [m].
+    """
     lifts = max(int(height / _LIFT), 1)
     bays = max(round(length / _BAY), 1)
     xs = np.linspace(-length / 2, length / 2, bays + 1)
@@ -304,7 +307,7 @@ _OPEN = frozenset({"pole", "traffic-sign", "vegetation"}) | GROUND_CLASSES
 def put_up_works(around: Surroundings, share: float) -> None:
     """Puts up roadworks along a share of the kerbs near a drive.
 
-    Kerbs without room beside them get none.
+    Kerbs without free space next to them get no roadworks.
     """
     stretches = _stretches(around, "works", _WORKS_CELL, _LENGTHS[0])
     solid, every = (
@@ -419,9 +422,10 @@ _ROWS = {
 
 
 def fill_roadsides(around: Surroundings, share: float) -> None:
-    """Adds a share of the objects that have room beside kerbs near a drive.
+    """Adds objects to a share of the free places beside kerbs near a drive.
 
-    Except for cars, they stand at the same places with every seed.
+    Except for parked cars, the objects and their places are the same for every
+    seed.
     """
     stretches = _stretches(around, "roadsides", _CELL, _SHORTEST)
     standing = around.obstacles(ignored=GROUND_CLASSES)

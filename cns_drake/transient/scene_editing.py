@@ -44,10 +44,10 @@ Named = TypeVar("Named", bound=_Named)
 
 
 class Look(NamedTuple):
-    """The look of new surfaces.
+    """Colour and reflectivity of new surfaces.
 
-    The reflectivity is from 0 to 1, near 900 nm; if it is None, it follows from
-    the class and the diffuse colour.
+    `rgb` is the diffuse colour. The reflectivity is from 0 to 1, near 900 nm;
+    if it is None, it follows from the class and the colour.
     """
 
     rgb: tuple[float, float, float]
@@ -55,7 +55,7 @@ class Look(NamedTuple):
 
 
 class SceneEditing:
-    """Removes structures from a world and adds others.
+    """Removes structures from a loaded world, changes them and adds new ones.
 
     The `cause` of a change is the name of the scenario's switch that made it.
     """
@@ -77,7 +77,7 @@ class SceneEditing:
         self._notes.append(f"transient: {text}")
 
     def blame(self, structure: str, cause: str) -> None:
-        """Records the cause of a structure's change."""
+        """Records the cause of a change to a structure."""
         if cause not in self._causes[structure]:
             self._causes[structure].append(cause)
 
@@ -106,7 +106,7 @@ class SceneEditing:
     def cover_part(
         self, part: StructurePart, p_W: np.ndarray, look: Look
     ) -> None:
-        """Moves a part of a structure by p_W (3,) [m], and changes its look."""
+        """Moves a part by p_W (3,) [m] in W and gives it a new look."""
         self._register(
             f"{part.geometry.structure}/{part.name}_covered",
             RigidTransform(p_W) @ part.X_WG,
@@ -123,14 +123,14 @@ class SceneEditing:
         X_WS: RigidTransform,
         cause: str,
     ) -> None:
-        """Adds a structure.
+        """Adds a structure to the world.
 
         Args:
-            name: unique in the world.
-            semantic_class: its class.
+            name: name of the structure, unique in the world.
+            semantic_class: class of the structure.
             model: a model of the city generator.
-            X_WS: its pose.
-            cause: the switch that adds it.
+            X_WS: pose of the structure.
+            cause: name of the switch that adds the structure.
         """
         for part in model.parts:
             self._register(
@@ -143,7 +143,7 @@ class SceneEditing:
         self.blame(name, cause)
 
     def keep_triangles(self, part: StructurePart, kept: np.ndarray) -> None:
-        """Removes the triangles of a part except those with indices `kept`."""
+        """Removes all triangles of a part except those with indices `kept`."""
         surface = part.geometry.surface
         assert isinstance(surface, TriangleSurface)
         triangles = surface.triangles[kept]
@@ -174,14 +174,14 @@ class SceneEditing:
         triangles: np.ndarray,
         look: Look,
     ) -> None:
-        """Adds a part made of triangles to the structure of another part.
+        """Adds a part made of triangles to the structure of an existing part.
 
         Args:
-            part: the other part.
+            part: the existing part.
             name: name of the new part.
             p_WVs: (N, 3) vertices [m].
             triangles: (M, 3) indices of vertices.
-            look: its colour and reflectivity.
+            look: colour and reflectivity of the new part.
         """
         R, p = part.X_WG.rotation().matrix(), part.X_WG.translation()
         mesh = _memory_mesh(product(p_WVs - p, R), triangles)
@@ -197,15 +197,15 @@ class SceneEditing:
         look: Look,
         cause: str,
     ) -> None:
-        """Adds a structure made of triangles.
+        """Adds a structure made of triangles to the world.
 
         Args:
-            name: unique in the world.
-            semantic_class: its class.
+            name: name of the structure, unique in the world.
+            semantic_class: class of the structure.
             p_WVs: (N, 3) vertices [m].
             triangles: (M, 3) indices of vertices.
-            look: its colour and reflectivity.
-            cause: the switch that adds it.
+            look: colour and reflectivity of the structure.
+            cause: name of the switch that adds the structure.
         """
         middle = np.round(p_WVs.mean(axis=0))
         self._register(
@@ -218,7 +218,7 @@ class SceneEditing:
         self.blame(name, cause)
 
     def finish(self) -> World:
-        """Returns the changed world, with updated structure table and notes.
+        """Returns the changed world, with a new structure table and new notes.
 
         Raises:
             InputError: there are more structures than instance ids.
@@ -289,7 +289,7 @@ class SceneEditing:
 
 @dataclass
 class Surroundings:
-    """The surroundings of a drive, while they are changed.
+    """The surroundings of a drive, to which changes are made.
 
     `things` are the structures before the changes, by name. `drive` is the path
     of the vehicle, and `kept_free` the area that must stay free of new objects,
@@ -317,10 +317,10 @@ class Surroundings:
         ignored: Collection[str] | None = None,
         classes: Collection[str] = (),
     ) -> Obstacles:
-        """Returns the footprints of structures, and the area to keep free.
+        """Returns the areas where new objects must not stand.
 
-        Structures of the classes `ignored` do not count; with `classes`, only
-        those of these classes do.
+        These are the area `kept_free` and the footprints of structures: of all
+        classes except `ignored` or, if `ignored` is None, only of `classes`.
         """
         feet = (
             (thing.name, thing.footprint)
@@ -336,7 +336,10 @@ class Surroundings:
     def chosen(
         self, cause: str, things: Iterable[Named], share: float
     ) -> Iterator[tuple[Named, np.random.Generator]]:
-        """Yields a random share of objects, each with a random generator."""
+        """Yields a random share of objects, each with its own random generator.
+
+        The choice depends on the seed, the cause and the names of the objects.
+        """
         for thing in things:
             rng = draws(self.seed, cause, thing.name)
             if rng.uniform() < share:

@@ -79,7 +79,7 @@ class StructurePart:
 
 @dataclass(frozen=True)
 class Structure:
-    """A structure in the world; its class is a key of `CLASS_IDS`."""
+    """A structure in a loaded world; its class is a key of `CLASS_IDS`."""
 
     name: str
     semantic_class: str
@@ -92,12 +92,12 @@ class Structure:
 
     @cached_property
     def bottom(self) -> float:
-        """Height of its lowest point [m]."""
+        """Height of the structure's lowest point in W [m]."""
         return float(self.p_WPs[:, 2].min(initial=np.inf))
 
     @cached_property
     def top(self) -> float:
-        """Height of its highest point [m]."""
+        """Height of the structure's highest point in W [m]."""
         return float(self.p_WPs[:, 2].max(initial=self.bottom))
 
     @cached_property
@@ -107,7 +107,7 @@ class Structure:
 
     @cached_property
     def footprint(self) -> BaseGeometry:
-        """The convex hull of the parts near its foot, seen from above [m]."""
+        """The convex hull of the parts near the ground, seen from above [m]."""
         p_WPs = self.p_WPs
         return _hull(p_WPs[p_WPs[:, 2] <= self.bottom + _HEADROOM])
 
@@ -155,7 +155,7 @@ def read_structures(
 
 
 class Obstacles:
-    """Areas, seen from above, where nothing new may stand."""
+    """Areas, seen from above, where new objects must not stand."""
 
     def __init__(self, areas: Iterable[tuple[str, BaseGeometry]]):
         """Takes names and areas in W [m]."""
@@ -167,7 +167,10 @@ class Obstacles:
     def is_free(
         self, area: BaseGeometry, ignored: Collection[str] = ()
     ) -> bool:
-        """Returns whether an area touches no obstacle, except ignored ones."""
+        """Returns whether an area touches no obstacle.
+
+        Obstacles with the names `ignored` do not count.
+        """
         return not self._met(area, ignored)
 
     def distance(
@@ -175,8 +178,9 @@ class Obstacles:
     ) -> float:
         """Returns the distance from an area to the nearest obstacle [m].
 
-        Only the parts of obstacles `within` another area count. Obstacles with
-        ignored names do not count. The distance is inf if there is no obstacle.
+        Only the parts of obstacles inside the area `within` count, and
+        obstacles with the names `ignored` do not. The distance is inf if there
+        is no obstacle.
         """
         return min(
             (
@@ -208,8 +212,8 @@ _LEAST_AREA = 4.0
 class Kerb(NamedTuple):
     """A stretch of the edge of the carriageway.
 
-    Points (N, 2) lie along it in W [m]; unit vectors (N, 2) point away from the
-    road.
+    `points` (N, 2) lie along the edge, in W [m]; at each of them, a unit vector
+    in `outwards` (N, 2) points away from the road.
     """
 
     points: np.ndarray
@@ -217,7 +221,7 @@ class Kerb(NamedTuple):
 
 
 class GroundSurface:
-    """The ground near a drive, within an area `near` in W [m]."""
+    """The ground near a drive: in the area `near`, given in W [m]."""
 
     def __init__(self, things: Mapping[str, Structure], near: BaseGeometry):
         """Takes all structures, and the area in which the ground is known."""
@@ -251,9 +255,9 @@ class GroundSurface:
     ) -> np.ndarray:
         """Returns the heights (N,) of the ground at places (N, 2) [m].
 
-        They are heights of carriageways if `of_road` is True, of all other
-        ground if it is False, and the higher ones of both if it is None. They
-        are NaN where there is no ground.
+        `of_road` selects the ground: True for carriageways only, False for all
+        other ground, and None for the higher of the two. The height is NaN
+        where there is no such ground.
         """
         kinds = (False, True) if of_road is None else (of_road,)
         found = np.max([self._sides[k].heights(xy) for k in kinds], axis=0)
@@ -262,7 +266,7 @@ class GroundSurface:
     def lowest(self, area: BaseGeometry, default: float) -> float:
         """Returns the least height at the corners of an area [m].
 
-        It is `default` if there is no ground.
+        The result is `default` if there is no ground.
         """
         z = self.heights(shapely.get_coordinates(area))
         z = z[np.isfinite(z)]
@@ -271,15 +275,16 @@ class GroundSurface:
     def rise(self, old: np.ndarray, new: np.ndarray) -> float:
         """Returns how much higher the ground is at `new` than at `old` [m].
 
-        Both are places (2,). The result is 0 if either has no ground.
+        `new` and `old` are places (2,) in W [m]. The result is 0 if there is no
+        ground at one of them.
         """
         z = self.heights(np.array([old, new]))
         return float(z[1] - z[0]) if np.isfinite(z).all() else 0.0
 
     def kerbs(self, spacing: float) -> Iterator[Kerb]:
-        """Yields the edges of the carriageway within the area.
+        """Yields the edges of the carriageway within the area `near`.
 
-        Their points are at most `spacing` apart [m].
+        The points of an edge are at most `spacing` apart [m].
         """
         inner = self.near.buffer(-1.0)  # The edge of `near` is not a kerb.
         shapely.prepare(inner)
@@ -322,9 +327,10 @@ def triangle_corners(part: StructurePart) -> np.ndarray:
 
 
 def draws(seed: int, cause: str, name: str) -> np.random.Generator:
-    """Returns the random generator of one structure for one cause.
+    """Returns the random generator of a structure for one kind of change.
 
-    Its numbers do not depend on other structures or other causes.
+    `cause` is the name of the switch. The random numbers do not depend on other
+    structures or other causes.
     """
     digest = hashlib.sha256(f"{seed}/{cause}/{name}".encode()).digest()
     return np.random.default_rng(int.from_bytes(digest[:16], "little"))

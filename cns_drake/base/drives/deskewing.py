@@ -18,14 +18,14 @@ _MOST_OFF = 300.0
 
 
 def deskew(drive: Drive, index: int) -> np.ndarray:
-    """Returns a scan as if it had been taken at once, at its stamp.
+    """Returns a scan as if all points had been measured at its time stamp.
 
-    A point was measured `t` ns after the stamp and is given in the frame that
-    the LiDAR had then. The pose at that time comes from cubic splines through
-    the poses of the drive around the scan: one for positions, and scipy's
-    RotationSpline, with smooth angular rates, for rotations. This pose takes
-    the point into the world. The pose at the stamp takes it into the LiDAR's
-    frame S.
+    In a recorded scan, each point was measured `t` ns after the stamp and is
+    expressed in the LiDAR's frame at that time. The pose at that time comes
+    from cubic splines through the poses of the drive around the scan: one for
+    positions, and scipy's RotationSpline, with smooth angular rates, for
+    rotations. With this pose the point is transformed to the world, and from
+    there, with the pose at the stamp, to the LiDAR's frame S at the stamp.
 
     At the end of the drive the motion is extrapolated over one scan.
 
@@ -34,11 +34,12 @@ def deskew(drive: Drive, index: int) -> np.ndarray:
         index: number of the scan.
 
     Returns:
-        A copy of the scan with other `x`, `y`, `z`.
+        A copy of the scan with corrected `x`, `y` and `z` [m]; all other fields
+        are unchanged.
 
     Raises:
-        InputError: if the scan cannot be read or does not say when its
-            points were measured, in nanoseconds, or there are too few poses.
+        InputError: if the scan cannot be read, has no field `t` in nanoseconds,
+            or the drive has too few poses.
     """
     points = drive.scan(index).copy()
     if "t" not in (points.dtype.names or ()):

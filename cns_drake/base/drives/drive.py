@@ -51,9 +51,10 @@ class ImuSamples(NamedTuple):
     """Consecutive samples of an IMU with a constant rate.
 
     Attributes:
-        first: number of the first sample, counted from time zero, which has
-            the number 0.
-        quat_xyzw: (N, 4) R_WI.
+        first: number of the first sample of this block; the sample at time zero
+            has the number 0.
+        quat_xyzw: (N, 4) orientations R_WI of the IMU I in the world W, as unit
+            quaternions (x, y, z, w).
         angular_velocity: (N, 3) w_WI, expressed in I [rad/s].
         specific_force: (N, 3) expressed in I [m/s^2].
     """
@@ -65,7 +66,7 @@ class ImuSamples(NamedTuple):
 
 
 def driven_way(scenario: Mapping | None) -> dict | None:
-    """Returns the fields of a scenario that determine the path of a drive.
+    """Returns those fields of a scenario that determine the driven path.
 
     Two drives for which these fields are equal differ at most in their
     surroundings and their sensors.
@@ -100,9 +101,10 @@ def read_scenario(folder: Path) -> Mapping | None:
 
 
 class Drive(abc.ABC):
-    """The scans of one LiDAR on one drive, with their poses and times.
+    """A recorded drive: the scans of one LiDAR, with their poses and times.
 
-    Frames: world W (shared by all drives of a place), LiDAR S.
+    Frames: W is the world, which all drives of the same map share; S is the
+    LiDAR.
 
     A scan is read on each access and not kept, so a drive can be larger than
     memory.
@@ -157,12 +159,12 @@ class Drive(abc.ABC):
 
     @property
     def odometry(self) -> np.ndarray | None:
-        """Motion of the vehicle, (M,) of `ODOMETRY_DTYPE`, if recorded."""
+        """Motion of the vehicle, (M,) of `ODOMETRY_DTYPE`, or None."""
         return None
 
     @property
     def imu(self) -> np.ndarray | None:
-        """Samples of the IMU, (M,) of `IMU_DTYPE`, if recorded."""
+        """Samples of the IMU, (M,) of `IMU_DTYPE`, or None."""
         return None
 
     @property
@@ -171,7 +173,7 @@ class Drive(abc.ABC):
         return np.zeros(0, np.int64)
 
     def image(self, index: int) -> bytes:
-        """Returns image `index` of the first camera: a file, such as a JPEG.
+        """Returns image `index` of the first camera, encoded, e.g. as JPEG.
 
         Raises:
             InputError: if the image cannot be read.
@@ -180,10 +182,10 @@ class Drive(abc.ABC):
 
     @property
     def datum(self) -> str | None:
-        """Name of the survey grid (datum) in which W lies, if any.
+        """Name of the survey grid in which W lies, or None.
 
-        The world frames of two drives with the same datum differ only by the
-        error of their positioning, some ten metres.
+        If two drives have the same survey grid, their world frames differ only
+        by the positioning error of the drives, about ten metres.
         """
         return None
 
@@ -196,16 +198,17 @@ class Drive(abc.ABC):
     def scenario(self) -> Mapping | None:
         """The scenario of a simulated drive, if recorded.
 
-        Keys used here: `map`, `stage`, and those of `driven_way`.
+        This class uses its keys `map` and `stage`, and the keys that
+        `driven_way` returns.
         """
         return None
 
     @property
     def lidar_section(self) -> Mapping:
-        """Section of the scenario on this LiDAR; empty if there is none.
+        """Settings of this LiDAR from the scenario; empty if there are none.
 
-        This is the LiDAR with whose name the drive's name ends, or otherwise
-        the first LiDAR.
+        If the name of the drive ends in `_<lidar>`, they are the settings of
+        this LiDAR, and otherwise those of the scenario's first LiDAR.
         """
         lidars = (self.scenario or {}).get("lidars")
         if not isinstance(lidars, dict) or not lidars:
@@ -218,7 +221,7 @@ class Drive(abc.ABC):
 
     @property
     def lidar_field(self) -> LidarField | None:
-        """Rings and field of view of the LiDAR, if the unit is known."""
+        """Rings and field of view of the LiDAR; None for an unknown model."""
         unit = self.lidar_section.get("preset")
         if self.scenario and "lidars" not in self.scenario:
             unit = _DEFAULT_UNIT
@@ -226,15 +229,16 @@ class Drive(abc.ABC):
 
     @property
     def instances(self) -> Mapping[int, Mapping] | None:
-        """Instance id -> structure (`name`, `class`, `label`), if recorded.
+        """Instance id -> structure (`name`, `class`, `label`); may be None.
 
-        Ids and labels are those of the scans' points.
+        It is None if not recorded. The points of the scans carry the same
+        instance ids and labels.
         """
         return None
 
 
 def index_instances(table: Any, source: str) -> dict[int, Mapping]:
-    """Returns a structure table from JSON as instance id -> structure.
+    """Converts a structure table from JSON to instance id -> structure.
 
     Raises:
         InputError: if it is no such table.
@@ -251,7 +255,7 @@ def index_instances(table: Any, source: str) -> dict[int, Mapping]:
 class PlacedDrive:
     """Name, world frame and map of a drive, without its scans.
 
-    Of the scenario, only the field `map` is kept.
+    `scenario` contains only the field `map`.
     """
 
     name: str
@@ -276,11 +280,11 @@ def check_same_world(
 ) -> None:
     """Raises an error if the poses of two drives cannot be compared.
 
-    The names of their world frames must be equal and, unless `across_maps`,
-    those of their maps.
+    The drives must name the same world frame and, unless `across_maps`, the
+    same map.
 
     Raises:
-        InputError: if their world frames or their maps differ by name.
+        InputError: if they name different world frames, or different maps.
     """
     frames = first.world_frame, second.world_frame
     if frames[0] != frames[1]:
@@ -299,10 +303,10 @@ def check_same_world(
 
 
 def check_same_map(first: Placed, second: Placed) -> None:
-    """Raises an error if two drives are of maps of different names.
+    """Raises an error if two drives name different maps.
 
     Raises:
-        InputError: if their maps differ by name.
+        InputError: if they name different maps.
     """
     maps = []
     for drive in (first, second):

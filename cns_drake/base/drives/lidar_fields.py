@@ -1,4 +1,4 @@
-"""Rings and fields of view of LiDARs that recordings name."""
+"""Rings and fields of view of the LiDAR models that recordings can name."""
 
 from typing import NamedTuple
 
@@ -38,5 +38,5 @@ _FIELDS = {
 
 
 def lidar_field(unit: object) -> LidarField | None:
-    """Returns rings and field of view of a LiDAR unit, if it is known."""
+    """Returns rings and field of view of a LiDAR model; None if unknown."""
     return _FIELDS.get(unit) if isinstance(unit, str) else None

@@ -1,4 +1,4 @@
-"""Drives recorded as MCAP by cns-drake (or by others on the same topics)."""
+"""Drives recorded as MCAP by cns-drake, or by other programs on its topics."""
 
 from collections.abc import Mapping
 import contextlib
@@ -32,19 +32,20 @@ _LATEST = 1.0
 
 
 class McapDrive(Drive):
-    """A recording on the topics /lidar/points, /odometry and /tf_static.
+    """A drive in an MCAP file with /lidar/points, /odometry and /tf_static.
 
-    Without `/lidar/points`, the only topic of point clouds takes its place. If
-    there are several LiDARs, the argument `lidar` chooses one. Two topics are
-    optional: /imu/data, and /<lidar>/labels with `label` and `instance` of each
-    point. Images come from the first topic of compressed images.
+    Without `/lidar/points`, the scans come from the file's only topic of point
+    clouds. If there are several LiDARs, the argument `lidar` chooses one. Two
+    topics are optional: /imu/data, and /<lidar>/labels with `label` and
+    `instance` of each point. Images come from the first topic of compressed
+    images.
 
     Scan i is the i-th point cloud of the LiDAR by log time. Its pose is that of
     the `/odometry` message with exactly the same stamp, composed with the
     sensor's place on the vehicle from `/tf_static`; nothing is interpolated.
-    Scans at both ends of the recording that have no pose, or no labels, are
-    left out, with a note: a recording that was cut off and repaired lacks the
-    last ones.
+    Scans without a pose or labels at the start and end of the recording are
+    left out, with a note. The last poses or labels are missing, for example, in
+    a repaired recording that was cut off.
 
     Contradictions raise an error: two poses for one stamp, two mounts of a
     sensor, or a frame that changes during the drive.
@@ -107,7 +108,7 @@ class McapDrive(Drive):
 
     @property
     def lidar_names(self) -> tuple[str, ...]:
-        """Names of the LiDARs; first the one that is read by default."""
+        """Names of the LiDARs; the first is the one that is read by default."""
         clouds = self._cloud_topics()
         clouds.sort(key=lambda topic: topic != _LIDAR_TOPIC)
         return tuple(map(_lidar_name, clouds))
@@ -148,9 +149,9 @@ class McapDrive(Drive):
 
     @property
     def distortion_note(self) -> str | None:
-        """Note that the scans have motion distortion, if this is known.
+        """Note that the scans contain motion distortion; None if they do not.
 
-        This is known only of simulated drives.
+        It is None as well for recordings of real LiDARs, which do not say so.
         """
         if not self.lidar_section.get("motion_distortion"):
             return None
@@ -213,7 +214,7 @@ class McapDrive(Drive):
 
     @property
     def kalibr(self) -> str | None:
-        """Text of the IMU's noise file in Kalibr's format, if it has noise.
+        """Noise of the IMU as text in Kalibr's file format; None without noise.
 
         Raises:
             InputError: if it is no text.
@@ -253,7 +254,8 @@ class McapDrive(Drive):
     def image_stamps_ns(self) -> np.ndarray:
         """(M,) int64 time of each image of the first camera [ns].
 
-        These are log times, converted to the clock of the stamps.
+        The times are the images' log times, converted to the clock of the
+        scans' stamps.
         """
         if not self._camera_topics:
             return super().image_stamps_ns

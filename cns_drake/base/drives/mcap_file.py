@@ -1,14 +1,14 @@
 """Random access to the messages of an MCAP file.
 
-The `mcap` package reads all messages, or those of a span of time, in the order
-of time. Reading a scan by its number needs the location of each message of a
-topic, and the one chunk that contains it. Both come from the index at the end
+The `mcap` package reads messages in the order of time: all of them, or those of
+an interval. Reading a scan by its number needs the location of each message of
+a topic, and the one chunk that contains it. Both come from the index at the end
 of a complete file, so that opening a file of gigabytes reads a few kilobytes.
 The format makes this index optional. If the message counts at the end of the
 file do not confirm the index, the whole file is read once.
 
-The package checks only the checksums of chunks, and trusts the sizes that a
-chunk claims. Here damaged or hostile records are refused.
+The `mcap` package checks only the checksums of chunks, and trusts the sizes
+that a chunk declares. This module refuses damaged or hostile records.
 """
 
 from collections.abc import Iterator
@@ -163,8 +163,8 @@ class McapFile:
     The file is opened for each access only; two uncompressed chunks (of
     1 MiB as a rule) are kept, since messages are mostly read in order.
 
-    All channels of a topic are one stream of messages, as when several nodes
-    publish on it.
+    If a topic has several channels, for example because several nodes publish
+    on it, their messages are read as one stream.
     """
 
     def __init__(self, path: Path):
@@ -192,9 +192,9 @@ class McapFile:
 
     @property
     def topics(self) -> dict[str, list[str]]:
-        """Topic -> kinds of its messages: `<type> in <encoding>`, sorted.
+        """Topic -> sorted message types and encodings, `<type> in <encoding>`.
 
-        A sound recording has one kind for each topic.
+        In an intact recording each topic has exactly one of them.
         """
         return {
             topic: sorted({self._kind(channel) for channel in channels})
@@ -215,7 +215,7 @@ class McapFile:
         return self._locations[topic]
 
     def step_back_ns(self, topic: str) -> int:
-        """Returns the largest step backwards of a topic's log times [ns].
+        """Returns by how much a topic's log times go back at most [ns].
 
         Raises:
             InputError: if the index cannot be read.

@@ -24,10 +24,11 @@ _ENCAPSULATION_BYTES = 4
 
 
 def decode(data: bytes | memoryview, message_type: str) -> Any:
-    """Returns the message that serialised bytes hold.
+    """Decodes serialised bytes to a message.
 
     Raises:
-        ValueError: if the bytes are no such message, or more than one can have.
+        ValueError: the bytes are not such a message, or more than such a
+            message can have.
     """
     if len(data) > _LONGEST.get(message_type, len(data)):
         raise ValueError(
@@ -106,7 +107,7 @@ def xyzw(q: Any) -> tuple[float, float, float, float]:
 
 
 class StaticTransforms:
-    """Poses of frames in their parents."""
+    """Constant poses of frames, each in its parent frame."""
 
     def __init__(self, messages: Iterable[Any], where: str):
         """Reads the transforms of messages of type tf2_msgs/msg/TFMessage.
@@ -136,8 +137,8 @@ class StaticTransforms:
         """Returns the pose (4, 4) of a frame in one of its ancestors.
 
         Raises:
-            InputError: no transforms lead from one to the other, or one of
-                them is no pose.
+            InputError: no transforms lead from the frame to the ancestor, or
+                one of them is not a rigid transform.
         """
         X_CF = np.eye(4)
         child = frame
@@ -155,7 +156,7 @@ class StaticTransforms:
 def checked_poses(
     p: np.ndarray, quat_xyzw: np.ndarray, where: str
 ) -> np.ndarray:
-    """Returns poses (..., 4, 4) of positions and quaternions in a recording.
+    """Returns poses (..., 4, 4) from recorded positions and quaternions.
 
     Args:
         p: (..., 3) positions [m].

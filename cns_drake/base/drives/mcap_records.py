@@ -2,8 +2,8 @@
 
 The readers of the `mcap` package need an intact file and trust the sizes that
 it declares. Here every size is checked against the file and a limit before
-memory is reserved, and every checksum is checked. The reader finds the next
-intact chunk behind damage.
+memory is reserved, and every checksum is checked. After a damaged part, reading
+continues at the next intact chunk.
 """
 
 from collections.abc import Callable, Iterator
@@ -151,7 +151,7 @@ _READERS = {
 
 @dataclass(frozen=True)
 class Fault:
-    """Why a file cannot be read from an offset [bytes] onwards."""
+    """Why the bytes of a file from an offset onwards cannot be read."""
 
     offset: int
     text: str
@@ -164,9 +164,9 @@ def read_records(stream: BinaryIO) -> Iterator[McapRecord | Fault]:
     """Yields the readable records of an MCAP file, in the file's order.
 
     These records are the header, schemas, channels, messages, attachments and
-    metadata. Chunks are opened, and indexes are left out. A Fault stands for
-    each part that cannot be read, also for a missing end. The caller may move
-    the stream between two records.
+    metadata. The records inside chunks are yielded too, and indexes are left
+    out. For each part that cannot be read, and for a missing end of the file, a
+    Fault is yielded. The caller may seek in the stream between two records.
     """
     return (record for _, _, record in locate_records(stream))
 
@@ -176,7 +176,7 @@ def locate_records(
 ) -> Iterator[tuple[int, int, McapRecord | Fault]]:
     """Yields the records of an MCAP file, each with its place in the file.
 
-    These are the records that `read_records` yields.
+    The records are the same as in `read_records`.
 
     Yields:
         Two offsets [bytes], and the record. For a record in a chunk, the

@@ -1,4 +1,4 @@
-"""The frames of MulRan: its LiDAR on the vehicle, and its survey grid."""
+"""Frames of MulRan: pose of its LiDAR on the vehicle, and its survey grid."""
 
 import numpy as np
 from scipy.spatial.transform import Rotation

@@ -1,9 +1,11 @@
-"""Points of PointCloud2 messages, and their layouts.
+"""Layouts (fields) of the points of PointCloud2 messages.
 
-`cns` is our own layout. `ouster` is that of Ouster's driver with `ring` as
-uint8, which LIO-SAM and FAST-LIO2 read; `velodyne` is PointXYZIRT of Velodyne's
-ROS 2 driver; `autoware` is PointXYZIRCAEDT. These layouts have no field for
-labels and instances, which come in another message."""
+`cns` is the layout of this project. `ouster` is the layout of Ouster's driver
+with `ring` as uint8, which LIO-SAM and FAST-LIO2 read; `velodyne` is
+PointXYZIRT of Velodyne's ROS 2 driver; `autoware` is PointXYZIRCAEDT. Only
+`cns` has fields for labels and instances; with the other layouts, labels and
+instances are recorded in a second message.
+"""
 
 from collections.abc import Callable
 import itertools
@@ -54,8 +56,8 @@ def to_points(message: Any) -> np.ndarray:
         names.
 
     Raises:
-        ValueError: if the message contradicts itself, or has no scalar
-            floating-point `x`, `y` and `z` beside each other.
+        ValueError: if the message contradicts itself, or has no adjacent scalar
+            floating-point fields `x`, `y` and `z`.
     """
     dtype = _record_type(message)
     for name in "xyz":
@@ -66,7 +68,7 @@ def to_points(message: Any) -> np.ndarray:
 
 
 def to_records(message: Any) -> np.ndarray:
-    """Returns a PointCloud2's records, which may lack coordinates.
+    """Returns a PointCloud2's points as records, even without coordinates.
 
     Returns:
         (height * width,) under the message's field names.
@@ -183,12 +185,13 @@ def to_layout(
     """Returns points with the fields of another layout, such as Ouster's.
 
     Args:
-        points: (N,) with the fields x y z intensity ring t; intensities from
-            0 to 1, or, if one is larger, calibrated ones up to 255.
+        points: (N,) with the fields x y z intensity ring t. If all intensities
+            are at most 1, they are read as 0 to 1, and otherwise as calibrated
+            intensities from 0 to 255.
         layout: one of `LAYOUT_NAMES`; `cns` is the layout that the points
             have.
-        num_rings: number of rings of the unit. In `velodyne`, whose driver
-            counts rings from below, they are then turned round.
+        num_rings: number of rings of the LiDAR. With it, the layout `velodyne`
+            counts rings from the lowest, as Velodyne's driver does.
 
     Returns:
         (N,). Ranges are in millimetres for `ouster`; `t` and `time_stamp` in
@@ -236,20 +239,22 @@ def from_layout(
     labels: np.ndarray | None = None,
     is_calibrated: Callable[[], bool] = lambda: False,
 ) -> np.ndarray:
-    """Returns points of another layout with this project's fields added.
+    """Converts points of any layout to the fields of the layout `cns`.
 
     Args:
         points: (N,) in any layout.
-        labels: (N,) records of other fields of the same points, if any.
+        labels: (N,) records with further fields of the same points, such as
+            `label`; by default none.
         is_calibrated: returns whether intensities of the `autoware` layout are
             calibrated. Calibrated intensities keep their range of 0 to 255.
 
     Returns:
-        (N,) points; `points` itself if nothing changes. In `velodyne`, `time`
-        [s] becomes `t` [ns]. In `autoware`, `time_stamp` and `channel` become
-        `t` and `ring`, and intensities are scaled to 0 to 1 unless they are
-        calibrated. A floating-point `t` becomes whole nanoseconds, unless its
-        unit is not certain.
+        (N,) points, in which all fields of the given layout stay, too; `points`
+        itself if nothing changes. In `velodyne`, `time` [s] becomes `t` [ns].
+        In `autoware`, `time_stamp` and `channel` become `t` and `ring`, and
+        intensities are scaled to 0 to 1 unless they are calibrated. A
+        floating-point `t` becomes whole nanoseconds, unless its unit is not
+        certain.
 
     Raises:
         ValueError: the numbers of labels and points differ.

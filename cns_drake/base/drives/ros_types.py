@@ -1,8 +1,9 @@
-"""Types of ROS 2 messages: classes, definitions, hashes and CDR.
+"""ROS 2 message types: Python classes, definitions, hashes, serialisation.
 
-Most come from rosbags' table of ROS 2 Humble. Types that it lacks are in
-`messages`: vision_msgs in version 4, which is Humble's, and foxglove_msgs after
-Foxglove's schemas. A recording contains the text of its types.
+Most types come from rosbags' table of ROS 2 Humble. The types that this table
+lacks are in the module `messages`: those of vision_msgs in version 4, as in
+Humble, and those of foxglove_msgs after Foxglove's schemas. A recording
+contains the definitions of its message types.
 """
 
 from collections.abc import Mapping
@@ -39,8 +40,9 @@ def message_class(message_type: str) -> type:
 def make_message(message_type: str, **fields: Any) -> Any:
     """Returns a message made from plain values.
 
-    Fields that are left out are zero or empty. A field that is a message takes
-    that message, a mapping of its fields, or all of its fields in order.
+    Fields that are left out are zero or empty. The value for a field that is
+    itself a message can be a message, a mapping of that message's fields, or a
+    sequence of all its fields.
     """
     _, kinds = _TYPESTORE.fielddefs[message_type]
     values = {
@@ -74,13 +76,13 @@ def _value(kind: tuple, given: Any) -> Any:
 
 
 def message_definition(message_type: str) -> str:
-    """Returns the .msg text of a type with the types it depends on."""
+    """Returns the .msg text of a type and of all types that it contains."""
     text, _ = _TYPESTORE.generate_msgdef(message_type, ros_version=2)
     return text
 
 
 def message_hash(message_type: str) -> str:
-    """Returns the type's hash in REP-2011 form (`RIHS01_...`)."""
+    """Returns the hash of a message type in REP-2011 form (`RIHS01_...`)."""
     return _TYPESTORE.hash_rihs01(message_type)
 
 
@@ -90,9 +92,9 @@ def serialize(message: Any) -> bytes:
 
 
 def deserialize(data: bytes | memoryview, message_type: str) -> Any:
-    """Returns the message in serialised CDR bytes.
+    """Returns the message of a given type from bytes serialised as CDR.
 
     Raises:
-        Exception: any type of error, if the data are no such message.
+        Exception: of any class, if the data are not a message of this type.
     """
     return _TYPESTORE.deserialize_cdr(data, message_type)

@@ -1,1 +1,1 @@
-"""Work cut into jobs, side by side, on one machine or many."""
+"""Work split into jobs that run in parallel, on one machine or many."""

@@ -42,13 +42,13 @@ _KIND = "job"
 
 @dataclass(frozen=True)
 class Cluster:
-    """This machine, or the workers of a scheduler of Dask.
+    """Where jobs run: on this machine, or on the workers of a Dask scheduler.
 
     Attributes:
         num_workers: how many jobs run on this machine at a time.
-        scheduler: the address of an existing scheduler instead, such as
-            `tcp://10.0.0.1:8786`; its workers must have this package and
-            share the file system.
+        scheduler: address of a Dask scheduler, such as `tcp://10.0.0.1:8786`,
+            whose workers run the jobs; None to run them on this machine. The
+            workers must have this package installed and share the file system.
     """
 
     num_workers: int = 1
@@ -56,10 +56,10 @@ class Cluster:
 
     @property
     def slots(self) -> int | None:
-        """Number of jobs that run at once; None if it is not fixed.
+        """Number of jobs that run at once; None for the workers of a scheduler.
 
-        An existing scheduler gets all jobs at once: it may have other users,
-        and may start workers for the jobs.
+        A scheduler gets all jobs at once: other users may be using its workers,
+        and it may start more workers for the jobs.
         """
         return self.num_workers if self.scheduler is None else None
 
@@ -75,7 +75,7 @@ class Cluster:
 
 
 def choose_cluster(num_jobs: int | None, scheduler: str | None) -> Cluster:
-    """Returns the cluster that the options --jobs and --scheduler name.
+    """Returns where jobs run according to --jobs and --scheduler.
 
     Args:
         num_jobs: `--jobs`: number of jobs that run at a time, on this machine.
@@ -103,7 +103,7 @@ def choose_cluster(num_jobs: int | None, scheduler: str | None) -> Cluster:
 
 
 class LocalWorkers:
-    """Runs jobs in processes of this machine; they end with this process.
+    """Runs jobs in child processes, which end when this process ends.
 
     No port is opened, since anyone who reached it could run programs here.
     """
@@ -121,14 +121,19 @@ class LocalWorkers:
         self._threads.shutdown()
 
     def submit(self, name: str, job: bytes, priority: float) -> None:
-        """Queues a job; those with a higher priority run first.
+        """Queues a job; jobs start in the order in which they are submitted.
 
-        Each job has a thread.
+        `priority` is not used, because at most `num_workers` jobs are submitted
+        at a time. A thread waits for the end of each job.
         """
         self._threads.submit(self._run, name, job)
 
     def stop(self) -> None:
-        """Ends all jobs; the message "ended" means a job's files are closed."""
+        """Ends all jobs.
+
+        When the listener receives the message "ended" of a job, the files of
+        that job are closed.
+        """
         self._stopped.set()
 
     def _run(self, name: str, job: bytes) -> None:
@@ -147,7 +152,10 @@ class LocalWorkers:
 
 
 class DaskWorkers:
-    """Has jobs run by the workers of a scheduler; see `LocalWorkers`."""
+    """Runs jobs on the workers of a Dask scheduler.
+
+    The methods are the same as in `LocalWorkers`.
+    """
 
     def __init__(self, client: Client, listener: Listener):
         self._client = client
@@ -211,7 +219,7 @@ Workers = LocalWorkers | DaskWorkers
 
 
 class LostSchedulerError(InputError):
-    """Ends all jobs after the connection was lost."""
+    """The connection to the Dask scheduler was lost, and all jobs ended."""
 
 
 @contextlib.contextmanager
@@ -219,7 +227,7 @@ def dask_workers(address: str, listener: Listener) -> Iterator[DaskWorkers]:
     """Yields the `DaskWorkers` of the scheduler at an address.
 
     Raises:
-        InputError: if it does not answer.
+        InputError: if the scheduler does not answer.
     """
     # Slow to import, and not needed to print help.
     from distributed import Client

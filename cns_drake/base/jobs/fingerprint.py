@@ -1,9 +1,9 @@
-"""Fingerprints: short texts of all that a result depends on.
+"""Fingerprints: hashes of everything on which a result depends.
 
-Two results with equal fingerprints are the same. A fingerprint covers the
-modules that the code imports, directly or indirectly, so that changes to other
-modules leave results valid. Of the libraries that influence numbers, it covers
-the versions.
+Results with equal fingerprints are equal. A fingerprint covers the modules that
+the code imports, directly or indirectly, so that changes to other modules leave
+results valid. It also covers the versions of the libraries that influence
+numbers.
 """
 
 from __future__ import annotations
@@ -40,9 +40,9 @@ def fingerprint(inputs: Mapping[str, object]) -> str:
 def code_digest(*modules: str, without: tuple[str, ...] = ()) -> str:
     """Returns a digest of modules and of all project modules they import.
 
-    The digest includes a data file if a module in the same folder names it, or
-    if a module next to the file's folder names that folder. It also includes
-    the versions of libraries.
+    The digest includes a data file if its name appears in a module of the same
+    folder, or if the name of its folder appears in a module next to that
+    folder. It also includes the versions of libraries.
 
     Args:
         modules: full names; `<package>.*` stands for all modules in it.
@@ -58,8 +58,8 @@ def code_digest(*modules: str, without: tuple[str, ...] = ()) -> str:
 def script_digest(path: Path) -> str:
     """Returns a digest of a Python file and of everything it imports.
 
-    These are files beside it, modules of this project and the versions of
-    libraries; see `code_digest`.
+    It covers imported files in the same folder, imported modules of this
+    project, and the versions of libraries; see `code_digest`.
 
     Raises:
         InputError: if a file cannot be read.

@@ -50,9 +50,9 @@ class _Work:
 
 
 class TimeLeft:
-    """Estimate of the time left for jobs, from their costs and the pace.
+    """Estimates the time left for jobs, from their costs and their progress.
 
-    All times must be of one clock [s].
+    All times `now` must come from the same clock [s].
     """
 
     def __init__(self, costs: Mapping[str, float]):
@@ -67,7 +67,11 @@ class TimeLeft:
         self._most_running = max(self._most_running, running)
 
     def progress(self, name: str, share: float, now: float) -> None:
-        """Notes the share of a job that is done, without its loading time."""
+        """Notes the share of a job that is done, 0 to 1.
+
+        The time until the first call for a job counts as loading, and not as
+        work.
+        """
         work = self._works[name]
         work.done = share
         if work.since is None or work.first is None:
@@ -90,7 +94,7 @@ class TimeLeft:
         return done / max(total, 1e-9)
 
     def seconds(self) -> float | None:
-        """Returns the time that is left [s]; None before any is measured."""
+        """Returns the time left [s]; None before enough has been measured."""
         works = self._works.values()
         taken = sum(work.taken for work in works)
         expected = sum(work.cost * work.measured for work in works)
@@ -113,7 +117,7 @@ class TimeLeft:
 
 
 class JobProgress:
-    """A line for all jobs together and one for each that is running.
+    """A progress display: a line for all jobs, and one per running job.
 
     A context manager. Without a terminal it prints a line every few seconds.
     """
@@ -187,7 +191,7 @@ class JobProgress:
         self.refresh()
 
     def end(self, name: str, fault: bool = False) -> None:
-        """Shows that a job has ended, or its error."""
+        """Shows that a job has ended; if `fault`, with an error."""
         self._left.end(name, time.monotonic())
         self._num_ended += 1
         self._remove(name)

@@ -1,10 +1,11 @@
-"""The process in which one job runs, and its messages to its parent.
+"""The process in which a job runs, and its messages to its parent process.
 
-Each job has a process with its own interpreter. Its memory is freed with the
-process (Python systems in a Drake diagram are not freed otherwise), and a crash
-does not reach the other jobs. Imports take seconds. On Linux, job processes are
-therefore forked from the fork server of `multiprocessing`, which has imported
-the parent's modules. On other systems the libraries do not support forks.
+Each job runs in a process of its own, with its own interpreter. When the
+process ends, its memory is freed (Python systems in a Drake diagram are not
+freed otherwise), and a crash does not affect other jobs. Imports take seconds.
+On Linux, job processes are therefore forked from the fork server of
+`multiprocessing`, which has already imported the parent's modules. On other
+systems the libraries do not support forks.
 """
 
 from collections.abc import Callable, Iterable, Iterator
@@ -83,8 +84,9 @@ def run_process(
 
     Args:
         job: a pickled `Step`.
-        on_message: takes the job's messages; see `Reporter`.
-        is_wanted: called often; the process is ended when it returns False.
+        on_message: called with each message of the job; see `Reporter`.
+        is_wanted: called again and again; when it returns False, the process is
+            ended.
 
     Raises:
         JobError: the job cannot be done.
@@ -242,7 +244,7 @@ def _run(job: bytes, reporter: Reporter) -> tuple[str, str]:
 
 
 def nothing_left(step: Step) -> bool:
-    """Returns whether a step is done; False if that cannot be determined."""
+    """Returns whether a step is done; False if this cannot be found out."""
     try:
         return step.is_done()
     except InputError:
@@ -250,7 +252,7 @@ def nothing_left(step: Step) -> bool:
 
 
 def end_with_parent() -> None:
-    """Makes this process end when its parent ends, even if that is killed."""
+    """Makes this process end with its parent, even if the parent is killed."""
     parent = multiprocessing.parent_process()
     assert parent is not None
     parent.join()

@@ -1,4 +1,4 @@
-"""Many jobs, side by side, on one machine or on a cluster."""
+"""Running many jobs in parallel, on one machine or on a cluster."""
 
 from __future__ import annotations
 
@@ -31,11 +31,11 @@ class Job:
     """A step to be run in a process of its own.
 
     Attributes:
-        name: unique, for people.
-        step: the work. `is_done` is called here once the needed jobs are done,
-            which saves a process, and again by the process, since another copy
-            of the job may have finished first.
-        needs: names of jobs that must have succeeded before.
+        name: unique name, shown to the user.
+        step: the work. `step.is_done` is called before a process is started, to
+            save the process, and again in the process, because another copy of
+            the job may have finished first.
+        needs: names of the jobs that must succeed before this job starts.
         cost: expected time on one core [s].
     """
 

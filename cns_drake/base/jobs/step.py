@@ -1,7 +1,7 @@
 """A piece of work, with its inputs and the files that it writes.
 
-A step has no other result than its files. An interrupted study goes on where it
-was when the same steps are run again, on any machine.
+A step has no result except its files. To continue an interrupted study, run the
+same steps again, on any machine: finished steps are skipped.
 """
 
 import abc
@@ -18,7 +18,7 @@ _REPORT_INTERVAL = 0.5
 
 
 class Reporter:
-    """Reports the progress of a step; without a receiver it is silent."""
+    """Reports the progress of a step; does nothing if nobody receives it."""
 
     def __init__(self, send: Callable[..., None] = lambda *message: None):
         """Takes the receiver of messages: a kind and its values."""
@@ -26,7 +26,7 @@ class Reporter:
         self._reported: float | None = None
 
     def progress(self, done: int, total: int) -> None:
-        """Reports how much of a total is done, in any unit."""
+        """Reports progress: `done` of `total`, in any unit."""
         now = time.monotonic()
         if (
             done >= total
@@ -50,19 +50,20 @@ class Reporter:
 
 
 class Step(abc.ABC):
-    """A piece of work that leaves files.
+    """A piece of work whose result is files.
 
-    Each kind is a frozen dataclass of a module, so that a step can be pickled
-    and run by a process anywhere; paths in it are absolute.
+    Each subclass is a frozen dataclass, defined at the top level of a module,
+    so that any process can unpickle and run a step. Paths in it are absolute.
     """
 
     @property
     @abc.abstractmethod
     def output(self) -> Path | None:
-        """File or folder that only one step at a time may write, if any.
+        """File or folder that only one step at a time may write, or None.
 
-        A lost connection can leave two copies of a step running. They never
-        work on it at the same time; see `cns_drake.base.files.exclusive`.
+        After a lost connection, two copies of a step may be running. A lock
+        prevents both from writing this output at the same time; see
+        `cns_drake.base.files.exclusive`.
         """
 
     @abc.abstractmethod
@@ -70,7 +71,7 @@ class Step(abc.ABC):
         """Returns whether all files of the step exist and are up to date.
 
         Raises:
-            InputError: a file that decides this cannot be read.
+            InputError: a file that has to be read for this cannot be read.
         """
 
     @abc.abstractmethod
@@ -93,8 +94,9 @@ class Steps(Step):
     """Several steps run in order; steps that are done already are skipped.
 
     Attributes:
-        place: the file or folder that the steps write; see `Step.output`.
-        steps: the steps, each after those that it needs.
+        place: the file or folder that only one process at a time may write; see
+            `Step.output`.
+        steps: the steps, in an order in which each finds its inputs.
     """
 
     place: Path

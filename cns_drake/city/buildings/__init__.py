@@ -1,8 +1,8 @@
 """Buildings of every archetype, drawn at random or fixed (landmarks).
 
-`archetypes.yaml` describes the sizes, colours and parameters of each archetype.
-A class named like the archetype builds it. `sample` draws the parameters and
-then builds:
+An archetype is a kind of building. `archetypes.yaml` describes the sizes,
+colours and parameters of each archetype, and a class with the archetype's name
+builds it. `sample` draws the parameters at random and then builds:
 
     footprint = shapely.box(-12, -9, 12, 9)     # front: the edge of least y
     model = sample("brick_block", footprint, 24.0, rng, name="block_003")
@@ -69,16 +69,15 @@ def sample(
             footprint by at most the archetype's `overhang`.
         height: height of the parapet, ridge or spire [m]. Only roof equipment
             and chimneys may rise above it.
-        rng: the only source of variation.
-        name: name of the structure, with which the names of its own meshes
-            begin.
-        blind_edges: edges that no part may cross, numbered counter-clockwise
-            from the front. At these edges the building has plain walls, or
-            keeps a distance.
+        rng: random generator for all parameters.
+        name: name of the structure; the names of its own meshes begin with it.
+        blind_edges: edges of the footprint towards neighbours, numbered
+            counter-clockwise from the front. No part crosses these edges: at
+            them, the building has plain walls or keeps a distance.
 
     Raises:
-        ValueError: the archetype needs a rectangle but the footprint is none,
-            or it cannot be built with this footprint or height.
+        ValueError: the archetype needs a rectangular footprint, or cannot be
+            built with this footprint or height.
     """
     kind = ARCHETYPES[archetype]
     height = round(height, 3)

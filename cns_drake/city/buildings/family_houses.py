@@ -24,10 +24,11 @@ _SIDE_PITCH_M = 3.8
 def storeys_for(
     height: float, floor: float, span: float, pitch_deg: float
 ) -> int:
-    """Returns the number of storeys that brings a roof closest to a pitch.
+    """Returns the number of storeys that gives a roof the wanted pitch.
 
-    The roof spans `span` and fills the height between the storeys and its
-    ridge, which is at `height`. The ground floor is at `floor` [m].
+    The pitch is met as closely as possible. The roof spans `span` [m] and fills
+    the height between the storeys and its ridge, which is at `height` [m]. The
+    ground floor is at the height `floor` [m].
     """
     wanted = wings.ridge_rise(span, pitch_deg)
     room = height - ROOF_M - floor - 0.15
@@ -38,7 +39,10 @@ def storeys_for(
 def wall_top_for(
     height: float, floor: float, span: float, storeys: int
 ) -> float:
-    """Returns the height of the walls below a ridge at `height` [m]."""
+    """Returns the height of the walls below a ridge at `height` [m].
+
+    The other arguments are as in `storeys_for`.
+    """
     wanted = floor + storeys * STOREY_M + 0.15
     return min(wanted, height - ROOF_M - 0.08 * span)
 

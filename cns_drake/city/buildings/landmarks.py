@@ -1,7 +1,8 @@
 """Landmarks: archetypes whose buildings are a few fixed models from files.
 
-Each folder of `landmark_models` is named after its archetype and a letter. It
-has the meshes of one model as OBJ files, and `model.yaml`:
+Each folder in `landmark_models` contains one model; its name consists of the
+archetype and a letter. In it are the meshes of the model as OBJ files, and
+`model.yaml`:
 
     size: [50, 30]        # of its lot, about the origin [m]
     overhang: [1.5, 1.5]  # of its eaves beyond the lot, along x and y [m]

@@ -1,4 +1,4 @@
-"""What facades are made of: walls, windows, doors, balconies and roofs."""
+"""Parts of facades: walls, windows, doors, balconies and roofs."""
 
 from cns_drake.city.facades.assembly import Assembly, Building, Rgb, Site
 from cns_drake.city.facades.details import add_railing

@@ -1,4 +1,4 @@
-"""The base class of all buildings: its site, random draws, collected parts."""
+"""The base class of buildings: site, random draws, collected parts."""
 
 from __future__ import annotations
 
@@ -40,7 +40,7 @@ class Site:
 
     The front is the edge between the first two corners; for a rectangle, the
     edge of least y. Edges are numbered counter-clockwise from the front, which
-    is 0. `blind_edges` are built against a neighbour. The names of the
+    is 0. Walls on `blind_edges` are built against a neighbour. The names of the
     building's own meshes begin with `<name>_`.
     """
 
@@ -71,13 +71,13 @@ class Site:
 
     @property
     def width(self) -> float:
-        """Length of a rectangle along its front [m]."""
+        """Length of a rectangular site along its front [m]."""
         x0, _, x1, _ = self.bounds
         return x1 - x0
 
     @property
     def depth(self) -> float:
-        """Length of a rectangle from front to back [m]."""
+        """Length of a rectangular site from front to back [m]."""
         _, y0, _, y1 = self.bounds
         return y1 - y0
 
@@ -94,7 +94,7 @@ class Site:
 
     @property
     def free_corners(self) -> list[int]:
-        """The front corners, 0 left and 1 right, that no neighbour hides."""
+        """The front corners (0 left, 1 right) that no neighbour hides."""
         flanks = {0: {3, 0}, 1: {0, 1}}
         return [k for k, e in flanks.items() if not e & self.blind_edges]
 
@@ -102,7 +102,8 @@ class Site:
         """Returns the blind edges of unit `number` of `count` units in a row.
 
         Units are numbered from left to right. A unit is blind towards its
-        neighbours in the row, and at the ends of the row where the site is.
+        neighbours in the row. The first and the last unit are also blind at the
+        outer end of the row, if the site is blind there.
         """
         outer = {3: number == 0, 1: number + 1 == count}
         return frozenset(
@@ -135,7 +136,7 @@ class Site:
         """x0, y0, x1, y1 of a rectangular footprint [m].
 
         Raises:
-            ValueError: the footprint is no rectangle along the axes.
+            ValueError: the footprint is not a rectangle along the axes of S.
         """
         if not self.is_rectangle:
             raise ValueError(f"{self.name} needs a rectangular footprint")
@@ -169,12 +170,12 @@ HEAD_ROOM_M = 2.3
 
 @dataclass
 class Assembly:
-    """Collects the parts and meshes of one building, which a builder adds.
+    """Collects the parts and meshes of one building.
 
-    `add` makes one part of the meshes it gets. `paint` and `add_to` collect
-    meshes by material instead: each material becomes one part, so that a
-    building of many small pieces has few visuals. Parts without a colour of
-    their own have the colour `rgb`.
+    `add` makes one part from the given meshes. `add_to` collects meshes by
+    material, and `paint` sets the materials' colours: each material becomes one
+    part, so that a building of many small pieces has few visuals. Parts without
+    a colour of their own have the colour `rgb`.
     """
 
     site: Site
@@ -206,7 +207,7 @@ class Assembly:
         return pick(self.rng, choices)
 
     def some_of(self, words: str, low: int, high: int) -> list[str]:
-        """Returns the first few of the words in a text, their number at random.
+        """Returns a random number of words from the beginning of a text.
 
         The number of words is at least `low` and less than `high`.
         """
@@ -215,7 +216,7 @@ class Assembly:
     def add(
         self, part: str, *meshes: Mesh, z: float = 0.0, rgb: Rgb | None = None
     ) -> None:
-        """Adds meshes as one part with one mesh, raised by `z` [m].
+        """Merges meshes into one part, raised by `z` [m], and adds it.
 
         Meshes without any faces (such as pilasters on walls too short for them)
         are left out.
@@ -300,8 +301,8 @@ class Assembly:
         Args:
             part: name of the visual.
             shape: the shape.
-            xyz: its position in the building's frame [m].
-            yaw: its heading [rad].
+            xyz: position of the shape in the building's frame [m].
+            yaw: heading of the shape [rad].
             rgb: colour; by default the building's.
         """
         x, y, z = (round(float(v), 3) for v in xyz)
@@ -312,9 +313,9 @@ class Assembly:
 class Building(Assembly, abc.ABC):
     """A building of an archetype: draws its parameters and builds itself.
 
-    Functions that add something to a building take the building as `p`, read
-    its parameters, and add parts and meshes to it. Only roof equipment and
-    chimneys may rise above its `height` [m].
+    Functions that add something to a building have the building as argument
+    `p`; they read its parameters, and add parts and meshes to it. Only roof
+    equipment and chimneys may rise above its `height` [m].
     """
 
     def __init__(

@@ -1,8 +1,8 @@
 """Bays of facades (windows, shop fronts, doors), and layouts that repeat them.
 
-A bay is a function that returns the reliefs on a stretch x0..x1 of a wall. A
-layout repeats bays along the walls of a storey. All heights are above the
-storey's floor [m].
+A bay is a function that returns the reliefs (recesses and protrusions) on a
+stretch x0..x1 of a wall. A layout is a function that repeats bays along the
+walls of a storey. All heights are above the storey's floor [m].
 """
 
 from collections.abc import Callable, Sequence
@@ -44,12 +44,13 @@ def window(
     """Returns a bay with a recessed window.
 
     Args:
-        width: width of the window; less in a bay that is too narrow for it [m].
+        width: width of the window [m]; the window is narrower in a bay that is
+            too narrow.
         sill: height of the bottom of the glass [m].
         head: height of the top of the glass [m].
         depth: distance of the glass behind the wall [m].
         mullions: number of upright bars.
-        transom: height of a horizontal bar; None for no bar [m].
+        transom: height of a horizontal bar [m]; None for no bar.
         ledge: how far the sill sticks out of the wall [m].
         hood: how far the lintel sticks out of the wall [m].
         pier: least width of wall on either side [m].
@@ -76,7 +77,12 @@ def window(
 
 
 def ribbon(sill: float, head: float, depth: float, post: float) -> Bay:
-    """Returns a bay of a ribbon window, with a post at its ends [m]."""
+    """Returns a bay of a ribbon window, with a post at its ends [m].
+
+    `sill` and `head` are the heights of the bottom and the top of the glass,
+    `depth` is its distance behind the wall, and `post` the width of the post
+    between two such bays.
+    """
     return window(1e3, sill, head, depth, pier=post / 2)
 
 
@@ -92,11 +98,13 @@ def arched(
     """Returns a bay with a round-headed recess in its middle.
 
     Args:
-        width: width of the recess; less in a bay that is too narrow for it [m].
-        bottom: height of its foot [m].
+        width: width of the recess [m]; the recess is narrower in a bay that is
+            too narrow.
+        bottom: height of the bottom of the recess [m].
         spring: height at which the arch begins [m].
-        depth: distance of its back behind the wall [m].
-        rise: height of the arch; by default half the width, a half circle [m].
+        depth: distance of the back of the recess behind the wall [m].
+        rise: height of the arch [m]; by default half the width, which gives a
+            half circle.
         pier: least width of wall on either side [m].
     """
 
@@ -120,7 +128,7 @@ def shop_front(
 ) -> Bay:
     """Returns a bay with a shop front: glass over a low riser, and a door.
 
-    The door is recessed. Bays without 1.6 m of room stay plain.
+    The door is recessed. Bays with less than 1.6 m of space stay plain.
 
     Args:
         head: height of the top of the glass [m].
@@ -216,9 +224,9 @@ def loggia(
     """Returns a bay with a balcony inside the wall, behind a solid rail.
 
     Args:
-        width: width of the balcony; less in a bay that is too narrow for it
-            [m].
-        depth: distance of its back behind the wall [m].
+        width: width of the balcony [m]; the balcony is narrower in a bay that
+            is too narrow.
+        depth: distance of the balcony's back wall behind the wall [m].
         rail: height of the top of the rail [m].
         head: height of the top of the opening [m].
         pier: least width of wall on each side [m].
@@ -236,11 +244,11 @@ def loggia(
 
 
 def stretches(length: float, pitch: float, margin: float) -> list[Span]:
-    """Returns start and end of equal bays that divide a wall [m].
+    """Divides a wall into equal bays; returns start and end of each [m].
 
     The bays are about `pitch` wide and keep `margin` away from both ends of the
-    wall. A wall too short for a bay of that width gets one narrower bay, or
-    none.
+    wall. A wall that is too short for a bay of this width gets one narrower
+    bay, or none.
     """
     room = length - 2 * margin
     count = max(int(room / pitch + 0.4), int(room > 0.6 * pitch))
@@ -251,7 +259,7 @@ def stretches(length: float, pitch: float, margin: float) -> list[Span]:
 
 
 def bounds(cells: Sequence[Span]) -> list[float]:
-    """Returns the start of the first of adjoining cells, and all ends [m]."""
+    """Returns the boundaries of adjoining cells, from first to last [m]."""
     return [cells[0][0], *(end for _, end in cells)]
 
 
@@ -261,10 +269,10 @@ def plain(edge: int, length: float) -> list[Relief]:
 
 
 def rhythm(pitch: float, bays: Sequence[Bay], margin: float = 0.5) -> Layout:
-    """Returns a layout that repeats `bays` along each wall.
+    """Returns a layout that repeats a sequence of bays along each wall.
 
-    The bays take turns from both ends towards the middle. They are about
-    `pitch` wide, and keep `margin` away from the ends of the wall [m].
+    `bays` is repeated from both ends of the wall towards the middle. They are
+    about `pitch` wide, and keep `margin` away from the ends of the wall [m].
     """
 
     def layout(edge: int, length: float) -> list[Relief]:
@@ -305,9 +313,10 @@ def alone(bay: Bay, width: float) -> Layout:
 
 
 def by_edge(layouts: dict[int, Layout], otherwise: Layout) -> Layout:
-    """Returns a layout that has a layout of its own for some edges.
+    """Returns a layout that uses other layouts for some edges.
 
-    All other edges get the layout `otherwise`.
+    `layouts` maps the number of an edge to its layout. All other edges get the
+    layout `otherwise`.
     """
 
     def layout(edge: int, length: float) -> Sequence[Relief]:

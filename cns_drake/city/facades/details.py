@@ -34,7 +34,7 @@ class WallFrame:
         self._outward = np.array([self._along[1], -self._along[0]])
 
     def place(self, mesh: Mesh, z: float = 0.0) -> Mesh:
-        """Returns a mesh of wall coordinates in the building's frame [m].
+        """Converts a mesh from wall coordinates to the building's frame [m].
 
         Wall coordinates (x along, y outwards, z up) are left-handed, so the
         faces are reversed.
@@ -47,15 +47,15 @@ class WallFrame:
     def box(self, *limits: float, bottom: bool = True) -> Mesh:
         """Returns a box in the building's frame, given in wall coordinates.
 
-        The limits are those of `massing.box` [m].
+        The limits are x0, x1, y0, y1, z0 and z1 in wall coordinates [m].
         """
         return self.place(massing.box(*limits, bottom=bottom))
 
     def standing(self, *limits: float, bottom: bool = False) -> Mesh:
         """Returns a box on the ground, given in wall coordinates.
 
-        The box is in the building's frame. The limits are those of
-        `massing.standing` [m].
+        The box is in the building's frame. The limits are x0, x1, y0, y1 and z1
+        in wall coordinates [m].
         """
         return self.place(massing.standing(*limits, bottom=bottom))
 
@@ -68,9 +68,10 @@ class WallFrame:
         return math.atan2(self._along[1], self._along[0])
 
     def point(self, x: float, y: float) -> np.ndarray:
-        """Returns x and y in the building's frame of a point on the ground [m].
+        """Converts a point on the ground from wall coordinates [m].
 
-        The point is `x` along the wall and `y` out of it.
+        The result is x and y in the building's frame. The point is `x` along
+        the wall and `y` outwards from it.
         """
         return self._start + x * self._along + y * self._outward
 
@@ -78,7 +79,8 @@ class WallFrame:
 def canopy(x0: float, x1: float, reach: float, z: float) -> Mesh:
     """Returns a flat canopy with a fascia, hung on two slanted rods.
 
-    It is in wall coordinates [m].
+    The mesh is in wall coordinates [m]. The canopy extends from x0 to x1 along
+    the wall and by `reach` out of it; its underside is at the height `z`.
     """
     rods = [
         beam((x, 0.05, z + 1.2), (x, reach - 0.3, z + 0.3), 0.08)
@@ -91,9 +93,11 @@ def canopy(x0: float, x1: float, reach: float, z: float) -> Mesh:
 def front_canopy(
     outline: ArrayLike, half: float, reach: float, z: float
 ) -> Mesh:
-    """Returns a canopy above a door in the middle of the front wall [m].
+    """Returns a canopy in the middle of the front wall, above a door [m].
 
-    It is in the building's frame, and `half` is half its width.
+    The mesh is in the building's frame. `outline` contains the corners of the
+    walls; `half` is half the canopy's width, `reach` how far it extends out of
+    the wall, and `z` its height.
     """
     front = WallFrame(outline, 0)
     middle = front.length / 2
@@ -134,12 +138,13 @@ def awnings(
     Args:
         wall: the wall.
         cells: start and end of each shop along the wall [m].
-        rng: draws which shops have one.
-        share: probability that a shop has one.
-        shape: four lengths [m]: how much narrower than its shop an awning is on
-            either side; its reach; the heights of its lower and its upper edge.
-        door: shops whose distance from the wall's middle is less than this have
-            none [m].
+        rng: random generator that chooses the shops with an awning.
+        share: probability that a shop has an awning.
+        shape: four lengths [m]: by how much an awning is narrower than its shop
+            on each side; how far it reaches out of the wall; the heights of its
+            lower edge and its upper edge.
+        door: shops that are closer than this to the wall's middle get no awning
+            [m].
     """
     narrower, reach, z0, z1 = shape
     middle, pieces = wall.length / 2, []
@@ -199,15 +204,15 @@ def piers(
         outline: (N, 2) corners of the walls in the building's frame,
             counter-clockwise [m].
         pitch: approximate distance from one pier to the next [m].
-        width: width of each [m].
-        reach: how far they reach out of the wall [m].
-        z0: height of their feet [m].
-        z1: height of their tops [m].
-        depth: how far they reach into the wall, past recessed glass [m].
+        width: width of each pier [m].
+        reach: how far the piers reach out of the wall [m].
+        z0: height of the feet of the piers [m].
+        z1: height of the tops of the piers [m].
+        depth: how far the piers reach into the wall, past recessed glass [m].
         margin: distance of the middle of the outermost piers from the wall's
             ends [m].
         entrance: width in the middle of the front that stays free [m].
-        skip: edges of the outline that get none.
+        skip: edges of the outline that get no piers.
     """
     pieces = []
     for edge in range(len(np.asarray(outline))):
@@ -253,7 +258,7 @@ def pilasters(
         reach: how far it reaches out of the wall [m].
         z0: height of its foot [m].
         z1: height of its top [m].
-        skip: edges of the outline that get none.
+        skip: edges of the outline that get no pilasters.
     """
     pieces = []
     for edge in range(len(np.asarray(outline))):
@@ -280,12 +285,12 @@ def corner_piers(
     Args:
         outline: (N, 2) corners of the walls in the building's frame,
             counter-clockwise [m].
-        width: length of each flank [m].
-        reach: how far they reach out of the walls [m].
-        depth: how far they reach into the walls, past recessed glass [m].
+        width: length of the pier along each of the two walls [m].
+        reach: how far the piers reach out of the walls [m].
+        depth: how far the piers reach into the walls, past recessed glass [m].
         z0: height of their feet [m].
         z1: height of their tops [m].
-        skip: edges whose corners get none.
+        skip: edges whose corners get no piers.
     """
     outline = np.asarray(outline, dtype=float)
     outer = massing.inset(outline, -reach)
@@ -385,8 +390,8 @@ def add_porch(
 ) -> None:
     """Adds a roofed porch in front of a wall.
 
-    Its materials are `trim` and `roof`. The roof extends 0.25 m beyond the
-    posts.
+    The parts have the materials `trim` and `roof`. The roof extends 0.25 m
+    beyond the posts.
 
     Args:
         out: the building under assembly, which gets the parts.
@@ -440,7 +445,7 @@ def add_steps(
         x1: right end along the wall [m].
         start: distance of the top step from the wall [m].
         rise: height of the top step [m].
-        room: greatest length of the flight [m].
+        room: greatest length of the steps away from the wall [m].
     """
     count = max(1, round(rise / 0.17))
     run = min(0.29 * count, room)
@@ -479,7 +484,7 @@ def add_railing(
         part: name of the visual.
         wall: the wall.
         start: first point: distances along the wall and out of it [m].
-        end: last point, in the same way [m].
+        end: last point: distances along the wall and out of it [m].
         z: height of the floor [m].
         rgb: colour.
     """
@@ -600,9 +605,8 @@ def casings(
 ) -> list[Mesh]:
     """Returns frames around a wall's windows, in wall coordinates [m].
 
-    Windows are the reliefs whose depth is in `glass`. `style` is `frame` (a
-    ring of boards), `sill` or `shutters`. The boards reach out of the wall by
-    `reach`.
+    Reliefs whose depth is in `glass` are windows. `style` is `frame` (a ring of
+    boards), `sill` or `shutters`. The boards reach out of the wall by `reach`.
     """
     pieces = []
     for r in reliefs:

@@ -1,8 +1,7 @@
 """Outlines and solids from which buildings are put together.
 
 Outlines are (N, 2) corners [m], counter-clockwise, with the front edge first.
-The faces of a solid look outwards, and it is closed on all sides that can be
-seen.
+The faces of a solid face outwards, and all sides that can be seen are closed.
 """
 
 from collections.abc import Callable, Collection, Sequence
@@ -50,9 +49,9 @@ def square(x: float, y: float, half: float) -> np.ndarray:
 def inset(points: ArrayLike, distance: ArrayLike) -> np.ndarray:
     """Returns an outline with each edge moved inwards.
 
-    The distance is one for all edges, or an array with one per edge [m]; a
-    negative distance moves an edge outwards. The corners keep their order.
-    Distances must be small compared with the lengths of the edges.
+    `distance` is one number for all edges, or an array with one number per edge
+    [m]; a negative distance moves an edge outwards. The corners keep their
+    order. Distances must be small compared with the lengths of the edges.
     """
     points = np.asarray(points, dtype=float)
     distances = np.broadcast_to(np.asarray(distance, float), len(points))
@@ -86,8 +85,8 @@ def rounded(
     """Returns an outline whose convex corners are rounded by chords.
 
     Chords are at most `step` long [m]. `corners` maps the number of a corner to
-    its radius [m]. The first edge of the result is what the arcs leave of the
-    outline's first edge.
+    its radius [m]. The first edge of the result is the part of the outline's
+    first edge that remains between the arcs.
     """
 
     def arc(
@@ -115,8 +114,8 @@ def rounded(
 def flat(points: ArrayLike, z: float, *, up: bool = True) -> Mesh:
     """Returns a horizontal surface that fills an outline, at the height z.
 
-    Convex outlines become quadrilaterals and at most one triangle, and others
-    triangles.
+    A convex outline is divided into quadrilaterals and at most one triangle,
+    and any other outline into triangles.
     """
     points = np.asarray(points, dtype=float)
     if _is_convex(points):
@@ -155,8 +154,9 @@ def _is_convex(points: np.ndarray) -> bool:
 def skirt(lower: ArrayLike, upper: ArrayLike, z0: float, z1: float) -> Mesh:
     """Returns the walls from an outline at z0 to another at z1.
 
-    The faces look outwards. Both outlines have the same number of corners, and
-    parallel edges in pairs, so that the faces are plane.
+    The faces face outwards. The two outlines must have the same number of
+    corners, and each edge must be parallel to the same edge of the other
+    outline, so that the faces are plane.
     """
     lower, upper = np.asarray(lower, float), np.asarray(upper, float)
     n = len(lower)
@@ -192,10 +192,10 @@ def frustum(lower: ArrayLike, upper: ArrayLike, z0: float, z1: float) -> Mesh:
 def sloped_prism(
     points: ArrayLike, z0: float, height: float, low: float
 ) -> Mesh:
-    """Returns a solid with a sloping top that rises along y.
+    """Returns a solid over an outline, with a top that slopes up along y.
 
-    Its top is `height` above z0 at the outline's greatest y, and `low` times
-    `height` above z0 at its least y.
+    The bottom is at z0. The height above z0 is `height` at the outline's
+    greatest y, and `low` times `height` at its least y [m].
     """
     points = np.asarray(points, dtype=float)
     n, y = len(points), points[:, 1]
@@ -209,7 +209,7 @@ def sloped_prism(
 
 
 def spire(points: ArrayLike, tip: ArrayLike, z0: float, z1: float) -> Mesh:
-    """Returns a pyramid over an outline."""
+    """Returns a pyramid over an outline, without a bottom."""
     points = np.asarray(points, dtype=float)
     n = len(points)
     apex = [*np.asarray(tip, dtype=float), z1]
@@ -218,7 +218,7 @@ def spire(points: ArrayLike, tip: ArrayLike, z0: float, z1: float) -> Mesh:
 
 
 def tent(eaves: ArrayLike, tip: ArrayLike, z0: float, z1: float) -> Mesh:
-    """Returns a pyramid that is closed below."""
+    """Returns a pyramid over an outline that also has a bottom."""
     return merge_meshes(flat(eaves, z0, up=False), spire(eaves, tip, z0, z1))
 
 
@@ -248,10 +248,10 @@ def revolved(
 
 
 def extruded(profile: Sequence[Point], x0: float, x1: float) -> Mesh:
-    """Returns a roof over a line that is drawn out along x, with end walls.
+    """Returns a roof: a line in y and z, extruded along x, with end walls.
 
-    The line consists of (y, z) points with rising y [m]. The end walls reach
-    down to the height of its first point.
+    The line consists of (y, z) points with increasing y [m]. The end walls
+    reach down to the height of the first point.
     """
     base = profile[0][1]
     faces = Faces()
@@ -270,7 +270,7 @@ def extruded(profile: Sequence[Point], x0: float, x1: float) -> Mesh:
 
 
 class Faces:
-    """Collects faces by their corners and drops those without area."""
+    """Collects faces, given by corners, and drops faces without area."""
 
     def __init__(self) -> None:
         self._vertices: list[tuple[float, float, float]] = []
@@ -325,7 +325,7 @@ def box(*limits: float, bottom: bool = True) -> Mesh:
 def standing(*limits: float, bottom: bool = False) -> Mesh:
     """Returns a box with x0, x1, y0, y1 and z1 that stands on the ground [m].
 
-    It reaches down to `FOUNDATION_M` below the ground.
+    The box reaches down to `FOUNDATION_M` below the ground.
     """
     *spot, z1 = limits
     return box(*spot, -FOUNDATION_M, z1, bottom=bottom)
@@ -337,11 +337,11 @@ def post(
     """Returns a square post that stands on the ground.
 
     Args:
-        x: x of its middle in the building's frame [m].
-        y: y of its middle in the building's frame [m].
-        half: half the length of its side [m].
-        z1: height of its top [m].
-        z0: height of its foot; by default hidden below the ground [m].
+        x: x of the post's axis in the building's frame [m].
+        y: y of the post's axis in the building's frame [m].
+        half: half the side of the square [m].
+        z1: height of the top [m].
+        z0: height of the foot [m]; by default hidden below the ground.
     """
     return box(x - half, x + half, y - half, y + half, z0, z1, bottom=False)
 
@@ -474,7 +474,10 @@ def mirrored(points: np.ndarray) -> np.ndarray:
 def edges_on(
     plan: np.ndarray, outline: np.ndarray, edges: Collection[int]
 ) -> frozenset[int]:
-    """Returns the edges of a plan that lie on some edges of an outline."""
+    """Returns the numbers of a plan's edges that lie on given edges.
+
+    The given edges are `edges` of the outline `outline`.
+    """
     found = set()
     ends = np.roll(plan, -1, axis=0)
     for k, (a, b) in enumerate(zip(plan, ends, strict=True)):

@@ -1,8 +1,8 @@
 """Roofs: shells along a roof line, gable walls, hips and roof equipment.
 
-A roof line is the upper surface of a roof, seen along its ridge: (across, z)
-points with rising `across` [m]. By default the ridge runs along x, and `across`
-is y; with `along_y` it is the other way round.
+A roof line is the upper surface of a roof, as seen along the ridge: (across, z)
+points with increasing `across` [m]. By default the ridge runs along x, and
+`across` is y; with `along_y` the ridge runs along y, and `across` is x.
 """
 
 from collections.abc import Sequence
@@ -31,7 +31,7 @@ def gable_line(
 
     Args:
         a: where the line begins across the roof [m].
-        b: where it ends [m].
+        b: where the line ends across the roof [m].
         z: height of both ends [m].
         top: height of the ridge [m].
         ridge: place of the ridge between a and b, as a share of the span.
@@ -44,11 +44,11 @@ def gambrel_line(
 ) -> list[tuple[float, float]]:
     """Returns (across, height) points [m] of a gambrel roof.
 
-    Its slopes are steep up to a knee, and flatter above.
+    The slopes are steep up to a knee, and flatter above.
 
     Args:
         a: where the line begins across the roof [m].
-        b: where it ends [m].
+        b: where the line ends across the roof [m].
         z: height of both ends [m].
         top: height of the ridge [m].
         knee: place of the knee, as shares of the half span and of the rise.
@@ -65,10 +65,10 @@ def barrel_line(
 
     Args:
         a: where the line begins across the roof [m].
-        b: where it ends [m].
+        b: where the line ends across the roof [m].
         z: height of both ends [m].
         top: height of the crown [m].
-        count: number of chords, even.
+        count: number of chords, an even number.
     """
     half, middle, rise = (b - a) / 2, (a + b) / 2, top - z
     radius = (half**2 + rise**2) / (2 * rise)
@@ -82,7 +82,8 @@ def barrel_line(
 def with_eaves(line: Line, low: float, high: float) -> list[bays.Span]:
     """Returns a roof line with its two end slopes lengthened [m].
 
-    `low` and `high` are how far they go beyond the first and the last point.
+    `low` and `high` are how far the slopes extend beyond the first and the last
+    point.
     """
     (a, za), (b, zb) = line[0], line[1]
     (c, zc), (d, zd) = line[-2], line[-1]
@@ -108,7 +109,7 @@ def shell(
     """Returns a roof of even vertical thickness over a roof line.
 
     Args:
-        line: (across, height) points of its upper surface [m].
+        line: (across, height) points of the roof's upper surface [m].
         start: where the roof begins along its ridge [m].
         end: where it ends along its ridge [m].
         thickness: vertical thickness [m].
@@ -150,7 +151,7 @@ def gable_wall(
         a: left end along the wall [m].
         b: right end along the wall [m].
         z: height of the wall's foot [m].
-        holes: openings beside one another; `gable_glass` closes them.
+        holes: openings, side by side; `gable_glass` returns their panes.
     """
     bounds = {a, b, *(u for u, _ in line if a < u < b)}
     bounds.update(x for hole in holes for x in (hole.x0, hole.x1))
@@ -195,7 +196,7 @@ def hip(
         outline: (4, 2) corners in the building's frame [m].
         z: height of the underside of the eaves [m].
         top: height of the ridge [m].
-        eaves: overhang, one for all edges or one for each [m].
+        eaves: overhang [m], one for all edges or one per edge.
         fascia: height of the vertical edge of the eaves [m].
     """
     outer = massing.inset(outline, -np.asarray(eaves))
@@ -246,7 +247,7 @@ def add_chimney(
     yaw: float = 0.0,
     scale: tuple[float, float, float] = (1.0, 1.0, 1.0),
 ) -> None:
-    """Adds a shared chimney to a pitched roof.
+    """Adds a chimney, one of the shared meshes, to a pitched roof.
 
     Args:
         out: the building under assembly, which gets the parts.
@@ -255,8 +256,8 @@ def add_chimney(
             frame [m].
         rgb: colour.
         item: `chimney` or `chimney_row`.
-        yaw: its heading [rad].
-        scale: factors of its size along x, y and z.
+        yaw: heading of the chimney [rad].
+        scale: scale factors along x, y and z.
     """
     out.place(part, out.shared(f"roof_{item}", scale), xyz, yaw, rgb=rgb)
 
@@ -269,9 +270,9 @@ def equip_roof(
     clear: float = 1.0,
     prefix: str = "",
 ) -> None:
-    """Adds equipment to a flat roof, without overlaps; omits what does not fit.
+    """Adds equipment to a flat roof; leaves out pieces that do not fit.
 
-    The random generator of `out` draws places, headings and sizes.
+    Pieces do not overlap. Places, headings and sizes are random.
 
     Args:
         out: the building under assembly, which gets the parts.

@@ -1,4 +1,4 @@
-"""Builds up a building from ground floor, storeys, top walls and roof."""
+"""Builds a building from ground floor, storeys, top walls and roof."""
 
 from collections.abc import Sequence
 import math
@@ -28,14 +28,15 @@ def add_awnings(p: Building, pieces: Sequence[Mesh]) -> None:
 def divided(
     height: float, storey: float, most: int = 10
 ) -> tuple[int, int, float]:
-    """Returns how storeys of about one height are divided into groups.
+    """Divides a height into equal storeys, and the storeys into groups.
 
-    There are at most `most` groups; each becomes one visual.
+    A storey is approximately `storey` high [m]. There are at most `most`
+    groups; each group becomes one visual.
 
     Returns:
         The number of groups, the number of storeys in a group, and the height
-        of a storey [m]. It is rounded down to millimetres, so that stacked
-        storeys leave no gap.
+        of a storey [m]. This height is rounded down to millimetres, so that
+        stacked storeys leave no gap.
     """
     count = max(1, round(height / storey))
     per_group = -(-count // most)
@@ -51,7 +52,7 @@ def add_ground(
     extras: Sequence[Mesh] = (),
     part: str = "ground",
 ) -> float:
-    """Adds the ground floor on its foundation; returns its top [m].
+    """Adds the ground floor and its foundation; returns its height [m].
 
     Args:
         out: the building under assembly, which gets the parts.
@@ -78,7 +79,7 @@ def add_storeys(
     extras: Sequence[Mesh] = (),
     part: str = "storey",
 ) -> float:
-    """Adds `groups` times `per_group` storeys; returns their top [m].
+    """Adds `groups` times `per_group` storeys; returns the top's height [m].
 
     If all glass has the same depth, one pane behind the walls closes all
     windows; no other relief may then be deeper. Glass of several depths is
@@ -133,18 +134,20 @@ def add_grooved(
     most: int = 4,
     plain: frozenset[int] = frozenset(),
 ) -> float:
-    """Adds storeys whose windows lie between upright piers; returns their top.
+    """Adds storeys with windows between upright piers.
 
-    The top is less than `goal` by millimetres [m]. Bands around the building
-    and piers of full height need far fewer faces than single windows.
+    Returns the height of the top [m], which is a few millimetres below `goal`.
+    Bands around the building and piers of full height need far fewer faces than
+    single windows.
 
     Args:
-        p: the building. These of its parameters are lengths [m]:
+        p: the building. Of its parameters, these lengths are used [m]:
             `storey_height`; `spandrel`, the height of the wall under the
-            windows; `ledge`, the reach of a lip there; `recess`, the depth of
-            the windows; `pitch`, `pier` (its width may be 0) and `pier_reach`
-            of the piers; `solid_corner`, the width of solid corners (0 for
-            glass around the corner).
+            windows; `ledge`, how far a lip on the spandrel protrudes; `recess`,
+            the depth of the windows; `pitch`, the distance between piers;
+            `pier`, their width (may be 0); `pier_reach`, how far they protrude;
+            `solid_corner`, the width of solid corners (0 for glass around the
+            corner).
         outline: (N, 2) corners of the walls, counter-clockwise [m].
         z0, goal: height of the bottom, and approximate height of the top [m].
         part: beginning of the visuals' names.
@@ -178,7 +181,7 @@ def add_grooved(
 
 
 def block(outline: ArrayLike, facade: Facade, z0: float) -> Mesh:
-    """Returns walls with their glass and a flat lid, as one mesh."""
+    """Returns walls, their glass and a flat lid, as one mesh."""
     pieces = [
         facade_mesh(outline, facade, z0),
         massing.flat(outline, z0 + facade.height),
@@ -196,9 +199,9 @@ def shaft_walls(
     rim: tuple[float, float],
     glass: tuple[float, ...] = (),
 ) -> Facade:
-    """Returns the walls of a stair tower, with one bay in front, one behind.
+    """Returns the walls of a stair tower, with a bay in front and behind.
 
-    Both bays are in the middle of their walls.
+    Each of the two bays is in the middle of its wall.
 
     Args:
         height: height of the walls [m].
@@ -263,7 +266,7 @@ def cornice(
 ) -> tuple[Band, ...]:
     """Returns bands that step outwards up to a height.
 
-    The topmost one ends at `height` and sticks out by `reach` [m].
+    The topmost band ends at `height` and protrudes by `reach` [m].
     """
     step = thickness / steps
     return tuple(

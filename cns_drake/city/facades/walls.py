@@ -3,9 +3,9 @@
 A wall is described in panel coordinates: x along the wall from left to right
 (seen from outside), z up, and depth inwards; a negative depth sticks out.
 Patches painted on the panel divide it into cells with one depth each. The
-depths determine the whole surface, with every reveal, sill and ledge, and it is
-closed whatever the patches are. Walls around a polygon are mitred at its
-corners, so that a ledge runs around them.
+depths determine the whole surface, with every reveal, sill and ledge. The
+surface is closed, whatever the patches are. Walls around a polygon are mitred
+at its corners, so that a ledge runs around them.
 """
 
 from __future__ import annotations
@@ -37,7 +37,10 @@ class Band(NamedTuple):
 
 
 class Patch(NamedTuple):
-    """A rectangle of the wall, pushed in by `depth`, or out if negative [m]."""
+    """A rectangle of the wall, pushed in by `depth` [m].
+
+    With a negative depth, the rectangle protrudes from the wall.
+    """
 
     x0: float
     x1: float
@@ -49,7 +52,8 @@ class Patch(NamedTuple):
 class Arch(NamedTuple):
     """A round-headed recess [m]; its head is half an ellipse above z_spring.
 
-    It must lie on wall of depth 0, and no later relief may lie over it.
+    The recess must lie where the wall has depth 0, and no later relief may
+    cover it.
     """
 
     x0: float
@@ -76,8 +80,8 @@ class Corner(NamedTuple):
 class WallCells:
     """The cells of one wall: their boundaries, their depths, and its arches.
 
-    Only rows of the same group may share a face, because rows of other groups
-    end at different places.
+    A face may only span rows of the same group, because rows of different
+    groups end at different places.
     """
 
     xs: list[float]
@@ -99,9 +103,8 @@ class WallCells:
 
         Args:
             length: length of the wall [m].
-            zs: rising heights that divide the wall into rows [m].
-            groups: (rows,) group of each row; only rows of one group share a
-                face.
+            zs: increasing heights that divide the wall into rows [m].
+            groups: (rows,) number of each row's group; see `WallCells`.
             bands: strips along the whole wall.
             reliefs: openings and arches; later ones cover earlier ones.
 
@@ -141,7 +144,10 @@ Quads = Iterator[list[Corner]]
 
 
 def wall_quads(grid: WallCells, glass: tuple[float, ...]) -> Quads:
-    """Yields the quadrilaterals of a wall, counter-clockwise from outside."""
+    """Yields the quadrilaterals of a wall, without its panes.
+
+    Corners are counter-clockwise as seen from outside.
+    """
     for arch in grid.arches:
         yield from _arch_reveals(arch)
         if arch.depth not in glass:
@@ -152,7 +158,10 @@ def wall_quads(grid: WallCells, glass: tuple[float, ...]) -> Quads:
 
 
 def glass_quads(grid: WallCells, glass: tuple[float, ...]) -> Quads:
-    """Yields the quadrilaterals of the panes, which `wall_quads` leaves out."""
+    """Yields the quadrilaterals of the panes of a wall.
+
+    `wall_quads` leaves them out.
+    """
     for arch in grid.arches:
         if arch.depth in glass:
             yield from _arch_back(arch)
@@ -315,13 +324,13 @@ class Facade:
 
     Attributes:
         height: height of the walls [m].
-        bands: strips around the building, painted in order; the rest has depth
-            0.
+        bands: strips around the building, painted in order; all other wall has
+            depth 0.
         layout: (edge index, edge length [m]) -> patches, painted in order.
-        glass: depths at which fronts are glass. `facade_mesh` leaves them open;
-            `glass_mesh` closes them, or a pane behind all windows.
+        glass: depths of reliefs whose fronts are glass. `facade_mesh` leaves
+            these fronts open, and `glass_mesh` returns their panes.
         plain: edges without any relief, such as walls against a neighbour.
-            Bands end there with a corner of their own, flush with the wall.
+            Bands of other walls end flush with such a wall.
     """
 
     height: float
@@ -357,9 +366,10 @@ def lifted(item: _Strip, dz: float) -> _Strip:
 
 
 def facade_mesh(points: ArrayLike, facade: Facade, z0: float = 0.0) -> Mesh:
-    """Returns the walls around (N, 2) counter-clockwise corners, without glass.
+    """Returns the walls around an outline, without their glass.
 
-    Walls start at z0 [m] and are open at the bottom and the top. There every
+    `points` contains the corners (N, 2), counter-clockwise [m]. The walls start
+    at z0 [m] and are open at the bottom and the top. At these two edges, every
     cell is closed back to depth 0, so that walls stacked on the same outline
     join without gaps.
 
@@ -382,9 +392,9 @@ def single_wall(
 ) -> list[Mesh]:
     """Returns a wall that touches no other wall, in wall coordinates.
 
-    Reliefs are painted in order and keep clear of both ends of the wall [m].
-    The first mesh is the wall without its glass. It is followed by one mesh of
-    panes for each set of depths in `fronts`.
+    Reliefs are painted in order; they must not touch the ends of the wall. The
+    first mesh of the result is the wall without its glass. Then follows one
+    mesh of panes for each set of depths in `fronts`.
 
     Raises:
         ValueError: a relief extends beyond the wall.

@@ -1,4 +1,4 @@
-"""Houses of several wings: boxes that may overlap, each with its own roof.
+"""Houses of several wings: boxes that can overlap, each with its own roof.
 
 Walls have windows and doors where no other wing hides them.
 
@@ -55,9 +55,9 @@ class Roof:
 class Wing:
     """A box-shaped part of a house with its own roof; all lengths in [m].
 
-    `wall_top` is the height of its walls and `top` that of its ridge, or of the
-    parapet of a flat roof. Edges built against a neighbour are `blind`: flush
-    and plain.
+    `wall_top` is the height of the walls. `top` is the height of the ridge or,
+    for a flat roof, of the parapet. `blind` contains the edges that are built
+    against a neighbour, whose walls are flush and plain.
     """
 
     x0: float
@@ -92,7 +92,11 @@ class Wing:
     def flat(
         area: massing.Area, top: float, parapet: float, rim: float = 0.1
     ) -> Wing:
-        """Returns a wing with a flat roof; its walls end `rim` below `top`."""
+        """Returns a wing with a flat roof and a parapet.
+
+        The walls end `rim` below `top`, the height of the parapet's top [m].
+        The parapet is `parapet` high.
+        """
         return Wing.at(area, top - rim, top, Roof("flat", parapet=parapet))
 
     def mirrored(self, width: float) -> Wing:
@@ -154,7 +158,7 @@ class Wing:
 
     @property
     def gables(self) -> tuple[int, int]:
-        """The two edges below the start and the end of the ridge."""
+        """The numbers of the two edges at the ends of the ridge."""
         return (0, 2) if self.roof.along_y else (3, 1)
 
     def covers(self, x: float, y: float) -> bool:
@@ -168,9 +172,10 @@ def add_roof(
     attic: Attic | None = None,
     material: str = "walls",
 ) -> None:
-    """Adds a wing's roof, and its gables in a given material.
+    """Adds the roof of a wing, and its gables in the material `material`.
 
-    `attic` returns the windows of the gables.
+    `attic` is a function that returns the windows of a gable; None for no
+    windows.
     """
     roof, outline, line = wing.roof, wing.outline, wing.line
     is_free = [k not in wing.blind for k in range(4)]
@@ -250,8 +255,8 @@ def attic_window(
 
     Args:
         width: width of each window [m].
-        z0: height of their sills [m].
-        z1: height of their heads [m].
+        z0: height of the windows' sills [m].
+        z1: height of the windows' tops [m].
         depth: distance of the glass behind the wall [m].
         count: number of windows.
     """
@@ -270,7 +275,10 @@ def attic_window(
 
 
 def ridge_rise(span: float, pitch_deg: float) -> float:
-    """Returns how high a ridge is above the eaves, for a span and pitch [m]."""
+    """Returns the height of a ridge above the eaves [m].
+
+    `span` is the width of the roof [m], and `pitch_deg` its pitch [deg].
+    """
     return span / 2 * math.tan(math.radians(pitch_deg))
 
 
@@ -294,13 +302,13 @@ def add_dormer(
     height: float,
     roof: str = "gable",
 ) -> None:
-    """Adds a dormer to the slope that rises behind a wall, if there is room.
+    """Adds a dormer to the roof slope behind a wall, if it fits.
 
     Args:
         out: the building under assembly, which gets the parts.
         wall: the wall.
         x: middle of the dormer along the wall [m].
-        width: its width along the wall [m].
+        width: width of the dormer along the wall [m].
         base: height of the slope's upper surface at the wall [m].
         slope: rise of the slope per run.
         ridge: height of the ridge [m].
@@ -362,10 +370,10 @@ def add_dormers(
     Args:
         out: the building under assembly, which gets the parts.
         wing: the wing.
-        start: where they begin along the front wall [m].
-        end: where they end along the front wall [m].
+        start: where the dormers begin along the front wall [m].
+        end: where the dormers end along the front wall [m].
         count: greatest number of dormers.
-        roof: their roof: `gable`, `shed` or `flat`.
+        roof: roof of the dormers: `gable`, `shed` or `flat`.
         pitch: greatest distance from the middle of one dormer to the next [m].
     """
     (u0, z0), (u1, z1) = wing.line[:2]
@@ -390,7 +398,10 @@ def add_dormers(
 def free_stretches(
     wing: Wing, edge: int, others: Iterable[Wing], z: float
 ) -> list[tuple[float, float]]:
-    """Returns the stretches of a wall that no wing hides at a height [m]."""
+    """Returns the stretches of a wall that no other wing hides [m].
+
+    They are computed at the height `z` [m].
+    """
     wall = wing.wall(edge)
     cuts = {0.0, wall.length}
     hiding = [w for w in others if w is not wing and w.top > z]
@@ -414,7 +425,7 @@ def free_stretches(
 
 
 class Openings:
-    """Collects the windows and doors of a wing, edge by edge, and builds it."""
+    """Collects the windows and doors of a wing by edge; builds the wing."""
 
     def __init__(
         self, out: Assembly, wing: Wing, others: Sequence[Wing] = ()
@@ -432,14 +443,14 @@ class Openings:
     ) -> None:
         """Adds rows of bays to the free parts of walls.
 
-        The choices take turns from both ends towards the middle. A part of a
-        wall is free if no other wing hides it at the height z.
+        The bays in `choices` alternate, from both ends towards the middle. A
+        part of a wall is free if no other wing hides it at the height z.
 
         Args:
             edges: numbers of the walls.
             z: height at which a wall must be free [m].
             pitch: approximate width of a bay [m].
-            choices: bays that take turns.
+            choices: bays that alternate.
             margin: distance of the bays from the ends of a free part [m].
         """
         for edge in edges:
@@ -451,7 +462,7 @@ class Openings:
                 ]
 
     def put(self, edge: int, x: float, width: float, bay: bays.Bay) -> None:
-        """Adds a bay around x, in place of the bays that it touches [m]."""
+        """Adds a bay around x [m]; it replaces the bays that it touches."""
         x0, x1 = x - width / 2, x + width / 2
         new = bay(x0, x1)
         if not new:
@@ -487,9 +498,9 @@ class Openings:
         ]
 
     def layout(self, edge: int, length: float) -> list[walls.Relief]:
-        """Returns all reliefs of a wall; it is the layout of a `Facade`.
+        """Returns all reliefs of a wall, as a layout for `Facade`.
 
-        Bands stop beside arches, which need flat wall around them.
+        Bands are interrupted at arches, which need flat wall around them.
         """
         found: list[walls.Relief] = []
         for relief in self._reliefs[edge]:
@@ -504,10 +515,9 @@ class Openings:
         bands: Sequence[walls.Band] = (),
         material: str = "walls",
     ) -> None:
-        """Adds the walls on their foundation, and their panes as `glass`.
+        """Adds the walls, their foundation, and panes of the material `glass`.
 
-        The argument `glass` gives the depths of the openings that have panes
-        [m].
+        The argument `glass` contains the depths of the openings with panes [m].
         """
         wing = self._wing
         bands, glass = tuple(bands), tuple(glass)
@@ -531,7 +541,8 @@ class Openings:
     ) -> None:
         """Adds the walls (see `add_walls`) and the roof on them.
 
-        `attic` returns the windows of its gables.
+        `attic` is a function that returns the windows of a gable; None for no
+        windows.
         """
         self.add_walls(glass, bands, material)
         add_roof(self._out, self._wing, attic, material)
@@ -646,7 +657,7 @@ class Openings:
     ) -> None:
         """Adds shops side by side between two points of a wall.
 
-        Their fascias have the material `sign`, hanging signs `trim` and awnings
+        Fascias have the material `sign`, hanging signs `trim`, and awnings
         `awning`.
 
         Args:

@@ -1,1 +1,1 @@
-"""Objects other than plants on streets, squares and building sites."""
+"""Objects on streets, squares and building sites, except plants."""

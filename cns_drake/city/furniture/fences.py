@@ -17,8 +17,8 @@ _LONGEST = 8
 class RunKind:
     """A kind of fence, from `fences.yaml`, with the size of its panels [m].
 
-    If there is an `end_post`, it closes the last panel. Its numbers are its
-    size in x, its least and greatest y, and its height [m].
+    `end_post`, if given, is a post after the last panel. Its four numbers are
+    its size in x, its least and its greatest y, and its height [m].
     """
 
     panel: float
@@ -46,8 +46,8 @@ def run(
 ) -> structures.Model:
     """Returns a fence of several panels in a random colour.
 
-    The name is a key of `RUN_KINDS`. Without a `height`, the fence has that of
-    its kind [m].
+    `name` is a key of `RUN_KINDS`. `length` and `height` are in [m]; by
+    default, the height is that of the kind of fence.
 
     Raises:
         ValueError: the length or the height is not positive.

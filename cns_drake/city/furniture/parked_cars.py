@@ -42,7 +42,10 @@ FORMS = {
 
 
 def car(rng: np.random.Generator, *, form: str) -> structures.Model:
-    """Returns a vehicle of a form in `FORMS`, with random paint and scale."""
+    """Returns a parked vehicle with random paint and scale.
+
+    `form` is a body type: a key of `FORMS`.
+    """
     size = rng.uniform(0.97, 1.03, 3)
     scale = structures.triple(round(float(s), 3) for s in size)
     paint = PAINTS[int(rng.integers(len(PAINTS)))]

@@ -1,4 +1,4 @@
-"""Returns all structures of a city from a road network and a plan."""
+"""Makes all structures of a city from a road network and a plan."""
 
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from pathlib import Path
@@ -44,9 +44,9 @@ from cns_drake.roads.network import RoadNetwork, load_road_network
 
 
 class City(NamedTuple):
-    """A whole city: its structures (ground first), and its parked cars.
+    """A whole city: its structures, ground first, and kinds of parked cars.
 
-    `cars` maps the name of a parked car to its weight in the random choice.
+    `cars` maps the name of a kind of car to its weight in random choices.
     """
 
     structures: tuple[Structure, ...]
@@ -59,17 +59,18 @@ class Streets(NamedTuple):
     Attributes:
         areas: carriageways, sidewalks and medians.
         surface: heights of the carriageways.
-        kerb_height: height of sidewalks above the carriageway [m], where
-            `kerbs` does not give another one for a place.
+        kerb_height: height of sidewalks above the carriageway [m], at places
+            where `kerbs` gives no height.
         junctions: area of all junctions.
         margins: strips beside the streets that stay free. Buildings stand along
-            them.
-        reserved: area in which nothing is built or planted either.
+            these strips.
+        reserved: further area in which nothing is built or planted.
         structures: structures of the streets themselves.
-        furnish: places the objects of the streets, after the buildings and
-            before everything else.
-        park: parks cars in the streets, last of all.
-        kerbs: height of the kerb by place, where it differs.
+        furnish: function that places the objects of the streets. It is called
+            after the buildings are placed and before everything else.
+        park: function that parks cars in the streets. It is called last.
+        kerbs: height of the kerb by place; None if it is `kerb_height`
+            everywhere.
     """
 
     areas: Areas
@@ -85,7 +86,7 @@ class Streets(NamedTuple):
 
 
 def meshes_of(structures: Iterable[Structure]) -> dict[str, Mesh]:
-    """Returns all meshes of structures by name.
+    """Returns name -> mesh of all meshes of structures.
 
     Raises:
         ValueError: if two different meshes have the same name, or one has no
@@ -103,7 +104,7 @@ def meshes_of(structures: Iterable[Structure]) -> dict[str, Mesh]:
 
 
 def make_city(world: Path) -> City:
-    """Returns the city of a folder with `roads.yaml` and `city.yaml`.
+    """Makes the city described by `roads.yaml` and `city.yaml` in a folder.
 
     Raises:
         InputError: if one of the files cannot be used.
@@ -123,9 +124,9 @@ def make_city(world: Path) -> City:
 
 
 def lay_out(network: RoadNetwork, plan: CityPlan, source: str) -> City:
-    """Returns the city made from a road network and a plan.
+    """Makes a city from a road network and a plan.
 
-    Errors name the `source` of the plan.
+    Error messages name the `source` of the plan.
 
     Raises:
         InputError: if the plan names something unknown or impossible.
@@ -145,10 +146,10 @@ def lay_out(network: RoadNetwork, plan: CityPlan, source: str) -> City:
 
 
 def build_along(streets: Streets, plan: CityPlan, source: str) -> City:
-    """Returns the city made along streets.
+    """Makes a city along streets.
 
-    Things that need most room, or that fit in the fewest places, are placed
-    first. Errors name the `source` of the plan.
+    What needs most space, or fits in the fewest places, is placed first. Error
+    messages name the `source` of the plan.
 
     Raises:
         InputError: if the plan names something unknown or impossible.

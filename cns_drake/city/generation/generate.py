@@ -39,12 +39,12 @@ _COLUMNS = ("name", "class", "x", "y", "tags")
 
 
 class Renaming(NamedTuple):
-    """What has become of the names in a file of stages, in a changed city.
+    """What happened to the names in `stages.yaml` after a city was changed.
 
-    `renamed` maps the old names of structures that still stand at their place
-    to their new names. Structures that no longer do are `lost`, even if another
-    structure has their name now. Patterns are `unclear` if they now match
-    different structures.
+    `renamed` maps old names to new names, for structures that are still at the
+    same place. `lost` contains the names of structures that are no longer
+    there, even if another structure has the name now. `unclear` contains
+    patterns that now match different structures.
     """
 
     renamed: dict[str, str]
@@ -69,8 +69,8 @@ def find_renaming(
     """Returns the new names of the structures that `stages.yaml` names.
 
     `table` is the `structures.csv` of the city for which `stages.yaml` was
-    written, and `structures` are those of the present city. A structure at the
-    same place counts as the same structure.
+    written, and `structures` are those of the current city. Structures at the
+    same place count as the same structure.
 
     Raises:
         InputError: a file cannot be read.
@@ -101,9 +101,9 @@ def find_renaming(
 
 
 def renamed_text(stages: Path, renamed: Mapping[str, str]) -> str:
-    """Returns the text of a file of stages with the structures renamed.
+    """Returns the text of `stages.yaml` with structures renamed.
 
-    Comments and order stay as they are.
+    Comments and order stay unchanged. `renamed` maps old names to new names.
 
     Raises:
         InputError: the file cannot be read.
@@ -260,9 +260,9 @@ def stage_sdf(
 
     Drake parses a static scene fastest as one link with many visuals. The link
     has no collision geometry, because nothing ever touches it. A visual is
-    named `<structure>/<part>`. Drake keeps this as the name of the geometry,
-    from which the structure of a LiDAR return is found. `comment` is one line
-    for the reader of the file, and `before` the SDF text of other visuals,
+    named `<structure>/<part>`. Drake gives the geometry the same name, from
+    which the structure of a LiDAR return is found. `comment` is a line for
+    readers of the file, and `before` contains the SDF texts of further visuals,
     which come first.
     """
     lines = [
@@ -386,15 +386,16 @@ def render_stages(
     Args:
         world: name of the map.
         city: the whole city.
-        stages: what each stage lacks.
+        stages: the content of `stages.yaml`.
         wanted: names of the stages to write.
-        source: the file of the stages, which errors name.
-        progress: is called with one line for the user after each file.
+        source: file of the stages, named in error messages.
+        progress: called with a message of one line after each file.
         origin: comment for readers of the files about the origin of the city.
 
     Raises:
-        InputError: if a structure cannot be lower or under construction as
-            asked, or the city has too many structures.
+        InputError: if a structure cannot be lower, or cannot be under
+            construction, as the stages demand, or the city has too many
+            structures.
     """
     growing = GrowingCity(city.structures, stages, city.cars)
     if len(growing.structures) > MAX_INSTANCE:
@@ -436,17 +437,17 @@ def generate_city(
     *,
     repair_stages: bool = False,
 ) -> list[Path]:
-    """Writes all generated files of a world folder, and returns their paths.
+    """Writes all generated files of a map's folder, and returns their paths.
 
     The same inputs give the same bytes. Each file is replaced atomically.
     Stages and meshes that no longer belong to the city are removed.
 
     Args:
         world: the folder.
-        progress: is called with one line at a time.
-        repair_stages: whether to rename structures in `stages.yaml`, if the
-            city now has other names than `structures.csv` for structures at the
-            same place.
+        progress: called with messages of one line on the progress.
+        repair_stages: whether to update the names in `stages.yaml`, if
+            structures at the same place have other names now than in
+            `structures.csv`.
 
     Raises:
         InputError: if an input cannot be used or a file cannot be written; if a

@@ -1,4 +1,4 @@
-"""Writes first inputs of a city whose roads exist already.
+"""Writes first input files for a city whose roads already exist.
 
 A user who has drawn `roads.yaml` gets a plan with districts, two stages and two
 drives, as files to edit.
@@ -108,7 +108,10 @@ def _drive(network: RoadNetwork, stage: str, rng: np.random.Generator) -> dict:
 
 
 def starter_plan(areas: Areas, seed: int) -> dict:
-    """Returns a plan with a character for each block, to fill `CityPlan`."""
+    """Returns a plan with a random character for each block between roads.
+
+    It contains fields of `CityPlan`.
+    """
     folder = resources.files("cns_drake.city.generation")
     text = folder.joinpath("characters.yaml").read_text(encoding="utf-8")
     templates = yaml.safe_load(text)
@@ -149,7 +152,7 @@ def starter_plan(areas: Areas, seed: int) -> dict:
 
 
 def starter_stages(city: City) -> dict:
-    """Returns two stages; the first one lacks the structures in the east."""
+    """Returns two stages; the first lacks buildings and trees in the east."""
     kinds = "building", "vegetation"
     standing = [s for s in city.structures if s.semantic_class in kinds]
     buildings = [s for s in standing if s.semantic_class == "building"]

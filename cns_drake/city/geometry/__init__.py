@@ -1,4 +1,4 @@
-"""Meshes and polygons, and the structures made of them."""
+"""Meshes, polygons, and structures made of meshes."""
 
 from cns_drake.city.geometry.mesh import (
     FOLDER,

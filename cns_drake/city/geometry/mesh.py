@@ -21,8 +21,8 @@ class Mesh:
 
     Attributes:
         vertices: (N, 3) float64 positions in the mesh frame [m].
-        faces: vertex indices (0-based) of each face, counter-clockwise seen
-            from outside; 3 or 4 per face. Quadrilaterals are plane and convex.
+        faces: 3 or 4 vertex indices (0-based) of each face, counter-clockwise
+            as seen from outside. Quadrilaterals are plane and convex.
     """
 
     vertices: np.ndarray
@@ -33,7 +33,10 @@ class Mesh:
         return sum(map(len, self.faces)) - 2 * len(self.faces)
 
     def triangles(self) -> np.ndarray:
-        """Returns the (M, 3) int32 vertex indices after fan triangulation."""
+        """Returns the faces as triangles: (M, 3) int32 vertex indices.
+
+        Quadrilaterals are divided into two triangles.
+        """
         corners = self._corners
         is_there = np.ones((len(corners), 2), dtype=bool)
         is_there[:, 1] = corners[:, 2] != corners[:, 3]
@@ -54,7 +57,7 @@ class Mesh:
         return corners[begin + np.minimum(np.arange(4), last)]
 
     def with_vertices(self, vertices: np.ndarray) -> Mesh:
-        """Returns the mesh with its vertices replaced by (N, 3) others [m]."""
+        """Returns the mesh with the same faces, but vertices (N, 3) [m]."""
         mesh = Mesh(vertices, self.faces)
         mesh.__dict__["_corners"] = self._corners
         return mesh
@@ -92,7 +95,7 @@ class Mesh:
 
 
 def merge_meshes(*meshes: Mesh) -> Mesh:
-    """Returns one mesh that holds the given ones."""
+    """Returns one mesh with the faces of all given meshes."""
     vertices, offset = [np.zeros((0, 3))], 0
     faces: list[tuple[int, ...]] = []
     for mesh in meshes:
@@ -117,7 +120,7 @@ FOLDER = Path(__file__).parents[1] / "object_meshes"
 
 
 def object_mesh(name: str) -> Mesh:
-    """Returns the shared object mesh with this name.
+    """Returns the shared object mesh with a given name.
 
     Raises:
         FileNotFoundError: there is no such mesh.
@@ -127,7 +130,7 @@ def object_mesh(name: str) -> Mesh:
 
 @cache
 def read_mesh(path: Path) -> Mesh:
-    """Returns the mesh in an OBJ file that the city generator wrote.
+    """Reads a mesh from an OBJ file that the city generator wrote.
 
     Raises:
         FileNotFoundError: there is no such file.

@@ -19,14 +19,14 @@ _Point = tuple[int, int]
 
 
 def triangulate(polygon: Polygon) -> np.ndarray:
-    """Returns a polygon as (M, 3, 2) counter-clockwise triangles [m].
+    """Divides a polygon into (M, 3, 2) counter-clockwise triangles [m].
 
-    Their vertices are those of the polygon, rounded to millimetres. All edges
-    of the polygon are edges of triangles.
+    The triangles have the vertices of the polygon, rounded to millimetres. All
+    edges of the polygon are edges of triangles.
 
     Args:
-        polygon: valid, also after rounding; holes may touch the outer ring and
-            each other in points.
+        polygon: a polygon that is valid, even after rounding. Holes may touch
+            the outer ring and each other in points.
 
     Raises:
         ValueError: the polygon turns out not to be valid.
@@ -175,7 +175,7 @@ def _is_between(p: _Point, q: _Point, c: _Point) -> bool:
 def cut_ears(
     ring: Sequence[_Point], fans: bool = False
 ) -> list[tuple[int, ...]]:
-    """Returns triangles that fill a ring, as indices of its corners.
+    """Divides a ring into triangles, given as indices of the ring's corners.
 
     The ring may touch itself. Unless `fans` is set, fans of thin triangles are
     avoided.
@@ -287,16 +287,16 @@ def hull_of(xy: np.ndarray) -> BaseGeometry:
 
 
 def placed(shape: Shape, xy: Sequence[float], yaw: float) -> Shape:
-    """Returns a shape turned about the origin by `yaw`, then moved by xy."""
+    """Returns a shape rotated about the origin by `yaw`, then moved by `xy`."""
     c, s = math.cos(yaw), math.sin(yaw)
     return affine_transform(shape, [c, -s, s, c, *xy])
 
 
 def polygons_of(geometry: BaseGeometry) -> list[Polygon]:
-    """Returns the polygons of a geometry without slivers, in fixed order.
+    """Returns the polygons of a geometry, except slivers, in fixed order.
 
-    They are in the order of the lower left corners of their bounds, which does
-    not depend on how the geometry was made.
+    They are sorted by the lower left corners of their bounding boxes, so that
+    the order does not depend on how the geometry was made.
     """
     parts = [
         part
@@ -307,7 +307,10 @@ def polygons_of(geometry: BaseGeometry) -> list[Polygon]:
 
 
 def tiles(geometry: BaseGeometry, size: float) -> Iterator[MultiPolygon]:
-    """Yields the part of a geometry in each square of a grid in W."""
+    """Yields the part of a geometry in each square of a grid in W.
+
+    `size` is the side of the squares [m].
+    """
     _, squares = _squares(geometry, size)
     pieces = shapely.intersection(geometry, squares)
     for piece in shapely.set_precision(pieces, _GRID):
@@ -335,10 +338,11 @@ def _squares(
 def surface_mesh(
     geometry: BaseGeometry, height: HeightMap | float, spacing: float = 0.0
 ) -> Mesh:
-    """Returns a mesh over polygons in W, at a height or on a height map [m].
+    """Returns a mesh over polygons in W, at one height or on a height map.
 
-    With a positive `spacing`, the polygons are first divided into squares of
-    this size [m], so that the mesh can follow a height map.
+    Heights are in [m]. With a positive `spacing`, the polygons are first
+    divided into squares of this size [m], so that the mesh can follow a height
+    map.
     """
     squares = np.zeros((0, 4, 2))
     pieces: list[BaseGeometry | None] = [geometry]
@@ -401,7 +405,8 @@ def wall_mesh(
 ) -> Mesh:
     """Returns vertical walls on the edges of polygons in W, facing inwards.
 
-    With `along`, only edges whose middle lies in this area get a wall.
+    The walls reach from the heights `bottom` to the heights `top` [m]. With
+    `along`, only edges whose middle lies in this area get a wall.
     """
     starts, ends = [], []
     for polygon in polygons_of(geometry):
@@ -463,10 +468,11 @@ def _are_planes(rings: np.ndarray, height: HeightMap | float) -> np.ndarray:
 
 
 class Occupancy:
-    """The ground that is taken, as a growing set of polygons in W.
+    """The occupied ground, as a growing set of polygons in W.
 
-    It is made for a few thousand polygons: one vectorised comparison of bounds
-    finds the candidates, and only these are checked exactly.
+    It is designed for a few thousand polygons: one vectorised comparison of
+    bounding boxes finds the candidates, and only the candidates are checked
+    exactly.
     """
 
     def __init__(self) -> None:
@@ -474,7 +480,7 @@ class Occupancy:
         self._bounds: np.ndarray = np.zeros((64, 4))
 
     def add(self, geometry: BaseGeometry) -> None:
-        """Marks the ground of a polygon as taken."""
+        """Marks the ground of a polygon as occupied."""
         count = len(self._geometries)
         if count == len(self._bounds):
             self._bounds = np.concatenate(
@@ -490,10 +496,10 @@ class Occupancy:
         clearance: float = 0.0,
         ignore: BaseGeometry | None = None,
     ) -> bool:
-        """Returns whether a polygon in W keeps clear of all taken ground.
+        """Returns whether a polygon in W keeps clear of all occupied ground.
 
-        With a clearance of 0, polygons may touch [m]. The taken polygon
-        `ignore` may be closer than the clearance, but may not be overlapped.
+        `clearance` is the least distance [m]; with 0, polygons may touch. The
+        occupied polygon `ignore` may be closer, but must not be overlapped.
         """
         x0, y0, x1, y1 = geometry.bounds
         taken = self._bounds[: len(self._geometries)]

@@ -1,4 +1,4 @@
-"""Structures: the named things of which a city consists, and their parts."""
+"""Structures: the named objects of which a city consists, and their parts."""
 
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
@@ -50,8 +50,8 @@ Shape = MeshShape | BoxShape | CylinderShape | SphereShape
 class Part:
     """One visual of a structure, at xyz and rpy in its frame S [m, rad].
 
-    Its name is unique within the structure, e.g. `storey_03`. Without `rgb`,
-    the part has the colour of the structure's class.
+    The part's name, e.g. `storey_03`, is unique within the structure. Without
+    `rgb`, the part has the colour of the structure's class.
     """
 
     name: str
@@ -63,9 +63,9 @@ class Part:
 
 @dataclass(frozen=True)
 class Model:
-    """What a builder returns: parts in S, and the meshes they use, by name.
+    """The shape of a structure: its parts in S, and name -> mesh.
 
-    The footprint is the ground area that the model needs, in S [m].
+    `footprint` is the ground area that the model needs, in S [m].
     """
 
     parts: tuple[Part, ...]
@@ -74,7 +74,7 @@ class Model:
 
     @property
     def num_triangles(self) -> int:
-        """Number of triangles of all parts; 12 for each part without mesh."""
+        """Number of triangles of all parts; 12 for a part without a mesh."""
         return sum(
             self.meshes[part.shape.mesh].num_triangles
             if isinstance(part.shape, MeshShape)
@@ -88,7 +88,7 @@ class Structure:
     """A named model, and the pose of its frame S in the world W [m, rad].
 
     The name is stable and unique in the city, e.g. `tower_017`. Tags are words
-    that the layout and the stages may use, such as the name of the block. The
+    for use by the layout and the stages, such as the name of the block. The
     semantic class is a key of `cns_drake.scene.semantics.CLASS_IDS`.
     """
 
@@ -116,7 +116,7 @@ class Structure:
     def p_WP(
         self, p_SP: tuple[float, float, float]
     ) -> tuple[float, float, float]:
-        """Returns the position in W of a point P that is given in S [m]."""
+        """Converts the position of a point P from S to W [m]."""
         c, s = math.cos(self.yaw), math.sin(self.yaw)
         x, y, z = p_SP
         return (
@@ -140,10 +140,10 @@ _ROUND_SIDES = 12
 
 @dataclass(frozen=True)
 class Builder:
-    """Makes objects of one kind, by `build(rng, **parameters) -> Model`.
+    """Makes objects of one kind with `build(rng, **parameters) -> Model`.
 
-    Every parameter has a default; most defaults are drawn from `rng`. The same
-    state of the generator gives the same model.
+    Every parameter has a default; most defaults are drawn at random from `rng`.
+    The same state of the random generator gives the same model.
     """
 
     semantic_class: str
@@ -161,7 +161,7 @@ def post(
 
     Args:
         name: name of the part.
-        radius: its radius [m].
+        radius: radius of the cylinder [m].
         height: height of its top above the ground [m].
         xy: position of its axis in the structure's frame [m].
         rgb: colour; by default the structure's.
@@ -187,7 +187,7 @@ def bar(
         name: name of the part.
         start: (3,) centre of one end in the structure's frame [m].
         end: (3,) centre of the other end [m].
-        radius: its radius [m].
+        radius: radius of the cylinder [m].
         rgb: colour; by default the structure's.
     """
     start, end = np.asarray(start, float), np.asarray(end, float)
@@ -215,9 +215,9 @@ def block(
 
     Args:
         name: name of the part.
-        size: its lengths along its own x, y and z [m].
-        center: (3,) its centre in the structure's frame [m].
-        yaw: its heading [rad].
+        size: lengths along the box's own x, y and z [m].
+        center: (3,) centre of the box in the structure's frame [m].
+        yaw: heading of the box [rad].
         rgb: colour; by default the structure's.
     """
     return Part(
@@ -230,7 +230,7 @@ def block(
 
 
 def triple(values: Iterable[float]) -> tuple[float, float, float]:
-    """Returns three values, such as those of an array, as a tuple of floats."""
+    """Converts three values, such as those of an array, to a float tuple."""
     x, y, z = values
     return float(x), float(y), float(z)
 
@@ -238,8 +238,8 @@ def triple(values: Iterable[float]) -> tuple[float, float, float]:
 def assemble(*parts: Part) -> Model:
     """Returns a model of the given parts, with their meshes.
 
-    The meshes are those of `object_meshes`. The footprint is the convex hull of
-    all geometry below `HEADROOM`.
+    The meshes are read from the shared `object_meshes`. The footprint is the
+    convex hull of all geometry below `HEADROOM`.
     """
     shapes = [part.shape for part in parts]
     names = [shape.mesh for shape in shapes if isinstance(shape, MeshShape)]
@@ -287,8 +287,8 @@ def part_triangles(
 ) -> tuple[np.ndarray, np.ndarray]:
     """Returns the vertices (N, 3) of a part in S, and its triangles (M, 3).
 
-    Round shapes become polyhedra that just contain them, so that a footprint
-    made from them is never too small.
+    Round shapes become polyhedra that just contain the shapes, so that a
+    footprint made from these polyhedra is never too small.
     """
     mesh = part_mesh(part, meshes)
     return mesh.vertices, mesh.triangles()

@@ -10,8 +10,9 @@ _UPWARDS = 0.05
 def long_normals(triangles: np.ndarray) -> np.ndarray:
     """Returns the cross products (M, 3) of two edges of triangles (M, 3, 3).
 
-    Each is a normal of the triangle, whose length is twice the area. For a few
-    triangles, this function is faster than `np.cross`.
+    Each result is a normal of its triangle, with a length of twice the
+    triangle's area. For a few triangles, this function is faster than
+    `np.cross`.
     """
     u = triangles[:, 1] - triangles[:, 0]
     v = triangles[:, 2] - triangles[:, 0]
@@ -32,12 +33,12 @@ def unit_normals(triangles: np.ndarray) -> np.ndarray:
 
 
 def looks_up(triangles: np.ndarray) -> np.ndarray:
-    """Returns (M,) which of the triangles (M, 3, 3) face upwards."""
+    """Returns (M,) bool: whether triangles (M, 3, 3) face upwards."""
     return np.asarray(unit_normals(triangles)[:, 2] > _UPWARDS)
 
 
 def turned_up(triangles: np.ndarray) -> np.ndarray:
-    """Returns the triangles (M, 3, 3), all turned to face upwards."""
+    """Returns triangles (M, 3, 3) with all of them turned to face upwards."""
     is_down = unit_normals(triangles)[:, 2] < 0.0
     return np.where(is_down[:, None, None], triangles[:, ::-1], triangles)
 
@@ -78,5 +79,5 @@ class UpperSides:
         return highest
 
     def hides(self, points: np.ndarray) -> np.ndarray:
-        """Returns (N,) which of the points (N, 3) lie below a surface."""
+        """Returns (N,) bool: whether points (N, 3) lie below a surface."""
         return np.asarray(self.heights(points[:, :2]) > points[:, 2])

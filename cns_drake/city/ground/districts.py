@@ -16,8 +16,8 @@ from cns_drake.city.plan.city_plan import CityPlan, DistrictPlan, PatchPlan
 class District(NamedTuple):
     """A district and its ground, in W [m].
 
-    `grounds` maps each kind of ground to its area; together these areas are
-    `area`. Terraces are patches that are level.
+    `grounds` maps each kind of ground to its area; together, these areas make
+    up `area`. Terraces are level patches.
     """
 
     plan: DistrictPlan
@@ -32,7 +32,7 @@ def share_out(
     """Returns the districts with their ground, in the order of the plan.
 
     `streets` is the area of carriageways, sidewalks and medians in W [m].
-    `source` is the name of the plan's file, which errors name.
+    `source` is the plan's file, named in error messages.
 
     Raises:
         InputError: if a block or area is outside the city or on ground that is

@@ -44,7 +44,7 @@ class Pad(NamedTuple):
 class LevelGround:
     """The ground of a city whose streets all have the same height [m].
 
-    Inside `pads` the ground has their height.
+    Inside the areas of `pads`, the ground has the heights of these pads.
     """
 
     height: float
@@ -59,15 +59,15 @@ class LevelGround:
 class SlopingGround:
     """The ground of a city with sloping streets, as a height over x and y.
 
-    Sidewalks follow their roads. Between the streets and level pads the height
+    Sidewalks follow their roads. Between the streets and level pads, the height
     is a harmonic field on a grid: each node has the mean height of its
-    neighbours. Nodes on streets and pads have given heights; at the rim of the
-    city the field is level across the rim.
+    neighbours. Nodes on streets and pads have given heights. At the edge of the
+    city, the field has no slope perpendicular to the edge.
 
     Within the reach R of a street or pad, at the distance d, the height is the
     mean of the field, with weight 1/R, and of the exact height of the street or
-    pad, with weight 1/d - 1/R (Shepard's interpolation). It thus meets their
-    edges without a step.
+    pad, with weight 1/d - 1/R (Shepard's interpolation). The ground thus meets
+    the edges of streets and pads without a step.
     """
 
     is_level = False
@@ -203,8 +203,8 @@ def make_ground(
             by place.
         streets: area of carriageways, sidewalks and medians in W [m].
         bounds: x0, y0, x1, y1 of the city in W [m].
-        pads: level areas outside the streets; of two that meet, the first one
-            takes precedence.
+        pads: level areas outside the streets. Where two of them meet, the first
+            one takes precedence.
     """
     if callable(kerb_height):
         return SlopingGround(surface, kerb_height, streets, bounds, pads)
@@ -214,7 +214,7 @@ def make_ground(
 
 
 def aprons(buildings: Iterable[Structure], streets: BaseGeometry) -> list[Pad]:
-    """Returns pads around buildings, in W, level with their floors."""
+    """Returns level pads in W around buildings, at the floors' heights."""
     kerbside = streets.buffer(_APRON)
     pads = []
     for building in buildings:
@@ -226,7 +226,7 @@ def aprons(buildings: Iterable[Structure], streets: BaseGeometry) -> list[Pad]:
 
 
 def relaxed(z: np.ndarray) -> np.ndarray:
-    """Returns a grid of heights [m] with its gaps (NaN) filled smoothly.
+    """Fills the gaps (NaN) in a grid of heights [m] smoothly.
 
     The height of every gap is the mean of its two to four neighbours, as in a
     harmonic field. At least one height must be given.

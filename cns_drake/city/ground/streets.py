@@ -60,7 +60,7 @@ _MEDIAN_RGB = (0.47, 0.55, 0.34)
 class Covering(NamedTuple):
     """Ground of one kind, and the name and colour of its structure.
 
-    Its area is in W [m].
+    `area` is in W [m].
     """
 
     name: str
@@ -76,10 +76,11 @@ class Covering(NamedTuple):
     def surface(
         self, height: HeightMap | float, spacing: float = 0.0
     ) -> Structure:
-        """Returns the upper side as a structure, with one part per tile.
+        """Returns the surface of the ground as a structure, one part per tile.
 
-        If the height is a map, the vertices are `spacing` apart [m]; with a
-        spacing of 0 there are only those of the polygons.
+        `height` is one height or a height map [m]. To follow a height map, give
+        the distance between vertices as `spacing` [m]; with 0, the surface has
+        only the vertices of the area's outline.
         """
         return self.structure(
             {
@@ -89,9 +90,10 @@ class Covering(NamedTuple):
         )
 
     def structure(self, pieces: dict[str, Mesh]) -> Structure:
-        """Returns the structure made of meshes that are given in W.
+        """Returns a structure of this kind, made of meshes given in W.
 
-        Meshes without faces, which come from slivers, are left out.
+        `pieces` maps the name of a part to its mesh. Meshes without faces,
+        which come from slivers, are left out.
         """
         pieces = {part: mesh for part, mesh in pieces.items() if mesh.faces}
         meshes = {f"{self.name}_{part}": mesh for part, mesh in pieces.items()}
@@ -130,8 +132,8 @@ def street_surfaces(
 ) -> list[Structure]:
     """Returns the structures of the ground of streets.
 
-    They are the carriageway, its coverings, kerbs, sidewalks and medians. Kinds
-    that these streets do not have are left out.
+    These are the carriageway, its coverings, kerbs, sidewalks and medians.
+    Structures without any area are left out.
 
     Args:
         areas: the areas of the streets in W [m].
@@ -163,7 +165,7 @@ def street_surfaces(
 
 
 def kerb_area(paved: BaseGeometry) -> MultiPolygon:
-    """Returns the kerb stones along a carriageway, both in W [m]."""
+    """Returns the area of the kerb stones along a carriageway, in W [m]."""
     grown = paved.buffer(_KERB_WIDTH, join_style="mitre")
     return MultiPolygon(polygons_of(snap(grown.difference(paved))))
 
@@ -186,7 +188,7 @@ def _heights(
 
 
 def kerb_height(network: RoadNetwork) -> float:
-    """Returns how far kerbs stand above the carriageway [m]."""
+    """Returns the height of kerbs above the carriageway [m]."""
     return max(road.kerb_height for road in network.roads.values())
 
 

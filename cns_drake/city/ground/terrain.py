@@ -107,7 +107,7 @@ def ground_structures(
 ) -> list[Structure]:
     """Returns the structures of the ground of all districts.
 
-    `shape` gives the height of everything except water.
+    `shape` defines all heights except that of the water, `water_level` [m].
     """
     structures = []
     # Land within water is a bridge, below which there is water.
@@ -212,7 +212,8 @@ def bridge_structures(
 
     There is a bridge where a street crosses a district of water, and where such
     a district has a patch of land. The street or the patch is the upper side of
-    the bridge. `shape` gives the height of everything except water.
+    the bridge. `shape` defines all heights except that of the water,
+    `water_level` [m].
     """
     structures = []
     for district in districts:

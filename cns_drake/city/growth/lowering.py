@@ -1,7 +1,7 @@
 """Makes a building as it was before its upper storeys were added.
 
-The part below the height stays as it is, to the millimetre, so that the street
-shows the same front. It gets a new roof.
+The part below the new height stays unchanged, to the millimetre, so that the
+street front looks the same. The building gets a new roof.
 """
 
 from collections.abc import Sequence
@@ -46,12 +46,13 @@ _Point = list[float]
 
 
 def lowered(model: Model, height: float, name: str, seed: int) -> Model:
-    """Returns a building that ends at a height, with a flat roof.
+    """Returns a building cut off at a height, with a flat roof.
 
-    The roof is at `height` above the building's own ground [m]. Its parapet and
-    its equipment, which `seed` draws, reach higher. The names of new meshes
-    begin with `name`. The model itself is returned if less than a storey of it
-    lies above `height`, or if its walls enclose nothing there.
+    The roof is at `height` above the building's own ground [m]. The parapet and
+    the roof equipment reach higher; `seed` is the seed of the equipment. The
+    names of new meshes begin with `name`. The model is returned unchanged if
+    less than a storey lies above `height`, or if its walls enclose no area at
+    this height.
     """
     if top_of(model) < height + _STOREY:
         return model
@@ -96,9 +97,9 @@ def top_of(model: Model) -> float:
 def cut_at(mesh: Mesh, height: float) -> tuple[Mesh, np.ndarray]:
     """Returns the part of a mesh below a height [m], and the edges of the cut.
 
-    The part is open at the cut. The mesh must have plane, convex faces. The
-    edges are (N, 2, 2): start and end of the segment in which the cut meets
-    each face [m]. The back of the face is on the left of the segment.
+    The part is open at the cut. The mesh must have plane, convex faces. An edge
+    is the segment in which the cut meets a face; (N, 2, 2) are the start and
+    the end of each edge [m]. The back of the face is on the left of the edge.
     """
     corners: list[_Point] = []
     faces: list[tuple[int, ...]] = []
@@ -154,11 +155,11 @@ def _clipped(
 
 
 def enclosed(edges: np.ndarray) -> MultiPolygon:
-    """Returns the area on the left of the cut edges (N, 2, 2) of walls [m].
+    """Returns the area that cut walls enclose: left of edges (N, 2, 2) [m].
 
     The polygons have holes for courtyards, and coordinates in whole
-    millimetres. They include reveals, and the gaps between walls and what
-    stands in front of them.
+    millimetres. They include reveals, and gaps between walls and objects in
+    front of the walls.
     """
     edges = edges[np.ptp(edges, axis=1).max(axis=1) > 0.001]
     lines = shapely.linestrings(edges)

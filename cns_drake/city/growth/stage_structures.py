@@ -1,6 +1,6 @@
-"""The structures of a city at each of its stages.
+"""The structures of a city in each of its stages.
 
-At earlier stages, plants are younger, buildings are lower or under
+In earlier stages, plants are younger, buildings are lower or under
 construction, or their lots have another use.
 """
 
@@ -48,7 +48,7 @@ def younger(model: Model, height: float) -> Model:
 
 
 def scaled(model: Model, share: float) -> Model:
-    """Returns a plant scaled to a share of its size."""
+    """Returns a plant scaled by the factor `share`."""
 
     def times(values: tuple[float, ...], digits: int) -> list[float]:
         return np.round(np.multiply(values, share), digits).tolist()
@@ -84,7 +84,7 @@ def building_site(model: Model, height: float, name: str, seed: int) -> Model:
     stays within the building's footprint.
 
     Raises:
-        ValueError: there is no room for a frame.
+        ValueError: the footprint has no room for a frame.
     """
     lot = largest_rectangle(model.footprint)
     x0, y0, x1, y1 = lot.bounds
@@ -124,9 +124,9 @@ def _beside(part: Part, xy: tuple[float, float]) -> Part:
 def largest_rectangle(footprint: BaseGeometry) -> Polygon:
     """Returns a large axis-aligned rectangle that lies within a footprint.
 
-    It is the largest one if all edges of the footprint are axis-aligned.
-    Otherwise it is the largest one whose sides pass through corners of the
-    footprint.
+    If all edges of the footprint are axis-aligned, it is the largest possible
+    rectangle. Otherwise it is the largest rectangle whose sides pass through
+    corners of the footprint.
     """
     corners = shapely.get_coordinates(footprint.simplify(0.05))
     xs, ys = (_spread(np.unique(np.round(c, 3))) for c in corners.T)
@@ -177,8 +177,9 @@ def lot_objects(
 ) -> Iterator[Structure]:
     """Yields the structures on a lot before its building is built.
 
-    The names of the structures begin with that of the building. `cars` maps
-    parked cars to their weights in the random choice.
+    `structure` is the building, and `use` the earlier use of its lot. The names
+    of the yielded structures begin with the name of the building. `cars` maps
+    kinds of parked cars to their weights in the random choice.
     """
     footprint = structure.model.footprint
     if use == "empty" or footprint.area < _SMALLEST:
@@ -232,11 +233,11 @@ def _places(
 
 
 class GrowingCity:
-    """A city at all of its stages.
+    """A city in all of its stages.
 
-    Its structures are first those of the whole city, then the objects on lots
-    that are not built on yet. The instance id of a structure is its number in
-    this order, counted from 1. It is the same at all stages.
+    Its structures are first the structures of the whole city, and then the
+    objects on lots that are not built on yet. The instance id of a structure is
+    its number in this order, counted from 1, and is the same in all stages.
     """
 
     def __init__(
@@ -267,8 +268,8 @@ class GrowingCity:
 
         Raises:
             KeyError: if there is no such stage.
-            ValueError: if a structure cannot be lower, or under construction,
-                as asked.
+            ValueError: if a structure cannot be lower, or cannot be under
+                construction, as the stage demands.
         """
         absent = self._stages.absent(stage)
         heights = self._stages.heights(stage)

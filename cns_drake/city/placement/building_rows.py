@@ -1,4 +1,4 @@
-"""Places buildings at given places and in rows along the streets."""
+"""Places single buildings, and rows of buildings along streets."""
 
 from dataclasses import dataclass, field
 import math
@@ -57,8 +57,8 @@ def place_buildings(draft: Draft, district: District) -> None:
     """Adds a district's single buildings, then its rows, to a draft.
 
     Raises:
-        InputError: if a single building has no room, or an archetype cannot be
-            built in the size that the plan gives.
+        InputError: if there is no space for a single building, or an archetype
+            cannot be built in the planned size.
     """
     name = district.plan.name
     draft.open_range()

@@ -1,4 +1,4 @@
-"""A city under construction: the structures placed so far."""
+"""A city being built: the structures placed so far."""
 
 from collections import Counter
 from collections.abc import Iterable
@@ -50,13 +50,13 @@ class Draft:
     All areas and heights are in W [m].
 
     Attributes:
-        streets: area of the streets, sidewalks included.
+        streets: area of the streets, including sidewalks.
         frontage: lines along which buildings stand.
         base: height of sidewalks and of the ground between them, before
-            buildings and relief change it.
+            buildings and relief change this ground.
         ground: upper sides of the finished ground; set once the buildings
             stand.
-        source: name of the plan's file, which errors name.
+        source: file of the plan, named in error messages.
     """
 
     def __init__(
@@ -80,25 +80,28 @@ class Draft:
         self._lanes.add(areas.lane_area)
 
     def rng(self, *words: str | int) -> np.random.Generator:
-        """Returns the random generator of the task with this name.
+        """Returns the random generator of a task, whose name is `words`.
 
-        Every task has a generator of its own, so that a change in one district
-        does not change the random draws in others.
+        Every task has its own generator, so that a change in one district does
+        not change the random draws in other districts.
         """
         key = "/".join(map(str, words)).encode()
         return np.random.default_rng([self.plan.seed, zlib.crc32(key)])
 
     def task(self, *words: str | int) -> np.random.Generator:
-        """Starts a task, see `open_range`; returns its generator, see `rng`."""
+        """Starts a task with the name `words`; returns its random generator.
+
+        See `rng` for the generator, and `open_range` for names in the task.
+        """
         self.open_range()
         return self.rng(*words)
 
     def open_range(self) -> None:
-        """Lets the names of the next task begin with a new range of numbers.
+        """Starts a new range of numbers for the names of the next task.
 
-        House numbers, too, begin anew in each street. The lists of the stages
-        refer to names. With ranges, one object more or less in a task does not
-        rename the objects of later tasks.
+        `stages.yaml` refers to structures by name. Thanks to the ranges, one
+        object more or less in a task does not rename the objects of later
+        tasks, just as house numbers begin anew in each street.
         """
         for kind, count in self._counts.items():
             self._counts[kind] = -(-count // _RANGE) * _RANGE
@@ -114,21 +117,22 @@ class Draft:
         clearance: float = 0.0,
         ignore: BaseGeometry | None = None,
     ) -> bool:
-        """Returns whether an area in W is off the lanes and not taken.
+        """Returns whether an area in W is off the lanes and not occupied.
 
-        The clearance applies to taken ground, not to lanes [m]. The taken area
-        `ignore` may be closer than the clearance, but may not be overlapped.
+        `clearance` is the least distance from occupied ground [m]; it does not
+        apply to lanes. The occupied area `ignore` may be closer, but must not
+        be overlapped.
         """
         return self._lanes.is_free(area) and self._occupancy.is_free(
             area, clearance, ignore
         )
 
     def take(self, area: BaseGeometry) -> None:
-        """Marks an area in W as taken: no later object is placed there."""
+        """Marks an area in W as occupied: no later object is placed there."""
         self._occupancy.add(area)
 
     def add_building(self, structure: Structure) -> None:
-        """Adds a building, on ground that has already been taken."""
+        """Adds a building on ground that is already marked as occupied."""
         self.structures.append(structure)
         self._walls.add(structure.footprint_W)
 
@@ -145,10 +149,10 @@ class Draft:
         crown_part: float = 0.0,
         within: BaseGeometry | None = None,
     ) -> Structure | None:
-        """Places an object on the finished ground; None if there is no room.
+        """Places an object on the finished ground; returns None without room.
 
-        An object without room uses up a name as well, so that the names of
-        others do not depend on whether it fits.
+        Even if there is no room for the object, its name is used up, so that
+        the names of later objects do not depend on whether it fits.
 
         Args:
             name: key of `OBJECTS`.

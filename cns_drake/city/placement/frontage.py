@@ -28,9 +28,10 @@ _SHORT = 0.25
 class Lot(NamedTuple):
     """A rectangle of ground for one building; its front faces the street.
 
-    (x, y) is the middle of the lot in W, the origin of its frame S. The x axis
-    of S runs along the front, and its y axis points away from the street; `yaw`
-    is its heading in W [rad]. Width and depth are along these axes [m].
+    (x, y) is the centre of the lot in W [m] and the origin of its frame S. The
+    x axis of S runs along the front, and the y axis points away from the
+    street; `yaw` is the heading of S in W [rad]. `width` is along x, and
+    `depth` along y [m].
     """
 
     x: float
@@ -64,8 +65,8 @@ def lines_along(
 ) -> list[LineString]:
     """Returns the lines within an area, at a distance from the streets [m].
 
-    The lines are divided at corners into smooth pieces, in fixed order. The
-    street is on the right of each piece.
+    The lines are divided at corners into smooth pieces. The order of the pieces
+    is always the same, and the street is on the right of each piece.
     """
     edge = streets.buffer(distance, quad_segs=_QUAD_SEGMENTS).boundary
     cut = shapely.set_precision(edge.intersection(within), 0.001)
@@ -94,9 +95,9 @@ def station_at(line: LineString, s: float) -> Station:
 def lot_at(
     line: LineString, start: float, width: float, depth: float
 ) -> Lot | None:
-    """Returns the lot whose front begins at an arc length of a line [m].
+    """Returns the lot whose front begins at `start` along a line [m].
 
-    It is None if the line ends within the lot or bends too much.
+    The result is None if the line ends within the lot or bends too much.
     """
     end = start + width
     if end > line.length + 1e-6:

@@ -12,7 +12,7 @@ from cns_drake.city.plants.vegetation import TREES
 
 
 def pick(weights: Mapping[str, float], rng: np.random.Generator) -> str:
-    """Returns a key at random; `weights` gives the weight of each."""
+    """Returns a random key of `weights`, which maps keys to weights."""
     names = list(weights)
     p = np.array([weights[name] for name in names])
     return names[int(rng.choice(len(names), p=p / p.sum()))]

@@ -38,7 +38,8 @@ def furnish(draft: Draft, district: District) -> None:
     """Places a district's objects, lines, parked cars and scattered plants.
 
     Raises:
-        InputError: if a single object has no room.
+        InputError: if there is no room for an object that the plan lists
+            singly.
     """
     plan = district.plan
     draft.open_range()
@@ -147,11 +148,11 @@ def place_car(
     """Places a parked car if there is room for it.
 
     Args:
-        draft: the city so far, which gets the car.
+        draft: the city so far, to which the car is added.
         cars: name of a car -> its weight in the random choice.
-        xy: position of its middle in W [m].
-        yaw: its heading [rad].
-        rng: draws the car.
+        xy: position of the car's centre in W [m].
+        yaw: heading of the car [rad].
+        rng: random generator for the choice of the car.
         tags: tags of the structure.
     """
     name = pick(cars, rng)

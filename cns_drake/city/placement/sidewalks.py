@@ -31,7 +31,7 @@ _SIGNS = ("sign_round", "sign_rectangular", "sign_triangular")
 
 
 def furnish_junctions(draft: Draft, network: RoadNetwork) -> None:
-    """Places traffic lights, then signs, at the arms of all junctions."""
+    """Places traffic lights and then signs at all junctions."""
     for junction in network.junctions.values():
         rng = draft.task("junction", junction.name)
         for arm in junction.arms:

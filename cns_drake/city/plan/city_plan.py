@@ -266,7 +266,7 @@ class DistrictPlan(_Model):
         block: `[x, y]` of a point [m]. The district fills the block between
             streets that contains this point. Give `block`, `area` or neither.
         area: corners of the district [m]. A district with neither `block` nor
-            `area` takes all ground that no other district has.
+            `area` gets all ground that belongs to no other district.
         ground: kind of ground of the district.
         relief: height of the swells of its lawns [m]; 0 for level ground.
         relief_margin: distance from paths and buildings over which the swells
@@ -279,7 +279,7 @@ class DistrictPlan(_Model):
         lines: objects along lines.
         scatter: objects scattered at random.
         street: objects on the sidewalks in front of the district; by default
-            those of the city.
+            the field `street` of the city.
     """
 
     name: str = Field(pattern=r"^[a-z][a-z0-9_]*$")
@@ -355,7 +355,7 @@ class CityPlan(_Model):
 
 
 def load_plan(path: Path) -> CityPlan:
-    """Returns the plan in a file `city.yaml`.
+    """Reads the plan of a city from a file `city.yaml`.
 
     Raises:
         InputError: if it cannot be read or has a wrong key or type.

@@ -1,4 +1,4 @@
-"""The stages of a city: what each one lacks of the whole city."""
+"""The stages of a city: how each one differs from the whole city."""
 
 from collections.abc import Collection, Iterable, Mapping
 from fnmatch import fnmatchcase
@@ -19,14 +19,15 @@ class _Model(BaseModel):
 
 
 class Growth(_Model):
-    """Structures that are not as high yet as in the next stage.
+    """Structures that are not yet as high as in the next stage.
 
     Attributes:
         height: height of these structures at this stage, measured from the
             ground below them [m].
         structures: names of the structures, as in `structures.csv`. `*` stands
             for any text and `?` for any letter.
-        but: names of structures to exclude again.
+        but: names of structures to which this does not apply, although they are
+            in `structures`.
     """
 
     height: float = Field(gt=2.0, allow_inf_nan=False)
@@ -40,14 +41,15 @@ class Stage(_Model):
     Attributes:
         story: text that says what a visitor would see change until the next
             stage.
-        absent: structures that this stage lacks and the next stage has: lists
-            of names, each list under a heading of your choice. The last stage
-            has none.
+        absent: structures that exist in the next stage but not in this one:
+            lists of names, each list under a heading of your choice. Not in the
+            last stage.
         lower: buildings and plants that are lower than in the next stage, under
-            headings of your choice. The last stage has none.
-        sites: buildings that are under construction at this stage only, under
-            headings of your choice. Each is a frame of the given height with
-            scaffolds and a crane, and needs a lot of 16 m by 16 m.
+            headings of your choice. Not in the last stage.
+        sites: buildings that are under construction in this stage only, under
+            headings of your choice. Each is shown as a frame of the given
+            height with scaffolds and a crane, and needs a lot of at least 16 m
+            by 16 m.
     """
 
     story: str
@@ -57,26 +59,27 @@ class Stage(_Model):
 
 
 class Stages(_Model):
-    """The file `stages.yaml`: how the city looked at each stage.
+    """The file `stages.yaml`: how the city looked in each stage.
 
     The last stage is the whole city. Each earlier stage lists only what the
     next stage adds or raises. A stage therefore has all structures of the stage
-    before, and none of them is lower. The only exception is what fills an empty
-    lot, such as a market: it goes when the lot is built on.
+    before, and none of these structures is lower. The only exception are
+    temporary objects on an empty lot, such as a market, which are removed when
+    the lot is built on.
 
     Attributes:
         stages: stages by number, in ascending order. A number has two digits in
             quotes, such as `"01"`.
-        lots: buildings by the use that their lots have until they are built:
-            `car_park`, `market`, `garden`, `yard` or `empty`. By default the
-            use of a lot depends on its size.
+        lots: use of a lot before its building exists (`car_park`, `market`,
+            `garden`, `yard` or `empty`) and names of the buildings with this
+            use. By default the use of a lot depends on its size.
     """
 
     stages: dict[StageName, Stage]
     lots: dict[LotUse, list[str]] = Field(default_factory=dict)
 
     def absent(self, stage: str) -> set[str]:
-        """Returns the names of all structures that a stage lacks.
+        """Returns the names of all structures that do not exist in a stage.
 
         Raises:
             KeyError: if there is no such stage.
@@ -89,7 +92,7 @@ class Stages(_Model):
         }
 
     def heights(self, stage: str) -> dict[str, float]:
-        """Returns name -> height of the structures lower at a stage [m].
+        """Returns name -> height [m] of the structures lower in a stage.
 
         Raises:
             KeyError: if there is no such stage.
@@ -103,7 +106,7 @@ class Stages(_Model):
         return heights
 
     def sites(self, stage: str) -> dict[str, float]:
-        """Returns the height of each building site at a stage, by name [m]."""
+        """Returns name -> height [m] of the building sites in a stage."""
         return {
             name: group.height
             for group in self.stages[stage].sites.values()
@@ -121,10 +124,11 @@ class Stages(_Model):
 def load_stages(
     path: Path, structures: Collection[str], text: str | None = None
 ) -> Stages:
-    """Returns the stages of `stages.yaml`, checked against all structures.
+    """Reads `stages.yaml`, and checks it against the city's structures.
 
-    `text` is the new content of the file; by default the file is read. Patterns
-    are replaced by the names that they match.
+    `structures` contains the names of all structures. `text` replaces the
+    content of the file; by default the file is read. Patterns are replaced by
+    the names that they match.
 
     Raises:
         InputError: if the file cannot be read, has a wrong key or type, its

@@ -19,7 +19,7 @@ from cns_drake.city.geometry import (
 
 @dataclass(frozen=True)
 class Species:
-    """A species of tree, with the range of heights of planted ones [m].
+    """A species of tree, with the range of heights of planted trees [m].
 
     People can walk under `street` trees: their crowns start at 2.5 m or higher.
     """
@@ -47,7 +47,7 @@ STREET_TREES = tuple(name for name, kind in SPECIES.items() if kind.street)
 
 
 def mesh_names(species: str, variant: int) -> tuple[str, str]:
-    """Returns the names of the meshes of a variant: its wood and its leaves."""
+    """Returns the names of a variant's meshes: those of wood and of leaves."""
     stem = f"{species}_{string.ascii_lowercase[variant]}"
     return f"{stem}_wood", f"{stem}_crown"
 
@@ -61,9 +61,9 @@ def tree(
 ) -> Model:
     """Returns one tree; parameters that are not given are drawn at random.
 
-    The `height` of its top must be within the species' range, so that street
-    trees have the promised clearance below the crown [m]. `variant` is the
-    number of the mesh variant.
+    `height` is the height of the tree's top [m]. It must be within the species'
+    range, so that street trees have enough clearance below their crowns.
+    `variant` is the number of the mesh variant.
     """
     kind = SPECIES[species]
     drawn_height = rng.uniform(*kind.height_range)

@@ -1,1 +1,4 @@
-"""Adds details to an imported city's bare shapes, by tags and at random."""
+"""Adds details to the plain shapes of an imported city.
+
+The details follow from tags in the file and are otherwise random.
+"""

@@ -1,4 +1,4 @@
-"""Dresses a city: details on its buildings and along its streets.
+"""Dresses a city: adds details to its buildings and along its streets.
 
 It also records which structures were added.
 """
@@ -55,7 +55,10 @@ _LET_IN = 2.0
 
 @dataclass(frozen=True)
 class Bare:
-    """A building by its surfaces, (M, 3, 3) triangles each [m]."""
+    """An imported building: its surfaces without details, and its style.
+
+    Walls, roof and all other surfaces are triangles (M, 3, 3) [m].
+    """
 
     one: Imported
     walls: np.ndarray
@@ -70,7 +73,10 @@ class Bare:
 def all_laid_bare(
     buildings: Sequence[Imported], ground: Ground, seed: int
 ) -> list[Bare]:
-    """Returns all buildings by surfaces; variants share a building's style."""
+    """Returns all buildings as `Bare`, split into walls, roof and the rest.
+
+    Variants of a building have the same style.
+    """
     found = []
     styles: dict[str, Style] = {}
     for one in sorted(buildings, key=lambda one: one.original != ""):
@@ -123,7 +129,7 @@ _BEFORE, _BELOW_TOP = 0.3, 0.3
 
 
 class DriveViews:
-    """Places on drives, from which visible walls are found."""
+    """Viewpoints on drives, from which visible walls are found."""
 
     def __init__(
         self,
@@ -149,20 +155,20 @@ class DriveViews:
             TriangleMesh(self._scene, (solids - self._middle).astype("f4"))
 
     def are_near(self, limits: np.ndarray, distance: float) -> np.ndarray:
-        """Returns which of N boxes are within a distance of a drive [m].
+        """Returns (N,) bool: whether boxes are within a distance of a drive.
 
-        `limits` (N, 2, 2) are their least and greatest x and y [m]. Each box is
-        taken as the circle around it.
+        The distance is in [m]. `limits` (N, 2, 2) are the least and greatest x
+        and y of each box [m]. A box is treated as the circle around it.
         """
         middles = limits.mean(axis=1)
         reach = np.linalg.norm(limits[:, 1] - middles, axis=1)
         return np.asarray(self._tree.query(middles)[0] <= reach + distance)
 
     def distances(self, panels: Sequence[Panel], most: float) -> np.ndarray:
-        """Returns (N,) distances from panels to the nearest place seeing them.
+        """Returns (N,) distances from panels to drives that see them [m].
 
-        These places lie on the drives [m]. The distance is infinite if no place
-        within `most` sees the panel.
+        A distance is that to the nearest viewpoint that sees the panel. It is
+        infinite if no viewpoint within `most` [m] sees the panel.
         """
         pairs = [self._looks(panel, most) for panel in panels]
         counts = [len(distance) for _, distance in pairs]
@@ -229,10 +235,10 @@ _NO_TRIANGLES = np.zeros((0, 3, 3))
 
 @dataclass(frozen=True)
 class DressedBuildings:
-    """Dressed buildings by the bare ones, and counts of their details.
+    """Original building -> building with details, and counts of the details.
 
-    `at_random` counts added details by kind. `by_file` counts buildings by the
-    kind of look that the file gives.
+    `at_random` counts random details by kind. `by_file` counts buildings for
+    which the file contains an appearance, by its kind.
     """
 
     buildings: Mapping[Imported, Imported]
@@ -252,8 +258,8 @@ def dress_buildings(
     """Returns the buildings of a city with windows, doors and shops.
 
     A building looks the same in each stage and each import, since its random
-    draws depend on its name. The drives only decide which walls get windows:
-    those near them. Doors and shops face streets.
+    draws depend on its name. Only walls near a drive get windows. Doors and
+    shops face streets.
 
     Args:
         structures: the structures of the city, of which the buildings are
@@ -262,10 +268,10 @@ def dress_buildings(
         streets: the streets that doors and shops face.
         ground: the ground on which buildings stand.
         seed: seed of all random draws.
-        always: structures that stand in all stages and hide what is behind
-            them; all structures if None.
-        paving: triangles (M, 3, 3) of terrain, streets and sidewalks, above
-            which doors stand [m].
+        always: structures that exist in all stages and so hide what is behind
+            them; None for all structures.
+        paving: triangles (M, 3, 3) of terrain, streets and sidewalks, on which
+            doors stand [m].
     """
     buildings = [one for one in structures if one.kind.startswith("Building")]
     bare = all_laid_bare(buildings, ground, seed)
@@ -410,11 +416,12 @@ def _seen(
 
 @dataclass(frozen=True)
 class Dressing:
-    """A dressed city, what was added to it, and its ground if guessed.
+    """A dressed city, and what was added to it.
 
-    `origins` maps the names of structures to `dressed` or `lot`; all others are
-    as in the file. `facts` counts parts from the file and at random. `bottom`
-    is the guessed ground with its class and colour.
+    `origins` maps the names of changed or added structures to `dressed` or
+    `lot`; all other structures are as in the file. `facts` contains counts of
+    parts from the file and of random parts. `bottom` contains the ground with
+    class and colour if the file has no terrain.
     """
 
     city: StagedCity
@@ -432,8 +439,8 @@ def dress_city(
 ) -> Dressing:
     """Returns a city with details on its buildings and along its streets.
 
-    Objects of the file that find a place are removed from the faults of the
-    city.
+    Small objects of the file that were counted as left out, but get a place
+    here, are removed from the faults of `city`.
 
     Args:
         staged: the structures of each stage.

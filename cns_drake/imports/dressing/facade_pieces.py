@@ -1,6 +1,6 @@
 """Walls and roofs with details for imported buildings.
 
-A wall is divided into storeys and bays, which are filled like those of
+A wall is divided into storeys and bays, which get the same details as those of
 generated buildings. A roof gets equipment or chimneys.
 """
 
@@ -60,8 +60,9 @@ _ON_GROUND = 0.6
 class Opening(NamedTuple):
     """A window or a door in a wall, in the coordinates of its panel [m].
 
-    `row` is its storey, and `nth` the number of its bay, counted from the
-    nearer end of the wall. The kind is `window`, `shop`, `door` or `gate`.
+    `row` is the number of the storey, and `nth` the number of the bay, counted
+    from the nearer end of the wall. `kind` is `window`, `shop`, `door` or
+    `gate`.
     """
 
     row: int
@@ -79,12 +80,12 @@ class FacadePlan:
 
     Attributes:
         panel: the wall.
-        style: the style of its building.
-        openings: its windows and doors.
+        style: the style of the building.
+        openings: the wall's windows and doors.
         floor, ground: heights of the lowest floor, and of the ground in front,
-            in the panel [m].
-        to_drive: distance of the nearest drive [m].
-        top_is_free: whether no building touches its upper edge.
+            in panel coordinates [m].
+        to_drive: distance from the wall to the nearest drive [m].
+        top_is_free: whether no building touches the wall's upper edge.
     """
 
     panel: Panel
@@ -106,15 +107,18 @@ class FacadePlan:
         return [o for o in self.openings if o.row == 0 and on_ground]
 
     def is_in_the_way(self, z: float, reach: float) -> bool:
-        """Returns whether a part at height z would block a car on a drive [m].
+        """Returns whether a part at height z [m] would block a car on a drive.
 
-        The part extends out of the wall by `reach`.
+        The part protrudes from the wall by `reach` [m].
         """
         is_low = z - self.ground < _TALLEST_CAR
         return is_low and self.to_drive < reach + _BESIDE
 
     def probes(self) -> np.ndarray:
-        """Returns points (N + 1, 3) in front of each opening and the top."""
+        """Returns points (N + 1, 3) in front of each opening and the top.
+
+        A wall or opening is hidden if its point cannot be seen.
+        """
         panel = self.panel
         at = [((o.x0 + o.x1) / 2, (o.z0 + o.z1) / 2) for o in self.openings]
         at.append((panel.length / 2, panel.height - _FROM_FOOT))
@@ -122,11 +126,11 @@ class FacadePlan:
         return panel.place(x, z, _BEFORE)
 
     def threshold(self, door: Opening, paving: upper_sides.UpperSides) -> float:
-        """Returns the height of a door's threshold, in the panel [m].
+        """Returns the height of a door's threshold, in panel coordinates [m].
 
         The threshold is one step above the highest paving in front of the door
-        and in its recess. Paving that is far above or below the ground does not
-        count.
+        and in the door's recess. Paving far above or below the ground is
+        ignored.
         """
         depths = {"shop": _SHOP_DEPTH, "gate": _GATE_DEPTH}
         deep = depths.get(door.kind, self.style.depth + _DOOR_DEEPER)
@@ -141,9 +145,9 @@ class FacadePlan:
         return max((low if is_near else self.ground) + _THRESHOLD, 0.0)
 
     def without(self, is_hidden: np.ndarray) -> FacadePlan:
-        """Returns the plan without openings whose probes are hidden.
+        """Returns the plan without hidden openings.
 
-        `is_hidden` (N + 1,) is as long as `probes`.
+        `is_hidden` (N + 1,) says which of the points `probes` are hidden.
         """
         pairs = zip(self.openings, is_hidden[:-1], strict=True)
         return replace(
@@ -156,14 +160,14 @@ class FacadePlan:
 def plan_facade(
     panel: Panel, style: Style, base: float, ground: float, to_drive: float
 ) -> FacadePlan:
-    """Returns the plan of a wall that is full of windows.
+    """Returns a plan with a window in each bay and storey of a wall.
 
     Args:
         panel: the wall.
-        style: the style of its building.
+        style: the style of the building.
         base: height of the lowest floor of the building [m].
         ground: height of the ground in front of the panel [m].
-        to_drive: distance of the nearest drive [m].
+        to_drive: distance from the wall to the nearest drive [m].
     """
     floor, ground = base - panel.origin[2], ground - panel.origin[2]
     cells = bays.stretches(panel.length, style.pitch, _MARGIN)
@@ -188,7 +192,10 @@ def plan_facade(
 
 
 def with_shops(plan: FacadePlan, paving: upper_sides.UpperSides) -> FacadePlan:
-    """Returns a plan with shop windows on the ground floor."""
+    """Returns the plan with shop windows on the ground floor, where possible.
+
+    `paving` is the paving in front of the wall.
+    """
     top = plan.floor + plan.style.storey - 0.75
     top = min(top, plan.ground + _SHOP_HEIGHT)
     street, openings = set(plan.on_street), []
@@ -203,7 +210,10 @@ def with_shops(plan: FacadePlan, paving: upper_sides.UpperSides) -> FacadePlan:
 
 
 def with_doors(plan: FacadePlan, paving: upper_sides.UpperSides) -> FacadePlan:
-    """Returns a plan with doors instead of windows on the ground floor."""
+    """Returns the plan with doors in place of some ground-floor windows.
+
+    `paving` is the paving in front of the wall.
+    """
     street = plan.on_street
     if not street or any(o.kind == "shop" for o in street):
         return plan
@@ -262,7 +272,7 @@ _EXACT, _LEAST_AREA = 1e-3, 1e-4
 def add_facade(
     out: Assembly, plan: FacadePlan, rng: np.random.Generator
 ) -> Counter[str]:
-    """Adds all parts of a wall; returns the number of each kind of part."""
+    """Adds all parts of a wall to `out`; returns kind of part -> number."""
     counts: Counter[str] = Counter()
     panel, style = plan.panel, plan.style
     has_balconies = style.balconies and bool(rng.random() < 0.6)
@@ -513,7 +523,7 @@ def is_flat_roof(roof: np.ndarray) -> bool:
 def add_roof_pieces(
     out: Assembly, roof: np.ndarray, style: Style, is_flat: bool
 ) -> None:
-    """Adds equipment to a roof with upper sides (M, 3, 3) [m]."""
+    """Adds equipment or chimneys to a roof of triangles (M, 3, 3) [m]."""
     items = _ITEMS.get(style.use, "").split()
     if is_flat and items and (found := _largest_level(roof)) is not None:
         area, z = found

@@ -52,7 +52,7 @@ _GRID = 0.001
 
 
 def is_dense(structures: Sequence[Imported]) -> bool:
-    """Returns whether buildings cover a large part of their city."""
+    """Returns whether buildings cover a large part of the city's area."""
     outlines = [
         one.structure.model.footprint
         for one in structures
@@ -127,10 +127,10 @@ def missing_sidewalks(
     streets: Sequence[Street],
     drives: Sequence[WaypointDrive],
 ) -> Iterator[Imported]:
-    """Yields sidewalks near drives that the file does not have.
+    """Yields sidewalks near drives that are missing in the file.
 
-    They are those of streets whose tags do not mention any. The ground must be
-    level.
+    They belong to streets whose tags do not mention sidewalks. The ground must
+    be level.
     """
     paths = MultiLineString([drive.path for drive in drives])
     near = [
@@ -210,8 +210,8 @@ def guessed_streets(
 ) -> Iterator[Imported]:
     """Yields a carriageway and sidewalks along drives, on the ground.
 
-    It is for a city without roads, whose drives are in the middle of its
-    streets.
+    Use it for a city whose file has no roads: its drives are assumed to be in
+    the middle of the streets.
     """
     paths = MultiLineString([drive.path for drive in drives]).simplify(0.05)
     near = near_drives(structures, drives)
@@ -368,7 +368,7 @@ def lane_marks(
 ) -> Iterator[Imported]:
     """Yields the middle lines of the larger streets near drives.
 
-    There is at least one drive, and the ground is level.
+    There must be at least one drive, and the ground must be level.
     """
     paths = MultiLineString([drive.path for drive in drives])
     junctions = _junctions(streets)

@@ -1,4 +1,4 @@
-"""Small objects along streets: those of the file, and random ones."""
+"""Small objects along streets: those in the file, and random ones."""
 
 from collections import Counter
 from collections.abc import Callable, Iterator, Sequence
@@ -50,7 +50,8 @@ def beside_street(
 ) -> tuple[np.ndarray, float]:
     """Returns a place beside the carriageway, and the heading to the street.
 
-    A place `xy` (2,) off all carriageways stays where it is [m, rad].
+    If `xy` (2,) [m] is on a carriageway, the result is a place next to it, and
+    otherwise `xy`. The heading is in [rad].
     """
     point = Point(xy)
     distances = shapely.distance(courses, point)
@@ -75,7 +76,8 @@ def place_along(
 ) -> tuple[tuple[float, float], float]:
     """Returns a place beside a line, and the heading of the object there.
 
-    The side is 1 for the right, and -1 for the left [m, rad].
+    The place is at the distance `s` along the line and `offset` beside it [m].
+    `side` is 1 for the right, and -1 for the left. The heading is in [rad].
     """
     at = station_at(line, s)
     x = at.x + side * offset * float(np.sin(at.yaw))
@@ -92,7 +94,7 @@ _POST, _DISC, _BALL = "round_post", "round_disc", "round_ball"
 def without_curves(model: Model) -> Model:
     """Returns a model with polyhedra instead of cylinders and spheres.
 
-    Their cross-sections have the same areas.
+    The cross-sections of the polyhedra have the same areas.
     """
     parts, meshes = [], dict(model.meshes)
     for part in model.parts:
@@ -135,12 +137,12 @@ _SOLID = ("building", "fence", "other-structure")
 
 @dataclass
 class StreetThings:
-    """The placed objects and their counts.
+    """The small objects along streets that were placed, and counts of them.
 
-    `by_file` counts objects of the file, `at_random` random ones, and `no_room`
-    objects of the file that are left out because they would block a drive, or
-    stand in a wall or in each other. `moved` has trees of the file that stood
-    on a carriageway and were moved beside it.
+    `by_file` counts objects from the file, and `at_random` random objects.
+    `no_room` counts objects from the file that are left out, because they would
+    block a drive or stand in a wall or another object. `moved` contains trees
+    from the file that stood on a carriageway and were moved to its edge.
     """
 
     structures: list[Imported] = field(default_factory=list)
@@ -153,7 +155,7 @@ class StreetThings:
 
 
 class StreetRoom:
-    """The room for objects: which ground is taken, and by what."""
+    """The free space for small objects: places objects where it is free."""
 
     def __init__(
         self,
@@ -196,7 +198,7 @@ class StreetRoom:
         return bool(shapely.dwithin(LineString(line), self.paths, distance))
 
     def keep_tree(self, tree: Imported) -> None:
-        """Marks the place of a tree's trunk as taken."""
+        """Marks the place of a tree's trunk as occupied."""
         x, y, _ = tree.structure.xyz
         self._taken.add(Point(x, y).buffer(_TRUNK, 4))
 
@@ -218,17 +220,17 @@ class StreetRoom:
         yaw: float,
         rng: np.random.Generator,
     ) -> bool:
-        """Places an object if there is room; returns whether there was.
+        """Places an object if its place is free; returns whether it was.
 
-        It stands on the lowest ground below it. Only cars stand on
-        carriageways.
+        The object stands at the height of the lowest ground below it. Only cars
+        are placed on carriageways.
 
         Args:
             name: name of the new structure.
             kind: kind of object, a key of `OBJECTS`.
-            xy: position of its middle in W [m].
-            yaw: its heading [rad].
-            rng: draws its variant and colours.
+            xy: position of the object's centre in W [m].
+            yaw: heading of the object [rad].
+            rng: random generator for the object's variant and colours.
         """
         builder = OBJECTS[kind]
         at = np.array([xy])
@@ -297,7 +299,9 @@ _ROW_PITCH, _BAY, _AISLE = 6.2, (2.6, 5.0), 5.5
 
 
 def may_park_on(side: str, street: Street) -> bool:
-    """Returns whether cars may park on the `left` or `right` of a street.
+    """Returns whether cars may park on a side of a street.
+
+    `side` is `left` or `right`. For the tags, see
 
     https://wiki.openstreetmap.org/wiki/Street_parking
     """
@@ -312,9 +316,9 @@ def may_park_on(side: str, street: Street) -> bool:
 
 
 class Row(NamedTuple):
-    """A street: its name, middle line, half its width [m], and where cars park.
+    """A street along which cars may park: name, middle line, half width [m].
 
-    `may_park` says whether they may park on the right, and whether on the left.
+    `may_park` says whether cars may park on the right, and on the left.
     """
 
     name: str
@@ -326,7 +330,7 @@ class Row(NamedTuple):
 def park_along(
     placing: StreetRoom, row: Row, lines: BaseGeometry, rng: np.random.Generator
 ) -> None:
-    """Parks cars along the right and the left of a street."""
+    """Parks cars along both sides of a street, where they may park."""
     line = row.line
     others = lines.difference(line.buffer(0.5))
     for side, is_allowed in zip((1.0, -1.0), row.may_park, strict=True):
@@ -400,14 +404,14 @@ def dress_streets(
     bottom: Sequence[Structure],
     seed: int,
 ) -> StreetThings:
-    """Returns the small objects along the streets of a city.
+    """Places small objects along the streets of a city, and returns them.
 
-    Objects of the file are placed first. Drives are kept free of objects;
-    without any drive nothing is placed.
+    Objects from the file are placed first, and then random ones. Drives are
+    kept free of objects. Without drives nothing is placed.
 
     Args:
-        structures: what stands already.
-        things: small objects of the file.
+        structures: structures that already exist.
+        things: small objects from the file.
         streets: the streets along which objects are added.
         drives: the drives, which are kept free.
         ground: the ground on which objects stand.

@@ -1,4 +1,4 @@
-"""The look of a building: from its tags, and otherwise at random."""
+"""The appearance of a building: from its tags, otherwise random."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -37,13 +37,14 @@ _SMALL = 45.0  # [m^2]
 
 @dataclass(frozen=True)
 class Style:
-    """How a building with a certain use is dressed; lengths in [m].
+    """The details that a building gets; lengths are in [m].
 
-    For windows, `pitch` is the distance from middle to middle, `sill` the
-    height above their floor, and `depth` that of their recess. `shops` says
-    whether the ground floor may have shops on the street, and `balconies`
-    whether every other window has one. A plinth or cornice of height 0 does not
-    exist. `by_tag` lists fields that come from the file.
+    For windows, `pitch` is the distance between the centres of neighbours,
+    `sill` the height above the floor, and `depth` the depth of the recess.
+    `shops` says whether the ground floor may have shops on the street, and
+    `balconies` whether every other window has a balcony. A plinth or cornice
+    with height 0 does not exist. `by_tag` lists the fields whose values come
+    from the file.
     """
 
     use: str
@@ -70,10 +71,10 @@ class Style:
 def building_use(
     tags: Mapping[str, str], area: float, height: float
 ) -> tuple[str, bool]:
-    """Returns the use of a building, and whether it comes from its tags.
+    """Returns the use of a building, and whether its tags state the use.
 
-    Without such tags it follows from the area of the footprint and the height
-    of the walls [m^2, m].
+    Without such tags, the use follows from the area of the footprint [m^2] and
+    the height of the walls [m].
     """
     words = [tags.get(key, "") for key in _USE_KEYS]
     words += [key for key in ("shop", "office") if key in tags]
@@ -91,7 +92,7 @@ def building_use(
 
 
 def tagged_colour(tags: Mapping[str, str], part: str) -> Rgb | None:
-    """Returns the colour that a tag gives a part, such as `building`."""
+    """Returns the colour that tags state for a part, such as `building`."""
     for key in (f"{part}:colour", f"{part}:color"):
         text = tags.get(key, "").strip().lower()
         for name in (text, re.sub(r"[\s_-]", "", text)):
@@ -113,17 +114,17 @@ def make_style(
     is_flat: bool,
     rng: np.random.Generator,
 ) -> Style:
-    """Returns a style for a building: from its tags, otherwise at random.
+    """Returns a style for a building: from its tags, otherwise random.
 
-    The number of draws does not depend on the tags.
+    The number of random draws does not depend on the tags.
 
     Args:
         tags: tags of the building, as in OpenStreetMap.
         year: year of construction; None if unknown.
-        area: approximate area of its footprint [m^2].
-        height: height of its walls [m].
-        is_flat: whether its roof is flat.
-        rng: draws everything that no tag says.
+        area: approximate area of the footprint [m^2].
+        height: height of the walls [m].
+        is_flat: whether the roof is flat.
+        rng: random generator for everything that no tag states.
     """
     use, is_tagged = building_use(tags, area, height)
     by_tag = {"use"} if is_tagged else set()

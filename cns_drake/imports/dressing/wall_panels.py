@@ -1,4 +1,4 @@
-"""Plane walls of imported buildings, found in the triangles of a file."""
+"""Plane walls of imported buildings, found among a file's triangles."""
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
@@ -34,13 +34,13 @@ _BENT, _PIECE_BENT = 0.05, 0.01
 
 @dataclass(frozen=True)
 class Panel:
-    """A vertical plane wall, or a piece of one, seen from outside.
+    """A vertical wall, or a piece of one, as seen from outside.
 
-    Its origin (3,) is where x = z = 0, and `along` (2,) is a unit vector to the
-    right. The outline is a polygon in x and z; it is None if it fills the
-    bounding rectangle [m]. The triangles (M, 3, 3) are those in the file, and
-    `building` is the number of their building. A wall that bends is not
-    `is_plane`.
+    Panel coordinates are x to the right and z upwards [m]. `origin` (3,) is the
+    point x = z = 0 in W, and `along` (2,) is a unit vector to the right.
+    `outline` is a polygon in x and z; None if the wall is a rectangle.
+    `triangles` (M, 3, 3) are the triangles in the file, and `building` is the
+    number of their building. `is_plane` is False for a wall that bends.
     """
 
     building: int
@@ -59,19 +59,19 @@ class Panel:
 
     @property
     def frame(self) -> WallFrame:
-        """Wall frame that places details of facades on the panel."""
+        """Frame of the wall, in which facade details are placed."""
         start = self.origin[:2]
         return WallFrame([start, start + self.length * self.along], 0)
 
     def place(
         self, x: ArrayLike, z: ArrayLike, out: ArrayLike = 0.0
     ) -> np.ndarray:
-        """Returns points (..., 3) in the world from panel coordinates [m].
+        """Converts panel coordinates to points (..., 3) in the world [m].
 
         Args:
-            x: distance along the panel from its origin.
-            z: height above its origin.
-            out: distance outwards from its plane.
+            x: distance along the panel from its origin [m].
+            z: height above the panel's origin [m].
+            out: distance outwards from the panel's plane [m].
         """
         x, z, out = (np.asarray(one, dtype=float) for one in (x, z, out))
         places = np.empty((*x.shape, 3))
@@ -84,7 +84,7 @@ class Panel:
 
 
 def is_upright(triangles: np.ndarray) -> np.ndarray:
-    """Returns (M,) which of the triangles (M, 3, 3) are vertical."""
+    """Returns (M,) bool: whether triangles (M, 3, 3) are vertical."""
     normals = unit_normals(triangles)
     return normals.any(axis=1) & (np.abs(normals[:, 2]) < _UPRIGHT)
 
@@ -95,10 +95,10 @@ def find_panels(
 ) -> list[Panel]:
     """Returns the panels of the walls of buildings.
 
-    `walls` has the vertical triangles (M, 3, 3) of each building, which look
-    outwards [m]. `is_wanted` selects walls: it gets the least and greatest x
-    and y of N walls, (N, 2, 2) [m], and returns (N,) bool. Without it, all are
-    wanted.
+    `walls` contains for each building its vertical triangles (M, 3, 3), which
+    face outwards [m]. `is_wanted` selects walls: it takes the least and
+    greatest x and y of N walls, (N, 2, 2) [m], and returns (N,) bool. By
+    default all walls are selected.
     """
     triangles = joined(walls)
     building = np.repeat(np.arange(len(walls)), [len(w) for w in walls])

@@ -1,4 +1,4 @@
-"""Finds the room for a car between the buildings of an imported city."""
+"""Finds the free space for a car between the buildings of a city."""
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
@@ -40,12 +40,12 @@ _LEAST_ROAD = 800.0
 
 @dataclass(frozen=True)
 class FreeSpace:
-    """The room for a car, on a grid that begins at the corner `low` (2,) [m].
+    """The free space for a car, on a grid with the corner `low` (2,) [m].
 
-    `clearance` (rows along y, columns along x) is the distance from the middle
-    of each cell to the nearest obstacle, and 0 where no car may be [m]. `least`
-    is the clearance that a path needs. `walls` are the obstacles, seen from
-    above.
+    `clearance` (rows along y, columns along x) is the distance from the centre
+    of each cell to the nearest obstacle [m], and 0 where a car must not drive.
+    `least` is the clearance that a path needs [m]. `walls` are the obstacles,
+    seen from above.
     """
 
     low: np.ndarray
@@ -56,7 +56,7 @@ class FreeSpace:
     def clearance_at(self, xy: np.ndarray) -> np.ndarray:
         """Returns the distances (N,) to obstacles at places (N, 2) [m].
 
-        Places outside of the grid have the distance of the nearest cell.
+        A place outside of the grid gets the distance of the nearest cell.
         """
         index = np.floor((xy - self.low) / CELL).astype(int)
         rows, columns = self.clearance.shape
@@ -65,9 +65,10 @@ class FreeSpace:
         return self.clearance[row, column]
 
     def obstacle(self, path: np.ndarray) -> np.ndarray | None:
-        """Returns the first place (2,) of a path without room; None if none.
+        """Returns the first place (2,) of a path where a car does not fit.
 
-        The places (N, 2) of the path are close together [m].
+        It is None if the car fits everywhere. The path is given by places (N,
+        2) that are close together [m].
         """
         narrow = self.clearance_at(path) < self.least - _SLACK
         hit = self.walls.query(shapely.points(path), "dwithin", _HALF_CAR)[0]
@@ -75,16 +76,17 @@ class FreeSpace:
         return path[narrow.argmax()] if narrow.any() else None
 
     def middle(self, row: np.ndarray, column: np.ndarray) -> np.ndarray:
-        """Returns the middles (N, 2) of cells given by row and column [m]."""
+        """Returns the centres (N, 2) of cells, given by row and column [m]."""
         return self.low + CELL * (np.c_[column, row] + 0.5)
 
 
 def find_free_space(
     structures: Sequence[Imported], ground: Ground
 ) -> FreeSpace:
-    """Returns the room for a car that is there at all stages.
+    """Returns the space for a car that is free in all stages.
 
-    If the city has roads, the room is on roads only.
+    `structures` are those of all stages. If the city has roads, only space on
+    roads counts.
     """
     low, high = _window(structures)
     size = np.ceil((high - low) / CELL).astype(int) + 1

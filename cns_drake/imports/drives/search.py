@@ -1,9 +1,9 @@
-"""Searches two drives through a city that share a part of their way.
+"""Searches two drives through a city that share a part of their paths.
 
-The first drive is approximately the longest of all shortest ways. The second
-one shares the middle of the first, and leaves it at both ends by an arm of its
-own. A `WayGraph` defines the pieces of which ways consist: lanes of streets, or
-cells of free space.
+The first drive is approximately the longest of all shortest paths. The second
+drive shares the middle part of the first drive; before and after it, an "arm"
+of its own leads elsewhere. A `WayGraph` defines the pieces that make up a path
+("way"): lanes of streets, or cells of free space.
 """
 
 from abc import ABC, abstractmethod
@@ -76,7 +76,7 @@ _MOST_REACHED = 400_000
 class WaypointDrive:
     """A drive: its waypoints (N, 2) or (N, 3), and the path (M, 2) [m].
 
-    The limit is the lowest speed limit on the way [m/s]; None without one.
+    `limit` is the lowest speed limit along the path [m/s]; None without one.
     """
 
     waypoints: np.ndarray
@@ -92,12 +92,13 @@ class WaypointDrive:
 def steerable_drive(
     waypoints: np.ndarray, room: Room | None = None, margin: float = _MARGIN
 ) -> WaypointDrive | Obstacle:
-    """Returns the drive along waypoints, or the place of the first obstacle.
+    """Returns the drive along waypoints, or the place of an obstacle.
 
-    Waypoints are (N, 2) or (N, 3) [m]. `room` returns an obstacle on the path;
-    without it, there is room everywhere. A bend is an obstacle, too, if its
-    radius is less than `margin` times the tightest one of the car. So is the
-    middle of a path that is too short.
+    Waypoints are (N, 2) or (N, 3) [m]. `room` takes the path and returns the
+    place of an obstacle on it, or None; by default there are no obstacles. A
+    bend also counts as an obstacle if its radius is less than `margin` times
+    the car's smallest radius. If the path is too short for a drive, its middle
+    is returned as an obstacle.
     """
     waypoints = np.round(waypoints, 3)
     xyz = np.zeros((len(waypoints), 3))
@@ -127,9 +128,9 @@ def evenly_spaced(line: np.ndarray, spacing: float) -> np.ndarray:
 
 
 def driven_path(points: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Returns places (M, 2) of a path, and the radii (M,) of its bends [m].
+    """Returns places (M, 2) of a path, and the radii (M,) there [m].
 
-    The control points (N, 2) of its spline are evenly spaced [m].
+    The path is a spline with evenly spaced control points `points` (N, 2) [m].
     """
     reach = _DEGREE // 2
     points = np.concatenate(
@@ -149,9 +150,11 @@ def driven_path(points: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
 
 
 class WayGraph(ABC):
-    """A graph of pieces with lengths (N,) [m], and of their successors.
+    """A graph whose nodes are N pieces of possible paths ("ways") of a car.
 
-    `is_open` (N,) says which pieces a car can drive along, as far as is known.
+    `lengths` (N,) contains the lengths of the pieces [m]. Edges lead from each
+    piece to the pieces that can follow it. `is_open` (N,) says which pieces a
+    car can drive along, as far as is known.
     """
 
     def __init__(
@@ -175,15 +178,16 @@ class WayGraph(ABC):
 
     @abstractmethod
     def beside(self, pieces: np.ndarray, joint: int) -> np.ndarray:
-        """Returns which pieces (N,) bool an arm must not use.
+        """Returns (N,) bool: which pieces an arm must not use.
 
-        They are those that drives use (`pieces`) and those close to them. The
-        arm begins at one of these, the `joint`.
+        An arm is the part of the second drive that it does not share with the
+        first. It must not use the pieces of drives (`pieces`), nor pieces close
+        to them. `joint` is the piece at which the arm begins.
         """
 
     @abstractmethod
     def is_simple(self, way: Sequence[int]) -> bool:
-        """Returns whether a way never visits a place twice."""
+        """Returns whether a way (sequence of pieces) visits no place twice."""
 
     @abstractmethod
     def drive(self, way: Sequence[int]) -> WaypointDrive | Obstacle:
@@ -191,10 +195,10 @@ class WayGraph(ABC):
 
     @abstractmethod
     def blocked(self, way: Sequence[int], place: Obstacle) -> np.ndarray:
-        """Returns the pieces of a way that an obstacle at a place blocks."""
+        """Returns the pieces of a way that an obstacle at `place` blocks."""
 
     def along(self, way: Sequence[int]) -> np.ndarray:
-        """Returns distances (N,) along a way to the end of each piece [m]."""
+        """Returns the distance (N,) along a way to each piece's end [m]."""
         return np.cumsum(self.lengths[list(way)])
 
     def length(self, way: Sequence[int]) -> float:
@@ -207,9 +211,9 @@ class WayGraph(ABC):
         return way[: max(1, kept)]
 
     def links(self, closed: np.ndarray | None = None) -> csr_array:
-        """Returns the costs from piece to piece, as a sparse matrix.
+        """Returns the costs from piece to next piece, as a sparse matrix.
 
-        Pieces that are `closed` (N,) are left out.
+        Pieces in the mask `closed` (N,) are left out.
         """
         is_open = self.is_open if closed is None else self.is_open & ~closed
         before, after, costs = self._links
@@ -220,7 +224,10 @@ class WayGraph(ABC):
 
 
 def find_drives(graph: WayGraph) -> list[WaypointDrive]:
-    """Returns two drives that share a part, or only one drive, or none."""
+    """Returns two drives that share a part, one drive, or none.
+
+    It returns fewer than two drives if no more are found.
+    """
     for _ in range(_MOST_TRIES):
         way = _longest(graph)
         if graph.length(way) < SHORTEST:
@@ -385,9 +392,10 @@ _ROUND, _SMOOTH_ASIDE = 7, 15
 class Lane:
     """A lane from one junction to the next.
 
-    Its line (N, 2) is the middle of its street in driving direction, and the
-    lane lies `aside` to the right of it [m]. The lane of the opposite
-    direction, on the same piece of street, has the same number `way`.
+    `line` (N, 2) is the middle of the street, in driving direction [m]. The
+    lane lies at the distance `aside` to the right of this line [m]. The lane in
+    the opposite direction on the same piece of street has the same number
+    `way`.
     """
 
     line: np.ndarray
@@ -402,7 +410,7 @@ class Lane:
 
 
 def make_lanes(streets: Sequence[Street]) -> list[Lane]:
-    """Returns the lanes of streets that meet."""
+    """Returns the lanes of streets, cut where streets meet."""
     lanes: list[Lane] = []
     for way, (street, line, (begin, end)) in enumerate(cut_at_nodes(streets)):
         if street.forward:
@@ -413,7 +421,10 @@ def make_lanes(streets: Sequence[Street]) -> list[Lane]:
 
 
 def lane_links(lanes: Sequence[Lane]) -> tuple[np.ndarray, np.ndarray]:
-    """Returns numbers of lanes in pairs; the first leads into the second."""
+    """Returns pairs of lanes of which the first leads into the second.
+
+    The result is the numbers of the first lanes, and of the second lanes.
+    """
     starts: defaultdict[int, list[int]] = defaultdict(list)
     for number, lane in enumerate(lanes):
         starts[lane.begin].append(number)
@@ -436,7 +447,7 @@ def _leads_on(lane: Lane, after: Lane) -> bool:
 
 
 def lane_path(lanes: Sequence[Lane], spacing: float) -> np.ndarray:
-    """Returns a line along lanes: x, y and lateral offset (N, 3) [m].
+    """Returns a line (N, 3) along lanes: x, y and lateral offset [m].
 
     Each lane leads into the next. The points are about `spacing` apart [m].
     """
@@ -503,10 +514,11 @@ def simplified_drive(
     space: FreeSpace,
     tolerances: Sequence[float] = _SIMPLIFICATIONS,
 ) -> WaypointDrive | Obstacle:
-    """Returns a drive with as few waypoints as the room allows.
+    """Returns a drive with few waypoints, or the obstacle that prevents it.
 
-    Otherwise it returns the obstacle. The drive passes places (N, 2), about 1 m
-    apart, within a tolerance [m]; the tolerances are tried in turn.
+    The drive passes the places `xy` (N, 2), about 1 m apart, within a tolerance
+    [m]. The tolerances are tried one after the other until a drive fits into
+    the free space `space`.
     """
     found: WaypointDrive | Obstacle = xy[len(xy) // 2]
     for straightened, tolerance in product(_STRAIGHTENED, tolerances):
@@ -542,8 +554,8 @@ def _densified(corners: np.ndarray) -> np.ndarray:
 class StreetGraph(WayGraph):
     """A graph of lanes of streets, from junction to junction.
 
-    One-way streets are driven in their direction, and all others in the
-    outermost lane.
+    On one-way streets a car drives only in the allowed direction. On all other
+    streets it drives in the outermost lane.
     """
 
     def __init__(

@@ -1,8 +1,8 @@
 """The areas of imported streets, along which a city is built.
 
-In a junction, lanes often lack the shoulders of the roads that lead to it. In
-the file the kerb of the road then steps aside at the junction. Real kerbs have
-tapers there instead, and so have the streets of this module.
+In an OpenDRIVE junction, lanes often lack the shoulders of the roads that lead
+to the junction, so that the kerb has a step there. Real kerbs have tapers
+instead, and this module adds such tapers.
 """
 
 from collections import defaultdict
@@ -58,7 +58,7 @@ _END = 0.2
 
 
 def kerb_tapers(carriageway: BaseGeometry) -> list[Polygon]:
-    """Returns areas that turn steps in a carriageway's edge into tapers [m]."""
+    """Returns areas that turn steps of a carriageway's edge into tapers [m]."""
     found: list[Polygon] = []
     for polygon in polygons_of(carriageway):
         polygon = shapely.orient_polygons(polygon)
@@ -143,11 +143,11 @@ def _kerb(xy: np.ndarray, ahead: np.ndarray) -> np.ndarray:
 class ImportedStreets:
     """Areas of lanes on the ground, by kind [m].
 
-    `areas` has the area of the lanes at road level, of the lanes that are road,
-    and of raised ground with a kerb. Where lanes overlap, road takes precedence
-    over parking, parking over other ground, and all of these over sidewalks.
-    Coverings are parts of the carriageway that are not road. Margins are lanes
-    without a use, which stay free.
+    `areas` contains three areas: all lanes at road level, the lanes of class
+    road, and raised ground with a kerb. Where lanes overlap, road takes
+    precedence over parking, parking over other ground, and all of these over
+    sidewalks. Coverings are parts of the carriageway that are not road. Margins
+    are lanes without a use, which stay empty.
     """
 
     def __init__(
@@ -284,7 +284,7 @@ def _multi(area: BaseGeometry) -> MultiPolygon:
 
 
 def bridge_decks(bands: Sequence[LaneBand]) -> Iterator[Structure]:
-    """Yields the upper sides of bridges, by class, and their undersides."""
+    """Yields structures of bridges: upper sides by class, and undersides."""
     of_road: dict[tuple[str, str], list[np.ndarray]] = defaultdict(list)
     for band in bands:
         # The sides of parts without a lane are closed as well.

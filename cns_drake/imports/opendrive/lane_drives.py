@@ -39,7 +39,7 @@ _LEAST_HALF_WIDTH, _SHORTEST = 0.3, 5.0
 
 
 class BandGraph(search.WayGraph):
-    """A graph of lanes of road sections in driving direction."""
+    """A graph of lanes of road sections, linked in driving direction."""
 
     def __init__(self, bands: Sequence[LaneBand]):
         self.bands = [band for band in bands if _is_driven(band)]
@@ -116,10 +116,10 @@ class BandGraph(search.WayGraph):
 
 
 def find_lane_drives(bands: Sequence[LaneBand]) -> list[WaypointDrive]:
-    """Returns two drives on lanes that share a part of their way.
+    """Returns two drives on lanes that share a part of their paths.
 
-    It returns one drive, or none, if there are no two. The lanes are those of
-    the whole network, bridges included.
+    If fewer are found, it returns one drive or none. `bands` contains the lanes
+    of the whole network, including bridges.
     """
     return search.find_drives(BandGraph(bands))
 

@@ -1,6 +1,6 @@
-"""The lanes of roads: their kinds, edges, levels and heights.
+"""The lanes of roads: kinds, edges, levels (ground or bridge), heights.
 
-Edges are sampled closely enough for LiDAR.
+Edges are sampled densely enough for simulated LiDARs.
 """
 
 from collections.abc import Iterator, Sequence
@@ -68,9 +68,9 @@ def lane_class(kind: str) -> str | None:
 
 
 def is_raised(kind: str, height: float) -> bool:
-    """Returns whether a lane lies above a kerb, not at road level.
+    """Returns whether a lane is above a kerb, and not at road level.
 
-    The height is that of the lane's inner edge above the road, as in the file
+    `height` is the height of the lane's inner edge above the road in the file
     [m].
     """
     has_kerb = height >= _LEAST_KERB
@@ -84,17 +84,19 @@ class LaneBand:
     """A lane of a road section, sampled from end to end.
 
     Attributes:
-        road, section, lane: its road, the number of its section there, and its
-            lane.
-        kind: type of the lane; "enclosed" for a lane of type none that has
-            others farther outside, as on a road that is closed to traffic.
-        inner, outer: (N, 3) places on its edges, in the order of the road [m].
-            Where the width of the lane steps, a place on one edge is repeated.
-            A lane above a kerb has the height of the road here.
-        middle: (N, 3) places in the middle between both edges [m].
+        road, section, lane: the road, the number of the section in this road,
+            and the lane.
+        kind: type of the lane. It is "enclosed" for a lane of type none with
+            other lanes farther outside, as on a road that is closed to traffic.
+        inner, outer: (N, 3) places on the lane's edges, in the order of the
+            road [m]. Where the width of the lane has a step, a place on one
+            edge is repeated. For a lane above a kerb, these heights are those
+            of the road.
+        middle: (N, 3) places midway between the two edges [m].
         heading, roll, grade: (N,) heading, roll and grade of the road at these
             places [rad, rad, 1]. The roll is 0 for a level lane.
-        rise: (N, 2) heights of its edges above the road; NaN if unknown [m].
+        rise: (N, 2) heights of the lane's edges above the road [m]; NaN if
+            unknown.
         s: (N,) distances along the road [m].
     """
 
@@ -118,7 +120,7 @@ class LaneBand:
 
 
 def lane_bands(road: ImportedRoad) -> Iterator[LaneBand]:
-    """Yields all lanes of a road, section by section, from the middle.
+    """Yields all lanes of a road, section by section, from the middle outwards.
 
     Raises:
         ValueError: naming the road and the fault, if it has too many bends to
@@ -275,7 +277,10 @@ def _stations(
 def split_levels(
     bands: Sequence[LaneBand],
 ) -> tuple[list[LaneBand], list[LaneBand]]:
-    """Returns lanes on the ground and lanes on bridges; lanes are cut there."""
+    """Splits lanes into those on the ground and those on bridges.
+
+    A lane that leads onto a bridge is cut at the bridge's end.
+    """
     raised = _raised_places(bands)
     ground: list[LaneBand] = []
     bridges: list[LaneBand] = []
@@ -332,12 +337,12 @@ def _runs(is_bridge: np.ndarray) -> Iterator[tuple[slice, bool]]:
 
 
 class RoadHeights:
-    """The height of imported carriageways, also beyond their edges.
+    """The height of imported carriageways, and of the ground near them.
 
-    Each place in the middle of a lane has a plane, from the grade and roll of
-    its road. The height is a weighted mean of the planes nearby (Shepard's
-    interpolation). It is exact on a single road, and has no step where roads
-    that overlap in a junction have different heights.
+    Each place in the middle of a lane defines a plane, with the grade and roll
+    of its road. The height at any place is a weighted mean of the nearby planes
+    (Shepard's interpolation). It is exact on a single road, and has no step
+    where roads that overlap in a junction have different heights.
     """
 
     def __init__(self, bands: Sequence[LaneBand]):

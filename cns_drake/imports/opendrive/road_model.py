@@ -1,7 +1,7 @@
 """Roads of a network: course, heights and lanes.
 
-The course consists of lines, arcs, spirals and cubic curves: ASAM OpenDRIVE
-1.7, chapter 8, https://www.asam.net/standards/detail/opendrive
+The course of a road consists of lines, arcs, spirals and cubic curves. Source:
+ASAM OpenDRIVE 1.7, chapter 8, https://www.asam.net/standards/detail/opendrive
 """
 
 from collections.abc import Callable, Sequence
@@ -38,7 +38,7 @@ def _integral(
 
 @dataclass(frozen=True)
 class Arc:
-    """An arc, or a line if the curvature is 0 [1/m]."""
+    """An arc; a straight line if the curvature [1/m] is 0."""
 
     curvature: float
 
@@ -162,10 +162,10 @@ Shape = Arc | Spiral | Cubic
 
 @dataclass(frozen=True)
 class Piece:
-    """One element of a road's plan view, beginning at s [m].
+    """One element of a road's course in plan view, which begins at s [m].
 
-    x, y and heading are those of its first point in the world [m, rad]. Its
-    shape is in the frame of this point.
+    x, y and heading are those of the element's first point in the world [m,
+    rad]. `shape` is expressed in the frame of this point.
     """
 
     s: float
@@ -190,7 +190,7 @@ class Piece:
 
 
 class Cubics:
-    """A piecewise cubic function of the distance along the road."""
+    """A piecewise cubic function of the distance along a road."""
 
     def __init__(self, rows: Sequence[Sequence[float]] = ()):
         """Takes rows: a piece's start and four coefficients, of ds^0 first."""
@@ -210,8 +210,9 @@ class Cubics:
     ) -> np.ndarray:
         """Returns the values (N,), or the slopes, at distances (N,) [m].
 
-        `inside` (N,) selects the piece for each distance. At a joint it lies
-        slightly on one side, where `s` is the joint itself.
+        `inside` (N,) selects the cubic piece for each distance. It is usually
+        equal to `s`. Where `s` is at a joint between two pieces, `inside` lies
+        slightly before or after the joint, within the wanted piece.
         """
         if not self:
             return np.zeros(len(s))
@@ -226,7 +227,10 @@ class Cubics:
         return np.where(index < 0, 0.0, value)
 
     def bend(self, start: float, end: float) -> float:
-        """Returns the greatest second derivative on a stretch of one piece."""
+        """Returns the greatest second derivative between `start` and `end`.
+
+        Both distances must lie within one cubic piece.
+        """
         middle = (start + end) / 2.0
         index = int(np.searchsorted(self.starts, middle, side="right")) - 1
         if index < 0:
@@ -243,11 +247,11 @@ NOWHERE = Cubics()
 
 @dataclass(frozen=True)
 class MarkLine:
-    """One line of a road mark, with its measures from the file.
+    """One line of a road mark, with its dimensions from the file.
 
     Attributes:
         aside: distance from the border of the lane, positive to the left [m].
-        start: where the first dash begins, from the start of the mark [m].
+        start: distance from the start of the mark to the first dash [m].
         dash, gap: lengths of a dash and of the gap after it; the line is
             continuous if the gap is 0 [m].
         width: width of the line [m].
@@ -264,9 +268,10 @@ class MarkLine:
 class RoadMark:
     """A mark painted on the border of a lane.
 
-    It begins at `start` along the road [m]. The kind is a text such as `solid
-    broken`, and the colour that in the file. Without `lines`, the mark has the
-    lines that are usual for its kind, each with the width `width` [m].
+    The mark begins at the distance `start` along the road [m]. `kind` is a text
+    such as `solid broken`, and `colour` the colour in the file. Without
+    `lines`, the mark has the lines that are usual for its kind, each with the
+    width `width` [m].
     """
 
     start: float
@@ -282,12 +287,12 @@ class Lane:
 
     Numbers count from the middle of the road outwards, positive on the left. A
     lane has either a width or a border, as functions of the distance along the
-    road; the border is the distance of its outer edge from the middle.
-    `inner_height` and `outer_height` are heights of its edges above the road,
-    if the file has any, and `height` is the greatest `inner_height` [m]. A lane
-    may be level across where the road is banked (`is_level`), and its traffic
-    may be reversed (`is_reversed`). Marks are on its outer border, one after
-    the other.
+    road; the border is the distance from the middle of the road to the lane's
+    outer edge. `inner_height` and `outer_height` are heights of the lane's
+    edges above the road, if the file has them, and `height` is the greatest
+    `inner_height` [m]. A lane with `is_level` is not banked even where the road
+    is. With `is_reversed`, traffic drives against the usual direction. Marks
+    are on the lane's outer border, one after the other.
     """
 
     number: int
@@ -306,7 +311,8 @@ class Lane:
 class LaneSection:
     """A stretch of road with the same lanes, from `start` to `end` [m].
 
-    `lanes` are by number, without the middle lane 0, which has only marks.
+    `lanes` maps lane number -> lane. It excludes the middle lane 0, which has
+    only marks.
     """
 
     start: float
@@ -322,16 +328,16 @@ class Thing(NamedTuple):
         name: unique in the network.
         is_signal: whether it is a signal; otherwise it is an object.
         kind: type of the thing, in lower case.
-        s, t: place along and across the road [m].
+        s, t: coordinates along and across the road [m].
         z: height above the road [m].
         heading: heading relative to that of the road [rad].
         size: length, width and height; 0 where unknown [m].
-        outline: (N, 3) corners u, v and height, relative to the place [m]; None
-            without.
-        road_outline: (N, 3) corners s, t and height [m]; None without.
-        is_dynamic: whether it has changing states, as lights have.
-        faces_back: whether it is for traffic in the opposite direction of the
-            road.
+        outline: (N, 3) corners as u, v and height relative to the object [m];
+            None if not in the file.
+        road_outline: (N, 3) corners as s, t and height [m]; None if not in the
+            file.
+        is_dynamic: whether its state can change, as that of a traffic light.
+        faces_back: whether it is for traffic against the direction of the road.
     """
 
     name: str
@@ -353,19 +359,20 @@ class ImportedRoad:
     """A road of a network.
 
     Attributes:
-        name: its id, in letters, digits, dots and dashes, and unique.
-        junction: name of its junction; None for none.
+        name: unique name, made from the id: letters, digits, dots and dashes.
+        junction: name of the junction to which the road belongs; None without
+            one.
         length: its length [m].
         pieces: pieces of its course, one after the other.
         elevation, superelevation: height [m] and roll [rad] of the reference
             line.
-        lane_offset: distance from the reference line to the left to the middle
-            of the lanes [m].
+        lane_offset: distance from the reference line to the middle of the
+            lanes, positive to the left [m].
         sections: stretches with the same lanes, one after the other.
         keeps_left: whether traffic keeps left.
         limits: start and value of each speed limit [m, m/s].
         things: signals and objects.
-        spans: `bridge` or `tunnel`, for each of them on the road in the file.
+        spans: `bridge` or `tunnel`, for each bridge or tunnel on the road.
     """
 
     name: str
@@ -384,8 +391,8 @@ class ImportedRoad:
     def reference(self, s: np.ndarray, inside: np.ndarray) -> np.ndarray:
         """Returns (N, 5) x, y, z, heading and roll of the reference line.
 
-        `s` (N,) are distances along the road [m]; for `inside`, see
-        `Cubics.at`.
+        `s` (N,) contains distances along the road [m], and `inside` (N,)
+        distances that select the pieces of the road; see `Cubics.at`.
         """
         starts = np.array([piece.s for piece in self.pieces])
         index = np.searchsorted(starts, inside, side="right") - 1
@@ -404,8 +411,8 @@ class ImportedRoad:
     ) -> np.ndarray:
         """Returns places (N, 3) that lie t (N,) left of the reference line [m].
 
-        `s` (N,) are distances along the road [m]; for `inside`, see
-        `Cubics.at`.
+        `s` (N,) contains distances along the road [m], and `inside` (N,)
+        distances that select the pieces of the road; see `Cubics.at`.
         """
         x, y, z, heading, roll = self.reference(s, inside).T
         across = t * np.cos(roll)
@@ -421,10 +428,10 @@ class ImportedRoad:
 
 @dataclass(frozen=True)
 class RoadMap:
-    """All roads of a file, in its order.
+    """All roads of an OpenDRIVE file, in the order of the file.
 
-    The reference system has the name that is in the file. The origin is that of
-    the world, in coordinates of the reference system [m].
+    `reference_system` is the name of the reference system in the file. `origin`
+    is the origin of the world in coordinates of this system [m].
     """
 
     roads: tuple[ImportedRoad, ...]

@@ -1,8 +1,8 @@
 """Reads roads from an OpenDRIVE file.
 
-The import joins lanes at their ends, and does not use the links of roads, lanes
-and junctions. Yet a link to something that is not in the file is reported as a
-fault.
+The import joins lanes whose ends meet, and does not use the links between
+roads, lanes and junctions. It only reports links to things that are not in the
+file, as faults.
 """
 
 from collections.abc import Iterable, Iterator, Mapping
@@ -53,8 +53,9 @@ def read_marks(
 ) -> list[road_model.RoadMark]:
     """Returns the marks of a lane, in their order along the road.
 
-    Its section begins at `start` [m], and `road` names the road for the faults.
-    Marks whose lines are not usable are counted.
+    `start` is where the lane's section begins along the road [m], and `road` is
+    the name of the road. Marks whose lines are not usable are counted in
+    `faults`.
 
     Raises:
         ValueError: naming line and fault, if a text is not a number.
@@ -104,7 +105,7 @@ def _mark_lines(
 
 
 def count_dangling_links(top: Element, faults: ImportFaults) -> None:
-    """Counts links in a file to objects that the file does not contain."""
+    """Counts links to objects that are not in the file, as faults."""
     roads = {one.attrib.get("id", ""): one for one in top.all("road")}
     junctions = {one.attrib.get("id", "") for one in top.all("junction")}
     for name, road in roads.items():
@@ -135,9 +136,9 @@ _KNOWN = parse_yaml(Path(__file__).with_name("unread.yaml").read_bytes())
 
 
 def count_unread(element: Element, faults: ImportFaults, name: str) -> None:
-    """Counts what is not read although it would change the road map.
+    """Counts parts of an element that are not read but affect the roads.
 
-    `name` is that of the road or junction that contains the element.
+    `name` is the name of the road or junction that contains the element.
     """
     known = _KNOWN["elements"].get(element.tag)
     for key, usual in _KNOWN["attributes"].get(element.tag, {}).items():

@@ -149,8 +149,8 @@ def thing_structures(
 ) -> Iterator[Structure]:
     """Yields structures of the signals and objects beside a road.
 
-    `lanes` is the area of all lanes, in which no sign stands. Things that are
-    left out are counted.
+    `lanes` is the area of all lanes; signs inside this area are left out. What
+    is left out is counted in `faults`.
     """
     for thing in road.things:
         if not 0.0 <= thing.s <= road.length + 1.0:

@@ -2,10 +2,11 @@
 
 Road marks follow ASAM OpenDRIVE 1.7, 11.9. The mark of a lane lies on the
 lane's outer border, and the mark of lane 0 in the middle of the road. Double
-lines are listed from the inside outwards; those of the middle are listed from
-left to right. A line on the border of two lanes lies half on each of them. If
-one of these lanes is no carriageway, half of the line would be hidden below the
-kerb stones, so the import moves the line off them.
+lines are listed from the inside outwards; double lines in the middle of the
+road are listed from left to right. A line on the border between two lanes lies
+half on each lane. If one of these lanes is not carriageway, half of the line
+would be hidden below the kerb stones, so the import moves the line onto the
+carriageway.
 """
 
 from collections import Counter, defaultdict
@@ -80,12 +81,13 @@ def moved_off_kerbs(
     reach: tuple[float, float],
     carriageway: BaseGeometry,
 ) -> np.ndarray:
-    """Returns how far (N,) lines are moved to the left to leave a kerb [m].
+    """Returns how far (N,) lines must move to the left off a kerb [m].
 
-    Where only one side of a border, places (N, 3), is carriageway, the lines
-    are moved to that side. Unit vectors `left` (N, 2) lead to its left. `reach`
-    is how far the lines extend to its left and right [m]. The carriageway must
-    be prepared (Shapely).
+    `border` contains places (N, 3) on the border of a lane, and `left` (N, 2)
+    unit vectors to its left. Where only one side of the border is carriageway,
+    lines are moved to this side. `reach` is how far the lines extend to the
+    left and right of the border [m]. `carriageway` must be a prepared geometry
+    (Shapely).
     """
     xy = border[:, :2].copy()
     # A kerb may cross the border right at its end.
@@ -105,15 +107,15 @@ def moved_off_kerbs(
 
 
 def as_triangles(quads: np.ndarray) -> np.ndarray:
-    """Returns quadrilaterals (K, 4, 3) as triangles (2 K, 3, 3)."""
+    """Splits quadrilaterals (K, 4, 3) into triangles (2 K, 3, 3)."""
     return quads[:, [0, 1, 2, 0, 2, 3]].reshape(-1, 3, 3)
 
 
 def on_carriageway(quads: np.ndarray, carriageway: BaseGeometry) -> np.ndarray:
     """Returns the parts of quadrilaterals (K, 4, 3) on a carriageway [m].
 
-    They are triangles (M, 3, 3), cut as seen from above. The carriageway must
-    be prepared (Shapely).
+    The parts are triangles (M, 3, 3), cut as seen from above. `carriageway`
+    must be a prepared geometry (Shapely).
     """
     outlines = np.asarray(shapely.polygons(quads[..., :2]))
     inside = shapely.contains_properly(carriageway, outlines)
@@ -157,10 +159,10 @@ def road_marks(
     Args:
         prefix: beginning of the structures' names.
         bands: the lanes of the roads.
-        heights: returns the heights of the ground at (N, 2) places [m]; without
-            it, marks have the heights of the lanes' borders.
-        carriageway: area with kerbs all around, which marks do not leave; None
-            for none.
+        heights: function that returns the heights of the ground at places (N,
+            2) [m]. By default, marks have the heights of the lanes' borders.
+        carriageway: area to which marks are limited, because kerbs surround it;
+            None for no limit.
     """
     if carriageway is not None:
         shapely.prepare(carriageway)
@@ -334,10 +336,10 @@ _SHOWN = (
 
 @dataclass(frozen=True)
 class Town:
-    """A town at all its stages, and the counts of its import.
+    """A town in all its stages, its drives, and counts of the import.
 
-    `streets` are those on the ground. There are at most two drives. `lanes` is
-    the text of the lane file; None if there are no lanes for traffic.
+    `streets` excludes bridges. There are at most two drives. `lanes` is the
+    text of the lane file; None if there are no lanes for traffic.
     """
 
     roads: RoadMap
@@ -551,13 +553,13 @@ def _kinds(
 def write_town(
     draft: Path, source: Path, town: Town, progress: Callable[[str], None]
 ) -> tuple[ImportReport, dict[str, tuple[int, int]]]:
-    """Writes all files of a town to its folder, which has the map's name.
+    """Writes all files of a town to a folder, which has the map's name.
 
     Returns:
         What was imported, and stage -> its numbers of structures and triangles.
 
     Raises:
-        InputError: if it has more structures than instance ids can count.
+        InputError: if the town has more structures than there are instance ids.
     """
     stages = town.stages.stages
     files = render_stages(

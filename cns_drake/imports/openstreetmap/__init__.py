@@ -1,1 +1,1 @@
-"""Makes a city of the buildings, streets and land in OpenStreetMap files."""
+"""Imports buildings, streets and land from OpenStreetMap files."""

@@ -65,7 +65,7 @@ _LARGEST = 20_000.0  # [m]
 
 
 def object_of(tags: reading.Tags) -> str | None:
-    """Returns the name of the object that a node's tags describe, or None."""
+    """Returns the kind of small object that a node's tags describe, or None."""
     found = [
         name
         for key, value, name in TABLES["objects"]
@@ -84,7 +84,7 @@ def object_of(tags: reading.Tags) -> str | None:
 
 
 def make_things(features: reading.OsmFeatures, local: Local) -> Iterator[Thing]:
-    """Yields the objects at nodes, and the trees of tree rows."""
+    """Yields small objects: those at nodes, and the trees of tree rows."""
     kinds = features.kinds
     for name, tags, place in features.nodes:
         kind = object_of(tags)
@@ -119,12 +119,13 @@ def _direction(tags: reading.Tags) -> float | None:
 def import_openstreetmap(
     path: Path, year_attribute: str | None, dressed: bool = False
 ) -> ForeignCity:
-    """Returns the city in a file; its origin is the middle of its buildings.
+    """Imports a city from a file; the origin is the centre of its buildings.
 
-    Some things are made only for a dressed city: the sea, grounds by their
-    material, and buildings demolished at an unknown date. In a dressed city,
-    bridges at ground level get parapets, and bridges over streets are left out,
-    like tunnels; otherwise all of them are streets on the ground.
+    Only with `dressed`, the result contains the sea, areas of ground by their
+    material, and buildings that were demolished at an unknown date. Also,
+    bridges at ground level then get parapets, and bridges over streets and
+    tunnels are left out. Without `dressed`, bridges and tunnels are streets on
+    the ground.
 
     Raises:
         InputError: if the file cannot be read, has no building, or is larger
@@ -335,7 +336,7 @@ class _Block:
 def standing_buildings(
     areas: Iterable[OsmArea], faults: ImportFaults, with_gone: bool = False
 ) -> Iterator[OsmArea]:
-    """Yields buildings and parts that stand, or once stood, above ground.
+    """Yields buildings and building parts above ground that exist or existed.
 
     Buildings demolished at an unknown date are included only with `with_gone`.
     Buildings that are left out are counted as faults.
@@ -358,14 +359,16 @@ def make_buildings(
     faults: ImportFaults,
     once: bool = False,
 ) -> Iterator[Imported]:
-    """Yields buildings; their parts replace the area that they cover.
+    """Yields buildings, made from outlines and building parts.
+
+    Where a building has parts, these replace the outline.
 
     Args:
-        areas: outlines and parts.
+        areas: outlines of buildings, and building parts.
         local: converts degrees to metres.
-        year_attribute: tag that has the year of construction; None for the
-            usual ones.
-        faults: counts what was repaired or omitted.
+        year_attribute: tag with the year of construction; None for the usual
+            tags.
+        faults: counts parts that were repaired or left out.
         once: whether buildings that lie inside one another are joined.
     """
     outlines: list[_Block] = []

@@ -1,9 +1,10 @@
-"""Reads from an OpenStreetMap file what makes a city.
+"""Reads the parts of an OpenStreetMap file that make up a city.
 
 The reader needs nodes before ways before relations, by ascending positive ids,
-and each only once. Other files are sorted first: Overpass writes nodes last, or
-the places of ways inside these; editors give negative ids to new objects and
-mark deleted ones; files with a history have each version of an object.
+and each only once. Files with another order are sorted first: Overpass writes
+nodes last, or the coordinates of nodes inside ways; editors give negative ids
+to new objects and mark deleted objects; files with a history contain every
+version of an object.
 """
 
 from collections.abc import Iterable, Iterator, Mapping
@@ -33,7 +34,7 @@ _CHUNK = 1 << 24
 
 
 def number_in_file(number: int) -> int:
-    """Returns the id in the original file of an object in the sorted file."""
+    """Returns an object's id in the original file, given its sorted id."""
     return _FIRST_NEW - number if number > _FIRST_NEW else number
 
 
@@ -51,12 +52,13 @@ class _Thing(NamedTuple):
 
 
 def sorted_file(path: Path, folder: Path, faults: ImportFaults) -> Path:
-    """Returns a file that the reader can read: this one or a sorted copy.
+    """Returns a file that the reader can read: `path` or a sorted copy.
 
-    A copy is made in `folder`. Objects that are left out are counted.
+    A copy is written to `folder`. Objects that are left out are counted in
+    `faults`.
 
     Raises:
-        RuntimeError, ValueError: it is no OpenStreetMap file.
+        RuntimeError, ValueError: the file is not an OpenStreetMap file.
     """
     import osmium
 
@@ -237,7 +239,7 @@ class Local:
         return self.metres(offset)
 
     def metres(self, offset: np.ndarray) -> np.ndarray:
-        """Returns offsets (..., 2) in degrees converted to metres."""
+        """Converts offsets (..., 2) from degrees to metres."""
         return np.asarray(offset * self._metres)
 
     def polygon(self, polygon: Polygon) -> Polygon:
@@ -267,11 +269,13 @@ class OsmArea(NamedTuple):
 
 @dataclass
 class OsmFeatures:
-    """The content of a file; places are longitude and latitude [deg].
+    """The content of an OpenStreetMap file; places are in [deg].
+
+    Places are longitude and latitude.
 
     Attributes:
         areas: closed ways and multipolygons.
-        ways: ways, with those of their places that are in the file.
+        ways: ways; places that are not in the file are left out.
         trees: nodes that are trees.
         crossings: the node id of each crossing, and its tags.
         nodes: all other nodes with tags.
@@ -293,7 +297,7 @@ class OsmFeatures:
 
 
 def read_openstreetmap(path: Path) -> OsmFeatures:
-    """Returns the content of a file.
+    """Reads an OpenStreetMap file.
 
     Raises:
         InputError: if it cannot be read.
@@ -404,7 +408,7 @@ def _is_flat(outlines: Iterable[BaseGeometry]) -> bool:
 
 
 def thing_kind(tags: Tags) -> str:
-    """Returns the kind of object, given by the first tag that is known."""
+    """Returns the kind of an element, from the first known tag."""
     for key in _KIND_KEYS:
         if has_tag(tags, key):
             return f"{key}={tags[key]}"
@@ -418,14 +422,14 @@ def thing_kind(tags: Tags) -> str:
 
 
 def has_tag(tags: Tags, name: str) -> bool:
-    """Returns whether the tag exists and is not `no`."""
+    """Returns whether a tag exists and its value is not `no`."""
     return tags.get(name, "no") != "no"
 
 
 def is_building(tags: Tags) -> bool:
-    """Returns whether tags describe a building or a part of one.
+    """Returns whether tags describe a building or a part of a building.
 
-    A former building with the date of its end counts, too.
+    A former building counts, too, if its tags contain the date of its end.
     """
     return (
         has_tag(tags, "building")
@@ -435,5 +439,5 @@ def is_building(tags: Tags) -> bool:
 
 
 def was_building(tags: Tags) -> bool:
-    """Returns whether a key marks a former building."""
+    """Returns whether a tag marks a former building."""
     return any(has_tag(tags, f"{stage}:building") for stage in _GONE)

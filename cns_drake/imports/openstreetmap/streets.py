@@ -51,11 +51,11 @@ _STRIPE, _STRIPE_LENGTH, _STRIPE_HEIGHT = 0.5, 3.0, 0.01
 
 @dataclass(frozen=True)
 class Bridges:
-    """Ids of ways for cars and people that are above or below the ground.
+    """Ids of the bridges and tunnels among the ways for cars and people.
 
-    `over_streets` are bridges over another street or a railway. `level` are all
-    other bridges, which have the height of the ground beside them. `tunnels`
-    are tunnels.
+    `over_streets` contains bridges over a street or a railway, `level` all
+    other bridges, which are assumed to be at the height of the surrounding
+    ground, and `tunnels` all tunnels.
     """
 
     over_streets: AbstractSet[str] = frozenset()
@@ -112,9 +112,10 @@ _PARAPET = Look("Parapet", "fence", (0.62, 0.60, 0.57), _HIGH)
 def laid(
     name: str, look: Look, areas: Iterable[Polygon], faults: ImportFaults
 ) -> Iterator[Imported]:
-    """Yields one level surface that fills areas; none if these are empty.
+    """Yields one level surface that fills areas; nothing if they are empty.
 
-    Its name ends with that of its element in the file, for the faults.
+    `name` is the name of the surface. Its part after the first underscore is
+    the name of the element in the file, which is used in `faults`.
     """
     source = name.partition("_")[2]
     surface = [
@@ -132,9 +133,9 @@ def raised(
     areas: Iterable[BaseGeometry],
     source: tuple[str, ImportFaults],
 ) -> Iterator[Imported]:
-    """Yields one solid on the ground that fills areas; none if these are empty.
+    """Yields one solid on the ground that fills areas; nothing if empty.
 
-    `source` is the name of its element in the file, and the faults.
+    `source` contains the name of the element in the file, and the faults.
     """
     solids = [
         np.concatenate(faces.extruded(polygon, 0.0, look.z, *source))
@@ -159,7 +160,7 @@ def _made(
 def parapets(
     ways: Iterable[OsmWay], bridges: Bridges, local: Local
 ) -> Iterator[Imported]:
-    """Yields low walls on both sides of level bridges for cars."""
+    """Yields low walls on both sides of bridges for cars at ground level."""
     for name, tags, line, _ in ways:
         width = street_width(tags)
         if width is None or name not in bridges.level:
@@ -343,7 +344,7 @@ _BEYOND, _BESIDE = 3000.0, 0.1
 def ground_areas(
     features: reading.OsmFeatures, local: Local, dressed: bool
 ) -> Iterator[Imported]:
-    """Yields areas on the ground; if `dressed`, by their material."""
+    """Yields areas on the ground; if `dressed`, also areas by material."""
     for name, tags, polygons in features.areas:
         look = _look(tags) if dressed else _plain_look(tags)
         if look is None or has_tag(tags, "building"):
@@ -405,7 +406,7 @@ def sea(
     limits: np.ndarray,
     faults: ImportFaults,
 ) -> Iterator[Imported]:
-    """Yields the sea on the right of coastlines, if there is any.
+    """Yields the sea, to the right of the coastlines; nothing without them.
 
     `limits` (2, 2) are the least and the greatest x and y of the city [m].
     """

@@ -53,7 +53,7 @@ _SPEED = re.compile(r"(\d{1,3})(?:\s*(km/h|kmh|kph|mph))?")
 def length(text: str | None) -> float | None:
     """Returns the length that a text states [m]; None if it states none.
 
-    For a list or a range, it is the greatest length.
+    If the text contains a list or a range, the greatest length is returned.
     """
     return _greatest(text, _length)
 
@@ -61,8 +61,8 @@ def length(text: str | None) -> float | None:
 def count(text: str | None) -> float | None:
     """Returns the number that a text states, such as a number of levels.
 
-    For a list or a range, it is the greatest number. It is None if the text
-    states none.
+    If the text contains a list or a range, the greatest number is returned. The
+    result is None if the text states no number.
     """
     return _greatest(
         text, lambda part: _decimal(part) if _COUNT.fullmatch(part) else None
@@ -132,9 +132,9 @@ def tag_value(
 def heights(
     tags: Mapping[str, str], where: tuple[str, ImportFaults] | None = None
 ) -> tuple[float, float, float]:
-    """Returns a building's lowest and highest point, and roof height [m].
+    """Returns heights of a building: lowest point, highest point, roof [m].
 
-    The first two are measured from the ground.
+    The lowest and highest points are measured from the ground.
     """
 
     def metres(key: str, least: float = 0.0) -> float | None:
@@ -172,7 +172,7 @@ def heights(
 
 
 def why_absent(tags: Mapping[str, str]) -> str | None:
-    """Returns why a building is left out; None if it stands."""
+    """Returns why a building is left out; None if it is not left out."""
     if not ("building" in tags or "building:part" in tags):
         return "demolished"
     kinds = [tags.get("building", ""), tags.get("building:part", "")]
@@ -197,7 +197,7 @@ def why_absent(tags: Mapping[str, str]) -> str | None:
 
 
 def is_inside(tags: Mapping[str, str]) -> bool:
-    """Returns whether an object is in a building or below the ground."""
+    """Returns whether an object is inside a building or below the ground."""
     below = [tags.get(key, "").startswith("-") for key in ("layer", "level")]
     return (
         any(below)
@@ -225,7 +225,10 @@ def street_width(
 
 
 def driven_ways(tags: Mapping[str, str]) -> tuple[bool, bool]:
-    """Returns whether cars may drive along a street's line, and against it."""
+    """Returns two bools: whether cars may drive along a street's line.
+
+    The first is for the direction of the line, the second against it.
+    """
     if any(
         tags.get(key) in ("no", "private", "bus", "agricultural")
         for key in ("motor_vehicle", "motorcar", "vehicle")
@@ -243,9 +246,9 @@ def driven_ways(tags: Mapping[str, str]) -> tuple[bool, bool]:
 
 
 def lanes_beside(tags: Mapping[str, str], width: float) -> float:
-    """Returns the distance of the outermost lane from a street's middle [m].
+    """Returns the distance from a street's middle to its outermost lane [m].
 
-    `width` is that of the carriageway [m].
+    `width` is the width of the carriageway [m].
     """
     lanes = tag_value(tags, "lanes", count, _LANES_OF_STREET, None)
     if not lanes:
@@ -288,7 +291,7 @@ def sidewalk_sides(tags: Mapping[str, str]) -> tuple[bool, bool]:
 
 
 def area_kind(tags: Mapping[str, str]) -> tuple[str, str] | None:
-    """Returns the kind and class of an area on the ground; None for others."""
+    """Returns kind and class of an area on the ground; None for other areas."""
     if tags.get("natural") == "water" or tags.get("waterway") in (
         "riverbank",
         "dock",
@@ -322,8 +325,9 @@ class LaneLayout(NamedTuple):
     def offset(self, is_forward: bool, number: int) -> float:
         """Returns the distance of a lane from the middle of the street [m].
 
-        It is positive towards the side on which traffic keeps, in driving
-        direction. Number 0 is the innermost lane.
+        `number` 0 is the innermost lane. The distance is positive to the right
+        in driving direction where traffic keeps right, and to the left where it
+        keeps left.
         """
         same, other = self.forward, self.backward
         if not is_forward:
@@ -334,7 +338,7 @@ class LaneLayout(NamedTuple):
 def lane_layout(tags: Mapping[str, str], width: float) -> LaneLayout:
     """Returns the lanes of a street; no lanes if vehicles cannot pass.
 
-    `width` is that of the carriageway [m].
+    `width` is the width of the carriageway [m].
     """
     is_along, is_against = driven_ways(tags)
     directions = is_along + is_against

@@ -1,4 +1,4 @@
-"""Makes lanes and walkways for traffic from OpenStreetMap's streets."""
+"""Makes lanes and walkways for traffic from OpenStreetMap streets."""
 
 from collections import defaultdict
 from collections.abc import Iterable, Iterator, Mapping, Sequence
@@ -46,9 +46,9 @@ _Place = tuple[int, float]
 
 
 class StreetWalkways:
-    """Strips of sidewalks and paths, and the crossings that join them.
+    """Walkways: strips of sidewalks and paths, and crossings between them.
 
-    A crossing is named by the id of its node in a street.
+    The name of a crossing is the id of its node on the street.
     """
 
     def __init__(
@@ -238,8 +238,8 @@ _ABOVE, _BELOW = 0.3, 3.5
 class Stretch:
     """A street between two junctions, with its lanes.
 
-    Its line (N, 2), the middle, has rounded corners and even spacing [m]. The
-    nodes are those of its first and last place.
+    `line` (N, 2) is the middle of the street [m], with rounded corners and
+    evenly spaced points. `nodes` are those of its first and last point.
     """
 
     street: Street
@@ -252,7 +252,10 @@ class Stretch:
         return float(np.linalg.norm(np.diff(self.line, axis=0), axis=1).sum())
 
     def heading(self, end: int) -> float:
-        """Returns the direction away from an end (0 or -1) [rad]."""
+        """Returns the heading away from an end of the stretch [rad].
+
+        `end` is 0 for the first point and -1 for the last.
+        """
         line = self.line if end == 0 else self.line[::-1]
         reach = min(len(line) - 1, max(1, round(_ARM / SPACING)))
         return float(np.arctan2(*(line[reach] - line[0])[::-1]))
@@ -283,9 +286,9 @@ class StreetTraffic:
     """The lanes of streets and their links, for traffic.
 
     Streets are cut at junctions into stretches. The lanes of the stretches come
-    first, then the ways through junctions between them. In a link, the second
-    lane follows the first. A lane may have another one beside it, on its outer
-    side and in the same direction.
+    first, and then the lanes through junctions. In a link, the second lane
+    follows the first. A lane can have a neighbour on its outer side, with the
+    same direction.
     """
 
     def __init__(
@@ -333,7 +336,7 @@ class StreetTraffic:
         return [node for node, arms in self._arms.items() if len(arms) > 2]
 
     def setback(self, arm: _Arm) -> float:
-        """Returns how far lanes end before the end of their stretch [m]."""
+        """Returns how far before the end of a stretch its lanes end [m]."""
         stretch = self.stretches[arm[0]]
         wanted = [self._wanted_setback((arm[0], end)) for end in (0, -1)]
         room = max(stretch.length - _SHORTEST, 0.0)
@@ -508,14 +511,14 @@ def lanes_of_streets(
 ) -> str | None:
     """Returns the text of a lane file; None if there is no lane to drive on.
 
-    Traffic stays on the streets near drives. Parked cars and other objects that
-    were added beside the streets are named in the file if they stand in a lane.
+    Traffic stays on streets near the drives. The lane file lists the objects,
+    such as parked cars, that were added beside the streets and stand in a lane.
 
     Args:
-        streets: streets of the file.
-        places: where people cross and signals stand, and the paths for people.
-        structures: structures of the file.
-        added: objects that were added, which are named if they stand in a lane.
+        streets: streets from the imported file.
+        places: crossings, traffic signals and footpaths.
+        structures: structures from the imported file.
+        added: objects that were added to the imported file.
         drives: the drives, near which there is traffic.
         drive_on: side of the road on which traffic keeps.
     """

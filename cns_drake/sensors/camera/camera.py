@@ -1,4 +1,4 @@
-"""Cameras on a vehicle, and the messages that are recorded from them."""
+"""Adding cameras on a vehicle to a diagram, and recording their images."""
 
 from collections.abc import Callable, Mapping
 import logging
@@ -62,12 +62,12 @@ def add_cameras(
     Args:
         builder: builder of a diagram with the scene.
         scene: scene that the cameras see.
-        base: the vehicle's frame, as in the scene that was copied.
+        base: the vehicle's frame in the SceneGraph that `scene` copies.
         cameras: name -> description.
 
     Returns:
-        Name of the recorder's input port -> output port that measures, and a
-        description of how it is recorded.
+        Name of an input port of the recorder -> output port of a camera that is
+        to be connected to it, and a description of how its images are recorded.
     """
     found = {}
     # Drake warns that 16-bit depth images end at 65 m; no such images are

@@ -2,9 +2,9 @@
 
 Drake's renderer needs normals, which the meshes of a world may lack, and is
 slow with thousands of geometries. All geometry that never moves is therefore
-merged into a few meshes: one per look for colour images, and one per class for
-images of depths and classes. Meshes of classes have no vertex colours, which
-would show in label images.
+merged into a few meshes: one per surface texture (look) for colour images, and
+one per class for depth and label images. The meshes per class have no vertex
+colours, which would falsify label images.
 """
 
 from collections.abc import Callable, Collection
@@ -98,7 +98,7 @@ _Member = tuple[RigidTransform, tuple[float, float, float], TriangleSurface]
 
 
 class CameraScene(LeafSystem):
-    """Copies a scene into SceneGraphs of its own, and moves their frames.
+    """Copies a SceneGraph into others for rendering, and moves their frames.
 
     .. pydrake_system::
 
@@ -108,13 +108,13 @@ class CameraScene(LeafSystem):
         output_ports:
         - geometry_pose
 
-    `frame_poses` is abstract, `KnownPoses`.
+    The input `frame_poses` is abstract, of type `KnownPoses`: the poses of the
+    frames that move.
 
     Attributes:
         scene_graphs: SceneGraphs that the cameras see: `colours`, and `classes`
             if labels are recorded.
-        frames: frame in the scene that was copied -> its frame in these
-            SceneGraphs.
+        frames: frame in the copied SceneGraph -> frame in `scene_graphs`.
     """
 
     def __init__(
@@ -227,7 +227,7 @@ class CameraScene(LeafSystem):
             scene_graph.RegisterGeometry(source, self.frames[frame], made)
 
     def connect(self, builder: DiagramBuilder, poses: object) -> None:
-        """Adds the system and its scenes to a diagram."""
+        """Adds this system and its SceneGraphs to a diagram."""
         builder.AddNamedSystem("camera_scene", self)
         builder.Connect(poses, self.GetInputPort("frame_poses"))
         for kind, scene in self.scene_graphs.items():

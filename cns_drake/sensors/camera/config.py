@@ -18,7 +18,7 @@ class CameraSection(Section):
         width: width of the image in pixels.
         height: height of the image in pixels.
         rate: images per second [Hz]. The scan rate of the first LiDAR must be a
-            multiple of it, because each image has the stamp of a scan.
+            multiple of this rate, because each image has the stamp of a scan.
         fov_y: vertical field of view [rad].
         xyz: position in `base_link` [m].
         rpy: roll, pitch, yaw in `base_link` [rad]; with zeros the camera looks

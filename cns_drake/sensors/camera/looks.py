@@ -1,8 +1,8 @@
 """What surfaces look like to a camera: textures that code makes from seeds.
 
-A texture is a brightness by which the colour of a surface is multiplied; its
-mean is 1, so that the mean colour of the surface stays the same. Textures
-repeat in the world. On a wall, their rows are horizontal.
+A texture is a brightness by which the colour of a surface is multiplied. The
+mean of a texture is 1, so that the mean colour of the surface stays the same.
+Textures are repeated over a surface. On a wall, their rows are horizontal.
 """
 
 from collections.abc import Callable, Sequence
@@ -23,15 +23,17 @@ HORIZON_RGB = np.array([204.0, 221.0, 237.0]) / 255.0
 
 @dataclass(frozen=True)
 class Look:
-    """The look of a surface: a repeated texture, and its roughness.
+    """How a surface looks to a camera: a repeated texture, and a roughness.
 
     Attributes:
-        size: side of the repeated square in the world [m].
-        paint: function that makes (N, N, 1 or 3) brightness, of any mean, from
-            random numbers. A fourth channel is 0 where there is nothing.
-        roughness: from 0, that of a mirror, to 1, that of chalk.
-        is_face: whether the texture covers each geometry once, with colours of
-            its own.
+        size: side of the square on a surface that one copy of the texture
+            covers [m].
+        paint: function that makes the texture, (N, N, 1, 3 or 4) brightness of
+            any mean, from a random generator. The fourth channel is 0 where the
+            surface has holes.
+        roughness: roughness of the surface, from 0 (a mirror) to 1 (chalk).
+        is_face: whether one copy of the texture, with its own colours, covers
+            the whole of each geometry instead of being repeated.
     """
 
     size: float
@@ -235,10 +237,10 @@ def look_of(
     rgb: tuple[float, float, float],
     corners: int,
 ) -> str:
-    """Returns the name of the look of a geometry.
+    """Returns the name of the `Look` of a geometry.
 
     The look depends on the geometry's name, class, colour and number of
-    corners.
+    vertices.
     """
     red, green, blue = rgb
     part = name.rpartition("/")[2]
@@ -266,9 +268,11 @@ def look_of(
 
 @functools.cache
 def texture(name: str) -> tuple[bytes, float]:
-    """Returns a look's texture as PNG, and the brightness of its white.
+    """Returns the texture of a look as PNG, and the brightness of its white.
 
-    The texture as light, times this brightness, has the mean 1.
+    The PNG is gamma-encoded. Unless the look has `is_face`, its pixels, decoded
+    to linear values from 0 to 1 and multiplied by the brightness of white, have
+    the mean 1.
     """
     from PIL import Image
 
@@ -297,7 +301,10 @@ def _clouds() -> np.ndarray:
 
 
 def sky(d_W: np.ndarray) -> np.ndarray:
-    """Returns (N, 3) uint8 colours of the sky in directions (N, 3), unit."""
+    """Returns the colour of the sky, (N, 3) uint8, for directions (N, 3).
+
+    The directions are unit vectors in the world, z up.
+    """
     height = np.maximum(d_W[:, 2:], 0.0)
     blue = HORIZON_RGB + height**0.45 * ((0.23, 0.43, 0.78) - HORIZON_RGB)
     # Clouds lie in a plane; their pattern repeats after three times its height.
@@ -311,10 +318,10 @@ def sky(d_W: np.ndarray) -> np.ndarray:
 
 
 def texture_places(corners: np.ndarray, normals: np.ndarray) -> np.ndarray:
-    """Returns texture coordinates (N, 3, 2) [m] of corners (N, 3, 3).
+    """Returns texture coordinates (N, 3, 2) [m] of the corners of N triangles.
 
-    The (N, 3) normals are of unit length. On walls, the rows of a texture are
-    horizontal.
+    The corners are (N, 3, 3) [m], and the unit normals of the triangles (N, 3).
+    On walls, the rows of a texture are horizontal.
     """
     across = np.round(np.stack([-normals[:, 1], normals[:, 0]], axis=1), 3)
     length = np.linalg.norm(across, axis=1, keepdims=True)
@@ -330,9 +337,9 @@ def face_places(
 ) -> np.ndarray:
     """Returns texture coordinates (N, 3, 2) that cover each geometry once.
 
-    They run from 0 to 1 over the face of a geometry. The (N,) owners are
-    indices of the triangles' geometries; corners (N, 3, 3) and normals (N, 3)
-    are as in `texture_places`.
+    The coordinates run from 0 to 1 over the face of a geometry. `owners` (N,)
+    contains the index of each triangle's geometry; corners (N, 3, 3) and
+    normals (N, 3) are as in `texture_places`.
     """
     low = np.full((owners.max() + 1, 3), np.inf)
     high = -low

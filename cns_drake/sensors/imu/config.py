@@ -1,4 +1,4 @@
-"""The description of an IMU, and the file of its noise."""
+"""The description of an IMU, and the file of its noise densities."""
 
 from __future__ import annotations
 
@@ -28,10 +28,10 @@ class ImuSection(Mount):
     Attributes:
         xyz: position in `base_link` [m].
         rpy_deg: roll, pitch, yaw in `base_link` [deg].
-        rate: samples per second [Hz], such as 100, 200, 250, 400 or 500: at
-            most 1000, at least as many as scans, and with a whole number of
-            nanoseconds between two samples. By default the rate in the file
-            `kalibr`, or else one sample per scan.
+        rate: samples per second [Hz], such as 100, 200, 250, 400 or 500. It is
+            at most 1000 and at least the scan rate, and the time between two
+            samples must be a whole number of nanoseconds. By default the rate
+            in the file `kalibr`, or else one sample per scan.
         kalibr: file in Kalibr's format with the four noise densities of the
             IMU. By default there is no noise.
         accelerometer_turn_on_bias: standard deviation of the constant bias that
@@ -54,13 +54,14 @@ class ImuSection(Mount):
 
     @property
     def is_ideal(self) -> bool:
-        """Whether the IMU has no errors, and one sample per scan."""
+        """Whether the IMU has no errors and takes one sample per scan."""
         return self == ImuSection(xyz=self.xyz, rpy_deg=self.rpy_deg)
 
     def sample_rate(self, scan_rate: int) -> int:
         """Returns the samples per second.
 
-        By default it is the rate in Kalibr's file, or else one sample a scan.
+        This is `rate` if given, or else the rate in Kalibr's file, or else the
+        scan rate.
 
         Raises:
             InputError: Kalibr's file cannot be used.
@@ -94,10 +95,11 @@ class ImuSection(Mount):
         )
 
     def describe_kalibr(self, scan_rate: int) -> dict | None:
-        """Returns the fields of Kalibr's file for the IMU as it is simulated.
+        """Returns the fields of a Kalibr file for the simulated IMU.
 
         Returns:
-            None if there is no such file.
+            Field -> value, with the simulated sample rate; None if `kalibr`
+            names no file.
 
         Raises:
             InputError: the file cannot be used.
@@ -134,7 +136,7 @@ class KalibrImu(Section):
 
 
 def read_kalibr(path: Path) -> KalibrImu:
-    """Returns the noise densities and the rate from a file of Kalibr.
+    """Reads the noise densities and the rate from a file in Kalibr's format.
 
     Raises:
         InputError: the file cannot be read, or has another form.

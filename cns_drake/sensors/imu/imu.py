@@ -40,7 +40,7 @@ _NAMES = ("specific_force", "angular_velocity")
 
 @dataclass(frozen=True)
 class Imu:
-    """The systems in a diagram that make up an IMU with the frame I.
+    """The systems in a diagram that together form an IMU with the frame I.
 
     It can be unpacked: `accelerometer, gyroscope = imu`.
 
@@ -49,7 +49,7 @@ class Imu:
             I [m/s^2]; at rest it is +9.81 along the upward axis.
         gyroscope: system whose `measurement` is the exact angular velocity
             w_WI_I [rad/s].
-        rate: samples per second; None if it follows the frames of the
+        rate: samples per second; None for one sample per frame (scan) of the
             recording.
         noise: errors of the IMU; None if it is ideal.
         noisy: system that adds the errors; None if it is ideal.
@@ -93,14 +93,13 @@ def add_imu(
 
     Args:
         builder: builder of a diagram with the plant, or with `motion`.
-        body: P, the body that carries the IMU, or a frame fixed on it, of a
-            finalized plant.
+        body: P: the body of a finalized plant that carries the IMU, or a frame
+            that is fixed on this body.
         X_PI: pose of the IMU in P.
-        rate: samples per second [1/s]; by default one for each frame of a
-            recorder.
+        rate: samples per second; by default one per frame (scan) of a recorder.
         noise: errors of the IMU, which need a rate; by default none.
-        motion: the source of body poses, velocities and accelerations, if not
-            the plant itself.
+        motion: system with the poses, velocities and accelerations of the
+            plant's bodies; by default the plant.
         name: the systems are named `<name>_accelerometer`,
             `<name>_gyroscope` and `<name>_noise`.
 
@@ -165,13 +164,13 @@ def add_described_imu(
         body: body that carries the IMU.
         trajectory: motion of that body.
         motion: the system that moves it.
-        scan_rate: scans per second; the rate of an IMU whose description has
+        scan_rate: scans per second; the rate of the IMU if the description has
             none.
         seed: seed of its errors.
 
     Returns:
-        The ports `specific_force` and `angular_velocity`; and `imu_samples`
-        of an IMU with a rate or errors of its own.
+        Name -> output port: `specific_force` and `angular_velocity`, and also
+        `imu_samples` if the IMU is not ideal or has a rate.
 
     Raises:
         InputError: Kalibr's file cannot be used.
@@ -203,8 +202,8 @@ class NoisyImu(LeafSystem):
         - angular_velocity
 
     All ports are vectors of size 3, expressed in the IMU's frame [m/s^2,
-    rad/s]. Sample k is at k / rate; between samples the error of the last one
-    holds.
+    rad/s]. Sample k is at time k / rate. Between two samples, the error stays
+    that of the earlier sample.
     """
 
     def __init__(self, noise: ImuNoise, rate: float):
@@ -235,9 +234,9 @@ class NoisyImu(LeafSystem):
 class VehicleImu(LeafSystem):
     """Measures like an ideal accelerometer and gyroscope on a vehicle.
 
-    Its values equal those of Drake's sensors on a `VehicleMotion`, up to
-    rounding, at a fifteenth of the cost: it handles one frame only, and
-    computes many samples at a time.
+    Up to rounding, the values are those of Drake's sensors on a
+    `VehicleMotion`. This system takes a fifteenth of their time, because it
+    handles only one frame and computes many samples at once.
 
     .. pydrake_system::
 
@@ -247,10 +246,11 @@ class VehicleImu(LeafSystem):
         - angular_velocity
         - samples
 
-    `specific_force` [m/s^2] and `angular_velocity` w_WI [rad/s] are vectors
-    of size 3, expressed in the IMU's frame I; between samples, the error of
-    the last one holds. `samples` is abstract, `ImuSamples`: the last 256 up
-    to the time of the context. All depend on time only.
+    `specific_force` [m/s^2] and `angular_velocity` w_WI [rad/s] are vectors of
+    size 3, expressed in the IMU's frame I; between two samples, the error stays
+    that of the earlier sample. `samples` is abstract, of type `ImuSamples`: the
+    last 256 samples up to the time of the context. All outputs depend only on
+    time.
     """
 
     def __init__(

@@ -1,4 +1,4 @@
-"""The errors of an IMU, as functions of the number of a sample."""
+"""The errors of an IMU, as functions of the sample number."""
 
 from dataclasses import dataclass
 
@@ -17,13 +17,13 @@ _MOST_BLOCKS = 1 << 32
 
 @dataclass(frozen=True)
 class ImuNoise:
-    """The errors of an IMU's measurements; by default it is ideal.
+    """The parameters of an IMU's errors; by default there are no errors.
 
-    The model is Kalibr's: a measurement is w + b + n with white noise n and a
-    bias b that is a random walk. For samples dt apart, n has the standard
-    deviation density / sqrt(dt), and the standard deviation of b's increment is
-    random_walk * sqrt(dt) (Kalibr, "IMU noise model"). The errors of a sensor's
-    three axes are independent and equally large.
+    The model is Kalibr's: a measurement is the true value plus white noise n
+    plus a bias b that is a random walk. For samples dt apart, n has the
+    standard deviation density / sqrt(dt), and the standard deviation of b's
+    increment is random_walk * sqrt(dt) (Kalibr, "IMU noise model"). The errors
+    of a sensor's three axes are independent and equally large.
 
     Attributes:
         accelerometer_noise_density: density of the white noise
@@ -81,7 +81,7 @@ class ImuErrors:
     The error of a sample depends only on its number, not on earlier calls. The
     random walk is a Brownian motion with given values at time zero and far
     away; values in between are drawn by halving intervals (Levy's
-    construction), so that no sample needs those before it.
+    construction), so that a sample can be computed without the earlier samples.
     """
 
     def __init__(self, noise: ImuNoise, rate: float):
@@ -103,14 +103,14 @@ class ImuErrors:
     def measure(self, first: int, exact: np.ndarray) -> np.ndarray:
         """Returns exact samples with the errors of the IMU added.
 
-        Samples are numbered from `first` on, 0 at time zero. The (N, 6) values
-        are specific force [m/s^2] and angular velocity [rad/s].
+        `first` is the number of the first sample; sample 0 is at time zero. The
+        (N, 6) values are specific force [m/s^2] and angular velocity [rad/s].
         """
         measured = exact + self._of_samples(first, len(exact))
         return np.minimum(np.maximum(measured, -self._range), self._range)
 
     def at(self, sample: int) -> np.ndarray:
-        """Returns the (6,) error of one sample, as in `measure`."""
+        """Returns the errors of one sample, (6,), in the order of `measure`."""
         return self._of_samples(sample, 1)[0]
 
     def _of_samples(self, first: int, count: int) -> np.ndarray:
@@ -125,7 +125,7 @@ class ImuErrors:
         return np.concatenate(parts)
 
     def of_block(self, number: int) -> np.ndarray:
-        """Returns the (1024, 6) errors of samples 1024 * number onwards."""
+        """Returns the (1024, 6) errors of samples from 1024 * number on."""
         errors = np.tile(self._turn_on, (_BLOCK, 1))
         if self._walk.any():
             errors += self._walk * self._walk_in_block(number)

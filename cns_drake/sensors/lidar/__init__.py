@@ -1,1 +1,1 @@
-"""The LiDAR: its description, presets and beams, its system."""
+"""The LiDAR: its description, its presets, its beams and its Drake system."""

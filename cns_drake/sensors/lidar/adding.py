@@ -58,25 +58,29 @@ def add_lidar(
     Args:
         builder: builder of a diagram with `scene_graph`.
         scene_graph: the SceneGraph to scan.
-        body: P, a body or a frame fixed on one, of a finalized plant that is
-            registered with `scene_graph`; or a frame that any other source has
-            registered there. A frame on a body stays where its model has it,
-            also if a context moves it, as for Drake's cameras.
+        body: P: a body, or a frame that is fixed on a body, of a finalized
+            plant that is registered with `scene_graph`; or a FrameId that any
+            other source has registered there. A frame on a body keeps the pose
+            from its model, even if a Context changes it, as for Drake's
+            cameras.
         X_PS: pose of the sensor S in P.
-        pattern: beams of the LiDAR, or the name of a preset, which then turns
-            at the rate of its data sheet and does not round coordinates.
+        pattern: beams of the LiDAR, or the name of a preset. With a name, the
+            LiDAR turns at the rate of its data sheet, and coordinates are not
+            rounded.
         name: name of the system.
-        unseen: frames and geometries that the LiDAR does not see; by default
-            its body and all bodies welded to it, without the world.
+        unseen: bodies, frames and geometries that the LiDAR does not see; by
+            default its body and all bodies that are welded to it, except the
+            world.
         motion_distortion: whether the LiDAR and all other bodies of the plant
             keep moving during a turn (see `Lidar`).
         motion: source of the bodies' velocities for motion distortion; by
             default the plant.
         range_noise: standard deviation of the Gaussian errors of ranges [m].
         dropout: probability that a return is lost.
-        seed: seed of noise, dropout and calibrated returns. The draws depend on
-            the seed, the name and the number of the frame. An option
-            `measurement` replaces `range_noise`, `dropout` and `seed`.
+        seed: seed of noise, dropout and calibrated returns. Random numbers
+            depend on the seed, the name and the number of the frame. The option
+            `measurement`, a `MeasurementModel`, replaces `range_noise`,
+            `dropout` and `seed`.
         returns: `ideal`, `calibrated` by the data sheet of a preset, or a
             `CalibratedReturns`.
         options: further arguments of `Lidar`, such as `causal`.
@@ -230,12 +234,14 @@ def add_described_lidar(
         config: the description.
         builder: builder of a diagram with `scene_graph`.
         scene_graph: the SceneGraph to scan.
-        body: P, or a frame on it.
+        body: P: the body that carries the LiDAR, or a frame that is fixed on
+            it.
         X_PS: pose of the sensor in P.
         name: name of the system.
         seed: seed of noise and returns.
         weather: weather of calibrated returns.
-        period: duration of a turn [s]; by default by the description's rate.
+        period: duration of a turn [s]; by default it follows from the rate in
+            the description.
         options: further arguments of `add_lidar`.
     """
     return add_lidar(
@@ -269,13 +275,15 @@ def add_lidar_view(
 ) -> geometry.MeshcatPointCloudVisualizer:
     """Adds a live view of a LiDAR's scans in Meshcat to a diagram.
 
-    Points are shown in the world, at the path of the LiDAR's name.
+    Points are shown in the world frame. Their path in Meshcat is the LiDAR's
+    name.
 
     Args:
         builder: builder of a diagram with the LiDAR.
         lidar: the LiDAR.
         meshcat: server that shows the points.
-        period: time between two shown scans [s]; by default a turn.
+        period: time between two shown scans [s]; by default the duration of a
+            turn.
         color: colour of the points.
         point_size: size of a point [m].
 

@@ -1,4 +1,4 @@
-"""Descriptions of a LiDAR and of the weather, and the models made from them."""
+"""Descriptions of a LiDAR and the weather, and their conversion to models."""
 
 from __future__ import annotations
 
@@ -157,7 +157,9 @@ class LidarSection(Mount):
 
 
 def make_lidar_config(preset: str) -> LidarSection:
-    """Returns a LiDAR of a preset.
+    """Returns the description of a LiDAR with a given preset.
+
+    All its other fields have their defaults.
 
     Raises:
         InputError: there is no such preset.
@@ -192,8 +194,9 @@ def make_pattern(
 def describe_unit(config: LidarSection) -> dict[str, Any]:
     """Returns what a user of a calibrated unit would know about it.
 
-    These are its preset, unit seed and nominal elevations. The true angles of
-    the lasers differ by the unit's errors.
+    This is the preset, the unit seed and the nominal elevations. The true
+    angles of the lasers differ from the nominal angles by the errors of the
+    individual unit.
     """
     nominal = getattr(make_pattern(config), "elevations_rad", ())
     return {

@@ -73,7 +73,7 @@ class RayHits(NamedTuple):
 
 
 class Lidar(LeafSystem):
-    """A LiDAR that sees all geometry of one role, except its own body's.
+    """A LiDAR that sees all geometry with a given role, except its own body.
 
     .. pydrake_system::
 
@@ -98,38 +98,39 @@ class Lidar(LeafSystem):
     minimum range or farther than the maximum range return nothing.
     `point_cloud_S` holds the same positions as a Drake point cloud, whose
     colours are the intensities as greys. Grey 255 stands for an intensity of 1,
-    or of 255 with calibrated returns. `point_cloud_W` has the points in the
-    world, and `positions_W` too, but without colours. `X_WS` is the pose of S
-    at the time of the output.
+    or of 255 with calibrated returns. `point_cloud_W` has the same points in
+    the world frame; `positions_W` is `point_cloud_W` without the colours.
+    `X_WS` is the pose of S at the time of the output.
 
     The turn starts at the time of the output. The turn of a causal LiDAR ends
     at that time instead, so that a controller may use the scan at once. By
     default all beams are cast from the pose of S at the time of the output,
     which follows from the pose of P in the SceneGraph (a deskewed scan).
 
-    The port `sweep` replaces this pose by those of a `Sweep` of P: one for the
-    whole turn; or, with motion distortion, one for each column at its firing
-    time. A point is then expressed in S at its firing time t, as a real unit
-    reports it: X_WS(start of the turn + t) takes it to its place in the world.
-    All other moving geometry stays, during the turn, where it is at the time of
-    the output.
+    If the port `sweep` is connected, poses of P from a `Sweep` replace this
+    pose: one pose for the whole turn or, with motion distortion, one for each
+    column at its firing time. With motion distortion, a point is expressed in S
+    at its firing time t, as a real unit reports it: X_WS(start of the turn + t)
+    transforms it to the world. During the turn, all other moving geometry stays
+    where it is at the time of the output.
 
-    `moving_bodies` and the port `body_spatial_velocities` (a list over a
-    plant's bodies of V_WB, expressed in the world, as a MultibodyPlant gives
-    it) make P and all other bodies of that plant move during the turn, with the
-    velocities that they have at the time of the output. Each beam is cast at
-    its own firing time: both S and the geometry have the poses of that time.
-    Points, too, are expressed in S at that time.
+    With `moving_bodies`, P and all other bodies of a plant move during the
+    turn, with the velocities that they have at the time of the output. The port
+    `body_spatial_velocities` supplies these velocities as a MultibodyPlant
+    does: a list of V_WB over the plant's bodies, expressed in the world. Each
+    beam is cast at its own firing time, with S and the geometry at their poses
+    of that time, and its point is expressed in S at that time.
 
-    The field `instance` of a point is the number of its structure: a model, or
-    the part of a name before a slash. `EvalInstances` maps the number to
-    geometries. `EvalGeometryIds` returns the geometry of each single point.
+    The field `instance` of a point is the number of the structure that was hit.
+    A structure is a model, or all geometries whose names are equal up to the
+    first slash. `EvalInstances` maps the number to geometries.
+    `EvalGeometryIds` returns the geometry of each single point.
 
-    `moving_instances` (abstract, the instance ids of structures) lists the
-    moving structures: their points have the label of the moving class.
+    `moving_instances` (abstract) lists the instance ids of the structures that
+    are moving: their points get the label of the moving class.
 
-    `frame_poses` (abstract, `KnownPoses`) repeats poses X_WF of the SceneGraph
-    in one array, from which a LiDAR reads many poses faster.
+    `frame_poses` (abstract, `KnownPoses`) contains poses X_WF of the SceneGraph
+    once more, in one array, from which many poses are read faster.
 
     Drake cannot cast rays. The system therefore reads shapes and poses from the
     QueryObject and casts rays on a hierarchy of its own. It rebuilds the parts
@@ -294,7 +295,10 @@ class Lidar(LeafSystem):
         )
 
     def EvalScene(self, context: Context) -> RayCastingScene:
-        """Returns the geometry that the LiDAR sees, to cast rays on."""
+        """Returns the scene of all geometry that the LiDAR sees in a Context.
+
+        Rays can be cast on it.
+        """
         scene = self._eval_seen(context).scene
         assert scene is not None
         return scene
@@ -312,7 +316,7 @@ class Lidar(LeafSystem):
     def EvalInstances(
         self, context: Context
     ) -> dict[int, tuple[GeometryId, ...]]:
-        """Returns the visible geometries of each instance, by its id.
+        """Returns instance id -> visible geometries of this structure.
 
         Example:
             gids = lidar.EvalInstances(lidar_context)[scan["instance"][0]]
@@ -608,7 +612,7 @@ class SeenGeometry:
 
     Attributes:
         scene: scene on which rays are cast; None before the first update. Its
-            geometry indices are those of `built`.
+            geometry indices are indices into `built`.
         built: the geometries in the scene.
         label: (num_geometries,) uint16 class of each geometry.
         moving_label: (num_geometries,) uint16 class of each geometry while it
@@ -643,15 +647,15 @@ class SeenGeometry:
         Args:
             query_object: query object of the SceneGraph, with geometry and
                 poses.
-            revision: revision of `geometry_revision_port`; without it all
-                geometries are compared.
+            revision: value of the port `geometry_revision`; if None, all
+                geometries are compared with those of the last update.
             motions: motions of frames that move during the turn.
-            known: poses that replace calls of the query object.
-            seen: the ball in which beams can meet geometry.
-            p_WS: the place of the sensor [m].
+            known: frame poses that are read instead of querying the SceneGraph.
+            seen: the ball within which beams can hit geometry.
+            p_WS: the position of the sensor in the world, (3,) [m].
 
         Raises:
-            InputError: see `GeometryReader.read`.
+            InputError: a geometry cannot be read; see `GeometryReader.read`.
         """
         inspector = query_object.inspector()
 
@@ -669,7 +673,10 @@ class SeenGeometry:
         self._revision = revision
 
     def labels(self, moving: np.ndarray) -> np.ndarray:
-        """Returns the class of each geometry, given the moving instances."""
+        """Returns the class of each geometry, given the moving structures.
+
+        `moving` contains the instance ids of the structures that are moving.
+        """
         moves = np.zeros(MAX_INSTANCE + 1, bool)
         moves[moving] = True
         return np.where(moves[self.instance], self.moving_label, self.label)
@@ -747,7 +754,8 @@ class BeamTable(NamedTuple):
             the origin of S.
         ring: (num_beams,) uint16.
         t_ns: (num_beams,) uint32 firing time since the start of the turn.
-        place: (num_beams,) position of each beam in the order of casting.
+        place: (num_beams,) position of each beam in the order in which rays are
+            cast.
     """
 
     d_Sset: np.ndarray
@@ -805,17 +813,18 @@ def assemble_points(
     instance: np.ndarray,
     step: np.float32,
 ) -> None:
-    """Fills a scan, one point of `POINT_DTYPE` for each of N returns.
+    """Fills a scan: one point of `POINT_DTYPE` for each of N returns.
 
-    Compiled, since NumPy would take a fifth of a frame.
+    It is compiled, because NumPy would take a fifth of a frame's computing time
+    for it.
 
     Args:
         scan: (N,) points, filled here.
         table: beams of the pattern.
         returns: the returns of the beams.
         met: (N,) int32 index of the hit geometry in `label` and `instance`;
-            negative for the weather.
-        label, instance: uint16 of each geometry.
+            negative for returns from rain, snow or fog.
+        label, instance: uint16 class and instance id of each geometry.
         step: coordinates are rounded to multiples of this [m]; 0 to keep them
             exact.
     """

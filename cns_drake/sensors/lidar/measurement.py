@@ -1,4 +1,4 @@
-"""The measurement of true ranges: noise, losses, rounding."""
+"""Measurement errors of ideal returns: noise, losses, rounding."""
 
 from dataclasses import dataclass
 from enum import Enum
@@ -25,7 +25,7 @@ _RANGE_NOISE, _DROPOUT = range(2)
 
 
 class Echoes(str, Enum):
-    """The echoes of a beam that a unit reports."""
+    """Which echoes of a beam a unit reports."""
 
     FIRST = "first"
     STRONGEST = "strongest"
@@ -38,7 +38,7 @@ class Returns(NamedTuple):
 
     Attributes:
         beams: (N,) int index of each beam.
-        ranges: (N,) float32 measured [m].
+        ranges: (N,) float32 measured ranges [m].
         intensity: (N,) float32, of at most 1.
     """
 
@@ -49,11 +49,12 @@ class Returns(NamedTuple):
 
 @dataclass(frozen=True)
 class MeasurementModel:
-    """The noise, losses and rounding of a LiDAR; by default it has none.
+    """The noise, losses and rounding of a LiDAR; by default there are none.
 
     Random numbers depend only on `seed`, `sensor_name` and the number of the
-    frame, and are drawn for every beam, hit or miss. Neither earlier calls nor
-    other geometry change a beam's noise.
+    frame, and are drawn for every beam, whether it hits a surface or not. A
+    beam's noise is therefore the same whatever was computed before and whatever
+    geometry other beams hit.
 
     Attributes:
         resolution: coordinates are rounded to multiples of this [m], and
@@ -103,14 +104,15 @@ class MeasurementModel:
 
     @property
     def is_random(self) -> bool:
-        """Whether two scans of the same geometry can differ."""
+        """Whether two scans of the same geometry from one pose can differ."""
         return max(self.range_noise, self.dropout, self.faint_dropout) > 0.0
 
     def reach(self, max_range: float) -> float:
-        """Returns how far rays must be cast for a maximum range [m].
+        """Returns how far rays must be cast [m], given the maximum range [m].
 
-        It is a little beyond the maximum even without noise, so that `measure`
-        decides on the limit and not a ray caster's rounding.
+        The result exceeds the maximum range even without noise, so that the
+        exact limit is applied by `measure` and does not depend on the ray
+        caster's rounding.
         """
         return max_range * (1.0 + 1e-5) + _FARTHEST_NOISE * self.range_noise
 
@@ -121,7 +123,7 @@ class MeasurementModel:
         max_range: float,
         frame: int,
     ) -> Returns:
-        """Returns the returns that the LiDAR reports for exact ranges.
+        """Converts exact ranges to the returns that the LiDAR reports.
 
         Args:
             true_ranges: (num_beams,) float32 distance to the nearest surface

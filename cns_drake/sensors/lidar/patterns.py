@@ -1,9 +1,9 @@
 """The beams of a LiDAR: directions and firing times.
 
-The patterns of Livox's units do not repeat. Livox publishes their fields of
-view, rates and numbers of lines, but no formula for the motion of a beam; each
-class states its assumptions. Directions depend only on time, so that a given
-frame is always the same.
+The scan patterns of Livox's LiDARs do not repeat. Livox publishes their fields
+of view, rates and numbers of lines, but no formula for the motion of the beams;
+each of these classes states its assumptions. Directions depend only on time, so
+that a frame of a given number always has the same directions.
 """
 
 from __future__ import annotations
@@ -60,13 +60,13 @@ class Beams:
     Attributes:
         d_Sset: (N, 3) float64 unit directions, expressed in the sensor frame
             S (x forward, y left, z up).
-        ring: (N,) uint16, number of the emitter.
-        column: (N,) int, index of its firing time.
-        column_t_ns: (C,) uint32 firing times since the start of the turn,
-            rising.
-        packet_order: (N,) beams in the order of casting: neighbours point
-            nearly the same way and meet the same geometry, which makes packets
-            of rays fast.
+        ring: (N,) uint16, number of each beam's laser.
+        column: (N,) int, index of each beam's firing time in `column_t_ns`.
+        column_t_ns: (C,) uint32 firing times since the start of the turn [ns],
+            increasing.
+        packet_order: (N,) indices of the beams in the order in which rays are
+            cast. Consecutive rays have nearly the same direction and mostly hit
+            the same geometry, which makes packets of rays fast.
 
     Raises:
         ValueError: a ring or a firing time does not fit into a point.
@@ -95,14 +95,15 @@ class Beams:
 
     @cached_property
     def t_ns(self) -> np.ndarray:
-        """(N,) uint32 firing time since the start of the turn."""
+        """(N,) uint32 firing times since the start of the turn [ns]."""
         return self.column_t_ns[self.column]
 
     @cached_property
     def cast_columns(self) -> np.ndarray | None:
-        """(N,) column of each beam in packet order.
+        """(N,) column of each beam, in packet order; None if unneeded.
 
-        None if the beams in packet order cycle through all columns.
+        It is None if the columns of the beams in packet order are simply 0, 1,
+        ..., C - 1, again and again.
         """
         columns = self.column[self.packet_order]
         turns, rest = divmod(len(columns), max(len(self.column_t_ns), 1))
@@ -115,8 +116,9 @@ class Beams:
 def make_beams(d_Sset: np.ndarray, ring: np.ndarray, t_ns: np.ndarray) -> Beams:
     """Returns beams with arbitrary directions, in firing order.
 
-    They have (N, 3) unit directions, (N,) rings and (N,) firing times, which do
-    not decrease.
+    `d_Sset` contains (N, 3) unit directions, `ring` (N,) numbers of lasers and
+    `t_ns` (N,) firing times since the start of the turn [ns], which must not
+    decrease.
     """
     elevation = np.arcsin(np.clip(d_Sset[:, 2], -1.0, 1.0))
     azimuth = np.arctan2(d_Sset[:, 1], d_Sset[:, 0])
@@ -130,8 +132,8 @@ def make_beams(d_Sset: np.ndarray, ring: np.ndarray, t_ns: np.ndarray) -> Beams:
 class BeamPattern(ABC):
     """The directions and firing times of a LiDAR's beams.
 
-    A turn is the time of one scan, and depends on the unit. Firing times are
-    the same in all turns; directions can differ.
+    A turn is the time that the LiDAR takes for one scan. Firing times within a
+    turn are the same in all turns; directions can differ between turns.
 
     Attributes:
         min_range: nearest measured range [m].
@@ -153,7 +155,7 @@ class BeamPattern(ABC):
 
     @abstractmethod
     def beams(self, frame: int) -> Beams:
-        """Returns the directions of the beams of one turn.
+        """Returns the beams of one turn.
 
         Args:
             frame: number of the turn.
@@ -180,7 +182,7 @@ class BeamPattern(ABC):
 
     @property
     def column_t_ns(self) -> np.ndarray:
-        """(C,) uint32 firing times since the start of a turn."""
+        """(C,) uint32 firing times since the start of a turn [ns]."""
         return self.beams(0).column_t_ns
 
     def within(
@@ -188,11 +190,12 @@ class BeamPattern(ABC):
         azimuths_deg: tuple[float, float] = (-180.0, 180.0),
         elevations_deg: tuple[float, float] = (-90.0, 90.0),
     ) -> BeamPattern:
-        """Returns the pattern without the beams outside a field of view.
+        """Returns a pattern with only the beams inside a field of view.
 
         Args:
-            azimuths_deg: limits of the azimuth [deg]; if the first is greater,
-                the field of view includes the rear.
+            azimuths_deg: first and last azimuth [deg], from -180 to 180; if the
+                first is greater than the last, the field of view includes the
+                rear.
             elevations_deg: limits of the elevation [deg].
 
         Raises:
@@ -260,7 +263,7 @@ def _limit(
 
 @dataclass(frozen=True)
 class SpinningPattern(BeamPattern):
-    """The pattern of a spinning LiDAR with one ring or many.
+    """The beam pattern of a spinning LiDAR with one or more rings.
 
     In the sensor frame S (x forward, y left, z up) the turn starts at the rear
     and goes clockwise seen from above, as Ouster's and Velodyne's units turn:
@@ -453,14 +456,13 @@ def make_flash_pattern(
     """Returns the pattern of a solid-state LiDAR with a grid of pixels.
 
     All pixels fire at once. They are evenly spaced in azimuth and elevation.
-    The middles of the outermost pixels lie half a pixel inside the edge of the
-    field of view.
-    Ring 0 is the uppermost row.
+    The centres of the outermost pixels lie half a pixel inside the edge of the
+    field of view. Ring 0 is the uppermost row.
 
     Args:
         width: number of pixels in a row.
         height: number of rows.
-        fov_deg: field of view across and up [deg].
+        fov_deg: horizontal and vertical field of view [deg].
         min_range: nearest range that is measured [m].
         max_range: farthest range that is measured [m].
         period: time between two flashes [s].
@@ -504,12 +506,13 @@ _NEAR_CELLS, _GAP_CELLS = 6, 48
 class BeamCoverage:
     """The directions that the beams of a turn cover.
 
-    A beam covers all directions within 1.5 deg of it in elevation and in
-    azimuth that are not outside of the field of view.
+    A beam covers all directions that differ from its own by at most 1.5 deg in
+    elevation and in azimuth and lie inside the field of view.
 
-    The field of view consists of cells of 0.25 deg: the cells of the beams;
-    their neighbours, since rounding can move a point off its beam; and all
-    cells between beams that are up to 24 deg apart (a morphological closing).
+    The field of view consists of cells of 0.25 deg: the cells of the beams; the
+    neighbours of these cells, since rounding can move a point into them; and
+    all cells between beams that are up to 24 deg apart (a morphological
+    closing).
     """
 
     def __init__(self, d_Sset: np.ndarray):
@@ -527,7 +530,7 @@ class BeamCoverage:
         self._is_covered = (near & field).astype(bool)
 
     def covers(self, d_Sset: np.ndarray) -> np.ndarray:
-        """Returns which directions (N, 3) in S are covered, (N,) bool."""
+        """Returns (N,) bool: whether directions (N, 3) in S are covered."""
         return self._is_covered[_cells(d_Sset)]
 
 
@@ -627,10 +630,11 @@ class RosettePattern(_TimedPattern):
     Each prism bends a beam by a quarter of the field of view, and both bends
     add up as vectors. The field of view is therefore a disc about x, densest in
     its middle. This holds to first order: a real prism bends an oblique beam
-    somewhat more. Each laser of a vertical row has a disc of its own.
+    somewhat more. If there is a vertical row of lasers, each laser scans a disc
+    of its own.
 
     Attributes:
-        fov_deg: full angle of a disc [deg].
+        fov_deg: full opening angle of a disc [deg].
         height_deg: angle between the highest and the lowest laser [deg].
 
     Example:
@@ -677,11 +681,12 @@ class RosettePattern(_TimedPattern):
 
 @dataclass(frozen=True)
 class NoddingPattern(_TimedPattern):
-    """A pattern of lines that rotate and slowly nod within their bands.
+    """A pattern of lasers (lines) that rotate and slowly nod up and down.
 
-    Bands of equal height fill the field of view. The lines turn about z 100
-    times a second and nod 6.18 times a second. The ratio of these rates is not
-    a simple fraction, so each frame fills gaps of the frames before.
+    Each line nods within a band of elevations of its own; the bands are of
+    equal height and fill the field of view. The lines turn about z 100 times a
+    second and nod 6.18 times a second. The ratio of these rates is not a simple
+    fraction, so each frame fills gaps of the frames before.
 
     Attributes:
         elevations_deg: lowest and highest elevation; line 0 has the highest

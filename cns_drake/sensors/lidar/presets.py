@@ -1,4 +1,4 @@
-"""Beam patterns of commercial units, from their data sheets: presets.yaml."""
+"""Beam patterns of commercial LiDARs by their data sheets: presets.yaml."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ UnitPattern: TypeAlias = (
 
 
 class LidarPreset(NamedTuple):
-    """The beams of a unit, and the source of these data."""
+    """The beams of a commercial LiDAR, and the source of the numbers."""
 
     pattern: UnitPattern
     source: str
@@ -27,7 +27,7 @@ class LidarPreset(NamedTuple):
     def of(
         cls, *, source: str, ranges: tuple[float, float], **fields: Any
     ) -> LidarPreset:
-        """Returns a preset from its fields in presets.yaml."""
+        """Makes a preset from its fields in presets.yaml."""
         fields["min_range"], fields["max_range"] = ranges
         if "pattern" in fields:
             kind = getattr(patterns, fields.pop("pattern"))
@@ -72,8 +72,9 @@ def make_beam_pattern(
     Args:
         preset: a key of `LIDAR_PRESETS`; `source` there names its data sheet.
         period: duration of a turn [s]; by default that of the data sheet.
-        num_columns: columns in a turn; by default those of the data sheet. The
-            number is fixed by the period if a unit fires at a fixed rate.
+        num_columns: columns in a turn; by default those of the data sheet. If
+            the lasers of a unit fire at a fixed rate, the period determines
+            this number.
         min_range: nearest range that is measured [m]; by default that of the
             data sheet.
         max_range: farthest range that is measured [m]; by default that of the
@@ -81,8 +82,8 @@ def make_beam_pattern(
 
     Raises:
         KeyError: there is no preset of that name.
-        ValueError: the preset has no columns to choose, or a value is
-            impossible.
+        ValueError: `num_columns` is given for a preset without columns, or a
+            value is impossible.
 
     Example:
         from cns_drake import LIDAR_PRESETS, make_beam_pattern

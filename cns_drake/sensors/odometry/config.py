@@ -7,9 +7,10 @@ class OdometrySection(Section):
     """How often the true motion of the vehicle is recorded.
 
     Attributes:
-        rate: messages per second [Hz], such as 100: a multiple of the fastest
-            LiDAR's rate, at most 1000, and with a whole number of nanoseconds
-            between two messages. By default one message per scan.
+        rate: messages per second [Hz], such as 100. It must be a multiple of
+            the fastest LiDAR's rate and at most 1000, and the time between two
+            messages must be a whole number of nanoseconds. By default one
+            message per scan.
     """
 
     rate: int | None = None

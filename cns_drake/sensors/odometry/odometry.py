@@ -48,8 +48,9 @@ class OdometrySensor(LeafSystem):
         output_ports:
         - odometry
 
-    The inputs are lists over a plant's bodies of X_WP and V_WP, expressed in
-    the world; the output is an `Odometry` of the place B.
+    The inputs are lists, over the bodies P of a plant, of X_WP and of V_WP,
+    expressed in the world. The output is the `Odometry` of the observed body or
+    frame B.
     """
 
     def __init__(self, body: RigidBody, X_PB: RigidTransform | None = None):
@@ -79,9 +80,10 @@ class OdometrySensor(LeafSystem):
     def place_of(
         self, body: BodyIndex, X_PC: RigidTransform
     ) -> RigidTransform | None:
-        """Returns the pose X_BC of a frame C on the body P.
+        """Returns the pose X_BC of a frame C in the observed frame B.
 
-        It is None if C is on another body.
+        X_PC is the pose of C on the body `body`. The result is None if B is
+        fixed on another body.
         """
         return self.X_PB.inverse() @ X_PC if body == self._body else None
 
@@ -106,13 +108,14 @@ def add_odometry(
     motion: System | None = None,
     name: str = "odometry",
 ) -> OdometrySensor:
-    """Adds exact odometry of a body to a diagram.
+    """Adds a sensor for the exact odometry of a body to a diagram.
 
     The system is connected to the motion of the body.
 
     Args:
         builder: builder of a diagram with the plant, or with `motion`.
-        body: body P, or frame fixed on one, of a finalized plant.
+        body: P: a body of a finalized plant, or a frame that is fixed on a
+            body.
         X_PB: pose of the observed frame B in P; by default B is P.
         motion: source of body poses and velocities; by default the plant.
         name: name of the system.

@@ -1,4 +1,4 @@
-"""Returns of a LiDAR modelled by its data sheet, in any weather."""
+"""The returns of a LiDAR, modelled by its data sheet, in any weather."""
 
 from __future__ import annotations
 
@@ -33,15 +33,17 @@ class CalibratedReturns:
 
     It adds the unit's noise, losses, angular errors and calibrated intensities.
     Random numbers depend only on the seed, the name of the sensor, the frame
-    and the beam. Errors of the individual unit depend on `unit_seed`, its name
-    and the laser; two drives with one unit share them.
+    and the beam. Errors of the individual unit depend on `unit_seed`, the name
+    of the sensor and the laser, so they are the same in all drives with the
+    same unit.
 
     Attributes:
         sheet: data sheet of the unit.
         echoes: which echoes of a beam are reported.
         weather: weather of the drive.
         seed: seed of random numbers.
-        sensor_name: distinguishes several LiDARs.
+        sensor_name: name of the LiDAR; LiDARs with different names get
+            different random numbers.
         unit_seed: seed of the errors of the unit.
 
     Example:
@@ -98,7 +100,8 @@ class CalibratedReturns:
     ) -> Materials:
         """Returns the materials of geometries, with wet ground in rain.
 
-        The classes of structures are known only from a `StructureTable`.
+        `structures` supplies the classes if it is a `StructureTable`; otherwise
+        no structure has a class.
         """
         if not isinstance(structures, StructureTable):
             structures = StructureTable(())
@@ -106,10 +109,10 @@ class CalibratedReturns:
         return find_materials(geometries, structures, is_wet=is_wet)
 
     def reach(self, max_range: float) -> float:
-        """Returns how far rays must be cast [m].
+        """Returns how far rays must be cast [m], given the maximum range [m].
 
-        It exceeds the reported range, since range noise can bring a farther
-        surface into range.
+        The result exceeds the maximum range, since range noise can bring a
+        farther surface into range.
         """
         return max_range + 8.0 * self.sheet.range_noise
 
@@ -146,16 +149,16 @@ class CalibratedReturns:
     ) -> Reported:
         """Returns the reported points of a turn.
 
-        Rays are numbered in the order of casting. Ray i takes pose i mod K and
-        time i mod T.
+        Rays are numbered in the order in which they are cast. Ray i is cast
+        from pose i mod K at time i mod T.
 
         Args:
             scene: geometry on which rays are cast.
-            materials: how each geometry reflects.
+            materials: reflection properties of each geometry.
             pattern: the beams of a turn.
-            turn: random errors of the turn.
-            p_WSset: (K, 3) positions of S [m].
-            R_WSset: (K, 3, 3) orientations of S.
+            turn: the beams' directions and errors in this turn.
+            p_WSset: (K, 3) positions of S in the world [m].
+            R_WSset: (K, 3, 3) orientations of S in the world.
             times: (T,) firing times as fractions of the turn.
             frame: number of the turn.
         """
@@ -231,7 +234,7 @@ class CalibratedReturns:
         return report_echoes(light, receiver, key, turn.range_error, turn.gain)
 
     def turn(self, beams: Beams) -> CalibratedTurn:
-        """Returns the beams of a turn, with the angular errors of the unit."""
+        """Returns the beams of a turn, with the individual unit's errors."""
         laser = np.arange(int(beams.ring.max()) + 1)
         key = frame_key(self.unit_seed, f"unit/{self.sensor_name}", 0)
         sheet, head = self.sheet, self.sheet.head
@@ -293,18 +296,21 @@ def _turned(
 
 
 class CalibratedTurn:
-    """The beams of a turn in the order of casting.
+    """The N beams of a turn, with the errors of their lasers.
+
+    Arrays are in the firing order, or in the order in which rays are cast
+    ("casting order"), as noted below.
 
     Attributes:
-        d_Sset: (N, 3) true directions of the beams, in the order of casting.
-        height: (N,) height of each beam's laser above the origin [m].
-        blocks: pairs of a height and the rows of the beams that have this
-            height.
-        reported: (N, 3) directions that the unit reports, in firing order.
+        d_Sset: (N, 3) true unit directions of the beams in S, in casting order.
+        height: (N,) height of each beam's laser above the origin of S [m].
+        blocks: pairs of a laser height and the rows of the beams whose laser is
+            at this height.
+        reported: (N, 3) unit directions that the unit reports, in firing order.
         p_SLset: (N, 3) position of each beam's laser, in firing order [m].
-        beam: (N,) number in firing order of each beam, in the order of casting.
-        orders: (2, N) two orders of the rows, in each of which neighbouring
-            rays follow each other: the order of casting and the firing order.
+        beam: (N,) for each beam in casting order, its number in firing order.
+        orders: (2, N) row numbers in casting order and in firing order. In both
+            orders, consecutive beams are neighbours.
         range_error: (N,) range error of each beam's laser, in firing order [m].
         gain: (N,) gain of each beam's laser.
     """

@@ -40,8 +40,8 @@ _FULL_INTENSITY = 255.0
 class Receiver(NamedTuple):
     """The receiver of a unit, in a given weather.
 
-    The extinction of the air is in 1/m, the limits of reported ranges in m.
-    `scattering` is None in clear air.
+    The extinction of the air is in [1/m], the limits of reported ranges are in
+    [m]. `scattering` is None in clear air.
     """
 
     sheet: UnitSheet
@@ -57,11 +57,11 @@ class Reported(NamedTuple):
     """M points that a unit reports, in firing order.
 
     Attributes:
-        beam: (M,) int64.
-        distance: (M,) float32 measured [m].
+        beam: (M,) int64 number of each point's beam.
+        distance: (M,) float32 measured distances [m].
         intensity: (M,) float32, whole numbers from 0 to 255.
-        geometry: (M,) int32 index of the geometry with most of the light;
-            `SCATTERED` for the weather.
+        geometry: (M,) int32 index of the geometry that reflected most of the
+            echo's light; `SCATTERED` for echoes of rain, snow or fog.
     """
 
     beam: np.ndarray
@@ -95,15 +95,15 @@ def report_echoes(
 ) -> Reported:
     """Returns the points that the unit reports for the light it receives.
 
-    Parts of the light that are less than a pulse apart form one echo, whose
-    distance is their mean, weighted by energy. The SNR of an echo determines
-    the probability that it is detected, and the standard deviation of its
-    distance.
+    Light from distances that differ by less than half a pulse length forms one
+    echo. The distance of the echo is the mean of these distances, weighted by
+    energy. The SNR of an echo determines the probability that it is detected,
+    and the standard deviation of its distance.
 
     Args:
         light: the light that came back.
         receiver: receiver of the unit.
-        key: key of the random draws.
+        key: key of the random numbers; see `frame_key`.
         range_error: (N,) range error of each beam's laser [m].
         gain: (N,) gain of each beam's laser.
     """

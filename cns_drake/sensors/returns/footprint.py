@@ -1,10 +1,11 @@
-"""The width of a beam: rays in its parts beside an edge.
+"""The width of a beam: additional rays next to edges.
 
 A beam's irradiance falls as exp(-2 r^2 / w^2) with the distance r from its
-axis; w is its radius at 1 / e^2. If the neighbour of a beam meets another
-surface, an additional ray at a random place in the beam's half on that side
-represents this half. The surface that the additional ray meets gets half of the
-light. The mean over beams is then that of the whole profile.
+axis; w is the radius at 1 / e^2. If a neighbouring beam hits another surface,
+an additional ray is cast at a random place in the half of the beam towards this
+neighbour. It represents this half of the beam, so half of the light goes to the
+surface that the additional ray hits. On average over many beams, this
+reproduces the full profile of irradiance.
 """
 
 from typing import NamedTuple
@@ -27,13 +28,13 @@ _NEIGHBOURS = 10.0
 
 
 class Sides(NamedTuple):
-    """P additional rays in those parts of beams that are next to an edge.
+    """P additional rays, in the halves of beams that are next to an edge.
 
     Attributes:
         row: (P,) row of the beam.
         neighbour: (P,) row of the beam beyond the edge.
-        share: (P,) part of the beam's light.
-        d_Wset: (P, 3) directions.
+        share: (P,) fraction of its beam's light that the ray represents.
+        d_Wset: (P, 3) unit directions in the world.
         reach: (P,) float32 length to cast, just beyond the nearer surface [m].
     """
 
@@ -47,11 +48,11 @@ class Sides(NamedTuple):
 def find_sides(shots: Shots, orders: np.ndarray, hits: BeamHits) -> Sides:
     """Returns extra rays to cast where neighbouring beams hit an edge.
 
-    Beams are neighbours if they follow each other in one of the (2, N) orders.
-    Two neighbours hit the same surface, or touching surfaces, if the point hit
-    by one lies in the plane hit by the other, or if the two planes meet in
-    between. Otherwise there is an edge between the neighbours, which may lie
-    within one of the beams or in the gap. `hits` are those of the beams' axes.
+    Beams are neighbours if they are consecutive in one of the two `orders`, (2,
+    N). There is no edge between two neighbours if the point that one beam hits
+    lies in the plane that the other beam hits, or if the two planes intersect
+    between the beams. Otherwise there is an edge, either within one of the two
+    beams or in the gap between them. `hits` are the hits of the beams' axes.
     """
     farthest = _NEIGHBOURS * shots.divergence
     edges = [_find_edges(order, hits, farthest) for order in orders]
@@ -154,12 +155,12 @@ def _share(
 
 @compiled
 def meet_sides(sides: Sides, side_hits: BeamHits, hits: BeamHits) -> np.ndarray:
-    """Completes the hits of additional rays, and shares out the light.
+    """Completes the hits of additional rays, and divides the beams' light.
 
-    The additional rays were cast only within their reach, just beyond the
-    nearer of the two surfaces at an edge. A ray that hit the surface of its own
-    beam becomes a miss. A ray that passed the nearer surface becomes a hit on
-    the plane of the farther one.
+    The additional rays were cast only to just beyond the nearer of the two
+    surfaces at an edge. If such a ray hit the surface that the axis of its own
+    beam hits, its hit is removed. If a ray passed the nearer surface, it gets a
+    hit on the plane of the farther surface.
 
     Returns:
         (N,) fraction of each beam's light that its axis represents; its

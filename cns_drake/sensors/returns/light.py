@@ -1,4 +1,4 @@
-"""The hits of beams' rays, and the light that comes back along them."""
+"""The hits of rays, and the light that returns along them."""
 
 from __future__ import annotations
 
@@ -19,14 +19,14 @@ _Table = TypeVar("_Table", bound=Any)
 
 
 def select(table: _Table, rows: np.ndarray) -> _Table:
-    """Returns some rows of a table, by their numbers or a mask."""
+    """Returns the rows of a table that numbers or a mask select."""
     if rows.dtype == bool:
         rows = np.flatnonzero(rows)
     return table._make(values.take(rows, axis=0) for values in table)
 
 
 def join(tables: Sequence[_Table]) -> _Table:
-    """Returns the rows of several tables, one table after the other."""
+    """Concatenates the rows of several tables."""
     return tables[0]._make(map(np.concatenate, zip(*tables, strict=True)))
 
 
@@ -34,11 +34,13 @@ class BeamHits(NamedTuple):
     """The hits of N rays.
 
     Attributes:
-        d_Wset: (N, 3) float64 directions.
-        ranges: (N,) float64, single precision [m]; inf for a miss.
-        geometry: (N,) int32, -1 for a miss.
-        normals_W: (N, 3) float32 towards the origin, zero for a miss.
-        is_outside: (N,) bool, whether the outside of a surface was met.
+        d_Wset: (N, 3) float64 unit directions of the rays in the world.
+        ranges: (N,) float64 ranges with the precision of float32 [m]; inf for a
+            miss.
+        geometry: (N,) int32 index of the geometry that was hit; -1 for a miss.
+        normals_W: (N, 3) float32 unit normals in the world that face the rays'
+            origins; zero for a miss.
+        is_outside: (N,) bool, whether the ray hit the outside of a surface.
         cosine: (N,) float64 cosine of the angle of incidence.
     """
 
@@ -51,7 +53,7 @@ class BeamHits(NamedTuple):
 
     @classmethod
     def of(cls, d_Wset: np.ndarray, hits: RayHits) -> BeamHits:
-        """Returns the hits of rays that were cast with normals."""
+        """Returns the hits of rays that were cast to find normals as well."""
         cosine = -(hits.normals_W * d_Wset).sum(axis=1)
         return cls(
             d_Wset,
@@ -64,19 +66,20 @@ class BeamHits(NamedTuple):
 
 
 class Shots(NamedTuple):
-    """The N beams of a turn, in the order of casting.
+    """The N beams of a turn, in the order in which they are cast.
 
     Attributes:
-        key: key of the frame; see `frame_key`.
-        beam: (N,) number of each beam.
-        p_WSset: (K, 3) places of the lasers, taken in turn.
-        times: (T,) float32 firing times as fractions of the turn, taken in
-            turn.
+        key: key of the frame's random numbers; see `frame_key`.
+        beam: (N,) number of each beam in firing order.
+        p_WSset: (K, 3) positions of the lasers in the world [m]; beam i has
+            number i mod K.
+        times: (T,) float32 firing times as fractions of the turn; beam i has
+            number i mod T.
         divergence: half angle of a beam [rad].
         max_range: how far light is followed [m].
         materials: materials of all geometries.
-        cast: casts rays of origins (N, 3), directions (N, 3) and times (N,),
-            each no farther than its own reach (N,).
+        cast: function that casts rays, given origins (N, 3), directions (N, 3),
+            times (N,) and the maximum length of each ray (N,).
     """
 
     key: np.uint64
@@ -90,10 +93,10 @@ class Shots(NamedTuple):
 
 
 class Light(NamedTuple):
-    """N parts of the returning light.
+    """N portions of returning light, each reflected by one surface.
 
     Attributes:
-        beam: (N,) int64 number of its beam.
+        beam: (N,) int64 number of each portion's beam.
         distance: (N,) float64, from the time of flight [m].
         energy: (N,) float64 product of reflectivity, cosine of incidence, and
             fraction of the beam's light that got there and back.
@@ -120,8 +123,8 @@ def reflect(
     Args:
         beam: (N,) number of the beam of each ray.
         share: (N,) fraction of its beam's light that a ray represents.
-        distance: (N,) length of the light's path to the surface [m].
-        geometry: (N,) number of the geometry that each ray meets.
+        distance: (N,) length of each ray's path to the surface [m].
+        geometry: (N,) index of the geometry that each ray hits.
         cosine: (N,) cosine of the angle of incidence.
         materials: materials of the geometries.
     """
@@ -176,17 +179,18 @@ def texture(
     normal_matrices: np.ndarray,
     p_WLset: np.ndarray,
 ) -> Light:
-    """Returns the light, varied by the texture of the surfaces.
+    """Returns light whose energy and distance vary with surface texture.
 
     Each spot of a surface has an albedo and a depth. Both are hashes of the
     spot's position in the surface's own frame, so that all scans of all drives
-    find the same values. Darker spots are deeper. The axes of the hash cells
-    are not parallel to walls or floors.
+    find the same values at a spot. Darker spots are deeper. The axes of the
+    hash cells are not parallel to walls or floors.
 
     Args:
         row: (B,) row of each beam in `d_Wset`.
-        d_Wset: (B, 3) directions.
-        p_WSset: (K, 3) positions of S, taken in turn.
+        d_Wset: (B, 3) unit directions in the world.
+        p_WSset: (K, 3) positions of S in the world [m]; row i of `d_Wset` has
+            number i mod K.
         group_of, normal_matrices, p_WLset: see
             `RayCastingScene.surface_frames`.
     """
@@ -260,7 +264,7 @@ def _wave(turns: float) -> float:
 
 @compiled
 def cell_number(a: float, b: float, c: float) -> float:
-    """Returns a random number from -1 to 1 for the unit cell of a point."""
+    """Returns a random number from -1 to 1 for the unit cell with (a, b, c)."""
     z = (
         np.uint64(np.int64(np.floor(a))) * np.uint64(0x9E3779B97F4A7C15)
         ^ np.uint64(np.int64(np.floor(b))) * np.uint64(0xC2B2AE3D27D4EB4F)

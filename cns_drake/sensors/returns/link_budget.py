@@ -5,10 +5,11 @@ One equation holds for all surfaces, the LiDAR equation of an extended target
 
     SNR(e, r) = S e exp(-2 (alpha + alpha_0) r) / r^2
 
-`e` is the target's reflectivity times the cosine of incidence, alpha the
-extinction of the weather. S and alpha_0 are the unit's own. They follow from
-two rows of the data sheet: the ranges at 80 % and at 10 % reflectivity. alpha_0
-accounts for every deviation of these rows from 1 / r^2.
+Here e is the target's reflectivity times the cosine of incidence, and alpha is
+the extinction of the weather. S and alpha_0 are constants of the unit. They
+follow from two rows of its data sheet: the ranges at 80 % and at 10 %
+reflectivity. alpha_0 accounts for the whole deviation of these rows from 1 /
+r^2.
 """
 
 from dataclasses import dataclass
@@ -37,7 +38,8 @@ HOPELESS_SNR = 0.9
 class SheetRow:
     """A row of a data sheet: range [m] and probability of detection there.
 
-    The Lambertian target faces the unit; its reflectivity is from 0 to 1.
+    The row holds for a Lambertian target that faces the unit, with a
+    reflectivity from 0 to 1.
     """
 
     reflectivity: float
@@ -54,11 +56,11 @@ class SheetRow:
 
 
 class LinkBudget(NamedTuple):
-    """The parameters of SNR and range noise.
+    """The parameters of a unit's SNR and range noise.
 
     Attributes:
-        scale: S of the equation above [m^2].
-        own_extinction: alpha_0 [1/m].
+        scale: S in SNR(e, r) = S e exp(-2 (alpha + alpha_0) r) / r^2 [m^2].
+        own_extinction: alpha_0 in the same equation [1/m].
         range_noise: standard deviation of a range at an SNR of 1 [m].
         range_floor: least standard deviation, at any SNR [m].
         range_bias: standard deviation of the range error that is constant for
@@ -78,9 +80,10 @@ def fit_link_budget(
     range_floor: float,
     range_bias: float = 0.0,
 ) -> LinkBudget:
-    """Returns the budget that fits one or two rows of a sheet exactly.
+    """Returns the link budget that fits one or two data sheet rows exactly.
 
-    If there are two rows, their ranges must differ.
+    If there are two rows, their ranges must differ. The other arguments are
+    fields of `LinkBudget`.
     """
     # log(snr r^2 / e) = log(S) - 2 alpha_0 r at each row.
     logs = [math.log(row.snr * row.range**2 / row.reflectivity) for row in rows]
@@ -99,7 +102,7 @@ def target_snr(
 ) -> _Value:
     """Returns the SNR of targets at positive distances [m].
 
-    The extinction is the weather's [1/m], the energy is reflectivity times
+    `extinction` is that of the weather [1/m]; `energy` is reflectivity times
     cosine of incidence.
     """
     loss = 2.0 * (extinction + budget.own_extinction) * distance
@@ -107,10 +110,10 @@ def target_snr(
 
 
 def detection_probability(snr: ArrayLike) -> np.ndarray:
-    """Returns the probability that an echo of an SNR is detected.
+    """Returns the probability that an echo with a given SNR is detected.
 
     The model compares a photon count with a threshold. The mean of the count is
-    the SNR, its standard deviation the root of the SNR (shot noise).
+    the SNR, and its standard deviation the root of the SNR (shot noise).
     """
     snr = np.asarray(snr)
     deviation = (snr - THRESHOLD_SNR) / np.sqrt(np.maximum(snr, 1e-9))
@@ -122,10 +125,10 @@ def detection_probability(snr: ArrayLike) -> np.ndarray:
 def range_deviation(budget: LinkBudget, snr: np.ndarray) -> np.ndarray:
     """Returns the standard deviation of a laser's ranges [m].
 
-    The deviation over all lasers falls with the root of the SNR (Wagner et al.,
-    2006), down to a limit that the unit's clock and the shape of its pulses
-    set. The part that is constant for a laser is subtracted; the rest differs
-    from shot to shot.
+    The total deviation is inversely proportional to the root of the SNR (Wagner
+    et al., 2006), down to a limit set by the unit's clock and the shape of its
+    pulses. The result is the part that differs from shot to shot: the error
+    that is constant for each laser is subtracted from the total.
     """
     whole = np.maximum(budget.range_noise / np.sqrt(snr), budget.range_floor)
     return np.sqrt(whole**2 - budget.range_bias**2)
@@ -133,6 +136,9 @@ def range_deviation(budget: LinkBudget, snr: np.ndarray) -> np.ndarray:
 
 @compiled
 def echo_energy(budget: LinkBudget, snr: _Value, distance: _Value) -> _Value:
-    """Returns the energy of echoes that the unit infers, assuming clear air."""
+    """Returns the energy that the unit infers from SNR and distance.
+
+    The unit assumes clear air. The distance is in [m].
+    """
     gain = np.exp(2.0 * budget.own_extinction * distance)
     return snr * distance * distance * gain / budget.scale

@@ -1,11 +1,11 @@
 """Reflection of surfaces near 900 nm.
 
-A structure's material follows from its class, or from the name of a part of
-another material; its brightness follows from its colour. Reflectivities of
-diffuse materials are those of the ECOSTRESS spectral library (Meerdink et al.,
-2019) near 0.9 um, rounded; those of markings, signs and plates follow from the
-minimum coefficients of EN 1436 (R_L 150 mcd/m2/lx at 30 m) and EN 12899-1
-(class RA1, 70 cd/lx/m2), times pi.
+The material of a geometry follows from the class of its structure or, if a part
+consists of another material, from the name of the part; the brightness follows
+from the colour. Reflectivities of diffuse materials are those of the ECOSTRESS
+spectral library (Meerdink et al., 2019) near 0.9 um, rounded; those of
+markings, signs and plates follow from the minimum coefficients of EN 1436 (R_L
+150 mcd/m2/lx at 30 m) and EN 12899-1 (class RA1, 70 cd/lx/m2), times pi.
 """
 
 from collections.abc import Sequence
@@ -47,13 +47,15 @@ class Materials(NamedTuple):
             leaves), `SPRAYS` (for sheets that stand for leaves on a twig) or
             `BEADS`, the retro-reflector of road markings, which works at any
             angle: EN 1436 measures it 1.24 deg above the road.
-        reflectivity: (G,) float32, of a retro-reflector in units of a
-            Lambertian target of reflectivity 1 that faces the beam.
+        reflectivity: (G,) float32 reflectivity. That of a retro-reflector is
+            relative to a Lambertian target of reflectivity 1 that faces the
+            beam.
         leaf_area_density: (G,) float32 [1/m].
-        rough: (G,) float32, factor of the square of the sine of incidence,
-            which is added to the cosine.
-        contrast: (G,) float32, how far albedo differs within a surface.
-        relief: (G,) float32, how far from the surface beams end [m].
+        rough: (G,) float32 factor k of rough surfaces: the cosine of incidence
+            is replaced by cos + k sin^2.
+        contrast: (G,) float32, how much the albedo varies within a surface.
+        relief: (G,) float32, distance from the nominal surface at which beams
+            end [m].
         tufts: (G,) float32 height of the plants on the surface [m].
         swell: (G,) float32, how far the surface rises and falls over some
             metres [m].
@@ -81,11 +83,13 @@ def find_materials(
 ) -> Materials:
     """Returns the materials of geometries.
 
-    Structures that are missing in the table have no class.
+    Structures that are missing in the table have no class. `is_wet` makes the
+    ground wet.
 
     The perception property ("lidar", "reflectivity") overrides the column
     `reflectivity` of a table of structures, which overrides class and colour.
-    Surfaces with a given reflectivity are even, Lambertian reflectors.
+    Surfaces whose reflectivity is given in one of these two ways are smooth
+    Lambertian reflectors.
     """
     names = [geometry.structure for geometry in geometries]
     table = structures.completed(names)

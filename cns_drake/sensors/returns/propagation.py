@@ -2,12 +2,14 @@
 
 Leaves are a medium: a ray passes a distance s with the probability exp(-G LAD
 s). LAD is the leaf area per volume. G is the fraction of that area that faces a
-ray: 1/2 for leaves of all directions. All rays that enter at the same clump or
-twig pass the same leaf area, in every scan of every drive.
+ray: 1/2 for leaves of all directions. All rays that enter a crown at the same
+clump of leaves or twig pass the same leaf area before they hit a leaf, in every
+scan of every drive.
 
-A pane reflects R of the light like a mirror and lets T through, by Fresnel's
-equations for both of its faces. Light scattered by dust on it comes back
-directly, and so does mirrored light if the beam meets the pane at right angles.
+A glass pane reflects the fraction R of the light like a mirror and transmits
+the fraction T, by Fresnel's equations for both of its faces. Light returns
+directly from a pane in two ways: scattered by dust on the pane, and mirrored if
+the beam hits the pane at right angles.
 """
 
 from typing import NamedTuple
@@ -50,18 +52,21 @@ _CLUMP, _TWIG, _CLUMPS = 0.5, 0.1, 0.6
 
 
 class Ways(NamedTuple):
-    """N rays that are still travelling.
+    """N rays that are still travelling, beyond their first hits.
 
     Attributes:
         beam: (N,) number of each ray's beam.
-        p_Wset: (N, 3) present origins.
-        d_Wset: (N, 3) directions.
+        p_Wset: (N, 3) current origins in the world [m].
+        d_Wset: (N, 3) unit directions in the world.
         time: (N,) float32 firing time as a fraction of the turn.
         length: (N,) length of the path so far [m].
         energy: (N,) fraction of the beam's light that gets here and back.
-        depth: (N,) leaf area that the ray still passes before it hits a leaf.
-        inside: (N,) geometry in which the ray begins, -1 for none.
-        reach: (N,) float32: greatest useful range of the ray [m].
+        depth: (N,) leaf area that each ray can still pass before it hits a
+            leaf.
+        inside: (N,) index of the geometry inside which each ray begins; -1 for
+            none.
+        reach: (N,) float32, the range beyond which a ray need not be followed
+            [m].
     """
 
     beam: np.ndarray
@@ -82,17 +87,20 @@ def start_ways(
     sides: Sides,
     side_hits: BeamHits,
 ) -> tuple[list[Light], Ways, BeamHits]:
-    """Returns light from opaque surfaces, and the rays that hit others.
+    """Splits the first hits of beams into returned light and further rays.
+
+    Opaque surfaces return light. Rays that hit panes or leaves go on.
 
     Args:
         shots: the beams.
         rest: (N,) fraction of each beam's light that its axis represents.
-        hits: hits of the axes.
+        hits: hits of the beams' axes.
         sides: additional rays at edges.
-        side_hits: hits of the additional rays; misses are left out.
+        side_hits: hits of the additional rays; rays without a hit are ignored.
 
     Returns:
-        The returned light, the rays that hit panes or leaves, and their hits.
+        The light from opaque surfaces, the rays that hit panes or leaves, and
+        the hits of these rays.
     """
     beam, materials = shots.beam, shots.materials
     is_open = np.isin(materials.kind, (GLASS, LEAVES, SPRAYS))
@@ -153,7 +161,10 @@ def _leaf_areas(p_Wset: np.ndarray) -> np.ndarray:
 
 @compiled
 def pane_shares(cosine: float) -> tuple[float, float]:
-    """Returns the shares of light that a pane reflects and transmits."""
+    """Returns the fractions of light that a pane reflects and transmits.
+
+    `cosine` is the cosine of the angle of incidence.
+    """
     n = _GLASS_INDEX
     sine = np.sqrt(max(1.0 - cosine**2, 0.0)) / n
     inner = np.sqrt(1.0 - sine**2)
@@ -168,9 +179,10 @@ def pane_shares(cosine: float) -> tuple[float, float]:
 def follow(
     shots: Shots, ways: Ways, met: BeamHits, scale: float
 ) -> list[Light]:
-    """Returns the light that comes back from behind panes and leaves.
+    """Follows rays through panes and leaves; returns the light that comes back.
 
-    See `LinkBudget` for the scale.
+    `met` contains the hits of the rays `ways` on panes and leaves. `scale` is
+    that of a `LinkBudget`; it decides which light is too faint to follow.
     """
     found: list[Light] = []
     for step in range(_MOST_STEPS):

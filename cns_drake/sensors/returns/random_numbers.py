@@ -1,7 +1,7 @@
-"""Counter-based random numbers, without a running stream.
+"""Counter-based random numbers, without the state of a generator.
 
-A number depends only on a key, a beam and the number of the draw. Neither other
-beams nor the order of work change it.
+A number depends only on a key, a beam and the number of the draw, and not on
+other beams or on the order of computation.
 """
 
 import numpy as np
@@ -30,9 +30,9 @@ def uniform(
 ) -> np.ndarray:
     """Returns random numbers that are uniform over [0, 1), from a key.
 
-    The key comes from `frame_key`. The numbers are those of the generator
-    SplitMix64 (Steele, Lea and Flood, OOPSLA 2014), each addressed by its beam
-    and draw. Beams are 0 or more; draws are below `DRAWS_PER_BEAM`.
+    The key comes from `frame_key`. The numbers come from the generator
+    SplitMix64 (Steele, Lea and Flood, OOPSLA 2014), addressed by `beam` (0 or
+    greater) and `draw` (from 0 to `DRAWS_PER_BEAM` - 1).
     """
     number = (beam * DRAWS_PER_BEAM + (draw + 1)).astype(np.uint64)
     z = key + number * _GOLDEN
@@ -46,10 +46,11 @@ def uniform(
 def normal(
     key: np.uint64, beam: np.ndarray, draw: int | np.ndarray
 ) -> np.ndarray:
-    """Returns standard normal numbers for uniform ones, by quantiles.
+    """Returns standard normal random numbers; arguments as in `uniform`.
 
-    The algorithm is PPND7, the short form of AS 241 (Wichura, Applied
-    Statistics 37, 1988), which is exact to seven digits.
+    They are the normal quantiles of uniform numbers, computed with PPND7, the
+    short form of AS 241 (Wichura, Applied Statistics 37, 1988), which is exact
+    to seven digits.
     """
     result = uniform(key, beam, draw)
     for k, u in enumerate(result):

@@ -1,4 +1,4 @@
-"""Values from the data sheets of the presets' units: unit_sheets.yaml."""
+"""Values from the data sheets of commercial LiDARs: unit_sheets.yaml."""
 
 from dataclasses import dataclass, replace
 from functools import cached_property
@@ -20,20 +20,20 @@ _LIGHT = 299_792_458.0
 
 @dataclass(frozen=True)
 class Response:
-    """How a unit converts energy to intensity; data sheets do not state it.
+    """How a unit converts energy to intensity. Data sheets do not state this.
 
     Attributes:
-        slope: the intensity of a diffuse target is `full` plus this times the
-            logarithm of its energy; 0 if, by the sheet, intensity is
-            proportional to energy.
+        slope: the intensity of a diffuse target is `full` plus `slope` times
+            the logarithm of its energy. A slope of 0 means that intensity is
+            proportional to energy, as the data sheet says.
         full: intensity of an energy of 1.
         far: range up to which the unit compensates intensity for distance [m].
-        floor: lower intensities are reported as 0, whatever the gain.
+        floor: intensities below this are reported as 0, whatever the gain.
         least: echoes of less energy are not reported even at close range, where
             the unit turns its power down.
         gain: standard deviation of a laser's gain.
-        dim: extra slope of gains more than one standard deviation below the
-            mean: such gains fall faster.
+        dim: additional slope for gains more than one standard deviation below
+            the mean, so that they are lower than in a normal distribution.
         flicker: a laser's shots are alternately brighter and darker by a fixed
             fraction of their intensity. This is the standard deviation of that
             fraction over lasers.
@@ -55,7 +55,8 @@ class Response:
     def table(self) -> np.ndarray:
         """Intensities of diffuse targets at even steps of sqrt(energy).
 
-        Computing the logarithms of all points would take half a frame.
+        The table is interpolated, because computing the logarithms of all
+        points would take half of a frame's computing time.
         """
         root = np.linspace(0.0, 1.0, 4097)
         energy = np.maximum(root, 1e-6) ** 2
@@ -68,8 +69,8 @@ class Head:
 
     Attributes:
         blocks: for each block of lasers, from the top: its lowest elevation
-            [deg], its height above the origin [m], and its range errors as a
-            fraction of the stated ones.
+            [deg], its height above the origin [m], and its range errors
+            relative to those in the data sheet.
         alternate: range offset [m]. Every second laser, starting with the
             first, measures this much too far and the other lasers this much too
             near. The offset is part of the lasers' range errors.
@@ -98,14 +99,14 @@ class UnitSheet:
         divergence_deg: full angle of the beam at 1 / e^2 of its peak [deg].
         pulse_ns: width of a pulse at half of its peak [ns].
         retro_from: least intensity of retro-reflectors. Diffuse targets with
-            reflectivities from 0 to 1 have intensities from 0 to this.
+            reflectivities from 0 to 1 have intensities from 0 to this value.
         unknown: names of the fields that the sheet does not state.
-        source: where the numbers are from.
+        source: where the numbers come from.
         angle_error_deg: standard deviation of a laser's elevation and azimuth
             [deg].
-        own_part: the fraction of the best accuracy that is constant for a
-            laser. The rest varies from shot to shot; the squares of the two
-            fractions add up to 1.
+        own_part: `range_floor` consists of an error that is constant for a
+            laser and one that varies from shot to shot. This is the fraction of
+            the constant error; the squares of both fractions add up to 1.
         response: how the unit converts energy to intensity.
         head: positions of the lasers.
     """
@@ -141,13 +142,14 @@ class UnitSheet:
 
     @property
     def resolution(self) -> float:
-        """Distance below which two echoes merge [m]."""
+        """Difference in distance below which two echoes merge [m]."""
         return _LIGHT * self.pulse_ns * 1e-9 / 2.0
 
     def aimed(self, pattern: _Pattern) -> _Pattern:
-        """Returns a pattern with the unit's own elevations, if they are known.
+        """Returns a pattern with the elevations of one real unit, if known.
 
-        A pattern of another number of rings is returned unchanged.
+        If they are not known, or the pattern has another number of rings, the
+        pattern is returned unchanged.
         """
         own = tuple(map(math.radians, self.head.elevations_deg))
         if not isinstance(pattern, SpinningPattern):

@@ -1,19 +1,21 @@
 """Fog, rain and snowfall: extinction of a beam, and back-scatter.
 
-Rain and snow are drops of random size and place. Their number in a volume
-follows Marshall and Palmer (1948) and Sekhon and Srivastava (1970),
+Rain and snow are drops and flakes of random size and place. Their number per
+volume and diameter follows Marshall and Palmer (1948) for rain and Sekhon and
+Srivastava (1970) for snow,
 
     N(D) = N_0 exp(-L D) [1/(m3 mm)]
 
 with N_0 = 8000 and L = 4.1 R^-0.21 for rain, N_0 = 2500 R^-0.94 and L = 2.29
-R^-0.45 for snow; D is the diameter in mm, for a flake that of the melted drop;
-R is the rate in mm/h of water. Extinction follows geometric optics: each drop
-counts with twice its cross-section. The back-scatter of a raindrop is that of
-LISA (Kilic et al., 2021). The back-scatter of a flake follows from the lidar
-ratio of ice crystals, 25 sr (Young and Vaughan, 2009).
+R^-0.45 for snow; D is the diameter in mm (for a flake, the diameter of the
+melted drop); R is the rate in mm/h of water. Extinction follows geometric
+optics: each drop counts with twice its cross-section. The back-scatter of a
+raindrop is that of LISA (Kilic et al., 2021). The back-scatter of a flake
+follows from the lidar ratio of ice crystals, 25 sr (Young and Vaughan, 2009).
 
-Fog is a medium: alpha = ln 20 / V by the meteorological visibility V, and a
-back-scatter coefficient of 0.046 / V [1/(m sr)] (Rasshofer et al., 2011).
+Fog is a homogeneous medium. With the meteorological visibility V [m], its
+extinction is alpha = ln 20 / V [1/m], and its back-scatter coefficient is 0.046
+/ V [1/(m sr)] (Rasshofer et al., 2011).
 """
 
 from dataclasses import dataclass
@@ -94,9 +96,10 @@ class Weather:
         )
 
     def drops(self, diameters_mm: np.ndarray) -> list[tuple[np.ndarray, float]]:
-        """Returns size distribution and reflectivity of each kind of drop.
+        """Returns size distribution and reflectivity of raindrops and flakes.
 
-        The distribution is N(D) [1/(m3 mm)].
+        There is one pair for each of rain and snow that falls. The distribution
+        is N(D) [1/(m3 mm)] at the given diameters.
         """
         kinds = []
         if self.rain > 0.0:
@@ -118,10 +121,10 @@ def _extinction(number: np.ndarray) -> float:
 
 
 class Scattering(NamedTuple):
-    """Echoes of drops and fog that a unit detects.
+    """Statistics of the echoes of drops and fog that a unit detects.
 
     Attributes:
-        distances: (R,) rising [m].
+        distances: (R,) increasing distances [m].
         counts: (R,) mean number of detected echoes of drops that are nearer
             than each distance.
         energies: (R, Q) quantiles of the energy of a drop's echo at each
@@ -150,10 +153,10 @@ def tabulate_scattering(
     resolution: float,
     min_range: float,
 ) -> Scattering:
-    """Returns the detected echoes of the weather.
+    """Returns statistics of the weather's echoes that a unit detects.
 
-    Drops are a Poisson process in distance and diameter. Each is detected
-    with the probability that its own SNR gives. The detected drops are
+    Drops are a Poisson process in distance and diameter. Each drop is detected
+    with a probability that follows from its SNR. The detected drops are
     therefore a Poisson process, too.
 
     Args:
