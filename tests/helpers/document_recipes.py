@@ -1023,6 +1023,8 @@ NOT_RUN = {
     ".venv/bin/cns-drake study docs/examples/nclt_twin": "ages a shipped city "
     "and drives through it, for an hour",
     ".venv/bin/cns-drake study docs/examples/anchor": "likewise, for minutes",
+    ".venv/bin/cns-drake study docs/examples/robust": "localises in a shipped "
+    "city, for half an hour",
     ".venv/bin/cns-eval tcr data/": "needs data sets that cannot be shipped",
     ".venv/bin/cns-eval pr data/nclt": "needs them, too",
     ".venv/bin/cns-eval pr data/sequences": "needs KITTI's scans",
