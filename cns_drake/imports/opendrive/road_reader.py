@@ -58,7 +58,7 @@ def read_marks(
     `faults`.
 
     Raises:
-        ValueError: naming line and fault, if a text is not a number.
+        ValueError: a text is not a number; the error names its line.
     """
     marks = []
     for one in lane.all("roadMark"):

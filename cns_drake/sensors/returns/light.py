@@ -181,16 +181,19 @@ def texture(
 ) -> Light:
     """Returns light whose energy and distance vary with surface texture.
 
-    Each spot of a surface has an albedo and a depth. Both are hashes of the
-    spot's position in the surface's own frame, so that all scans of all drives
-    find the same values at a spot. Darker spots are deeper. The axes of the
-    hash cells are not parallel to walls or floors.
+    Each spot of a surface has an albedo and a height above the mean surface.
+    Both are hashes of the spot's position in the surface's own frame, so that
+    all scans of all drives find the same values at a spot. Bright spots are
+    higher than dark spots, so their distances are shorter. The axes of the hash
+    cells are not parallel to walls or floors.
 
     Args:
+        light: light from surfaces without texture.
         row: (B,) row of each beam in `d_Wset`.
-        d_Wset: (B, 3) unit directions in the world.
-        p_WSset: (K, 3) positions of S in the world [m]; row i of `d_Wset` has
-            number i mod K.
+        p_WSset: (K, 3) positions of the sensor in the world [m]; the ray in row
+            i of `d_Wset` starts at position i mod K.
+        d_Wset: (B, 3) unit directions of the rays in the world.
+        materials: materials of the geometries.
         group_of, normal_matrices, p_WLset: see
             `RayCastingScene.surface_frames`.
     """
