@@ -210,8 +210,8 @@ def read_roads(path: Path, faults: ImportFaults) -> road_model.RoadMap:
     """Returns all roads of a file.
 
     Raises:
-        InputError: naming file, road, line and fault, if the file cannot be
-            read or describes an impossible road.
+        InputError: the file cannot be read, or describes an impossible road.
+            The message names the file, the road, the line and the fault.
     """
     top = read_elements(path, "OpenDRIVE")
     roads: list[road_model.ImportedRoad] = []

@@ -19,7 +19,7 @@ _Table = TypeVar("_Table", bound=Any)
 
 
 def select(table: _Table, rows: np.ndarray) -> _Table:
-    """Returns the rows of a table that numbers or a mask select."""
+    """Returns the rows of a table, given their numbers or a mask."""
     if rows.dtype == bool:
         rows = np.flatnonzero(rows)
     return table._make(values.take(rows, axis=0) for values in table)
@@ -53,7 +53,7 @@ class BeamHits(NamedTuple):
 
     @classmethod
     def of(cls, d_Wset: np.ndarray, hits: RayHits) -> BeamHits:
-        """Returns the hits of rays that were cast to find normals as well."""
+        """Returns the hits of rays whose cast found normals as well."""
         cosine = -(hits.normals_W * d_Wset).sum(axis=1)
         return cls(
             d_Wset,
@@ -71,10 +71,10 @@ class Shots(NamedTuple):
     Attributes:
         key: key of the frame's random numbers; see `frame_key`.
         beam: (N,) number of each beam in firing order.
-        p_WSset: (K, 3) positions of the lasers in the world [m]; beam i has
-            number i mod K.
-        times: (T,) float32 firing times as fractions of the turn; beam i has
-            number i mod T.
+        p_WSset: (K, 3) positions of the lasers in the world [m]; beam i starts
+            at position i mod K.
+        times: (T,) float32 firing times as fractions of the turn; beam i fires
+            at time i mod T.
         divergence: half angle of a beam [rad].
         max_range: how far light is followed [m].
         materials: materials of all geometries.
