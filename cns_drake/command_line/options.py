@@ -35,8 +35,8 @@ LidarPreset = Annotated[str | None, LIDAR_OPTION]
 Recording = Annotated[
     Path | None,
     typer.Option(
-        help="File for a web page that replays the drive; its name ends in "
-        ".html. By default no page is written."
+        help="File for a web page (.html) that replays the drive in a browser, "
+        "with Meshcat. By default no page is written."
     ),
 ]
 Graphviz = Annotated[

@@ -43,8 +43,8 @@ class StageDifference:
         additional: structures that exist only in this stage, and the upper
             parts of structures that are lower in the other stage.
         absent: structures that exist only in the other stage.
-        lower: the upper parts, in the other stage, of structures that are lower
-            in this stage.
+        lower: for each structure that is lower in this stage, its upper parts
+            in the other stage.
     """
 
     common: list[Part] = field(default_factory=list)

@@ -95,8 +95,8 @@ class SensorConfig(Mount, abc.ABC):
     Attributes:
         xyz: position in base_link [m].
         rpy_deg: roll, pitch, yaw in base_link [deg].
-        rate: messages per second, from the rate of the fastest LiDAR to 1000;
-            by default one message a scan.
+        rate: messages per second, at least the rate of the fastest LiDAR and
+            at most 1000; by default one message per scan.
     """
 
     xyz: Triple = (0.0, 0.0, 0.0)

@@ -138,7 +138,11 @@ class MadeMaps:
         return str(drive.map), str(drive.stage)
 
     def want_redrawn(self, drive: Scenario, seed: Any) -> tuple[str, str]:
-        """Notes that a drive's city must be drawn anew with a seed.
+        """Notes that a drive's city must be generated anew, from a seed.
+
+        Returns:
+            The drive's own map and stage, because the new map does not exist
+            yet.
 
         Raises:
             InputError: the seed is out of range.

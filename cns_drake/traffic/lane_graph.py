@@ -220,7 +220,7 @@ def _lengthened(points: np.ndarray, count: int) -> np.ndarray:
 
 @dataclass(frozen=True)
 class LaneGraph:
-    """All pieces of vehicles' paths, and the crossings over these pieces."""
+    """The pieces of vehicles' paths, and the walkers' crossings over them."""
 
     pieces: tuple[Piece, ...]
     crossings: tuple[Crossing, ...] = ()

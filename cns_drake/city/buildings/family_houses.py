@@ -107,7 +107,7 @@ class DetachedHouse(Building):
     """
 
     def build(self) -> None:
-        """Builds the house on a rectangle, its porch in front."""
+        """Builds the house on the rectangular site, its porch in front."""
         self._lay_out()
         _add_main(self)
         for wing in self.wings:
@@ -241,7 +241,7 @@ class Bungalow(Building):
     """The bungalow: one long low storey, a carport or a garage."""
 
     def build(self) -> None:
-        """Builds the bungalow along the front of a rectangle."""
+        """Builds the bungalow along the front of the rectangular site."""
         self._lay_out()
         main, *fronts = self.boxes
         openings = _window_rows(self, main, 1)
@@ -343,7 +343,7 @@ class SemiDetached(Building):
     """The pair of semi-detached houses: mirrored halves under one roof."""
 
     def build(self) -> None:
-        """Builds the pair on a rectangle."""
+        """Builds the pair on the rectangular site."""
         x0, y0, x1, y1 = self.site.bounds
         left, right, back = x0 + _MARGIN, x1 - _MARGIN, y1 - _MARGIN
         front = y0 + min(2.4, 0.25 * (y1 - y0))

@@ -31,7 +31,10 @@ class CourtBlock(Building):
     """The court block: wings around a court, a mansard roof with dormers."""
 
     def build(self) -> None:
-        """Builds the block on a rectangle, its court open to the back."""
+        """Builds the block on the rectangular site.
+
+        Its court is open to the back.
+        """
         form = massing.u_shape if self.shape == "U" else massing.l_shape
         plan = form(*self.site.bounds, self.wing, self.back)
         if self.mirrored:
@@ -148,7 +151,7 @@ class WalkUp(Building):
     """The walk-up: brick flats around a stair, behind a raised entrance."""
 
     def build(self) -> None:
-        """Builds the flats on a rectangle."""
+        """Builds the flats on the rectangular site."""
         site = self.site
         x0, y0, x1, y1 = site.bounds
         left = x0 + 0.5 * (3 not in site.blind_edges)
@@ -291,7 +294,7 @@ class GardenFlats(Building):
     """Flats in a garden: staggered houses under gables, stacks of verandas."""
 
     def build(self) -> None:
-        """Builds the group along the front of a rectangle."""
+        """Builds the group along the front of the rectangular site."""
         x0, y0, x1, y1 = self.site.bounds
         left, right = x0 + _MARGIN, x1 - _MARGIN
         count = max(1, round((right - left) / self.section))

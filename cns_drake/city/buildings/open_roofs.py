@@ -29,7 +29,7 @@ class GasStation(Building):
     """The gas station: pumps under a canopy, shop, car wash and price sign."""
 
     def build(self) -> None:
-        """Builds the station on a rectangle, its forecourt in front."""
+        """Builds the station on the rectangular site, behind a forecourt."""
         x0, y0, x1, y1 = self.site.bounds
         shop_front = y1 - self.shop_depth - 0.3
         room = shop_front - 3.0 - (y0 + 1.5)
@@ -156,7 +156,7 @@ class ParkPavilion(Building):
     """The park pavilion: a bandstand, a shelter with tables, or a tea house."""
 
     def build(self) -> None:
-        """Builds the pavilion in the middle of a rectangle."""
+        """Builds the pavilion in the middle of the rectangular site."""
         x0, y0, x1, y1 = self.site.bounds
         if self.form == "shelter":
             _add_shelter(self, (x0, y0, x1, y1))

@@ -27,7 +27,7 @@ class School(Building):
     """The school: classroom wings, a glazed entrance, a gymnasium."""
 
     def build(self) -> None:
-        """Builds the school on a rectangle, its entrance in front."""
+        """Builds the school on the rectangular site, its entrance in front."""
         x0, y0, x1, y1 = self.site.bounds
         front = y0 + 3.2
         left, right, back = x0 + _MARGIN, x1 - _MARGIN, y1 - _MARGIN
@@ -156,7 +156,7 @@ class Chapel(Building):
     """The chapel: a nave with a steep roof, a tower or bell cote, a porch."""
 
     def build(self) -> None:
-        """Builds the chapel along the longer side of a rectangle.
+        """Builds the chapel along the longer side of the rectangular site.
 
         Its door is in front, or on the left if the longer side lies along x.
         """

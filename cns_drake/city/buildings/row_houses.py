@@ -225,7 +225,7 @@ class RowHouse(Building):
     """The row house: one narrow house between its neighbours, with a stoop."""
 
     def build(self) -> None:
-        """Builds the house on a rectangle."""
+        """Builds the house on the rectangular site."""
         _, y0, _, y1 = self.site.bounds
         left, right, blind = _front_site(self)
         front, back = y0 + self.stoop, y1 - 0.35
@@ -258,7 +258,7 @@ class Terrace(Building):
     """The terrace: a row of narrow houses, similar but not the same."""
 
     def build(self) -> None:
-        """Builds the terrace along the front of a rectangle."""
+        """Builds the terrace along the front of the rectangular site."""
         x0, y0, x1, y1 = self.site.bounds
         front = y0 + self.stoop
         back = min(y1 - 0.35, front + 10.5)
@@ -297,7 +297,7 @@ class ShopHouse(Building):
     """The shop house: shops on the ground floor, flats above them."""
 
     def build(self) -> None:
-        """Builds the house on a rectangle."""
+        """Builds the house on the rectangular site."""
         _, y0, _, y1 = self.site.bounds
         left, right, blind = _front_site(self)
         area = (left, y0 + self.stoop, right, y1 - 0.35)

@@ -30,7 +30,7 @@ class SlabTower(Building):
     """The concrete slab block: loggias, a stair tower, pillars, a pavilion."""
 
     def build(self) -> None:
-        """Builds the slab along x on a rectangle."""
+        """Builds the slab along x on the rectangular site."""
         x0, y0, x1, y1 = self.site.bounds
         front = y1 - self.depth if self.at_back else y0
         back = front + self.depth
@@ -122,7 +122,7 @@ class BalconyFlats(Building):
     """The white slab block: stacks of balconies, staggered sections."""
 
     def build(self) -> None:
-        """Builds the slab along the front of a rectangle."""
+        """Builds the slab along the front of the rectangular site."""
         sections = _sections(self, self.site)
         plan, fronts = _outline(sections)
         storeys = max(2, round((self.height - 1.9) / self.storey))
@@ -314,7 +314,7 @@ class GalleryFlats(Building):
     """The gallery block: walkways along the doors, loggias at the back."""
 
     def build(self) -> None:
-        """Builds the bar along x on a rectangle."""
+        """Builds the bar along x on the rectangular site."""
         x0, y0, x1, y1 = self.site.bounds
         front = y0 + (self.gallery if self.gallery_front else 0.1)
         back = min(

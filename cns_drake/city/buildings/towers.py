@@ -20,7 +20,7 @@ class ArtDecoTower(Building):
     """The art-deco tower: symmetric setbacks, tall piers, a stepped crown."""
 
     def build(self) -> None:
-        """Builds the tower on a rectangle."""
+        """Builds the tower on the rectangular site."""
         base = self.site.outline
         plan = massing.notched(base, self.notch) if self.notch else base
         top = _add_ground(self, plan)
@@ -73,7 +73,7 @@ class GlassSkyscraper(Building):
     """The glass skyscraper: curtain walls with fins, setbacks, a crown."""
 
     def build(self) -> None:
-        """Builds the skyscraper on any outline."""
+        """Builds the skyscraper on a site of any outline."""
         base = self.site.outline
         plan = _shaped(self, base)
         top = _add_lobby(self, plan)
@@ -157,7 +157,7 @@ class Hotel(Building):
     """The hotel: balconies along rounded walls, a forecourt, a roof-top bar."""
 
     def build(self) -> None:
-        """Builds the hotel on a rectangle, behind a forecourt."""
+        """Builds the hotel on the rectangular site, behind a forecourt."""
         x0, y0, x1, y1 = self.site.bounds
         front = y0 + _FORECOURT_M
         if self.round_ends:
@@ -238,7 +238,7 @@ class PodiumTower(Building):
     """The podium tower: a block of shops with a tower set back on its roof."""
 
     def build(self) -> None:
-        """Builds the podium and the tower on a rectangle."""
+        """Builds the podium and the tower on the rectangular site."""
         (x0, y0, x1, y1), base = self.site.bounds, self.site.outline
         top, walls = _add_shops(self), _podium_storey(self)
         top = tiers.add_storeys(

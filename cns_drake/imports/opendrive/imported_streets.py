@@ -58,7 +58,7 @@ _END = 0.2
 
 
 def kerb_tapers(carriageway: BaseGeometry) -> list[Polygon]:
-    """Returns areas that turn steps of a carriageway's edge into tapers [m]."""
+    """Returns areas that fill steps in a carriageway's edge, as tapers [m]."""
     found: list[Polygon] = []
     for polygon in polygons_of(carriageway):
         polygon = shapely.orient_polygons(polygon)

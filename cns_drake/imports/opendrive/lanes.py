@@ -90,8 +90,8 @@ class LaneBand:
             other lanes farther outside, as on a road that is closed to traffic.
         inner, outer: (N, 3) places on the lane's edges, in the order of the
             road [m]. Where the width of the lane has a step, a place on one
-            edge is repeated. For a lane above a kerb, these heights are those
-            of the road.
+            edge is repeated. For a lane above a kerb, z is the height of the
+            road, not that of the lane.
         middle: (N, 3) places midway between the two edges [m].
         heading, roll, grade: (N,) heading, roll and grade of the road at these
             places [rad, rad, 1]. The roll is 0 for a level lane.
@@ -123,8 +123,8 @@ def lane_bands(road: ImportedRoad) -> Iterator[LaneBand]:
     """Yields all lanes of a road, section by section, from the middle outwards.
 
     Raises:
-        ValueError: naming the road and the fault, if it has too many bends to
-            be followed, or a lane leads out of the world.
+        ValueError: the road has too many bends to be followed, or a lane leads
+            out of the world. The message names the road and the fault.
     """
     for k, section in enumerate(road.sections):
         s, inside = _stations(road, section)

@@ -58,7 +58,7 @@ def read_marks(
     `faults`.
 
     Raises:
-        ValueError: naming line and fault, if a text is not a number.
+        ValueError: a text is not a number; the error names its line.
     """
     marks = []
     for one in lane.all("roadMark"):
@@ -210,8 +210,8 @@ def read_roads(path: Path, faults: ImportFaults) -> road_model.RoadMap:
     """Returns all roads of a file.
 
     Raises:
-        InputError: naming file, road, line and fault, if the file cannot be
-            read or describes an impossible road.
+        InputError: the file cannot be read, or describes an impossible road.
+            The message names the file, the road, the line and the fault.
     """
     top = read_elements(path, "OpenDRIVE")
     roads: list[road_model.ImportedRoad] = []

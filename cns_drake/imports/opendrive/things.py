@@ -38,7 +38,7 @@ def read_things(
     """Yields the signals and objects beside a road.
 
     Raises:
-        ValueError: naming line and fault, if a text is not a number.
+        ValueError: a text is not a number; the error names its line.
     """
     for k, one in enumerate(road.all("signals", "signal")):
         yield Thing(

@@ -81,11 +81,12 @@ def moved_off_kerbs(
     reach: tuple[float, float],
     carriageway: BaseGeometry,
 ) -> np.ndarray:
-    """Returns how far (N,) lines must move to the left off a kerb [m].
+    """Returns how far to move lines off a kerb, (N,), positive to the left [m].
 
     `border` contains places (N, 3) on the border of a lane, and `left` (N, 2)
     unit vectors to its left. Where only one side of the border is carriageway,
-    lines are moved to this side. `reach` is how far the lines extend to the
+    lines are moved to this side; elsewhere the result is 0, except next to
+    such a place. `reach` is how far the lines extend to the
     left and right of the border [m]. `carriageway` must be a prepared geometry
     (Shapely).
     """
@@ -364,7 +365,7 @@ def build_town(
     Road marks of the file are painted only if the town is dressed.
 
     Raises:
-        InputError: if the file cannot be used.
+        InputError: the file cannot be used.
     """
     faults = ImportFaults()
     roads = read_roads(source, faults)
@@ -559,7 +560,7 @@ def write_town(
         What was imported, and stage -> its numbers of structures and triangles.
 
     Raises:
-        InputError: if the town has more structures than there are instance ids.
+        InputError: the town has more structures than there are instance ids.
     """
     stages = town.stages.stages
     files = render_stages(

@@ -227,7 +227,10 @@ class CameraScene(LeafSystem):
             scene_graph.RegisterGeometry(source, self.frames[frame], made)
 
     def connect(self, builder: DiagramBuilder, poses: object) -> None:
-        """Adds this system and its SceneGraphs to a diagram."""
+        """Adds this system and its SceneGraphs to a diagram.
+
+        `poses` is the output port that supplies `frame_poses`.
+        """
         builder.AddNamedSystem("camera_scene", self)
         builder.Connect(poses, self.GetInputPort("frame_poses"))
         for kind, scene in self.scene_graphs.items():

@@ -28,9 +28,10 @@ class Look:
     Attributes:
         size: side of the square on a surface that one copy of the texture
             covers [m].
-        paint: function that makes the texture, (N, N, 1, 3 or 4) brightness of
-            any mean, from a random generator. The fourth channel is 0 where the
-            surface has holes.
+        paint: function that makes the texture from a random generator: an
+            array (N, N, channels) of brightness. The mean may have any value.
+            There are 1, 3 or 4 channels; the fourth is 0 where the surface has
+            holes.
         roughness: roughness of the surface, from 0 (a mirror) to 1 (chalk).
         is_face: whether one copy of the texture, with its own colours, covers
             the whole of each geometry instead of being repeated.
@@ -268,7 +269,7 @@ def look_of(
 
 @functools.cache
 def texture(name: str) -> tuple[bytes, float]:
-    """Returns the texture of a look as PNG, and the brightness of its white.
+    """Returns a look's texture as PNG, and the brightness that white means.
 
     The PNG is gamma-encoded. Unless the look has `is_face`, its pixels, decoded
     to linear values from 0 to 1 and multiplied by the brightness of white, have

@@ -202,8 +202,8 @@ class NoisyImu(LeafSystem):
         - angular_velocity
 
     All ports are vectors of size 3, expressed in the IMU's frame [m/s^2,
-    rad/s]. Sample k is at time k / rate. Between two samples, the error stays
-    that of the earlier sample.
+    rad/s]. Sample k is at time k / rate. Between two samples, the error of the
+    earlier sample holds.
     """
 
     def __init__(self, noise: ImuNoise, rate: float):
@@ -247,8 +247,8 @@ class VehicleImu(LeafSystem):
         - samples
 
     `specific_force` [m/s^2] and `angular_velocity` w_WI [rad/s] are vectors of
-    size 3, expressed in the IMU's frame I; between two samples, the error stays
-    that of the earlier sample. `samples` is abstract, of type `ImuSamples`: the
+    size 3, expressed in the IMU's frame I. Between two samples, the error of
+    the earlier sample holds. `samples` is abstract, of type `ImuSamples`: the
     last 256 samples up to the time of the context. All outputs depend only on
     time.
     """

@@ -125,7 +125,7 @@ class ImuErrors:
         return np.concatenate(parts)
 
     def of_block(self, number: int) -> np.ndarray:
-        """Returns the (1024, 6) errors of samples from 1024 * number on."""
+        """Returns the (1024, 6) errors from sample 1024 * number onwards."""
         errors = np.tile(self._turn_on, (_BLOCK, 1))
         if self._walk.any():
             errors += self._walk * self._walk_in_block(number)

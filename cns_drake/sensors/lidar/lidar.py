@@ -51,7 +51,7 @@ _WITH_GREY = Fields(BaseField.kXYZs | BaseField.kRGBs)
 
 
 class Structures(Protocol):
-    """Interface of a table of the labels and instance ids of geometries."""
+    """A table that supplies labels and instance ids of geometries."""
 
     def labels(self, names: Sequence[str]) -> Labels:
         """Returns labels of geometries, by the names of their structures."""
@@ -129,8 +129,8 @@ class Lidar(LeafSystem):
     `moving_instances` (abstract) lists the instance ids of the structures that
     are moving: their points get the label of the moving class.
 
-    `frame_poses` (abstract, `KnownPoses`) contains poses X_WF of the SceneGraph
-    once more, in one array, from which many poses are read faster.
+    `frame_poses` (abstract, `KnownPoses`) repeats poses X_WF of the SceneGraph
+    in one array. Many poses are read faster from this array.
 
     Drake cannot cast rays. The system therefore reads shapes and poses from the
     QueryObject and casts rays on a hierarchy of its own. It rebuilds the parts
@@ -752,8 +752,8 @@ class BeamTable(NamedTuple):
         d_Sset: (num_beams, 3) float32 unit directions, expressed in S.
         p_Sset: (num_beams, 3) float32 where beams start [m]; (0, 3) if that is
             the origin of S.
-        ring: (num_beams,) uint16.
-        t_ns: (num_beams,) uint32 firing time since the start of the turn.
+        ring: (num_beams,) uint16 number of each beam's laser.
+        t_ns: (num_beams,) uint32 firing time since the start of the turn [ns].
         place: (num_beams,) position of each beam in the order in which rays are
             cast.
     """

@@ -63,9 +63,9 @@ class MeasurementModel:
         range_noise: standard deviation of the Gaussian error of a range,
             along the beam and before rounding [m].
         dropout: probability that a return is lost.
-        faint_dropout: additional probability that a return of no intensity is
-            lost. It falls linearly with intensity, to none for a return of full
-            intensity.
+        faint_dropout: additional probability that a return of intensity 0 is
+            lost. The probability falls linearly with intensity, to 0 for a
+            return of intensity 1.
         seed: seed of the noise.
         sensor_name: distinguishes the noise of several LiDARs.
 

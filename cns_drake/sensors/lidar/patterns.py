@@ -1,9 +1,9 @@
 """The beams of a LiDAR: directions and firing times.
 
 The scan patterns of Livox's LiDARs do not repeat. Livox publishes their fields
-of view, rates and numbers of lines, but no formula for the motion of the beams;
-each of these classes states its assumptions. Directions depend only on time, so
-that a frame of a given number always has the same directions.
+of view, rates and numbers of lines, but no formula for the motion of the beams.
+`RosettePattern` and `NoddingPattern` state what they assume. Directions depend
+only on time, so that a frame of a given number always has the same directions.
 """
 
 from __future__ import annotations

@@ -48,9 +48,9 @@ class OdometrySensor(LeafSystem):
         output_ports:
         - odometry
 
-    The inputs are lists, over the bodies P of a plant, of X_WP and of V_WP,
-    expressed in the world. The output is the `Odometry` of the observed body or
-    frame B.
+    Each input is a list with one entry per body P of a plant: the pose X_WP, or
+    the spatial velocity V_WP, expressed in the world. The output is the
+    `Odometry` of the observed body or frame B.
     """
 
     def __init__(self, body: RigidBody, X_PB: RigidTransform | None = None):

@@ -298,21 +298,23 @@ def _turned(
 class CalibratedTurn:
     """The N beams of a turn, with the errors of their lasers.
 
-    Arrays are in the firing order, or in the order in which rays are cast
-    ("casting order"), as noted below.
+    Some arrays are in firing order, others in the order in which rays are cast
+    (casting order), as noted below.
 
     Attributes:
         d_Sset: (N, 3) true unit directions of the beams in S, in casting order.
-        height: (N,) height of each beam's laser above the origin of S [m].
-        blocks: pairs of a laser height and the rows of the beams whose laser is
-            at this height.
+        height: (N,) height of each beam's laser above the origin of S, in
+            casting order [m].
+        blocks: pairs of a laser height and a slice: the rows, in casting order,
+            of consecutive beams whose lasers have this height.
         reported: (N, 3) unit directions that the unit reports, in firing order.
         p_SLset: (N, 3) position of each beam's laser, in firing order [m].
         beam: (N,) for each beam in casting order, its number in firing order.
-        orders: (2, N) row numbers in casting order and in firing order. In both
-            orders, consecutive beams are neighbours.
+        orders: (2, N) the beams' rows in casting order, sorted in two ways: by
+            casting, and by firing. Beams that are consecutive in one of them
+            count as neighbours.
         range_error: (N,) range error of each beam's laser, in firing order [m].
-        gain: (N,) gain of each beam's laser.
+        gain: (N,) gain of each beam's laser, in firing order.
     """
 
     def __init__(

@@ -19,7 +19,7 @@ _Table = TypeVar("_Table", bound=Any)
 
 
 def select(table: _Table, rows: np.ndarray) -> _Table:
-    """Returns the rows of a table that numbers or a mask select."""
+    """Returns the rows of a table, given their numbers or a mask."""
     if rows.dtype == bool:
         rows = np.flatnonzero(rows)
     return table._make(values.take(rows, axis=0) for values in table)
@@ -53,7 +53,7 @@ class BeamHits(NamedTuple):
 
     @classmethod
     def of(cls, d_Wset: np.ndarray, hits: RayHits) -> BeamHits:
-        """Returns the hits of rays that were cast to find normals as well."""
+        """Returns the hits of rays whose cast found normals as well."""
         cosine = -(hits.normals_W * d_Wset).sum(axis=1)
         return cls(
             d_Wset,
@@ -71,10 +71,10 @@ class Shots(NamedTuple):
     Attributes:
         key: key of the frame's random numbers; see `frame_key`.
         beam: (N,) number of each beam in firing order.
-        p_WSset: (K, 3) positions of the lasers in the world [m]; beam i has
-            number i mod K.
-        times: (T,) float32 firing times as fractions of the turn; beam i has
-            number i mod T.
+        p_WSset: (K, 3) positions of the lasers in the world [m]; beam i starts
+            at position i mod K.
+        times: (T,) float32 firing times as fractions of the turn; beam i fires
+            at time i mod T.
         divergence: half angle of a beam [rad].
         max_range: how far light is followed [m].
         materials: materials of all geometries.
@@ -181,16 +181,19 @@ def texture(
 ) -> Light:
     """Returns light whose energy and distance vary with surface texture.
 
-    Each spot of a surface has an albedo and a depth. Both are hashes of the
-    spot's position in the surface's own frame, so that all scans of all drives
-    find the same values at a spot. Darker spots are deeper. The axes of the
-    hash cells are not parallel to walls or floors.
+    Each spot of a surface has an albedo and a height above the mean surface.
+    Both are hashes of the spot's position in the surface's own frame, so that
+    all scans of all drives find the same values at a spot. Bright spots are
+    higher than dark spots, so their distances are shorter. The axes of the hash
+    cells are not parallel to walls or floors.
 
     Args:
+        light: light from surfaces without texture.
         row: (B,) row of each beam in `d_Wset`.
-        d_Wset: (B, 3) unit directions in the world.
-        p_WSset: (K, 3) positions of S in the world [m]; row i of `d_Wset` has
-            number i mod K.
+        p_WSset: (K, 3) positions of the sensor in the world [m]; the ray in row
+            i of `d_Wset` starts at position i mod K.
+        d_Wset: (B, 3) unit directions of the rays in the world.
+        materials: materials of the geometries.
         group_of, normal_matrices, p_WLset: see
             `RayCastingScene.surface_frames`.
     """

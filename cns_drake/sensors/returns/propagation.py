@@ -60,7 +60,8 @@ class Ways(NamedTuple):
         d_Wset: (N, 3) unit directions in the world.
         time: (N,) float32 firing time as a fraction of the turn.
         length: (N,) length of the path so far [m].
-        energy: (N,) fraction of the beam's light that gets here and back.
+        energy: (N,) fraction of the beam's light that gets to the origin and
+            back.
         depth: (N,) leaf area that each ray can still pass before it hits a
             leaf.
         inside: (N,) index of the geometry inside which each ray begins; -1 for

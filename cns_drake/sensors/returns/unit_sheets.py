@@ -34,9 +34,9 @@ class Response:
         gain: standard deviation of a laser's gain.
         dim: additional slope for gains more than one standard deviation below
             the mean, so that they are lower than in a normal distribution.
-        flicker: a laser's shots are alternately brighter and darker by a fixed
-            fraction of their intensity. This is the standard deviation of that
-            fraction over lasers.
+        flicker: standard deviation over lasers of the fraction of intensity by
+            which a laser's shots are alternately brighter and darker. Each
+            laser has a fixed fraction.
         speckle: standard deviation of the intensity of single shots, as a
             fraction of the intensity.
     """
@@ -104,9 +104,9 @@ class UnitSheet:
         source: where the numbers come from.
         angle_error_deg: standard deviation of a laser's elevation and azimuth
             [deg].
-        own_part: `range_floor` consists of an error that is constant for a
-            laser and one that varies from shot to shot. This is the fraction of
-            the constant error; the squares of both fractions add up to 1.
+        own_part: fraction of `range_floor` that is an error that stays
+            constant for a laser. The other fraction varies from shot to shot;
+            the squares of both fractions add up to 1.
         response: how the unit converts energy to intensity.
         head: positions of the lasers.
     """

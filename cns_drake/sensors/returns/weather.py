@@ -98,8 +98,9 @@ class Weather:
     def drops(self, diameters_mm: np.ndarray) -> list[tuple[np.ndarray, float]]:
         """Returns size distribution and reflectivity of raindrops and flakes.
 
-        There is one pair for each of rain and snow that falls. The distribution
-        is N(D) [1/(m3 mm)] at the given diameters.
+        The list contains a pair for rain if it rains, and then a pair for snow
+        if it snows. The distribution is N(D) [1/(m3 mm)] at the given
+        diameters.
         """
         kinds = []
         if self.rain > 0.0:
