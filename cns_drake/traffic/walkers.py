@@ -396,7 +396,7 @@ def _forces(
         right = (paths.tangents[here, 1], -paths.tangents[here, 0])
         force[i] -= one.velocity / _RELAXATION
         if is_waiting[i]:
-            # In a narrow gap, the edges would push it to and fro.
+            # In a narrow gap, the edges would push it back and forth.
             continue
         target = path.first + min(one.at + _AHEAD, path.num_points - 1)
         left, most = paths.limits[target]
