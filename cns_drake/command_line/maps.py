@@ -327,9 +327,9 @@ def city(
         check: Write nothing. List the files that would change, and exit with
             status 1 if there are any.
         repair_stages: Update the names of structures in stages.yaml. Use it
-            after you have added something to the plan, since this renumbers
-            structures. Structures are recognised by their positions in
-            structures.csv.
+            after you have added something to the plan, because additions
+            renumber the structures. Structures are recognised by their
+            positions in structures.csv.
     """
     with uninterrupted():
         from cns_drake.city.generation.generate import (

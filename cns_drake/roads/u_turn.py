@@ -45,9 +45,9 @@ def loop_corners(
 
     If the corners are rounded with the loop's radius, the path is smooth. The
     car first swings out to the right of the line on which it arrives. It then
-    turns left around the centre, by more than 90 degrees, and joins the line on
-    which it leaves from this line's right side. The bends at both ends have the
-    loop's radius, too.
+    turns left around the centre, by more than 90 degrees. At the end, it comes
+    from the right of the line on which it leaves, and joins that line. The
+    bends at both ends have the loop's radius, too.
 
     Args:
         centre: centre of the loop [m].

@@ -76,7 +76,7 @@ class Ties:
     is_doubtful: bool
 
     def errors(self, V: np.ndarray) -> np.ndarray:
-        """Returns the rotation and translation errors (M, 6) of the ties."""
+        """Returns the errors (M, 6) of the measured relative poses [rad, m]."""
         E = poses.inverse(V[self.i]) @ V[self.j] @ poses.inverse(self.Z)
         turn = Rotation.from_matrix(E[:, :3, :3]).as_rotvec()
         return np.concatenate([turn, E[:, :3, 3]], axis=1)

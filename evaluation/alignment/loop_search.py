@@ -96,7 +96,7 @@ def loop_errors(
 
 
 def implied_poses(loops: list[Loop], X_WL: np.ndarray) -> np.ndarray:
-    """Returns the poses X_WK (M, 4, 4) of keyframes that loops imply."""
+    """Returns, per loop, the pose X_WK that it implies: (M, 4, 4)."""
     X_LK = np.array([loop.X_LK for loop in loops]).reshape(-1, 4, 4)
     return X_WL[[loop.target for loop in loops]] @ X_LK
 

@@ -30,10 +30,10 @@ def real(
             of a shipped one, or a Python file with your own. By default all
             shipped ones. May be repeated.
         simulated: Folder with simulated recordings. Recordings with the same
-            model of LiDAR as a data set are used twice. Their scans are added
-            to the data set's database as further places; and a classifier is
-            trained to tell them from the real scans, which shows how realistic
-            the simulated scans are.
+            model of LiDAR as a data set are used in two ways: their scans are
+            added to the data set's database as further places, and a classifier
+            is trained to tell them from the real scans, which shows how
+            realistic the simulated scans are.
     """
     from cns_drake.base.files import make_folder
     from evaluation.real.measuring import Measuring

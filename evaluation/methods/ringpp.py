@@ -501,11 +501,11 @@ def radon(image: np.ndarray, angles: np.ndarray) -> np.ndarray:
 
     With u the column and v the row of a pixel, counted from the centre of the
     image, the ray s of angle t is u cos t - v sin t = s, where s counts pixels
-    from the centre, too. Image and value follow torch-radon (Ronchetti 2020): a
-    ray that is nearer to vertical samples the image once in each row, any other
-    ray once in each column. It interpolates between the two nearest pixels. The
-    sum of the samples is multiplied by the distance between samples. Outside
-    the image all is zero.
+    from the centre, too. The axes and the values are those of torch-radon
+    (Ronchetti 2020). A ray within 45 degrees of the vertical samples the image
+    once in each row, any other ray once in each column. Each sample
+    interpolates between the two nearest pixels; outside the image it is zero.
+    The sum of the samples is multiplied by the distance between samples.
 
     A pixel at distance d from a ray contributes hat(d / w) / w with w =
     max(|cos t|, |sin t|) and hat(x) = max(1 - |x|, 0).

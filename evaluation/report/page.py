@@ -137,7 +137,7 @@ class Report:
 
     @property
     def compared(self) -> list[PlaceRecognition]:
-        """Results with which published numbers can be compared."""
+        """Results for which there are published numbers to compare."""
         known = filter(self.reference.covers, self.recognitions)
         return [*known, *self.repeated]
 

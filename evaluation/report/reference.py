@@ -95,10 +95,9 @@ class Reference:
     def further_changes(
         self, map_names: Iterable[str]
     ) -> Sequence[tuple[str, str, float]]:
-        """Returns published changes for which no place recognition exists.
+        """Returns published TCR_sym of pairs without published recognition.
 
-        The result is empty unless the report has a map that the source has,
-        too.
+        The result is empty if the publication has none of the maps.
         """
         return () if self.city_names.isdisjoint(map_names) else self.further
 
