@@ -12,12 +12,17 @@ import logging
 import multiprocessing
 import os
 import threading
+import traceback
 from typing import TYPE_CHECKING
 import uuid
 
 from cns_drake.base.errors import InputError
 from cns_drake.base.interrupts import uninterrupted
-from cns_drake.base.jobs.processes import ProcessDiedError, run_process
+from cns_drake.base.jobs.processes import (
+    JobError,
+    ProcessDiedError,
+    run_process,
+)
 from cns_drake.base.process import num_cores
 
 if TYPE_CHECKING:
@@ -145,7 +150,10 @@ class LocalWorkers:
                 lambda kind, *values: self._listener(kind, name, *values),
                 lambda: not self._stopped.is_set(),
             )
-        except Exception as caught:  # It becomes the result.
+        except (JobError, ProcessDiedError) as caught:
+            error = caught
+        except Exception as caught:  # A fault of this program.
+            self._listener("note", name, traceback.format_exc())
             error = caught
         self._listener("ended", name)
         self._listener("result", name, error)

@@ -15,6 +15,7 @@ import pytest
 
 from cns_drake.base.errors import FailedJobsError, InputError
 from cns_drake.base.files import exclusive
+from cns_drake.base.jobs import cluster
 from cns_drake.base.jobs.cluster import (
     Cluster,
     DaskWorkers,
@@ -97,6 +98,16 @@ def test_a_job_shows_its_traceback_on_request(monkeypatch, capsys, words):
     with pytest.raises(FailedJobsError, match="FILE: field: cannot be used"):
         run_jobs([job("a", job_functions.refuse)], Cluster(num_workers=1))
     assert ("in refuse\n" in capsys.readouterr().err) == bool(words)
+
+
+def test_a_fault_outside_the_job_shows_where_it_arose(monkeypatch, capsys):
+    def fail(*arguments):
+        raise AssertionError
+
+    monkeypatch.setattr(cluster, "run_process", fail)
+    with pytest.raises(FailedJobsError, match="a: AssertionError"):
+        run_jobs([job("a", job_functions.refuse)], Cluster(num_workers=1))
+    assert "in fail\n" in capsys.readouterr().err
 
 
 def test_needs_come_first_and_faults_stay_alone(tmp_path, capsys):
