@@ -61,11 +61,11 @@ class Stage(_Model):
 class Stages(_Model):
     """The file `stages.yaml`: how the city looked in each stage.
 
-    The last stage is the whole city. Each earlier stage lists only what the
-    next stage adds or raises. A stage therefore has all structures of the stage
-    before, and none of these structures is lower. The only exception are
-    temporary objects on an empty lot, such as a market, which are removed when
-    the lot is built on.
+    The last stage is the whole city. Each earlier stage lists how it differs
+    from the next stage: which structures it lacks, and which are lower in it.
+    A city therefore only grows from stage to stage, with one exception:
+    temporary objects on an empty lot, such as a market, are removed when the
+    lot is built on.
 
     Attributes:
         stages: stages by number, in ascending order. A number has two digits in
