@@ -543,9 +543,12 @@ class Scenario(Section):
         return self.replaced(driver=chosen)
 
     def with_lidar_preset(self, preset: str) -> Scenario:
-        """Returns the scenario with every LiDAR replaced by a unit of a preset.
+        """Returns the scenario with every LiDAR replaced by another model.
 
-        The LiDARs keep their poses and measurement settings.
+        The LiDARs keep their poses and the settings of their measurements.
+
+        Args:
+            preset: name of the model's preset, such as `vlp-16`.
 
         Raises:
             InputError: there is no such preset.
