@@ -166,7 +166,13 @@ class OldWorld:
     def area(
         self, wanted: Callable[[world_structures.Structure], bool]
     ) -> BaseGeometry:
-        """Returns the area in W [m] of all structures that `wanted` selects."""
+        """Returns the area that selected structures cover in W [m].
+
+        The structures are seen from above.
+
+        Args:
+            wanted: function that returns whether a structure is selected.
+        """
         found = [
             from_above(world_structures.triangle_corners(part))
             for one in self._seen.values()

@@ -67,8 +67,8 @@ class BagWriter:
 
     Leaving the context normally completes the recording. Leaving it by an
     exception closes the file as a shorter but valid MCAP file under its `.part`
-    name. Equal calls produce equal bytes, even if the first run was interrupted
-    and a second run continued it.
+    name. The same calls always produce the same bytes, even if a run was
+    interrupted and another one continued it.
 
     Example:
         from cns_drake import BagWriter, recording_topics
@@ -100,18 +100,18 @@ class BagWriter:
             topics: every topic, in the order of the file's channels.
             start_ns: time of the first message, also the nominal time of
                 the attachments [ns].
-            attachments: file name -> value, put before all messages; as YAML
-                if the name ends with `.yaml`, and else as JSON.
-                An interrupted recording with the same attachments is of the
-                same kind, and its messages can be taken over.
-            scenario: the content of `scenario.yaml` beside the MCAP.
-            beside: name of a further file beside the MCAP -> its content, as
-                YAML.
+            attachments: name -> value of each attachment of the MCAP file.
+                Values are written as YAML if the name ends with `.yaml`,
+                otherwise as JSON. An interrupted recording can be continued
+                only with the same attachments.
+            scenario: the content of `scenario.yaml`, next to the MCAP file.
+            beside: name -> content of further YAML files next to the MCAP file.
             custom_data: key -> text for `ros2 bag info`.
-            fingerprint: the content of `fingerprint.txt`, if any. An
-                interrupted recording with another one is of another kind, too.
-            overwrite: whether an existing recording may be replaced. A
-                finished one is kept until the new one is complete.
+            fingerprint: the content of `fingerprint.txt`; no file if empty. An
+                interrupted recording can be continued only with the same
+                fingerprint.
+            overwrite: whether an existing recording may be replaced. A finished
+                recording stays until the new one is complete.
 
         Raises:
             InputError: if the folder must not be used, see
@@ -504,7 +504,12 @@ class BackgroundWriter:
     """
 
     def __init__(self, write: Callable[..., None]):
-        """Prepares the writer; `write` will be called in a second thread."""
+        """Prepares the writer.
+
+        Args:
+            write: function that writes a message, such as `BagWriter.write`. It
+                is called in a second thread.
+        """
         self._write = write
         self._thread = ThreadPoolExecutor(1)
         self._batches: deque[Future] = deque()
@@ -522,6 +527,9 @@ class BackgroundWriter:
 
     def write(self, *message: Any) -> None:
         """Queues a message for writing; waits while too many are queued.
+
+        Args:
+            message: the arguments of the function that writes a message.
 
         Raises:
             Exception: the error that occurred while an earlier message was

@@ -173,7 +173,13 @@ def make_odometry(
 def make_tf(
     parent: str, X_PCs: dict[str, RigidTransform], stamp_ns: int
 ) -> Any:
-    """Returns a TFMessage with the poses X_PC of frames C in one parent P."""
+    """Returns a TFMessage with the poses of frames C in one parent frame P.
+
+    Args:
+        parent: name of P.
+        X_PCs: name of a frame C -> its pose X_PC.
+        stamp_ns: time of the poses [ns].
+    """
     header = make_header(parent, stamp_ns)
     return ros_types.make_message(
         ros_types.TF,
@@ -229,9 +235,12 @@ def make_image(
 def make_compressed_image(
     pixels: np.ndarray, frame_id: str, stamp_ns: int
 ) -> Any:
-    """Returns a CompressedImage message, a JPEG, of (height, width, 3) uint8.
+    """Returns a CompressedImage message with an image as JPEG.
 
-    The camera's frame has z ahead and y down.
+    Args:
+        pixels: (height, width, 3) uint8 red, green and blue.
+        frame_id: name of the camera's frame, z ahead and y down.
+        stamp_ns: time of the image [ns].
     """
     # Slow to import, and few recordings have cameras.
     from PIL import Image
