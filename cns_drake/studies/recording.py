@@ -43,7 +43,13 @@ def record_all(
     """Records scenarios as `<output>/<name>/`, with progress on stderr.
 
     A finished recording of the same scenario and world is kept; an interrupted
-    one goes on.
+    one is continued.
+
+    Args:
+        scenarios: the scenarios to record.
+        output: folder of the recordings.
+        cluster: runs the jobs.
+        overwrite: whether other recordings of these names may be replaced.
 
     Raises:
         InputError: scenarios could not be recorded (the error names all of
@@ -61,11 +67,16 @@ def plan_recordings(
     overwrite: bool = True,
     pages: Mapping[str, Path] | None = None,
 ) -> list[Job]:
-    """Returns a job for each unfinished recording; notes the finished ones.
+    """Returns a job for each recording that is not finished yet.
 
-    Each job has the recording's name. `overwrite` allows it to replace another
-    recording of this name. If `pages` (name of a recording -> file of its web
-    page) is given, a recording counts as finished only if its page exists.
+    Each job has the name of its recording. A note says which are finished.
+
+    Args:
+        scenarios: the scenarios to record.
+        output: folder of the recordings.
+        overwrite: whether a job may replace another recording of the same name.
+        pages: name of a recording -> file of its web page. If given, a
+            recording counts as finished only if its page exists.
 
     Raises:
         InputError: two scenarios have the same name, or a folder must not be
