@@ -515,7 +515,7 @@ def _ending(side: str, condition: Condition, seed: int) -> str:
 
 
 def beside(drive: Scenario) -> Scenario:
-    """Returns a drive with its LiDARs 1.25 m further ahead and 0.5 m to the left.
+    """Returns a drive with its LiDARs moved 1.25 m ahead and 0.5 m to the left.
 
     This is the default viewpoint of a database on the same route as the
     queries, so that the two drives do not coincide.

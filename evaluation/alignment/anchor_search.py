@@ -63,7 +63,7 @@ class Ties:
     Attributes:
         i: (M,) index of the first pose.
         j: (M,) index of the second pose.
-        Z: (M, 4, 4).
+        Z: (M, 4, 4) measured relative poses.
         covariance: (M, 6, 6) covariance of a small motion applied to Z from the
             left: rotation [rad], then translation [m].
         is_doubtful: whether the ties may be wrong.
@@ -76,7 +76,11 @@ class Ties:
     is_doubtful: bool
 
     def errors(self, V: np.ndarray) -> np.ndarray:
-        """Returns the errors (M, 6) of the measured relative poses [rad, m]."""
+        """Returns the errors (M, 6) of the measured relative poses [rad, m].
+
+        Args:
+            V: (N, 4, 4) poses to which `i` and `j` refer.
+        """
         E = poses.inverse(V[self.i]) @ V[self.j] @ poses.inverse(self.Z)
         turn = Rotation.from_matrix(E[:, :3, :3]).as_rotvec()
         return np.concatenate([turn, E[:, :3, 3]], axis=1)
@@ -236,8 +240,8 @@ def find_candidates(
 def find_guesses(candidates: Candidates) -> list[Guess]:
     """Returns the guesses with the most agreeing candidates, best first.
 
-    Each is the consensus of two pairs, refined with all agreeing pairs. A pair
-    that agrees with one guess does not vote for the next.
+    A guess is computed from two candidates, and refined with all candidates
+    that agree with it. These candidates are not used for further guesses.
     """
     trials = _trials(candidates)
     is_left = np.ones(len(candidates.turn), dtype=bool)
@@ -400,7 +404,13 @@ def straighten(loops: list[Loop], drive: Submaps) -> np.ndarray:
 def agreeing(
     loops: list[Loop], X_TL: np.ndarray, X_TK: np.ndarray
 ) -> np.ndarray:
-    """Returns which loops agree with the poses, (M,) bool."""
+    """Returns which loops agree with given poses of the keyframes, (M,) bool.
+
+    Args:
+        loops: the M loops.
+        X_TL: (L, 4, 4) poses of the target's keyframes.
+        X_TK: (K, 4, 4) poses of the source's keyframes.
+    """
     distances, angles = loop_errors(loops, X_TL, X_TK)
     return (distances < AGREEMENT[0]) & (angles < AGREEMENT[1])
 

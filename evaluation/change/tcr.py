@@ -250,7 +250,7 @@ def temporal_change(
         source: (N, 3) float64 voxel centroids, in the common world frame [m].
         target: (M, 3) float64 voxel centroids of the other map [m].
         tau: distance up to which a point is unchanged, inclusive [m].
-        margin: margin of the hulls, see `in_convex_hull` [m].
+        margin: distance by which the convex hulls are widened [m].
         restrict_to_hull: whether O is counted inside H. False is the literal
             equation 2, under which values may be negative.
 

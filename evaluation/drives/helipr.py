@@ -112,9 +112,13 @@ class HeliprDrive(FileDrive):
 
 
 def read_scan(lidar: str, path: Path, stamp_ns: int = 2**63) -> np.ndarray:
-    """Returns the points (N,) of a scan file of a LiDAR.
+    """Returns the points of a scan file as a structured array (N,).
 
-    Aeva's format depends on the time of the scan [ns].
+    Args:
+        lidar: name of the LiDAR: `Ouster`, `Velodyne`, `Avia` or `Aeva`.
+        path: the file.
+        stamp_ns: time of the scan [ns], on which the format of the Aeva
+            depends.
 
     Raises:
         ValueError: if the file is not of that LiDAR.

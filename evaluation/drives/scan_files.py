@@ -24,7 +24,10 @@ _LIMITS = ((100_000.0, 900_000.0), (0.0, 10_000_000.0))
 
 
 def is_local(X_WB: np.ndarray) -> bool:
-    """Returns whether poses (N, 4, 4) are too near the origin for UTM."""
+    """Returns whether poses (N, 4, 4) are in local coordinates, not in UTM.
+
+    They are if all of them are near the origin.
+    """
     return bool((np.abs(X_WB[:, :2, 3]) < _LIMITS[0][0]).all())
 
 
@@ -170,7 +173,7 @@ def list_stamped(
     Args:
         folder: folder of the files.
         suffix: suffix of their names.
-        parse: function that returns the times [ns] of texts.
+        parse: function that converts an array of texts to times [ns].
 
     Returns:
         The files in order of time; (N,) int64 times [ns]; N >= 1.
@@ -196,7 +199,13 @@ def list_stamped(
 def keep_spanned(
     files: list[Path], spanned: np.ndarray, poses_path: Path
 ) -> tuple[list[Path], tuple[str, ...]]:
-    """Leaves out scan files before the first or after the last pose.
+    """Leaves out the scan files that lie outside the time of the poses.
+
+    Args:
+        files: files of N scans.
+        spanned: (N,) bool, whether a scan is between the first and the last
+            pose.
+        poses_path: file of the poses, for the note.
 
     Returns:
         The remaining files; a note if scans were left out.
@@ -228,9 +237,12 @@ def read_packed(path: Path, dtype: np.dtype) -> np.ndarray:
 
 
 def check_below(points: np.ndarray, name: str, limit: int) -> None:
-    """Raises an error for points whose field exceeds a sensor's limit.
+    """Raises an error if a field shows that a file is from another sensor.
 
-    The error shows that a file is from another sensor.
+    Args:
+        points: structured array (N,).
+        name: name of the field.
+        limit: number that the values of the sensor do not reach.
 
     Raises:
         ValueError: if `points[name]` reaches `limit`.

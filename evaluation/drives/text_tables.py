@@ -376,7 +376,8 @@ def pose_matrices(path: Path, values: np.ndarray) -> np.ndarray:
         values: (N, 12) numbers.
 
     Returns:
-        (N, 4, 4) with the rotations as they are in the text, rounded.
+        (N, 4, 4) poses. The rotations are as in the text, and exact only to its
+        digits.
 
     Raises:
         InputError: if a number is not finite or a matrix is no rotation.
