@@ -135,10 +135,16 @@ class Starts:
 
 
 class OneScan(FileDrive):
-    """A point cloud as a drive of one scan, at the origin of its world."""
+    """A point cloud that is read as a drive: one scan at the origin of W."""
 
     def __init__(self, path: Path, columns: int | None = None):
-        """Reads the cloud, with its columns if it is a `.bin` file."""
+        """Opens the point cloud.
+
+        Args:
+            path: its file.
+            columns: number of columns of a `.bin` file; by default guessed from
+                the values.
+        """
         notes: list[str] = []
         scan = read_cloud(path, columns, notes.append)
         super().__init__(
@@ -164,6 +170,14 @@ def mapped_frames(
     place: Drive | Path, surroundings: LocalisationMap, query: Drive
 ) -> np.ndarray:
     """Returns which frames of a query drive lie within the map, (N,) bool.
+
+    A frame lies within the map if it is at most `NEAR` [m] from the map's drive
+    or, if the map is a file, from a point of the map.
+
+    Args:
+        place: drive or file from which the map was made.
+        surroundings: the map.
+        query: the query drive.
 
     Raises:
         InputError: no frame lies within the map.
@@ -357,7 +371,13 @@ def is_right(
     translation: float = RIGHT_TRANSLATION,
     rotation_deg: float = RIGHT_ROTATION_DEG,
 ) -> np.ndarray:
-    """Returns which results are within limits of the error, (K,) bool."""
+    """Returns which results have errors within given limits, (K,) bool.
+
+    Args:
+        rows: (K,) results, records of `QUERY`.
+        translation: greatest error of the position [m].
+        rotation_deg: greatest error of the orientation [deg].
+    """
     return (rows["translation_error"] <= translation) & (
         rows["rotation_error_deg"] <= rotation_deg
     )
@@ -424,7 +444,12 @@ def summary(rows: np.ndarray) -> dict[str, float | int | None]:
 
 
 def numbers(rows: np.ndarray, method: str) -> Iterator[Number]:
-    """Yields the numbers of the summary that go into tables of results."""
+    """Yields the numbers of a method's results that go into `results.csv`.
+
+    Args:
+        rows: (K,) results, records of `QUERY`.
+        method: name of the method.
+    """
     found = summary(rows)
     for name in _SHOWN:
         if (value := found[name]) is not None:
@@ -432,7 +457,11 @@ def numbers(rows: np.ndarray, method: str) -> Iterator[Number]:
 
 
 def columns(rows: np.ndarray) -> dict[str, np.ndarray]:
-    """Returns the columns of `queries.csv` of results (K,) of `QUERY`."""
+    """Returns the columns of `queries.csv` from results: name -> (K,) values.
+
+    Args:
+        rows: (K,) results, records of `QUERY`.
+    """
     scores = rows["own_score"]
     return {
         "query_frame": rows["frame"],
@@ -463,7 +492,16 @@ def write_rows(rows: np.ndarray, path: Path) -> None:
 def query_frames(
     query: Drive, is_mapped: np.ndarray, spacing: float
 ) -> list[int]:
-    """Returns frames of a query drive within the map, `spacing` apart [m]."""
+    """Returns the frames of a query drive that are localised in the map.
+
+    Args:
+        query: the drive of N frames.
+        is_mapped: (N,) bool, whether a frame lies within the map.
+        spacing: distance driven between two chosen frames [m].
+
+    Returns:
+        Increasing frame numbers, at least one.
+    """
     frames = sample_frames(query.X_WS[:, :3, 3], spacing)
     chosen = frames[is_mapped[frames]]
     # A short pass through the map may lie between two sampled frames.

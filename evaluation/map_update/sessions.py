@@ -117,8 +117,8 @@ class Session:
 class MapBuilder:
     """Merges scans into a map with one point in each cell of 0.1 m.
 
-    The first point of a cell represents it: a mean might lie beside the
-    surface.
+    The first point of a cell represents it, because the mean of its points may
+    lie off the surface.
     """
 
     def __init__(self, origin: np.ndarray):

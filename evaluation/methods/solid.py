@@ -68,7 +68,13 @@ class SolidConfig(MethodConfig):
         return self
 
     def field(self, lidar: LidarField = _CNS) -> LidarField:
-        """Returns the field of view of the settings, or else of the LiDAR."""
+        """Returns the beams and the field of view that the method assumes.
+
+        Values that the settings do not give are those of the LiDAR.
+
+        Args:
+            lidar: number of rings and field of view of the LiDAR.
+        """
         elevations, lowest_deg, highest_deg = lidar
         if self.elevations is not None:
             elevations = self.elevations
