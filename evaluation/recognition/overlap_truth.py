@@ -135,7 +135,7 @@ def best_overlaps(
         X_WPs: (D, 4, 4) poses of these sensors.
         query_scans: Q scans.
         X_WQs: (Q, 4, 4) poses of their sensors.
-        matches: (Q, D) bool, the truth.
+        matches: (Q, D) bool, whether a place is a true match of a query.
 
     Returns:
         (Q,) greatest share of the query's scan that the scan of a match shows;

@@ -116,9 +116,13 @@ class PlaceOutcome:
         interval: Interval = UNKNOWN,
         n: int | None = None,
     ) -> Number:
-        """Returns a metric as a row of results; by default, n is Q.
+        """Returns a number as a result of the outcome's method and gate.
 
-        Method and gate are those of the outcome.
+        Args:
+            metric: name of the number.
+            value: the number.
+            interval: its 95 % interval.
+            n: number of queries from which it is computed; by default all.
         """
         count = len(self.outcomes) if n is None else n
         return Number(

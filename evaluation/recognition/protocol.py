@@ -105,13 +105,19 @@ class RetrievalProtocol:
             raise InputError(f"--seed: {self.seed} is negative")
 
     def scans(self, method: Method) -> int:
-        """Returns how many scans are merged for one place with a method."""
+        """Returns how many scans are merged for one place.
+
+        That is `scans_per_place` or, if it is None, the method's own number.
+        """
         if self.scans_per_place is not None:
             return self.scans_per_place
         return method.scans_per_place
 
     def scans_before(self, method: Method) -> int:
-        """Returns how many of a place's scans precede the scan at its pose."""
+        """Returns how many of the merged scans come before the place's scan.
+
+        The place's scan is the one that gives the place its pose.
+        """
         is_middle = self.of(method).place == "middle"
         return self.scans(method) // 2 if is_middle else 0
 
@@ -196,7 +202,7 @@ class RetrievalProtocol:
         )
 
     def asked_like(self, other: RetrievalProtocol) -> RetrievalProtocol:
-        """Returns the protocol with queries made as by another protocol.
+        """Returns the protocol with the queries of another protocol.
 
         The choice of the scan that stands for a place is also taken from
         `other`.
@@ -204,7 +210,7 @@ class RetrievalProtocol:
         return replace(self, place=other.place, **other._asked)
 
     def described(self, *, queries: bool = True) -> dict[str, object]:
-        """Returns the options on which the descriptions of a drive depend.
+        """Returns name -> value of the options that affect descriptions of scans.
 
         Args:
             queries: whether the drive has queries, and not only places.

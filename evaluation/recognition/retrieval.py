@@ -37,7 +37,8 @@ class Retrieval:
         matches: (Q, D) bool, whether a place is a true match of a query.
         pose_errors: errors of the estimated pose at each query's best place.
         is_known: (Q, D) bool, whether a place is allowed as an answer to a
-            query.
+            query; with `exclude_recent`, places that the drive has passed just
+            before are not.
         overlaps: (Q, D) float64 share of a query's scan that a place's scan
             shows (see `overlap_truth`); None if matches are by the radius.
         query_blocks: (Q,) block of the route in which each query lies.
@@ -166,10 +167,10 @@ def compare_with_gates(
     overlaps: np.ndarray | None = None,
     is_known: np.ndarray | None = None,
 ) -> list[Retrieval]:
-    """Returns the result of each gate; queries are scored only once.
+    """Returns the scores after each of several gates.
 
-    A gate rejects places that lie beyond a radius by the method's own pose
-    estimate.
+    A gate rejects places that lie beyond a radius according to the method's own
+    pose estimate. Queries are described and scored only once.
 
     Args:
         method, database, query, track, overlaps: see `compare`.

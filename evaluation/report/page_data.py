@@ -64,8 +64,8 @@ class CameraImages:
     """Images of a camera at K frames of a drive.
 
     Attributes:
-        stamps_ns: (K,) stamps of the frames.
-        times_ns: (M,) times of images, increasing.
+        stamps_ns: (K,) time stamps of the frames [ns].
+        times_ns: (M,) times of the images, increasing [ns].
         files: the M images as JPEG.
     """
 
@@ -74,9 +74,12 @@ class CameraImages:
     files: list[bytes]
 
     def to_data(self, step: int) -> dict:
-        """Returns every `step`-th image, and which of them each frame shows.
+        """Returns every `step`-th image, ready for JSON.
 
-        Each frame shows the image that is nearest in time.
+        Returns:
+            `files`, the images as base64; and, for each of the K frames,
+            `nearest`, the number of the image that is nearest in time, and
+            `later`, how much later than the frame this image is [s].
         """
         times_ns = self.times_ns[::step]
         nearest = _nearest(times_ns, self.stamps_ns)
@@ -154,9 +157,15 @@ def make_drive(
 def camera_images(
     drive: Drive, stamps_ns: np.ndarray, on_note: Callable[[str], None]
 ) -> CameraImages | None:
-    """Returns a drive's camera images that are nearest in time to frames.
+    """Returns the images of a drive's camera that are nearest to frames.
 
-    A note tells how many could not be decoded.
+    Nearest means nearest in time. The result is None for a drive without a
+    camera.
+
+    Args:
+        drive: the drive.
+        stamps_ns: (K,) time stamps of the frames [ns].
+        on_note: is called with a note if images could not be decoded.
 
     Raises:
         InputError: if the drive cannot be read.

@@ -219,7 +219,11 @@ def check(chart: Mapping[str, Any]) -> dict[str, str]:
 
 
 def styles(labels: Sequence[str]) -> dict[str, tuple[str, str, str]]:
-    """Returns the colour, line style and marker of each method, by title."""
+    """Returns how each method is drawn: title -> colour, line style and marker.
+
+    Args:
+        labels: names of the methods, with their settings.
+    """
     others = [name for name in labels if name not in METHOD_STYLES]
     return {
         title(name): METHOD_STYLES.get(name)

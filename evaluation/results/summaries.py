@@ -107,7 +107,7 @@ class Summary(NamedTuple):
         low: float = math.nan,
         high: float = math.nan,
     ) -> Summary:
-        """Returns the summary of a number of one method on one map.
+        """Returns a number of one method on one map, with its interval.
 
         Args:
             what: name of the number.
