@@ -210,7 +210,7 @@ class RetrievalProtocol:
         return replace(self, place=other.place, **other._asked)
 
     def described(self, *, queries: bool = True) -> dict[str, object]:
-        """Returns name -> value of the options that affect descriptions of scans.
+        """Returns name -> value of the options that affect descriptions.
 
         Args:
             queries: whether the drive has queries, and not only places.
