@@ -83,7 +83,7 @@ def age_map(
             years are before today; they need the buildings' years of
             construction (column `built` of `structures.csv`).
         seed: the seed of all random draws, not negative.
-        rates: event -> rate per year; see `read_rates`.
+        rates: event -> rate per year, see `cns_drake.ageing.rates.read_rates`.
         output: the folder to write, which must not exist yet.
         progress: called with each message on the progress, a line of text.
         finish: called with the folder and the result when all else is done, to

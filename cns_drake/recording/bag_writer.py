@@ -5,7 +5,8 @@ name when it is complete, and `metadata.yaml` is written last. A folder with
 `metadata.yaml` is therefore complete and consistent.
 
 An interrupted run leaves a part file. A later run of the same recording takes
-over the messages in this file by writing them again; see `PartFile`.
+over the messages in this file by writing them again; see
+`cns_drake.recording.recording_folder.PartFile`.
 
 Messages are written in a thread, while the next frame is computed: compression
 takes half of a frame's time, during which other Python code can run.
@@ -114,8 +115,8 @@ class BagWriter:
                 recording stays until the new one is complete.
 
         Raises:
-            InputError: if the folder must not be used, see
-                `RecordingFolder.check`.
+            InputError: if the folder contains a finished recording that must
+                not be replaced, or files that do not belong to a recording.
         """
         self._files = RecordingFolder(folder)
         self._overwrite = overwrite

@@ -73,8 +73,8 @@ class HeliprDrive(FileDrive):
     """The scans of one LiDAR of HeLiPR on a drive.
 
     If there is a `global_*_gt.txt`, W is the UTM grid with a nearer origin (see
-    `scan_files.to_world`). Otherwise W is the frame of the drive's own
-    `*_gt.txt`. Points without a return are left out.
+    `evaluation.drives.scan_files.to_world`). Otherwise W is the frame of the
+    drive's own `*_gt.txt`. Points without a return are left out.
     """
 
     def __init__(self, path: Path, lidar: str | None = None):

@@ -86,9 +86,9 @@ class FileDrive(Drive):
             read: function that returns the points in the file of a scan,
                 unchanged. Its arguments are the file and the time of the scan
                 [ns]. It raises ValueError if the file has another format.
-            notes: see `Drive.notes`.
-            datum: see `Drive.datum`.
-            scenario: see `Drive.scenario`.
+            notes: notes for the user on how the drive was read.
+            datum: see `evaluation.drives.Drive.datum`.
+            scenario: see `evaluation.drives.Drive.scenario`.
             unit: name of the LiDAR's unit, if the data set has only one.
         """
         self.name = name
@@ -144,8 +144,9 @@ class BinDrive(FileDrive):
         """Describes a drive.
 
         Args:
-            columns: see `find_layout`.
-            drive: see `FileDrive`.
+            columns: number of float32 values per point; None to guess it from
+                the values.
+            drive: all arguments of `FileDrive` except `read`.
         """
         super().__init__(read=self._read_bin, **drive)
         self._columns = columns

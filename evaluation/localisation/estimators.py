@@ -191,8 +191,9 @@ def make_map(
         source: the drive, or the cloud's file.
         settings: settings for thinning and for normals.
         track: reports progress.
-        columns: see `read_cloud`, for a cloud's file.
-        on_note: see `read_cloud`.
+        columns: number of columns of a `.bin` file; by default guessed from the
+            values.
+        on_note: is called with notes on how a cloud's file was read.
 
     Raises:
         InputError: the source cannot be read, or has too few points.

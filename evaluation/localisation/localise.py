@@ -229,7 +229,8 @@ class Localiser:
 
     Attributes:
         surroundings: the map.
-        estimator: see `make_estimator`.
+        estimator: function that registers a scan, see
+            `evaluation.localisation.estimators.make_estimator`.
         settings: settings for thinning scans.
     """
 

@@ -83,7 +83,7 @@ def track_drive(
     Args:
         localiser: the map and the estimator.
         query: the drive.
-        is_mapped: (N,) see `mapped_frames`.
+        is_mapped: (N,) bool, which frames lie within the map.
         starts: how the initial pose of a section's first scan is drawn.
         drift: see `drifting_steps`.
         track: reports progress.

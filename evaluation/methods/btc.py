@@ -89,8 +89,9 @@ class BtcConfig(MethodConfig):
             another plane with which it is merged [m]; [O] 0.3.
         image_axes: axes of the image on a plane, in which keypoints are found.
             `public` copies the authors' program, in which a wrong term tilts
-            the second axis out of the plane (see `btc_triangles.image_axes`).
-            `orthogonal` corrects it. [P] public.
+            the second axis out of the plane (see
+            `evaluation.methods.btc_triangles.image_axes`). `orthogonal`
+            corrects it. [P] public.
         resolution: side of a cell of the image on a plane [m]; [O] 0.5.
         height_range: lowest and highest height above the ground of the points
             that are used [m]; [O] -1, 4.

@@ -71,8 +71,8 @@ def paper() -> Reference:
     Downtown 01-04 the value of 02-04, and one R@1 of RING++ on Riverside 02->01
     contradicts the F1 beside it. The paper does not state whether a method was
     scored on all queries or only on queries with a match (the mode, see
-    `recognition.metrics`). This is inferred from the relation between R@1, F1
-    and AUC in all rows of the method.
+    `evaluation.recognition.metrics`). This is inferred from the relation
+    between R@1, F1 and AUC in all rows of the method.
     """
     changes = {
         (row["map"], row["sequence_a"], row["sequence_b"]): float(

@@ -40,7 +40,8 @@ class DescribedScans:
         clouds: the K described clouds if the method has a second stage;
             otherwise empty.
         blocks: (K,) block of the route in which each place or query lies, see
-            `route_blocks`; None if the route is unknown.
+            `evaluation.recognition.metrics.route_blocks`; None if the route is
+            unknown.
     """
 
     frames: np.ndarray

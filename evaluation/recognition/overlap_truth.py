@@ -1,9 +1,9 @@
 """Truth by overlap: the share of a query's scan that a place's scan shows.
 
 Poses are exact. A point of the query's scan counts as shown if it lies on a
-surface of the place's scan, see `seen_surfaces`. The overlap is the share of
-the query's points that are shown. Points that were hidden from the place's
-sensor, or absent when it passed, are not shown.
+surface of the place's scan, see `evaluation.recognition.seen_surfaces`. The
+overlap is the share of the query's points that are shown. Points that were
+hidden from the place's sensor, or absent when it passed, are not shown.
 
 The idea is that of OverlapNet (Chen et al., RSS 2020), which compares range
 images pixel by pixel.
@@ -179,7 +179,8 @@ def write_overlaps(
         path: CSV file to write.
         query_frames: (Q,) frames of the queries.
         database_frames: (D,) frames of the places.
-        overlaps: (Q, D) overlaps, see `overlap_truth`.
+        overlaps: (Q, D) share of each query's scan that each place's scan
+            shows.
 
     Raises:
         InputError: if the file cannot be written.

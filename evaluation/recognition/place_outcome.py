@@ -76,7 +76,8 @@ class PlaceOutcome:
                 drive through the query's own city; distances to places of all
                 other drives are unknown.
             overlaps: (Q,) how much of the query's scan the best of its matches
-                shows, see `overlap_truth`; NaN without a match.
+                shows, see `evaluation.recognition.overlap_truth`; NaN without a
+                match.
             radius: radius of a match [m].
         """
         best = retrieval.best_places.tolist()

@@ -47,8 +47,9 @@ class RetrievalProtocol:
             compared only with places that the drive passed at least this time
             before [s]. None if two drives are compared.
         overlap: share of a query's scan, up to 1, that the scan of a place must
-            show to be a match, at any distance (see `overlap_truth`). None if
-            places within `radius` are matches.
+            show to be a match, at any distance (see
+            `evaluation.recognition.overlap_truth`). None if places within
+            `radius` are matches.
         gate: whether to reject top-ranked places that lie beyond the radius
             according to the method's own pose estimate.
         turn_queries: whether each query is turned by a random yaw. Places stay
@@ -57,8 +58,7 @@ class RetrievalProtocol:
             tilted, from 0 to 90 [deg].
         hide_sector: angle of a random sector that is hidden from each query,
             from 0 to below 360 [deg].
-        seed: seed of the turns, tilts and hidden sectors, see
-            `QuerySensor.draw`.
+        seed: seed of the random turns, tilts and hidden sectors.
 
     Raises:
         InputError: a value is out of range; the message names the command-line

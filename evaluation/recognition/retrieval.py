@@ -40,7 +40,8 @@ class Retrieval:
             query; with `exclude_recent`, places that the drive has passed just
             before are not.
         overlaps: (Q, D) float64 share of a query's scan that a place's scan
-            shows (see `overlap_truth`); None if matches are by the radius.
+            shows (see `evaluation.recognition.overlap_truth`); None if matches
+            are by the radius.
         query_blocks: (Q,) block of the route in which each query lies.
 
     Example:
@@ -144,8 +145,8 @@ def compare(
         query: drive with described queries, in the same world frame.
         protocol: protocol by which both drives were described.
         track: reports progress.
-        overlaps: (Q, D) overlaps, see `overlap_matrix`; needed for matches by
-            overlap.
+        overlaps: (Q, D) share of each query's scan that each place's scan
+            shows; needed for matches by overlap.
 
     Raises:
         InputError: if the method returns an invalid result.

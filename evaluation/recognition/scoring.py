@@ -128,7 +128,8 @@ def score_places(
             place, the query is compared with every place, because a search for
             a few best places might return only excluded ones.
         gate_radius: radius of a match for `gated` [m]; None without a gate.
-        exhaustive: see `Method.score`.
+        exhaustive: whether to compare also with places that a search would skip
+            only to save time.
         where: the name of the current query, for errors.
 
     Raises:

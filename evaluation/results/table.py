@@ -121,7 +121,7 @@ class Key:
         task: `place`, `pose`, `localise`, `map`, `change`, `cost` or another.
         method: method, estimator or baseline; "" for the task `change`.
         gate: whether places were rejected by the method's own pose.
-        protocol: name of the protocol, see `RetrievalProtocol.name`.
+        protocol: name of the protocol: `fair`, `paper`, `recorded` or `own`.
     """
 
     experiment: str

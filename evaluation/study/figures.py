@@ -143,7 +143,7 @@ def change_stems(
 
 
 def curves_stem(city: City) -> str:
-    """Returns the file name of the figure with a city's precision-recall curves.
+    """Returns the file name of a city's figure of precision-recall curves.
 
     The name has no ending.
     """
