@@ -28,7 +28,12 @@ _GRAVITY = 9.81
 
 
 class AxleRates(BaseModel):
-    """A rate, for example of a spring, on each of the two axles."""
+    """A rate, for example of a spring, on each of the two axles.
+
+    Attributes:
+        front: rate on the front axle.
+        rear: rate on the rear axle.
+    """
 
     model_config = ConfigDict(extra="forbid", frozen=True, strict=True)
 

@@ -319,7 +319,9 @@ class VehicleMotion(LeafSystem):
 class Sweep(NamedTuple):
     """Poses of a frame P in W at N times.
 
-    The poses are given as rotations (N, 3, 3) and positions (N, 3) [m].
+    Attributes:
+        R_WPset: (N, 3, 3) rotations.
+        p_WPset: (N, 3) positions [m].
     """
 
     R_WPset: np.ndarray

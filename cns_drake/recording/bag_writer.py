@@ -55,7 +55,14 @@ _MOST_HELD = 64
 
 
 class RecordedMessage(NamedTuple):
-    """A message to record; its fields are arguments of `BagWriter.write`."""
+    """A message of a recording.
+
+    Attributes:
+        topic: name of its topic.
+        stamp_ns: its time [ns].
+        data: the serialised message.
+        sequence: number of the message on its topic.
+    """
 
     topic: str
     stamp_ns: int

@@ -32,6 +32,10 @@ def recording_topics(
     """Returns the topics of a recording with their types and encodings.
 
     Args:
+        lidar_names: names of the LiDARs.
+        camera_names: names of the cameras.
+        with_imu: whether an IMU is recorded.
+        with_odometry: whether odometry is recorded.
         layouts: LiDAR name -> layout of its points, if not `cns`.
         with_objects: whether boxes of moving objects are recorded.
         further: topics of sensors of other kinds.

@@ -22,12 +22,17 @@ from cns_drake.scenarios.scenario import Scenario
 
 @dataclass(frozen=True)
 class DriveRow:
-    """A drive and its figures; `sequence` is the name of the drive.
+    """A drive, as a row of the table of a map's drives.
 
     Attributes:
-        checksum: checksum of the files on which the figures depend.
+        sequence: name of the drive.
+        map: name of the map.
+        stage: stage through which the drive goes.
+        title: one line on what the drive shows.
+        checksum: checksum of the files on which the numbers depend.
         length: length of the path [m].
         duration: duration of the drive [s].
+        frames: number of frames that are recorded.
         structures, triangles: numbers of structures and triangles in the stage.
     """
 

@@ -51,7 +51,14 @@ _NOTED_DRIVES = 20
 
 @dataclass(frozen=True)
 class AgeCity(MakeMap):
-    """Ages a city, with a stage after each given number of years."""
+    """A job step that ages a city and makes a map with a stage for each age.
+
+    Attributes:
+        source: folder of the city's map.
+        years: the ages: numbers of years from today.
+        seed: seed of the events.
+        rates: events and their rates per year.
+    """
 
     source: Path
     years: tuple[int, ...]
@@ -81,7 +88,12 @@ class AgeCity(MakeMap):
 
 @dataclass(frozen=True)
 class ImportCity(MakeMap):
-    """Imports the file of a real city."""
+    """A job step that makes a map from the file of a real city.
+
+    Attributes:
+        source: the file.
+        options: options of the import.
+    """
 
     source: Path
     options: ImportOptions

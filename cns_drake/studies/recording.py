@@ -119,7 +119,14 @@ def plan_recordings(
 
 @dataclass(frozen=True)
 class Record(Step):
-    """Records a scenario, and saves a web page of the drive."""
+    """A job step that records a drive.
+
+    Attributes:
+        scenario: the drive.
+        folder: folder of the recording.
+        overwrite: whether another recording in this folder may be replaced.
+        page: file for a web page of the drive, if any.
+    """
 
     scenario: Scenario
     folder: Path

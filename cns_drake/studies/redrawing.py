@@ -147,7 +147,12 @@ class MakeMap(Step):
 
 
 def make_maps(steps: Sequence[MakeMap], output: Path, cluster: Cluster) -> None:
-    """Makes maps in a folder, with progress on stderr; finished ones are kept.
+    """Makes maps, with progress on stderr; finished maps are kept.
+
+    Args:
+        steps: a step for each map.
+        output: folder of the maps, which is created if needed.
+        cluster: runs the steps as jobs.
 
     Raises:
         InputError: another file or folder has the name of a map, or maps could
@@ -167,6 +172,11 @@ class RedrawCity(MakeMap):
     """A job step that makes a map with another city along a map's streets.
 
     The new map has one stage, which contains the whole city.
+
+    Attributes:
+        map_folder: folder of the map with the streets.
+        stage: name of the new map's stage.
+        seed: seed of the new city.
     """
 
     map_folder: Path

@@ -54,8 +54,8 @@ class MovedDrive(DriveView):
             drive: drive of N scans.
             X_WS: (N, 4, 4) new poses of the LiDAR in the world.
             world_frame: name of W.
-            datum: name of the geographic origin of W, see
-                `evaluation.drives.Drive.datum`; None if unknown.
+            datum: name of the survey grid in which W lies; None if there is
+                none.
         """
         super().__init__(drive)
         self.world_frame = world_frame

@@ -87,7 +87,8 @@ class FileDrive(Drive):
                 unchanged. Its arguments are the file and the time of the scan
                 [ns]. It raises ValueError if the file has another format.
             notes: notes for the user on how the drive was read.
-            datum: see `evaluation.drives.Drive.datum`.
+            datum: name of the survey grid in which W lies; None if there is
+                none.
             scenario: see `evaluation.drives.Drive.scenario`.
             unit: name of the LiDAR's unit, if the data set has only one.
         """

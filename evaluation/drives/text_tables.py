@@ -138,6 +138,11 @@ def parse_microseconds(texts: np.ndarray) -> np.ndarray:
 def check_increasing(path: Path, stamps_ns: np.ndarray, what: str) -> None:
     """Raises an error for times that do not increase.
 
+    Args:
+        path: file of the times, for the error message.
+        stamps_ns: (N,) int64 times [ns].
+        what: word for a row in the error message, such as `pose`.
+
     Raises:
         InputError: the times do not increase; the error names the first such
             row.
@@ -152,7 +157,7 @@ def check_increasing(path: Path, stamps_ns: np.ndarray, what: str) -> None:
 
 
 def check_finite(path: Path, values: np.ndarray) -> None:
-    """Raises an error for a table (N, width) with NaN or infinity.
+    """Raises an error for an array (N, width) that contains NaN or infinity.
 
     Raises:
         InputError: a number is not finite; the error names the first such row.

@@ -267,9 +267,10 @@ class Btc(Method[BtcDescription, BtcDatabase]):
         database: BtcDatabase,
         places: Sequence[int],
     ) -> list[np.ndarray | None]:
-        """Returns the poses on which most matching triangles agree.
+        """Returns, for each of several places, the pose of the query's LiDAR.
 
-        A pose is None if too few triangles match or agree.
+        It is the pose on which most of the matching triangles agree; None if
+        too few triangles match or agree.
         """
         some = self.build_database([database.places[place] for place in places])
         found = dict(self._motions(query, some, None))

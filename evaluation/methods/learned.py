@@ -230,9 +230,10 @@ class Learned(Method[LearnedScan, LearnedDatabase]):
     def relative_pose(
         self, query: LearnedScan, database: LearnedDatabase, place: int
     ) -> np.ndarray | None:
-        """Returns a pose with the query's heading, in steps of 3.75 deg.
+        """Returns the query's heading relative to a place, as a pose (4, 4).
 
-        Returns None if one of the two scans has no points within reach.
+        The heading is a multiple of 3.75 deg; the translation is zero. The
+        result is None if one of the two scans has no points within reach.
         """
         if not (query.features.any() and database.filled[place]):
             return None

@@ -199,9 +199,10 @@ class SolidMethod(Method[Solid, SolidDatabase]):
     def relative_pose(
         self, query: Solid, database: SolidDatabase, place: int
     ) -> np.ndarray | None:
-        """Returns a pose with the query's heading, in steps of one cell.
+        """Returns the query's heading relative to a place, as a pose (4, 4).
 
-        Returns None if one of the two scans has no points within range.
+        The heading is a multiple of a cell of azimuth; the translation is zero.
+        The result is None if one of the two scans has no points within range.
         """
         azimuths = database.azimuths[place]
         if not (query.azimuths.any() and azimuths.any()):

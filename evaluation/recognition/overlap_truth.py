@@ -114,7 +114,16 @@ def overlap_matrix(
 def compared_frames(
     database: Drive, query: Drive, protocol: RetrievalProtocol
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Returns the frames of the queries (Q,), and of the places (D,)."""
+    """Returns the frames that are compared: those of queries, and of places.
+
+    Args:
+        database: the drive of the places.
+        query: the drive of the queries.
+        protocol: protocol with the spacings of queries and places.
+
+    Returns:
+        (Q,) increasing frame numbers of the query drive; (D,) of the database.
+    """
     return (
         sample_frames(query.X_WS[:, :3, 3], protocol.query_spacing),
         sample_frames(database.X_WS[:, :3, 3], protocol.place_spacing),

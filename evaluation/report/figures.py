@@ -67,8 +67,11 @@ _STEP_LIMIT = 4.0
 class View:
     """An orthographic camera that looks at the ground.
 
-    The azimuth is the direction from the scene to the camera, seen from above;
-    the elevation is the camera's height above the horizon, up to 90 [deg].
+    Attributes:
+        azimuth_deg: direction from the scene to the camera, seen from above,
+            anticlockwise from the x axis [deg].
+        elevation_deg: height of the camera above the horizon, up to 90 [deg].
+        pixels_per_metre: scale of the picture.
     """
 
     azimuth_deg: float = -60.0
@@ -90,9 +93,12 @@ class View:
 
 @dataclass(frozen=True)
 class Picture:
-    """An image (height, width, 3) uint8 of a cloud, white where it is empty.
+    """An image of a cloud, white where it is empty.
 
-    The origin is the lower left corner, along right and up [m].
+    Attributes:
+        image: (height, width, 3) uint8 pixels.
+        origin: (2,) lower left corner of the image, along right and up [m].
+        view: the camera.
     """
 
     image: np.ndarray

@@ -13,7 +13,13 @@ from evaluation.results.table import Results, Row
 
 @dataclass(frozen=True)
 class Published:
-    """Published numbers of a method on a pair of drives."""
+    """Published numbers of a method on a pair of drives.
+
+    Attributes:
+        auc: area under the precision-recall curve.
+        recall_at_1: R@1.
+        f1_max: greatest F1 on the curve.
+    """
 
     auc: float
     recall_at_1: float

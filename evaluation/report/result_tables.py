@@ -85,7 +85,14 @@ def change_table(
     reference: Reference = NO_REFERENCE,
     evidence: Evidence = MappingProxyType({}),
 ) -> Table:
-    """Returns Table I: the change between the drives of each pair."""
+    """Returns Table I of a report: the change between the drives of each pair.
+
+    Args:
+        results: change of each pair.
+        reference: published results to put next to them.
+        evidence: (database, query) -> evidence from scans, for the column with
+            the change that is visible from the query's route.
+    """
 
     def visible(one: ChangeResult) -> tuple[float | None, ...]:
         return _visible_change(evidence, one.report.source, one.report.target)

@@ -39,8 +39,12 @@ _SAMPLES = 1000
 class Mean(NamedTuple):
     """A mean over rows that have the same values in some columns.
 
-    `number` is the number of rows in the mean. Rows without a known value are
-    left out.
+    Attributes:
+        key: the values in these columns.
+        value: the mean.
+        least, greatest: least and greatest of the averaged values.
+        number: number of averaged values. Rows without a known value are left
+            out.
     """
 
     key: tuple
@@ -84,8 +88,15 @@ def means(rows: Iterable[Row], *columns: str) -> list[Mean]:
 class Summary(NamedTuple):
     """A number computed from a table, with its 95 % interval or range.
 
-    `n` is the number of conditions from which the number is computed; None if
-    unknown.
+    Attributes:
+        what: name of the number.
+        map: name of the map.
+        task: the task from whose results it is computed.
+        method: name of the method, with its settings.
+        gate: whether the gate was used.
+        value: the number.
+        low, high: its interval or range; NaN if unknown.
+        n: number of conditions from which it is computed; None if unknown.
     """
 
     what: str
