@@ -2,13 +2,11 @@
 
 Rays that are cast in the worlds of both drives decide.
 
-- A drive **observes** a point if, from one of its poses, the point is within
-  the LiDAR's ranges, its beams cover the direction, and no surface hides it. A
-  surface hides a point that lies more than `NEAR` behind it along the line of
-  sight. There is an exception at grazing angles: if the point lies less than
-  `_GRAZING` behind the surface along that line, it is hidden only if it also
-  lies more than `_SKIN` behind, measured perpendicular to the surface. A wall
-  that has moved a little therefore does not hide its old position.
+- A drive **observes** a point if the LiDAR can see it from one of the drive's
+  poses: the point is within the LiDAR's ranges and field of view, and no
+  surface hides it. A surface hides a point that lies more than `NEAR` behind it
+  along the line of sight. At grazing angles the point must lie farther behind,
+  so that a wall that has moved a little does not hide its old position.
 - A surface is **there** if it passes within `NEAR` of the point, measured
   perpendicular to the surface. Moving objects do not count.
 
@@ -66,7 +64,8 @@ from evaluation.results.drawing import GONE, NEW
 
 # A surface this near to a point is its own [m].
 NEAR = 0.1
-# A surface hides points that lie this far behind, perpendicular to it [m].
+# At grazing angles, a surface hides points that lie this far behind,
+# perpendicular to it [m].
 _SKIN = 0.3
 # Greatest distance behind a surface, along the line of sight, up to which
 # `_SKIN` applies [m].
@@ -294,7 +293,8 @@ def observed(
 ) -> np.ndarray:
     """Returns which points a simulated drive observes, (N,) bool.
 
-    The module's description says when a drive observes a point.
+    A point is observed if the LiDAR can see it from one of the drive's frames:
+    it is within the LiDAR's ranges and field of view, and no surface hides it.
 
     Args:
         points: (N, 3) points in W [m].

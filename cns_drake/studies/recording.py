@@ -198,8 +198,12 @@ class Record(Step):
 def is_recorded(scenario: Scenario, folder: Path) -> bool:
     """Returns whether a finished recording of exactly this scenario exists.
 
-    It counts only if the world, the roads and the program have not changed
+    The result is false if the world, the roads or the program have changed
     since it was recorded.
+
+    Args:
+        scenario: the scenario.
+        folder: folder of the recording.
 
     Raises:
         InputError: the scenario's files cannot be read.

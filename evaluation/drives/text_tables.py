@@ -279,7 +279,7 @@ class Trajectory:
 
 
 def read_matrices(path: Path, separator: str | None) -> Trajectory:
-    """Returns a trajectory of rows with a time and a 3 x 4 matrix.
+    """Reads a trajectory: rows with a time and a 3 x 4 matrix.
 
     The matrix is the upper part of a pose, row by row.
 
@@ -296,15 +296,17 @@ def read_quaternions(
     separator: str | None,
     parse: Callable[[np.ndarray], np.ndarray] | None = None,
 ) -> Trajectory:
-    """Returns a trajectory of rows with a time, a position and a quat_xyzw.
+    """Reads a trajectory: rows with a time, x y z [m] and quaternion x y z w.
 
     Args:
         path: the file.
-        separator: see `read_stamped_rows`.
-        parse: see `read_stamped_rows`.
+        separator: text between columns; None for white space.
+        parse: function that converts an array of texts to times [ns]; by
+            default `parse_stamps_ns`.
 
     Raises:
-        InputError: like `read_matrices`.
+        InputError: if the table does not have that form, a quaternion is not of
+            unit length, or the poses are out of order.
     """
     stamps_ns, values = read_stamped_rows(path, 7, separator, parse)
     with np.errstate(over="ignore"):
@@ -321,7 +323,7 @@ def read_quaternions(
 
 
 def read_angles(path: Path, width: int) -> tuple[Trajectory, tuple[str, ...]]:
-    """Returns a trajectory of rows with a time, position and angles.
+    """Reads a trajectory: rows with a time, a position and three angles.
 
     Times are in microseconds, roll, pitch and yaw in radians.
 
@@ -336,7 +338,8 @@ def read_angles(path: Path, width: int) -> tuple[Trajectory, tuple[str, ...]]:
         left out because a number in them is NaN.
 
     Raises:
-        InputError: like `read_matrices`, except for NaN.
+        InputError: if the table does not have that form, or the poses are out
+            of order.
     """
     columns = [("stamp", "U40"), ("values", "f8", width)]
     rows = read_numbers(path, columns, ",")
@@ -363,7 +366,8 @@ def read_poses(path: Path) -> np.ndarray:
     """Returns poses (N, 4, 4) from rows with a 3 x 4 matrix, row by row.
 
     Raises:
-        InputError: like `read_numbers`, or a matrix is no rotation.
+        InputError: if there is no such table, it is empty, a row has another
+            length, or a matrix is no rotation.
     """
     values = read_numbers(path, float)
     if values.shape[1] != 12:

@@ -316,7 +316,14 @@ def percentile_interval(samples: np.ndarray) -> Interval:
 def bootstrap_intervals(
     outcomes: QueryOutcomes, seed: int
 ) -> tuple[Interval, Interval]:
-    """Returns percentile intervals of AUC and R@1 over resampled blocks."""
+    """Returns 95 % intervals of AUC and of R@1, by bootstrap.
+
+    Each bootstrap sample draws whole blocks of the queries' route.
+
+    Args:
+        outcomes: outcomes of the queries.
+        seed: seed of the draws.
+    """
     if len(outcomes) == 0:
         return UNKNOWN, UNKNOWN
     areas, recalls, _ = own_samples(outcomes, seed)

@@ -38,7 +38,7 @@ _UNKNOWN, _SHOWN, _BEHIND = range(3)
 
 
 class Shares(NamedTuple):
-    """How much of other points a scan shows and hides; NaN without points.
+    """Which shares of given points a scan shows and hides; NaN without points.
 
     Attributes:
         shown: share of points on surfaces that this scan shows.

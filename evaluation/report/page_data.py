@@ -1,4 +1,4 @@
-"""Drives and pairs, in the form that the page's script reads."""
+"""Data for the script of a report's page: drives, and pairs of drives."""
 
 import base64
 from collections.abc import Callable, Mapping, Sequence
@@ -44,11 +44,13 @@ class Illustration:
 
     Attributes:
         stem: path of the figure without ending.
-        page_kind: "svg" or "webp", the form in which the page holds it.
-        section: section of the page with the figure; "print" for none.
+        title: title of the figure.
+        page_kind: format of the figure on the page, "svg" or "webp".
+        section: section of the page that shows the figure; "print" for a figure
+            that the page does not show.
         num_panels: number of panels side by side; a phone shows one at a time.
-        legend: red, green, blue and meaning of the colours. The page repeats it
-            below the figure, in letters that a phone shows legibly.
+        legend: the colours (red, green, blue), each with its meaning. The page
+            shows them below the figure.
     """
 
     stem: Path

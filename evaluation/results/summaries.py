@@ -447,9 +447,9 @@ def summarised(
 ) -> list[Summary]:
     """Returns the numbers behind an experiment's charts.
 
-    They are, for charts of the kind `lines`, lifetimes (metric `kept`) or
-    growth exponents (CPU times); for scatter plots, correlations; and, for two
-    kinds of change, what they cost together beyond expectation.
+    For charts of the kind `lines`, these are lifetimes (metric `kept`) or
+    growth exponents (CPU times); for scatter plots, they are correlations. For
+    combined kinds of change, excesses are added.
     """
     found = []
     for chart in charts:

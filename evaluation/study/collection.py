@@ -96,7 +96,10 @@ class Run:
 
     @property
     def shares_places(self) -> bool:
-        """Whether the run uses places described by the study's own protocol."""
+        """Whether the places are described by the study's own protocol.
+
+        If not, they are described by the protocol of published numbers.
+        """
         return self.places == self.method.key
 
 
