@@ -85,10 +85,16 @@ _INSULATION = 0.15
 
 @dataclass(frozen=True)
 class Plot:
-    """The ground of one building: its area in W and its height z [m].
+    """The ground of one building.
 
-    The plot's frame S is at `xy` [m] and has the heading `yaw` [rad]. The x
-    axis of S runs along the street, and the y axis points away from the street.
+    The x axis of the plot's frame S runs along the street, and its y axis
+    points away from the street.
+
+    Attributes:
+        area: area of the plot in W [m].
+        xy: origin of S in W [m].
+        yaw: heading of the x axis of S [rad].
+        z: height of the ground [m].
     """
 
     area: BaseGeometry

@@ -101,9 +101,11 @@ def check_years(years: Iterable[int]) -> tuple[int, ...]:
 class Tally:
     """Counts how often events happened to the objects of a city.
 
-    Four mappings have an entry for each kind of event: `rates` the rate per
-    year, `expected` the expected number of events, `number` the actual number,
-    and `exposure` the number of objects at risk, summed over the years.
+    Attributes:
+        rates: event -> rate per year.
+        expected: event -> expected number of events.
+        exposure: event -> number of objects at risk, summed over the years.
+        number: event -> number of events that happened.
     """
 
     rates: Mapping[str, float]
@@ -114,10 +116,13 @@ class Tally:
     number: Counter[str] = field(default_factory=Counter)
 
     def count(self, event: str, share: float, hit: bool, things: int) -> None:
-        """Counts one random draw for an event, and whether the event happened.
+        """Counts one random draw of an event.
 
-        `share` is the probability of the event in this draw, and `things` the
-        number of objects at risk.
+        Args:
+            event: name of the event.
+            share: probability of the event in this draw.
+            hit: whether the event happened.
+            things: number of objects at risk.
         """
         self.expected[event] += share
         self.exposure[event] += things

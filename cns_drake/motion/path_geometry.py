@@ -201,11 +201,14 @@ class SmoothPath:
         return float(1 / max(curvature[at], 1e-12)), jet.p[at]
 
     def integral(self, integrand: Callable[[PathJet], np.ndarray]) -> PPoly:
-        """Returns the integral of a function over u, from 0 to any u.
+        """Returns the integral of a function along the path, from 0 to u.
 
-        `integrand` takes the path at N parameters and returns N values. The
-        error is far below a micrometre if the function is as smooth as the
-        path.
+        The result is a function of u. Its error is far below a micrometre if
+        the integrand is as smooth as the path.
+
+        Args:
+            integrand: function that takes the path at N parameters and returns
+                (N,) values.
         """
         # This import is slow.
         from scipy.interpolate import CubicSpline

@@ -155,10 +155,14 @@ def _covariance(value: object, variance: float) -> np.ndarray:
 def make_odometry(
     X_WB: RigidTransform, V_WB_B: SpatialVelocity, stamp_ns: int
 ) -> Any:
-    """Returns an Odometry message: pose in the map, twist expressed in B.
+    """Returns an Odometry message: the vehicle's pose and velocity.
 
-    The velocity V_WB_B is expressed in B [rad/s, m/s]. The values are exact;
-    their standard deviations are given as 1e-6.
+    The values are exact; their standard deviations are given as 1e-6.
+
+    Args:
+        X_WB: pose of the vehicle B in the map W.
+        V_WB_B: velocity of B in W, expressed in B [rad/s, m/s].
+        stamp_ns: time of the message [ns].
     """
     twist = (V_WB_B.translational(), V_WB_B.rotational())
     return ros_types.make_message(

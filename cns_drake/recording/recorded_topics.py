@@ -95,9 +95,11 @@ def image_topic(camera_name: str, kind: str) -> Topic:
 
 
 def camera_topic(camera_name: str, kind: str) -> Topic:
-    """Returns the topic of a kind of a camera's messages.
+    """Returns one of the topics of a camera.
 
-    The kind is `image`, `depth`, `label` or `camera_info`.
+    Args:
+        camera_name: name of the camera.
+        kind: kind of messages: `image`, `depth`, `label` or `camera_info`.
     """
     message_type = {
         "image": ros_types.COMPRESSED_IMAGE,

@@ -56,6 +56,8 @@ def drive_rows(
     """Returns the table rows of those drives of a map whose stage exists.
 
     Args:
+        folder: folder of the map.
+        progress: called with a line of text before slow steps.
         sizes: stage -> its numbers of structures and triangles, if known. For a
             stage without an entry, the world is loaded to count them, which
             takes long.

@@ -95,6 +95,10 @@ def recording_fingerprint(scenario: Scenario, inputs: dict[str, str]) -> str:
 
     The hash does not depend on the folder of the files or on settings that
     affect only the drive's web page.
+
+    Args:
+        scenario: the scenario.
+        inputs: digests of its files, see `digest_inputs`.
     """
     places: dict[str, object] = {
         field: Path(place).name

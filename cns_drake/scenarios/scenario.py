@@ -519,7 +519,11 @@ class Scenario(Section):
         )
 
     def with_transient(self, **changes: float | str) -> Scenario:
-        """Returns the scenario with some switches of `transient` set.
+        """Returns the scenario with other values of some temporary changes.
+
+        Args:
+            changes: values of switches in the section `transient`, such as
+                `snow=0.25`.
 
         Raises:
             InputError: there is no such switch, or its value is not usable.

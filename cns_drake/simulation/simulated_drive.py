@@ -61,9 +61,12 @@ class DriveSimulation:
 class SimulatedDrive(Drive):
     """A drive whose scans are simulated; they equal those of a recording.
 
-    Each access to a scan simulates it. `period` is the time between two frames
-    [s]. X_BS is the pose of the first LiDAR in base_link. `structures` contains
-    the names of all structures in the world.
+    Each access to a scan simulates it.
+
+    Attributes:
+        X_BS: pose of the first LiDAR in base_link.
+        structures: names of all structures in the world.
+        period: time between two frames [s].
     """
 
     def __init__(self, scenario: Scenario):

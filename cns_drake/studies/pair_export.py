@@ -62,9 +62,10 @@ class ExportOptions:
     """Settings of the export of each drive.
 
     Attributes:
-        format: data format, that of the training program.
+        format: program that reads the data: `pointnetvlad`, or `overlap` for
+            OverlapNet and its like.
         spacing: distance between two clouds, along the path [m].
-        scans: consecutive scans that are merged into a cloud.
+        scans: number of consecutive scans that are merged into a cloud.
         max_range: points that are farther away than this along x, y or z are
             left out [m].
     """

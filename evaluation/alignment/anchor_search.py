@@ -89,17 +89,18 @@ class Ties:
 def optimise(
     V: np.ndarray, all_ties: list[Ties], num_held: int = 0
 ) -> np.ndarray:
-    """Returns poses that fit the ties best, by least squares.
+    """Returns poses that fit measured relative poses best, by least squares.
 
-    Gauss-Newton on SE(3) with sparse normal equations, as in Grisetti et al.,
-    "A tutorial on graph-based SLAM" (2010). Ties that may be wrong are weighted
-    by Cauchy's kernel, whose width shrinks step by step to its final value
-    (graduated non-convexity), so that a poor start does not decide which ties
-    count as right.
+    The method is Gauss-Newton on SE(3) with sparse normal equations, as in
+    Grisetti et al., "A tutorial on graph-based SLAM" (2010). Measurements
+    (ties) that may be wrong are weighted by Cauchy's kernel, whose width
+    shrinks step by step to its final value (graduated non-convexity), so that a
+    poor start does not decide which measurements count as right.
 
     Args:
         V: (N, 4, 4) poses from which the optimisation starts.
-        all_ties: the ties, which together must determine every pose.
+        all_ties: the measured relative poses, which together must determine
+            every pose.
         num_held: number of fixed poses; these are the last ones.
     """
     information = [np.linalg.inv(ties.covariance) for ties in all_ties]
@@ -189,7 +190,7 @@ class Guess:
 
     Attributes:
         X_TS: (4, 4) pose, whose z axis is vertical.
-        pairs: indices of the candidates that agree.
+        pairs: (A,) indices of the candidates that agree.
     """
 
     X_TS: np.ndarray
@@ -379,9 +380,10 @@ def fit_bent(
 
     Args:
         loops: one or more loops (M) from the source to a target.
-        X_TL: poses of the target's keyframes in its world.
+        X_TL: (L, 4, 4) poses of the target's keyframes in its world T.
         source: the drive.
-        X_TS: (4, 4) anchor to start from.
+        X_TS: (4, 4) pose of the source's world in T, from which the
+            optimisation starts.
     """
     ties = _loop_ties(loops)
     ties = replace(ties, i=len(source) + ties.i)

@@ -130,7 +130,7 @@ def _is_flat(
 
 @dataclass(frozen=True)
 class DirectedChange:
-    """The part of one map (the source) that is missing in another (the target).
+    """Which points of a map, the source, are unchanged in another, the target.
 
     Attributes:
         in_hull: (N,) bool, the set H: source points in the target's hull.

@@ -2,8 +2,8 @@
 
 - Places d metres apart: frame i is a place when the length of the path so far
   first reaches a multiple of d. The first frame is a place.
-- Points are limited to a range, 100 m in the paper: each of x, y, z in the
-  frame of the sensor.
+- Points are limited to a range, 100 m in the paper. It is the greatest absolute
+  value of x, y and z in the frame of the sensor.
 """
 
 from __future__ import annotations

@@ -197,7 +197,7 @@ class Trajectory:
     Attributes:
         path: the file it comes from, for messages.
         stamps_ns: (N,) int64 [ns], strictly increasing.
-        X_WB: (N, 4, 4) float64.
+        X_WB: (N, 4, 4) float64 poses.
     """
 
     path: Path
@@ -253,10 +253,11 @@ class Trajectory:
 
         Args:
             stamps_ns: (M,) int64 [ns].
-            tolerance_ns: greatest difference of two equal times [ns].
+            tolerance_ns: greatest difference between a given time and that of a
+                stored pose [ns].
 
         Returns:
-            (M, 4, 4).
+            (M, 4, 4) poses.
 
         Raises:
             InputError: there is no pose at one of the times.

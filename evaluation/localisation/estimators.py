@@ -86,7 +86,10 @@ class Settings:
     iterations: int = 50
 
     def with_values(self, values: Iterable[tuple[str, Any]]) -> "Settings":
-        """Returns the settings with some replaced; values are numbers or text.
+        """Returns the settings with other values of some of them.
+
+        Args:
+            values: pairs of a name and its value, a number or text.
 
         Raises:
             InputError: if a setting is unknown, or a value does not fit.

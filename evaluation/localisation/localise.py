@@ -120,11 +120,12 @@ class Starts:
             raise InputError(f"--seed: {self.seed} is below 0")
 
     def draw(self, frame: int) -> tuple[np.ndarray, np.ndarray]:
-        """Returns the error of a frame's initial pose, equal for all methods.
+        """Returns the random error of a frame's initial pose.
 
         Returns:
             (3,) offset of the position in W, in a random direction [m]; (3,)
-            turn about a random axis, as a rotation vector in S [rad].
+            turn about a random axis, as a rotation vector in S [rad]. Both
+            depend only on the seed and the frame.
         """
         rng = np.random.default_rng([self.seed, frame])
         offset, axis = rng.normal(size=(2, 3))
@@ -200,9 +201,9 @@ def mapped_frames(
 
 
 def way_axes(p_WS: np.ndarray, X_WS: np.ndarray) -> np.ndarray:
-    """Returns rotations R_WT (N, 3, 3) to axes along, left of and above a path.
+    """Returns the axes of a path at N poses, as rotations R_WT (N, 3, 3).
 
-    Columns point along the path, to its left, and up.
+    The columns of a rotation point along the path, to its left, and up.
 
     Args:
         p_WS: (N, 3) positions of a drive [m].
@@ -255,16 +256,16 @@ class Localiser:
             frame: number of the scan.
             stamp_ns: time of the scan [ns].
             scan: structured array, in S.
-            X_WS: the true pose.
-            R_WT: see `way_axes`.
-            offset: (3,) offset of the initial from the true position, in W [m].
+            X_WS: (4, 4) true pose.
+            R_WT: (3, 3) axes of the path: along, to the left, and up.
+            offset: (3,) vector from the true to the initial position, in W [m].
             turn: (3,) rotation vector from the true to the initial orientation,
                 in S [rad].
             X_WS0: the initial pose; by default it follows from `offset` and
                 `turn`.
 
         Returns:
-            A record of `QUERY`; the estimated X_WS, or None.
+            A record of `QUERY`; and the estimated pose X_WS (4, 4), or None.
 
         Raises:
             InputError: the scan has too few points.
@@ -330,7 +331,7 @@ def localise(
         track: reports progress.
 
     Returns:
-        (K,) of `QUERY`, in the order of the frames.
+        (K,) records of `QUERY`, in the order of the frames.
 
     Raises:
         InputError: a scan cannot be read, or has too few points.
@@ -393,9 +394,12 @@ def _believed_from(rows: np.ndarray) -> float:
 
 
 def summary(rows: np.ndarray) -> dict[str, float | int | None]:
-    """Returns a summary of results (K,) of `QUERY`, for JSON.
+    """Returns a summary of localised scans, for JSON.
 
     Success rates count all queries; quantiles count queries with a pose.
+
+    Args:
+        rows: (K,) results, records of `QUERY`.
     """
     right = is_right(rows)
     posed = rows[~np.isnan(rows["translation_error"])]

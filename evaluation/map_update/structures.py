@@ -144,7 +144,9 @@ def write_structures(
 
 
 def class_names(folder: Path) -> dict[int, str]:
-    """Returns class number -> name from the table in a folder, if any.
+    """Returns class number -> name, from the table of structures in a folder.
+
+    The result is empty if the folder has no such table.
 
     Raises:
         InputError: the table cannot be read.

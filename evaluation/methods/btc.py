@@ -168,7 +168,7 @@ class BtcDescription:
 
 @dataclass(frozen=True)
 class BtcDatabase:
-    """D places.
+    """Descriptions of D places, prepared for the search.
 
     Attributes:
         places: descriptions of the places.
@@ -322,7 +322,7 @@ def align(query: np.ndarray, place: np.ndarray) -> np.ndarray:
         place: (..., 3, 3) the partners of these vertices [m].
 
     Returns:
-        (..., 4, 4) X_PQ.
+        (..., 4, 4) pose X_PQ of the query's frame in that of the place.
     """
     query_mean = query.mean(axis=-2)
     place_mean = place.mean(axis=-2)

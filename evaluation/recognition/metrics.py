@@ -438,7 +438,8 @@ class PlaceRecognitionMetrics:
     """The scores of one method on one pair of drives.
 
     Attributes:
-        mode: which queries the precision-recall curve counts.
+        mode: which queries the precision-recall curve counts: `all`, or only
+            those with a match (`filtered`).
         curve: exact precision-recall curve.
         auc: area under the curve.
         auc_strict: area under the curve with recall = TP / N at each of its
@@ -490,7 +491,8 @@ def evaluate(
 
     Args:
         outcomes: outcome of each query.
-        mode: which queries the precision-recall curve counts.
+        mode: which queries the precision-recall curve counts: `all`, or only
+            those with a match (`filtered`).
         seed: seed of the bootstrap.
 
     Example:

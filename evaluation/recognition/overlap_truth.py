@@ -41,9 +41,10 @@ class Seen(Protocol):
     def reach(self) -> float: ...
 
     def share_of(self, points: np.ndarray) -> float:
-        """Returns which share of points (N, 3) is visible.
+        """Returns the share of points that the sensor sees.
 
-        Points are in the sensor's frame [m].
+        Args:
+            points: (N, 3) points in the sensor's frame [m].
         """
         ...
 

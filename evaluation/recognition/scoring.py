@@ -37,7 +37,7 @@ def gate_weight(
 ) -> np.ndarray:
     """Returns the factor from 1 to 0 by which the gate scales a score.
 
-    It depends on the distance of the place.
+    The factor is 1 for near places, 0 for far ones, and 1/2 at the radius.
 
     Args:
         distance: distances from query to place according to the method's own

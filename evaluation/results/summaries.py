@@ -196,11 +196,17 @@ def excesses(queries: QueryRows) -> list[Summary]:
 def lifetime(
     times: Sequence[float], kept: Sequence[float], left: float
 ) -> float:
-    """Returns the time until only a given share is left.
+    """Returns the time at which only a given share is left.
 
-    The times ascend. The share is 1 at the first time, and changes linearly
-    between two times. The result is infinite if more than `left` remains at the
-    last time, and NaN if a share is unknown.
+    Args:
+        times: (N,) ascending times.
+        kept: (N,) shares at these times, the first of which is 1. The share
+            changes linearly between two times.
+        left: the given share.
+
+    Returns:
+        The time; infinite if more than `left` remains at the last time, and NaN
+        if a share is unknown.
     """
     if any(math.isnan(share) for share in kept):
         return math.nan

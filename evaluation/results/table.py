@@ -317,8 +317,11 @@ class Results:
     ) -> Results:
         """Returns the rows that have given values in given columns.
 
-        If the given value is a tuple, list or set, a row needs any one of its
-        values. Give the names of factors that contain dots in `columns`.
+        Args:
+            columns: name of a column -> value, or a tuple, list or set of
+                values of which a row must have one. Use this argument for names
+                that contain dots.
+            named: further columns, as keyword arguments.
         """
         wanted = {
             name: value if isinstance(value, tuple | list | set) else (value,)

@@ -89,6 +89,7 @@ class Table:
     formats. Truth values are written as 0 or 1.
 
     Attributes:
+        header: name of each column.
         rows: one value for each column: text, a number, a `Cell`, or None for
             an empty cell.
         groups: headings above the columns, each with the number of columns that
