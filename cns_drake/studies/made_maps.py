@@ -177,7 +177,7 @@ class MadeMaps:
     def aged(
         self, drive: Scenario, years: int, rates: Any, seed: int
     ) -> tuple[str, str]:
-        """Returns the map folder and the stage with a drive's aged city.
+        """Returns the map folder and the stage of a drive's aged city.
 
         The arguments must have been given to `want_age` before.
         """
@@ -186,9 +186,10 @@ class MadeMaps:
         return str(self._aged_folder(*key)), f"{number + 2:02d}"
 
     def redrawn(self, drive: Scenario, seed: int) -> tuple[str, str]:
-        """Returns the map folder and the stage with another city for a drive.
+        """Returns the map folder and the stage of another city for a drive.
 
-        The other city has the same streets and is generated from the seed.
+        The city has the same streets as the drive's own, and is generated from
+        a seed.
         """
         source = map_folder(drive).path.resolve()
         return str(self.folder / f"{source.name}_c{seed}"), _STAGE

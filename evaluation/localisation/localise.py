@@ -481,7 +481,7 @@ def columns(rows: np.ndarray) -> dict[str, np.ndarray]:
 
 
 def write_rows(rows: np.ndarray, path: Path) -> None:
-    """Writes the result of each query as CSV; unknown numbers are empty."""
+    """Writes results as CSV, one row per query; unknown numbers are empty."""
     cells = (
         [
             ""

@@ -1,8 +1,8 @@
 """Public data sets of few scans: where each file is from, and how it is read.
 
-Nothing is shipped. A folder holds a folder for each data set, as `docs/real.md`
-lays them out. A data set is recognised by its folder's name. The digest of its
-scans tells whether they are the same scans as in earlier measurements.
+The data sets are not shipped. Each is a folder with a given name in a common
+folder, see `docs/real.md`. The digest of its scans shows whether they are the
+same as in earlier measurements.
 """
 
 from collections.abc import Callable, Sequence

@@ -172,11 +172,13 @@ def draw_routes(
     routes: Sequence[np.ndarray],
     stem: Path,
 ) -> None:
-    """Draws routes over views from above, from red to blue, and saves them.
+    """Draws routes on pictures from above, and saves the figure.
+
+    Each route is red at its start and blue at its end.
 
     Args:
         map_name: name of the map, for the titles.
-        stages: stage of each view.
+        stages: stage of each picture.
         views: picture of each stage from above.
         routes: (M, 3) positions in W along the route through each stage [m].
         stem: path of the files without the ending.

@@ -1,4 +1,4 @@
-"""The numbers of a report as rows of a table of results, and conclusions.
+"""The numbers of a report as rows of a table, and conclusions from them.
 
 The conclusions are the ranking of the methods, and the share of its result that
 each method keeps under structural change. Each pair of drives can have a
