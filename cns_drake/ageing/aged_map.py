@@ -83,11 +83,11 @@ def age_map(
             years are before today; they need the buildings' years of
             construction (column `built` of `structures.csv`).
         seed: the seed of all random draws, not negative.
-        rates: event -> rate per year; see `read_rates`.
+        rates: event -> rate per year, see `cns_drake.ageing.rates.read_rates`.
         output: the folder to write, which must not exist yet.
-        progress: called with messages of one line on the progress.
-        finish: called with the folder and the result before the folder gets its
-            final name, to add files.
+        progress: called with each message on the progress, a line of text.
+        finish: called with the folder and the result when all else is done, to
+            add files of your own. The folder gets its final name afterwards.
 
     Returns:
         The stages and the events.
@@ -168,11 +168,18 @@ def _swept(trajectory: Trajectory) -> BaseGeometry:
 def past(
     world: OldWorld, year: int
 ) -> tuple[dict[str, Structure | None], list[Event]]:
-    """Returns a city in a year before today, and the events since then.
+    """Returns a city as it was in a past year, and the events since then.
 
-    The city is name -> structure; None stands for a structure that is the same
-    as today. `year` is negative. Buildings that were built later did not exist,
-    and their lots had another use. Trees were younger.
+    Buildings built after that year are missing; their lots had another use.
+    Trees are smaller.
+
+    Args:
+        world: the city of today, with the buildings' years of construction.
+        year: the year relative to today, negative.
+
+    Returns:
+        Name of each structure -> the structure, or None if it is the same as
+        today; and the events in order of time.
     """
     assert world.today is not None  # The caller has checked it.
     standing: dict[str, Structure | None] = dict.fromkeys(world.visuals)

@@ -24,7 +24,14 @@ _SEEN = 60.0
 
 
 def street_views(aged: AgedMap) -> dict[str, View]:
-    """Returns views along the last drive, where most buildings have changed."""
+    """Returns views from where many changed buildings can be seen.
+
+    They look ahead from places along the map's last drive that are not close
+    together.
+
+    Returns:
+        Name of the view, `street_1` onwards in the order of the drive -> view.
+    """
     way = aged.trajectory
     times = np.linspace(0.0, way.duration, int(way.length / _SPACING) + 2)[:-1]
     R_WBs, p_WBs = way.poses(times)
@@ -51,7 +58,7 @@ def street_views(aged: AgedMap) -> dict[str, View]:
 
 
 def air_view(aged: AgedMap) -> View:
-    """Returns a view from the air on the surroundings of the last drive."""
+    """Returns a view from the air of the area around the map's last drive."""
     _, p = aged.trajectory.poses(np.linspace(0.0, aged.trajectory.duration, 99))
     x, y, z = (p.min(axis=0) + p.max(axis=0)) / 2
     half = float(np.ptp(p, axis=0)[:2].max()) / 2
@@ -64,10 +71,15 @@ def draw_pictures(
     aged: AgedMap,
     progress: Callable[[str], None] = lambda line: None,
 ) -> None:
-    """Writes a picture of each view for each year, and a film strip.
+    """Writes a picture of each view in each year, and one of all together.
 
-    The pictures are `pictures/year_<y>_<view>.jpg`, and the film strip is
-    `film.jpg`, both in the map's folder.
+    The files are `pictures/year_<year>_<view>.jpg` and `pictures/film.jpg` in
+    the map's folder.
+
+    Args:
+        folder: folder of the map.
+        aged: stages and last drive of the map.
+        progress: called with each message on the progress, a line of text.
     """
     views = {"air": air_view(aged), **street_views(aged)}
     years = sorted(aged.years, key=lambda stage: aged.years[stage])

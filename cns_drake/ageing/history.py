@@ -85,8 +85,13 @@ PUT_UP, TAKEN_DOWN = "put_up", "taken_down"
 class Event:
     """A row of `history.csv`: what happened to a structure in a year.
 
-    Year 0 is today. `successor` is the name of the structure that takes the
-    structure's place; "" if there is none.
+    Attributes:
+        year: year relative to today, which is 0.
+        event: kind of event, such as `demolished` or `planted`.
+        structure: name of the structure.
+        successor: name of the structure that takes its place; "" if there is
+            none.
+        detail: further text on the event, such as the height of a new tree.
     """
 
     year: int
@@ -141,9 +146,14 @@ class _Tree:
 class City:
     """A city at the end of a year.
 
-    `standing` maps the name of each existing structure to the structure, or to
-    None if it is the same as today. `new` contains the structures that do not
-    exist today, in the order in which they were built.
+    Attributes:
+        year: the year; today is 0.
+        standing: name of each existing structure -> the structure, or None if
+            it is the same as today.
+        new: name -> structure, for all structures that are not the same as
+            today, in the order in which they were built.
+        events: all events since today.
+        tally: counts of these events.
     """
 
     def __init__(
@@ -155,11 +165,16 @@ class City:
     ):
         """Begins with the city of today.
 
-        No structure is put up on the area `kept_free` in W [m], where drives
-        lead.
+        Args:
+            world: the city of today.
+            rates: event -> rate per year, see
+                `cns_drake.ageing.rates.read_rates`.
+            seed: seed of all random draws.
+            kept_free: area in W [m] on which nothing is built, because drives
+                lead across it.
 
         Raises:
-            InputError: the city has no lots.
+            InputError: the city has no building.
         """
         self._world, self._rates, self._seed = world, rates, seed
         self._kept_free = kept_free

@@ -39,11 +39,14 @@ _OWN_MESH = re.compile(rf"{MESH_FOLDER}/[^/]+\.obj")
 class OldWorld:
     """The last stage of a map, which is today.
 
-    `columns` and `rows` are those of the map's structure table. Three
-    dictionaries have the names of structures as keys: `things` contains the
-    structures in W, `visuals` the SDF texts of their visuals, and `built` the
-    years of construction, for structures whose year is in the table. `today` is
-    the calendar year of the stage; None if the table has no years.
+    Attributes:
+        columns: names of the columns of the map's structure table.
+        rows: name of a structure -> its row in this table.
+        things: name of a structure -> the structure in W.
+        visuals: name of a structure -> SDF texts of its visuals.
+        built: name of a structure -> year of construction, if it is in the
+            table.
+        today: calendar year of the stage; None if the table has no years.
     """
 
     def __init__(self, folder: MapFolder):
@@ -166,7 +169,13 @@ class OldWorld:
     def area(
         self, wanted: Callable[[world_structures.Structure], bool]
     ) -> BaseGeometry:
-        """Returns the area in W [m] of all structures that `wanted` selects."""
+        """Returns the area that selected structures cover in W [m].
+
+        The structures are seen from above.
+
+        Args:
+            wanted: function that returns whether a structure is selected.
+        """
         found = [
             from_above(world_structures.triangle_corners(part))
             for one in self._seen.values()

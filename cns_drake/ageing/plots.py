@@ -85,10 +85,16 @@ _INSULATION = 0.15
 
 @dataclass(frozen=True)
 class Plot:
-    """The ground of one building: its area in W and its height z [m].
+    """The ground of one building.
 
-    The plot's frame S is at `xy` [m] and has the heading `yaw` [rad]. The x
-    axis of S runs along the street, and the y axis points away from the street.
+    The x axis of the plot's frame S runs along the street, and its y axis
+    points away from the street.
+
+    Attributes:
+        area: area of the plot in W [m].
+        xy: origin of S in W [m].
+        yaw: heading of the x axis of S [rad].
+        z: height of the ground [m].
     """
 
     area: BaseGeometry
@@ -113,7 +119,7 @@ class Plot:
         return cls(area, xy, yaw, round(z, 3))
 
     def place(self, x: float, y: float) -> tuple[float, float]:
-        """Converts a point in S to W, in whole millimetres [m]."""
+        """Converts a point in S to W [m], rounded to millimetres."""
         c, s = math.cos(self.yaw), math.sin(self.yaw)
         return (
             round(self.xy[0] + c * x - s * y, 3),
@@ -135,13 +141,16 @@ class Plot:
         return np.stack([c * x + s * y, c * y - s * x, z], axis=-1)
 
     def room(self) -> Polygon:
-        """Returns a large rectangle in S that a building may fill."""
+        """Returns a large rectangle inside the plot, in S [m]."""
         return largest_rectangle(self.inside(self.area))
 
     def thing(self, name: str, kind: str, model: Model) -> Structure:
-        """Returns a structure on the plot, given a model expressed in S.
+        """Returns a structure that stands on the plot.
 
-        `kind` is the semantic class of the structure.
+        Args:
+            name: name of the structure.
+            kind: semantic class of the structure.
+            model: shape of the structure, expressed in S.
         """
         return Structure(name, kind, model, (*self.xy, self.z), self.yaw)
 
@@ -357,9 +366,16 @@ def annex_to(
 def balconies_on(
     plot: Plot, triangles: np.ndarray, name: str, rng: np.random.Generator
 ) -> Structure | None:
-    """Returns new balconies on the front; None if the front is not plane.
+    """Returns new balconies for the front of a building.
 
-    The building on the plot has triangles (M, 3, 3) in W [m].
+    None is returned if the front is not plane, or the building is too high or
+    too small for balconies.
+
+    Args:
+        plot: plot of the building.
+        triangles: (M, 3, 3) triangles of the building in W [m].
+        name: name of the balconies.
+        rng: random generator for the choice of the balconies.
     """
     inside = plot.triangles(triangles)
     x0, y0, x1, _ = plot.inside(plot.area).bounds
@@ -395,9 +411,14 @@ def balconies_on(
 def renewed(
     building: Structure, moves: bool, rng: np.random.Generator
 ) -> Structure:
-    """Returns a building with new colours.
+    """Returns a building whose walls have another colour.
 
-    If `moves`, new insulation also moves its walls outwards by 15 cm.
+    A building without coloured walls stays the same.
+
+    Args:
+        building: the building.
+        moves: whether new insulation also moves the walls outwards by 15 cm.
+        rng: random generator for the colour.
     """
     model = building.model
     walls = [p for p in model.parts if "glass" not in p.name and p.rgb]
@@ -429,7 +450,14 @@ def _widened(part: Part, middle: np.ndarray, share: float) -> Part:
 
 
 def section(triangles: np.ndarray, z: float) -> np.ndarray:
-    """Returns segments (N, 2, 2) [m] where triangles cut the height z [m]."""
+    """Returns where triangles cut a horizontal plane: segments (N, 2, 2) [m].
+
+    Each row of a segment is x and y of one of its ends.
+
+    Args:
+        triangles: (M, 3, 3) triangles [m].
+        z: height of the plane [m].
+    """
     z += 1e-4  # Not exactly at a vertex, whose heights are whole millimetres.
     a, b = triangles, np.roll(triangles, -1, axis=1)
     rise = b[..., 2] - a[..., 2]
@@ -441,7 +469,15 @@ def section(triangles: np.ndarray, z: float) -> np.ndarray:
 
 
 def last(segments: np.ndarray, x: float) -> float:
-    """Returns the greatest y of segments (N, 2, 2) at x; NaN without any."""
+    """Returns the greatest y at which segments cross a line of constant x.
+
+    Args:
+        segments: (N, 2, 2) segments; each row is x and y of an end [m].
+        x: the line [m].
+
+    Returns:
+        The coordinate y [m]; NaN if no segment crosses the line.
+    """
     a, b = segments[:, 0], segments[:, 1]
     meets = (a[:, 0] - x) * (b[:, 0] - x) < 0
     a, b = a[meets], b[meets]

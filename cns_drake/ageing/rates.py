@@ -54,8 +54,13 @@ def read_rates(path: Path | None, factor: float = 1.0) -> dict[str, float]:
 def check_rates(found: object, source: object) -> dict[str, float]:
     """Checks that events and their rates are valid; returns the rates.
 
+    Args:
+        found: event -> rate per year from 0 to 1, and `moved` -> distance [m],
+            as read from a file.
+        source: the file, for error messages.
+
     Raises:
-        InputError: an event is unknown, or a rate is not from 0 to 1.
+        InputError: an event is unknown, or a rate is out of range.
     """
     if not isinstance(found, dict):
         raise InputError(f"{source}: not a mapping of event: rate")
@@ -75,7 +80,7 @@ def check_rates(found: object, source: object) -> dict[str, float]:
 
 
 def check_years(years: Iterable[int]) -> tuple[int, ...]:
-    """Checks that years ascend and are at most 200 from today; returns them.
+    """Checks the years of an aged map, relative to today, and returns them.
 
     Raises:
         InputError: the years do not ascend, or one is more than 200 years from
@@ -96,9 +101,11 @@ def check_years(years: Iterable[int]) -> tuple[int, ...]:
 class Tally:
     """Counts how often events happened to the objects of a city.
 
-    Four mappings have an entry for each kind of event: `rates` the rate per
-    year, `expected` the expected number of events, `number` the actual number,
-    and `exposure` the number of objects at risk, summed over the years.
+    Attributes:
+        rates: event -> rate per year.
+        expected: event -> expected number of events.
+        exposure: event -> number of objects at risk, summed over the years.
+        number: event -> number of events that happened.
     """
 
     rates: Mapping[str, float]
@@ -109,10 +116,13 @@ class Tally:
     number: Counter[str] = field(default_factory=Counter)
 
     def count(self, event: str, share: float, hit: bool, things: int) -> None:
-        """Counts one random draw for an event, and whether the event happened.
+        """Counts one random draw of an event.
 
-        `share` is the probability of the event in this draw, and `things` the
-        number of objects at risk.
+        Args:
+            event: name of the event.
+            share: probability of the event in this draw.
+            hit: whether the event happened.
+            things: number of objects at risk.
         """
         self.expected[event] += share
         self.exposure[event] += things
@@ -122,8 +132,7 @@ class Tally:
         """Returns a CSV table of the specified and the observed rates.
 
         The column `p` is the two-sided p-value of the observed number of
-        events: the probability that a Poisson variable is at least as far from
-        its expectation.
+        events, see `poisson_p`.
         """
         lines = ["event,rate,exposure,expected,events,rate_came_about,p\n"]
         for event, rate in self.rates.items():
@@ -140,6 +149,13 @@ class Tally:
 
 
 def poisson_p(number: int, expected: float) -> float:
-    """Returns the two-sided p-value of a number of events, if Poisson."""
+    """Returns the two-sided p-value of an observed number of events.
+
+    The number is compared with a Poisson distribution.
+
+    Args:
+        number: observed number.
+        expected: mean of the distribution.
+    """
     tails = poisson.cdf(number, expected), poisson.sf(number - 1, expected)
     return min(1.0, 2.0 * float(min(tails)))

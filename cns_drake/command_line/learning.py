@@ -1,4 +1,8 @@
-"""Commands that give methods exact truth: training, scan sets, changes."""
+"""Commands that use the simulator's exact truth: for training, and for change.
+
+`train` trains a method, `export-pairs` writes training data for other programs,
+and `map-truth` labels what changed between two drives.
+"""
 
 from enum import Enum
 from pathlib import Path

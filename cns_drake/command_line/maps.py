@@ -359,8 +359,15 @@ def maps_and_years(
 ) -> tuple[list[str], tuple[int, ...]]:
     """Separates the maps from the years among a command's arguments.
 
-    On the command line only the first year belongs to the option --years; all
-    further years arrive as arguments, after the names of the maps.
+    Only the first year belongs to the option --years. All further years arrive
+    as arguments, after the names of the maps.
+
+    Args:
+        words: the arguments: maps, then years.
+        first: the years that belong to the option.
+
+    Returns:
+        The maps, and all years.
 
     Raises:
         InputError: a word begins like an option.

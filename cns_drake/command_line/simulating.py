@@ -70,10 +70,15 @@ Snowfall = Annotated[
 def family_members(
     vary: Path, output: Path, cluster: Cluster
 ) -> list[Scenario]:
-    """Returns the scenarios of a family, and writes their files.
+    """Reads a family of drives, writes its scenario files and returns them.
 
     The scenario files are written to `<output>/scenarios`, and cities that are
     generated for the family to `<output>/cities`.
+
+    Args:
+        vary: the family's file.
+        output: folder of the recordings.
+        cluster: runs the jobs that generate cities.
 
     Raises:
         InputError: the family cannot be used.
@@ -98,7 +103,15 @@ def choose_returns(
 ) -> tuple[Kind | None, WeatherConfig | None]:
     """Returns the model of LiDAR returns and the weather, from options.
 
-    Each is None if the options leave it as the scenario says.
+    Args:
+        returns: the option --returns; None if it is not given.
+        fog: visibility in fog [m]; None for no fog.
+        rain: rain rate [mm/h].
+        snowfall: snowfall rate, as melted water [mm/h].
+
+    Returns:
+        The model and the weather. Each is None if no option sets it, so that
+        the scenario decides.
 
     Raises:
         InputError: a value is out of range; the message names its option.

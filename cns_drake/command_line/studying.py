@@ -1,4 +1,4 @@
-"""The commands that run studies: how change affects each method."""
+"""The commands `reproduce` and `study`, which run studies of methods."""
 
 from pathlib import Path
 from typing import Annotated, Any

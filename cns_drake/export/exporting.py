@@ -51,7 +51,8 @@ def export_drive(
         lidar: name of the LiDAR to export, if the recording has several.
         absent_in: another stage of the recording's map. Points on structures
             that are absent in this other stage get SemanticKITTI's labels of
-            moving objects (see `MarkedDrive`). None keeps the recorded labels.
+            moving objects (see `cns_drake.export.marked_drive.MarkedDrive`).
+            None keeps the recorded labels.
         sequence: number of the drive in KITTI's layout; by default the digits
             at the end of its name.
         on_note: called with notes about how the recording was read and written.

@@ -39,19 +39,21 @@ _PROJECTION = np.eye(4)
 class Layout:
     """The files that one export format has for a drive.
 
-    Paths are relative to the folder of all drives.
+    All attributes except the last two are functions that take the drive. Paths
+    are relative to the folder that holds all exported drives, unless stated
+    otherwise.
 
     Attributes:
-        drive_folder: drive -> folder of the drive.
-        inner_files: drive -> texts of the files inside this folder, except
-            scans, by their paths in the folder.
-        outer_files: drive -> texts of the files outside this folder, by their
-            paths.
-        scan_files: drive, frame number, stamp [ns] and scan -> contents of the
-            files of the scan, by their paths in the drive's folder. None for
-            layouts without scans.
-        shared_outer_files: whether all drives share the outer files, which must
-            then be the same.
+        drive_folder: function that returns the folder of the drive.
+        inner_files: function that returns the text files inside this folder:
+            path in the folder -> text. Scans are not included.
+        outer_files: function that returns the text files outside this folder:
+            path -> text.
+        scan_files: function of the drive, a frame number, its time [ns] and its
+            scan. It returns the files of the scan: path in the drive's folder
+            -> content. None for formats without scans.
+        shared_outer_files: whether the outer files belong to all drives
+            together, for which they must be the same.
         has_labels: whether points have labels.
     """
 
@@ -66,7 +68,11 @@ class Layout:
 
 
 def checked_name(drive: McapDrive, text: str) -> str:
-    """Returns a name from a recording, after checking that it fits in a path.
+    """Returns a name from a recording if it is safe as the name of a folder.
+
+    Args:
+        drive: the recording, for the error message.
+        text: the name.
 
     Raises:
         InputError: if the name could lead to another folder.
@@ -79,10 +85,13 @@ def checked_name(drive: McapDrive, text: str) -> str:
 
 
 def scenario_files(drive: McapDrive, name: str | None = None) -> dict[str, str]:
-    """Returns `scenario.yaml` -> its text, with the name of the drive.
+    """Returns the file `scenario.yaml` of a drive: file name -> text.
 
-    The result is empty if the recording contains no scenario. `name` replaces
-    the drive's name.
+    The result is empty if the recording contains no scenario.
+
+    Args:
+        drive: the recording.
+        name: name of the drive in the scenario; by default the recording's.
     """
     if drive.scenario is None:
         return {}
@@ -91,12 +100,20 @@ def scenario_files(drive: McapDrive, name: str | None = None) -> dict[str, str]:
 
 
 def imu_files(drive: McapDrive) -> dict[str, str]:
-    """Returns `imu.yaml` -> the IMU's noise in Kalibr's format, if any."""
+    """Returns the file `imu.yaml`, the IMU's noise in Kalibr's format.
+
+    The result maps the file name to its text. It is empty if the recording does
+    not contain the noise.
+    """
     return {} if drive.kalibr is None else {"imu.yaml": drive.kalibr}
 
 
 def structure_files(drive: McapDrive) -> dict[str, str]:
-    """Returns `structures.json` -> the structure table, if it was recorded."""
+    """Returns the file `structures.json`, the table of structures.
+
+    The result maps the file name to its text. It is empty if the recording
+    contains no such table.
+    """
     if drive.instances is None:
         return {}
     table = list(drive.instances.values())
@@ -104,10 +121,10 @@ def structure_files(drive: McapDrive) -> dict[str, str]:
 
 
 def unit_quaternions(drive: McapDrive) -> np.ndarray:
-    """Returns the orientations of the odometry as unit quaternions (M, 4).
+    """Returns the orientations of a drive's M odometry messages, (M, 4).
 
-    Quaternions in a recording may have any length, but programs that read text
-    files need unit length.
+    They are unit quaternions x, y, z, w of R_WB. Quaternions in the recording
+    may have any length.
 
     Raises:
         InputError: if a quaternion has no direction, or a position is not
@@ -139,9 +156,14 @@ def seconds(stamp_ns: int) -> str:
 def stamped_rows(
     stamps: Iterable[object], columns: Sequence[np.ndarray], separator: str
 ) -> str:
-    """Returns rows of text, each with a time and K numbers, with all digits.
+    """Returns a text table whose rows consist of a time and K numbers.
 
-    `stamps` contains the N times as text, and `columns` the arrays of numbers.
+    Numbers are written with all digits.
+
+    Args:
+        stamps: the N times, as they are to be written.
+        columns: arrays (N, k) of numbers, whose columns are put side by side.
+        separator: text between two values of a row.
     """
     rows = zip(stamps, np.hstack(columns).tolist(), strict=True)
     return "".join(
@@ -271,9 +293,12 @@ def _kitti_rows(X: np.ndarray) -> str:
 
 
 def kitti_layout(number: str | None = None) -> Layout:
-    """Returns KITTI's layout for a drive.
+    """Returns the layout of KITTI odometry.
 
-    The sequence has the given number, or by default the drive's own.
+    Args:
+        number: number of the sequence, as text. By default the digits at the
+            end of the drive's name; the second LiDAR of a recording adds 100,
+            the third 200.
     """
 
     def of(drive: McapDrive) -> str:

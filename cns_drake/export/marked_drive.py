@@ -1,4 +1,4 @@
-"""Reads a recording and marks points that another stage would not have."""
+"""Reads a recording and marks the points that are absent in another stage."""
 
 from collections import defaultdict
 from collections.abc import Mapping
@@ -20,11 +20,11 @@ from cns_drake.scene.world import load_world, structures_in
 class MarkedDrive(McapDrive):
     """A recording whose points are marked if absent in another stage.
 
-    A structure is absent in the other stage if this stage has no visual that
-    belongs to the structure. A building that is lower there is not absent.
-    Points on absent structures get SemanticKITTI's labels of moving objects,
-    and all other labels are as recorded. In the structure table, absent
-    structures get `"absent_in": <stage>`.
+    A structure is absent if the world of the other stage contains no part of
+    it. A building that is only lower in the other stage is not absent. Points
+    on absent structures get SemanticKITTI's labels of moving objects, and all
+    other labels are as recorded. In the structure table, absent structures get
+    `"absent_in": <stage>`.
     """
 
     def __init__(self, path: Path, lidar: str | None, stage: str):
@@ -66,7 +66,11 @@ class MarkedDrive(McapDrive):
         }
 
     def scan(self, index: int) -> np.ndarray:
-        """Returns scan `index` with marked labels; labels are uint16."""
+        """Returns the scan with number `index`, with its labels changed.
+
+        The result is a structured array (N,) in the LiDAR's frame, as
+        `McapDrive.scan` returns it. The field `label` is uint16.
+        """
         recorded = super().scan(index)
         names = recorded.dtype.names or ()
         if not {"label", "instance"} <= set(names):

@@ -26,17 +26,19 @@ REACH = ORDER // 2 - 1
 def make_uniform_spline(
     control_points: np.ndarray, spacing: float
 ) -> BsplineTrajectory:
-    """Returns a quintic spline with one control point per knot.
+    """Returns a quintic B-spline with evenly spaced control points.
 
-    Bounds on the control points are also bounds on the curve: each point of the
-    spline lies in the convex hull of ORDER neighbouring control points, and
-    each value of a derivative in the convex hull of the control points'
-    difference quotients. Control points on a straight line give a straight
-    line.
+    At the i-th control point, the spline's parameter is i * spacing. The spline
+    starts at the first control point and ends at the last one, but runs only
+    near the others. Control points on a straight line give a straight line.
 
-    The parameter starts at 0, and the i-th knot is at i * spacing. There are N
-    > REACH control points, (N, D). At each end they are mirrored at the
-    outermost control point, so that the curve ends in this point.
+    A bound on all control points also bounds the spline. In the same way, a
+    bound on the difference quotients of the control points bounds the
+    derivatives.
+
+    Args:
+        control_points: (N, D) points of any dimension D, N >= 3.
+        spacing: difference of the parameter between two control points.
     """
     points = np.asarray(control_points, dtype=float)
     points = np.concatenate(
@@ -56,13 +58,17 @@ class SplineDerivatives:
     """A spline and its first derivatives, for evaluation at many parameters."""
 
     def __init__(self, spline: BsplineTrajectory, count: int):
-        """Prepares the value and the first `count` derivatives."""
+        """Takes the spline and the number of derivatives to prepare."""
         self._splines = [spline]
         self._splines += [spline.MakeDerivative(k) for k in range(1, count + 1)]
         self.end = spline.end_time()
 
     def evaluate(self, parameter: ArrayLike) -> list[np.ndarray]:
-        """Returns value and derivatives, each (N, D), at N parameters."""
+        """Returns the value and the derivatives of the spline at N parameters.
+
+        The list begins with the value, followed by the derivatives in order.
+        Each is (N, D) for a spline of D dimensions.
+        """
         parameter = np.clip(parameter, 0.0, self.end)
         return [spline.vector_values(parameter).T for spline in self._splines]
 
@@ -116,7 +122,7 @@ class SmoothPath:
     """
 
     def __init__(self, points: np.ndarray, spacing: float):
-        """Makes the path along evenly spaced points (N, 3) [m]."""
+        """Makes the path along points (N, 3) in W, `spacing` apart [m]."""
         self.spacing = spacing
         self._spline = SplineDerivatives(
             make_uniform_spline(points, spacing), 4
@@ -185,18 +191,24 @@ class SmoothPath:
         )
 
     def tightest_bend(self) -> tuple[float, np.ndarray]:
-        """Returns the path's smallest radius [m] and its place (3,) [m]."""
+        """Returns the smallest radius of the path [m], and where it is.
+
+        The place is a point (3,) of the path in W [m].
+        """
         jet = self.evaluate(self._places())
         curvature = np.abs(jet.turn) / jet.speed
         at = int(curvature.argmax())
         return float(1 / max(curvature[at], 1e-12)), jet.p[at]
 
     def integral(self, integrand: Callable[[PathJet], np.ndarray]) -> PPoly:
-        """Returns the integral of a function over u, from 0 to any u.
+        """Returns the integral of a function along the path, from 0 to u.
 
-        `integrand` takes the path at N parameters and returns N values. The
-        error is far below a micrometre if the function is as smooth as the
-        path.
+        The result is a function of u. Its error is far below a micrometre if
+        the integrand is as smooth as the path.
+
+        Args:
+            integrand: function that takes the path at N parameters and returns
+                (N,) values.
         """
         # This import is slow.
         from scipy.interpolate import CubicSpline

@@ -34,10 +34,12 @@ class SpeedProfile(NamedTuple):
 
 
 def make_time_scaling(positions: np.ndarray) -> BsplineTrajectory:
-    """Returns a smooth path parameter u(t) from the places of a drive.
+    """Returns the path parameter of a drive as a smooth function of time.
 
-    The places (N,) are path parameters at multiples of `KNOT_PERIOD` [m]. At
-    both ends, the drive must be at rest for REACH of these periods.
+    Args:
+        positions: (N,) path parameters [m] at evenly spaced times, one for each
+            `KNOT_PERIOD` [s]. The first three are equal, and so are the last
+            three, so that the drive starts and ends at rest.
     """
     return path_geometry.make_uniform_spline(positions[:, None], KNOT_PERIOD)
 
@@ -45,23 +47,25 @@ def make_time_scaling(positions: np.ndarray) -> BsplineTrajectory:
 def find_speed_profile(
     path: path_geometry.SmoothPath, speed_limits: np.ndarray, speeds: Speeds
 ) -> SpeedProfile:
-    """Returns the fastest drive under limits (N,) at control points [m/s].
+    """Returns the fastest drive along a path that respects all limits.
 
-    The drive has piecewise constant acceleration. It is found by a forward and
-    a backward pass over v^2.
+    The drive starts and ends at rest. Its acceleration is piecewise constant.
 
-    Later, the positions of the drive at evenly spaced times become the control
-    points of a quintic B-spline u(t). At each time, u' is a weighted mean of
-    the drive's speed, and u'' a weighted mean of its acceleration, over at most
-    REACH + 1 knot periods before and after. A limit on the drive's acceleration
-    therefore also limits u''. A limit on the drive's speed limits u' only if
-    the drive keeps this limit for REACH + 1 periods before and after, which
-    `_early_and_late` ensures.
-
-    The path parameter u and the arc length differ by less than a percent. Since
-    |p'| <= 1, a limit on u' also limits the speed. The acceleration differs
-    from u'' by a term that is subtracted from the limit.
+    Args:
+        path: the path.
+        speed_limits: (N,) speed limit at each control point of the path [m/s].
+        speeds: limits of the speed, and of the longitudinal and the lateral
+            acceleration.
     """
+    # Later, the positions of this drive at evenly spaced times become the
+    # control points of a quintic B-spline u(t). At each time, u' is a weighted
+    # mean of the drive's speed, and u'' of its acceleration, over at most
+    # REACH + 1 knot periods before and after. A limit on the acceleration
+    # therefore also holds for u''; a limit on the speed holds for u' only if
+    # the drive keeps it for as long, see `_early_and_late`.
+    #
+    # |p'| <= 1, so that a limit on u' also limits the speed. The acceleration
+    # differs from u'' by a term that is subtracted from the limit.
     u = np.linspace(0.0, path.end, max(2, int(np.ceil(path.end / _STEP)) + 1))
     jet = path.evaluate(u)
     bending = np.linalg.norm(np.cross(jet.dp, jet.ddp), axis=1) / jet.speed
@@ -82,7 +86,11 @@ def find_speed_profile(
 
 
 def drive_positions(profile: SpeedProfile) -> np.ndarray:
-    """Returns the fastest drive's path parameters at each `KNOT_PERIOD` [m]."""
+    """Returns the path parameters (N,) of the fastest drive over time [m].
+
+    There is one for each `KNOT_PERIOD` [s], with rest at the start and at the
+    end.
+    """
     u, speed, _ = profile
     times = np.concatenate(
         [[0.0], np.cumsum(2 * np.diff(u) / (speed[1:] + speed[:-1]))]

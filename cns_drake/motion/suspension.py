@@ -28,7 +28,12 @@ _GRAVITY = 9.81
 
 
 class AxleRates(BaseModel):
-    """A rate, for example of a spring, on each of the two axles."""
+    """A rate, for example of a spring, on each of the two axles.
+
+    Attributes:
+        front: rate on the front axle.
+        rear: rate on the rear axle.
+    """
 
     model_config = ConfigDict(extra="forbid", frozen=True, strict=True)
 
@@ -127,17 +132,16 @@ class Suspension:
     upwards; its roll and pitch about x and y of B (positive with the right side
     down and the nose down); and the heights of the wheels. All coordinates are
     zero at rest on a level road. The body rotates about the point on the ground
-    below its centre of mass, because the source of the shipped rates has its
-    roll axis at ground level. The model has no anti-dive or anti-squat
-    geometry.
+    below its centre of mass, as in the source of the shipped rates. The model
+    has no anti-dive or anti-squat geometry.
 
-    A spring with the rate k is stretched by g q at the coordinates q, where g
-    is a row vector. The stiffness matrix K is the sum of k g' g over all
-    springs, and the damping matrix C the corresponding sum over all dampers.
+    Let q be the vector of the coordinates, and g q the stretch of a spring with
+    the rate k, where g is a row vector. The stiffness matrix is the sum of k g'
+    g over all springs, and the damping matrix is the same sum over all dampers.
     """
 
     def __init__(self, masses: CarMasses, rates: SuspensionRates):
-        """Sets up the equations of motion."""
+        """Sets up the equations of motion of a car."""
         self.masses = masses
         x, y = masses.p_BWset.T
         count = len(x)
@@ -187,25 +191,31 @@ class Suspension:
         self._loads[NUM_COORDINATES:, count + 2] = -masses.wheels
 
     def at_rest(self, inputs: np.ndarray) -> np.ndarray:
-        """Returns the body's heave, roll and pitch at rest, (3,) [m, rad].
+        """Returns heave [m], roll and pitch [rad] of the body at rest, (3,).
 
-        The inputs (W + 3,) are constant, and as in `respond`.
+        Args:
+            inputs: (W + 3,) constant loads: height of the road below each of
+                the W wheels [m], then the specific force along x, y and z of B,
+                minus its value for a car at rest on a level road [m/s^2].
         """
         return rotated(inv(self._stiffness), rotated(self._loads, inputs))
 
     def respond(
         self, inputs: np.ndarray, step: float
     ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        """Returns the motion of the body, which starts at rest.
+        """Returns the motion of the body under given loads.
 
-        The inputs (N, W + 3), one row every `step` [s], are heights of the road
-        below the W wheels [m], and the specific force along x, y, z of B minus
-        its value at rest [m/s^2]. The body starts at rest under the first row.
-        The solution is exact for inputs that change linearly within a step.
+        At first, the body rests under the loads of the first row. The solution
+        is exact for loads that change linearly between two rows.
+
+        Args:
+            inputs: (N, W + 3) loads, see `Suspension.at_rest`; one row per
+                time.
+            step: time between two rows [s].
 
         Returns:
-            (N, 3) heave [m], roll and pitch [rad], and their first and second
-            derivatives.
+            Three arrays (N, 3): heave [m], roll and pitch [rad]; their first
+            derivatives; and their second derivatives.
         """
         size, count = self._loads.shape
         to_rates = np.hstack([-self._stiffness, -self._damping, self._loads])

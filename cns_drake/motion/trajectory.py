@@ -69,11 +69,13 @@ NUM_COORDINATES = 3
 
 
 class RideMoments(NamedTuple):
-    """Heave, roll and pitch (N, 3) at N times, and their time derivatives.
+    """Heave, roll and pitch of a vehicle's body at N times, with derivatives.
 
-    Heave is the upward motion of the body [m]. Roll and pitch are about x and y
-    of the vehicle [rad]. `pivot` is x of the point on the ground about which
-    the body rotates [m].
+    Attributes:
+        q: (N, 3) upward motion of the body [m], and its roll and pitch about
+            the x and y axis of the vehicle [rad].
+        dq, ddq: (N, 3) first and second time derivatives of `q`.
+        pivot: x of the point on the ground about which the body rotates [m].
     """
 
     q: np.ndarray
@@ -145,7 +147,8 @@ class BodyRide:
 def ride_motion(moments: RideMoments) -> FrameMotion:
     """Returns the motion of the body frame B in the path frame F.
 
-    With R = R_y(pitch) R_x(roll), the roll axis turns with the pitch.
+    The rotation is R_FB = R_y(pitch) R_x(roll): the body rolls about an axis
+    that pitches with it.
     """
     heave, roll, pitch = moments.q.T
     _, droll, dpitch = moments.dq.T
@@ -180,10 +183,13 @@ _UP = np.array([[0.0, 0.0, 1.0]])
 class Moments(NamedTuple):
     """The state of a drive at N times, from which all motion is computed.
 
-    `u` contains the path parameters (N,) [m]; `rate` and `acceleration` are
-    their first and second time derivatives [m/s, m/s^2]; `jet` is the path at
-    these parameters. `ride` is the motion of the body relative to the path;
-    None if the vehicle is rigid.
+    Attributes:
+        u: (N,) path parameters of the vehicle [m].
+        rate, acceleration: (N,) first and second time derivatives of `u` [m/s,
+            m/s^2].
+        jet: the path and its derivatives at these parameters.
+        ride: motion of the body on its springs relative to the path; None for a
+            rigid vehicle.
     """
 
     u: np.ndarray
@@ -223,7 +229,9 @@ class Trajectory:
     def with_positions(self, positions: np.ndarray) -> Trajectory:
         """Returns a drive along the same path with another timing.
 
-        `make_time_scaling` describes the positions.
+        Args:
+            positions: (N,) path parameters at evenly spaced times [m], see
+                `cns_drake.motion.speed_profile.make_time_scaling`.
         """
         drive = copy.copy(self)
         drive._time_scaling = path_geometry.SplineDerivatives(
@@ -293,7 +301,7 @@ class Trajectory:
 
 
 def pose_at(moments: Moments, row: int = 0) -> RigidTransform:
-    """Returns X_WB at one of the N times, given the number of its row."""
+    """Returns X_WB at one of the N times of `moments`, time number `row`."""
     jet = moments.jet
     X_WF = RigidTransform(
         RollPitchYaw(0.0, -jet.climb[row], jet.yaw[row]), jet.p[row]
@@ -307,7 +315,7 @@ def pose_at(moments: Moments, row: int = 0) -> RigidTransform:
 def poses_and_motion(
     moments: Moments,
 ) -> tuple[list[RigidTransform], FrameMotion]:
-    """Returns X_WB at N times, and the motion of B in W."""
+    """Returns X_WB and the motion of B in W, both at N times."""
     motion = _path_motion(moments.jet, moments.rate, moments.acceleration)
     if moments.ride is None:
         return [pose_at(moments, k) for k in range(len(moments.u))], motion

@@ -36,7 +36,11 @@ _PARALLEL = 1 - 1e-9
 
 
 class JointMotion(NamedTuple):
-    """The angle [rad] or distance [m] of a joint, its rate and acceleration."""
+    """The motion of a joint at N times: three arrays (N,).
+
+    `position` is the angle [rad] or the distance [m]; `rate` and `acceleration`
+    are its first and second time derivatives.
+    """
 
     position: np.ndarray
     rate: np.ndarray
@@ -47,12 +51,12 @@ class WheelMotion:
     """Steering, rolling and suspension travel of a wheel without slip.
 
     The wheel's centre is at p_BC = (x, y, r) in the vehicle frame, where r is
-    its radius. Let s be the speed and m the turn rate about the vehicle's z
-    axis, both with respect to the path parameter. The ground below the wheel
-    then moves relative to the vehicle with a velocity of direction (s - m y, m
-    x). The steering angle d is therefore given by tan(d) = m x / (s - m y), so
-    that a wheel on the rear axle (x = 0) is not steered. The rolling rate is
-    the length of this vector divided by r.
+    its radius. Let s be the vehicle's speed and m its turn rate about the z
+    axis, both per unit of the path parameter. The ground below the wheel then
+    moves relative to the vehicle with a velocity of direction (s - m y, m x).
+    The steering angle d is therefore given by tan(d) = m x / (s - m y), so that
+    a wheel on the rear axle (x = 0) is not steered. The rolling rate is the
+    length of this vector divided by r.
 
     While the body moves on its springs, the wheel stays on the road's surface
     in the world: relative to the body, it moves up by as much as the body moves
@@ -61,7 +65,7 @@ class WheelMotion:
     """
 
     def __init__(self, trajectory: Trajectory, p_BC: np.ndarray):
-        """Takes a trajectory, and the wheel's centre p_BC [m]."""
+        """Takes the trajectory, and the wheel's centre p_BC (3,) [m]."""
         self._x, self._y, self._radius = p_BC
         self._rolled = trajectory.path.integral(
             lambda jet: np.hypot(*self._ground_velocity(jet))
@@ -100,7 +104,10 @@ class WheelMotion:
         )
 
     def travel(self, moments: Moments) -> JointMotion:
-        """Returns the upward travel of the wheel in the body at N times [m]."""
+        """Returns the upward motion of the wheel in the body at N times [m].
+
+        The result is zero for a vehicle without springs.
+        """
         ride = moments.ride
         if ride is None:
             still = np.zeros_like(moments.u)
@@ -146,7 +153,7 @@ class VehicleMotion(LeafSystem):
     The vehicle's floating base B follows the trajectory. Revolute joints about
     the y axis of B roll the wheels and revolute joints about z steer them, so
     that no wheel slips. Prismatic joints along z of B keep their wheels on the
-    ground. All other joints keep their default positions.
+    ground. The joints of all other models keep their default positions.
 
     .. pydrake_system::
 
@@ -182,10 +189,12 @@ class VehicleMotion(LeafSystem):
             vehicle: the model instance that moves.
             trajectory: motion of its base.
             period: time step at which states are usually needed [s]. States at
-                many such times are then computed at once, ten times as fast.
+                many multiples of this step are then computed together, which is
+                ten times as fast. None computes each state when it is needed.
 
         Raises:
-            ValueError: a joint of the vehicle is of another kind.
+            ValueError: a movable joint of the vehicle is neither revolute about
+                y or z of B nor prismatic along z.
         """
         super().__init__()
         self._plant = plant
@@ -310,7 +319,9 @@ class VehicleMotion(LeafSystem):
 class Sweep(NamedTuple):
     """Poses of a frame P in W at N times.
 
-    The poses are given as rotations (N, 3, 3) and positions (N, 3) [m].
+    Attributes:
+        R_WPset: (N, 3, 3) rotations.
+        p_WPset: (N, 3) positions [m].
     """
 
     R_WPset: np.ndarray

@@ -5,7 +5,8 @@ name when it is complete, and `metadata.yaml` is written last. A folder with
 `metadata.yaml` is therefore complete and consistent.
 
 An interrupted run leaves a part file. A later run of the same recording takes
-over the messages in this file by writing them again; see `PartFile`.
+over the messages in this file by writing them again; see
+`cns_drake.recording.recording_folder.PartFile`.
 
 Messages are written in a thread, while the next frame is computed: compression
 takes half of a frame's time, during which other Python code can run.
@@ -54,7 +55,14 @@ _MOST_HELD = 64
 
 
 class RecordedMessage(NamedTuple):
-    """A message to record; its fields are arguments of `BagWriter.write`."""
+    """A message of a recording.
+
+    Attributes:
+        topic: name of its topic.
+        stamp_ns: its time [ns].
+        data: the serialised message.
+        sequence: number of the message on its topic.
+    """
 
     topic: str
     stamp_ns: int
@@ -67,8 +75,8 @@ class BagWriter:
 
     Leaving the context normally completes the recording. Leaving it by an
     exception closes the file as a shorter but valid MCAP file under its `.part`
-    name. Equal calls produce equal bytes, even if the first run was interrupted
-    and a second run continued it.
+    name. The same calls always produce the same bytes, even if a run was
+    interrupted and another one continued it.
 
     Example:
         from cns_drake import BagWriter, recording_topics
@@ -100,22 +108,22 @@ class BagWriter:
             topics: every topic, in the order of the file's channels.
             start_ns: time of the first message, also the nominal time of
                 the attachments [ns].
-            attachments: file name -> value, put before all messages; as YAML
-                if the name ends with `.yaml`, and else as JSON.
-                An interrupted recording with the same attachments is of the
-                same kind, and its messages can be taken over.
-            scenario: the content of `scenario.yaml` beside the MCAP.
-            beside: name of a further file beside the MCAP -> its content, as
-                YAML.
+            attachments: name -> value of each attachment of the MCAP file.
+                Values are written as YAML if the name ends with `.yaml`,
+                otherwise as JSON. An interrupted recording can be continued
+                only with the same attachments.
+            scenario: the content of `scenario.yaml`, next to the MCAP file.
+            beside: name -> content of further YAML files next to the MCAP file.
             custom_data: key -> text for `ros2 bag info`.
-            fingerprint: the content of `fingerprint.txt`, if any. An
-                interrupted recording with another one is of another kind, too.
-            overwrite: whether an existing recording may be replaced. A
-                finished one is kept until the new one is complete.
+            fingerprint: the content of `fingerprint.txt`; no file if empty. An
+                interrupted recording can be continued only with the same
+                fingerprint.
+            overwrite: whether an existing recording may be replaced. A finished
+                recording stays until the new one is complete.
 
         Raises:
-            InputError: if the folder must not be used, see
-                `RecordingFolder.check`.
+            InputError: if the folder contains a finished recording that must
+                not be replaced, or files that do not belong to a recording.
         """
         self._files = RecordingFolder(folder)
         self._overwrite = overwrite
@@ -504,7 +512,12 @@ class BackgroundWriter:
     """
 
     def __init__(self, write: Callable[..., None]):
-        """Prepares the writer; `write` will be called in a second thread."""
+        """Prepares the writer.
+
+        Args:
+            write: function that writes a message, such as `BagWriter.write`. It
+                is called in a second thread.
+        """
         self._write = write
         self._thread = ThreadPoolExecutor(1)
         self._batches: deque[Future] = deque()
@@ -522,6 +535,9 @@ class BackgroundWriter:
 
     def write(self, *message: Any) -> None:
         """Queues a message for writing; waits while too many are queued.
+
+        Args:
+            message: the arguments of the function that writes a message.
 
         Raises:
             Exception: the error that occurred while an earlier message was

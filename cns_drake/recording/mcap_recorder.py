@@ -150,16 +150,19 @@ class McapRecorder(LeafSystem):
         Args:
             bag: a bag with the topics of `recording_topics`; it must be open at
                 the first frame.
-            X_BSs: LiDAR name -> pose of its frame S in B, None if it has no
-                fixed place there.
-            X_BI: pose of the imu frame I in B, None if it has none.
+            X_BSs: LiDAR name -> pose of its frame S in B. None for a LiDAR that
+                is not fixed on B.
+            X_BI: pose of the IMU frame I in B; None without an IMU.
             cameras: camera name -> camera.
-            period: time between frames [s], if all sensors share it.
-            schedule: the ticks of each topic, by name, if they do not.
+            period: time between frames [s], if all topics share it. Give either
+                `period` or `schedule`.
+            schedule: times of the messages, with a stream for each topic, if
+                topics have rates of their own.
             further: name -> further sensor.
-            layouts: LiDAR name -> layout of its points (see
-                `point_layouts`), `cns` unless given.
-            num_rings: LiDAR name -> rings of the unit; see `to_layout`.
+            layouts: LiDAR name -> name of the layout of its recorded points; by
+                default `cns`.
+            num_rings: LiDAR name -> number of its rings. With it, the layout
+                `velodyne` counts rings from the lowest.
             imu_variances: variances of specific force [m^2/s^4] and of
                 angular velocity [rad^2/s^2].
             with_imu_samples: whether there is a port `imu_samples`.

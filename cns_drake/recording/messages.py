@@ -155,10 +155,14 @@ def _covariance(value: object, variance: float) -> np.ndarray:
 def make_odometry(
     X_WB: RigidTransform, V_WB_B: SpatialVelocity, stamp_ns: int
 ) -> Any:
-    """Returns an Odometry message: pose in the map, twist expressed in B.
+    """Returns an Odometry message: the vehicle's pose and velocity.
 
-    The velocity V_WB_B is expressed in B [rad/s, m/s]. The values are exact;
-    their standard deviations are given as 1e-6.
+    The values are exact; their standard deviations are given as 1e-6.
+
+    Args:
+        X_WB: pose of the vehicle B in the map W.
+        V_WB_B: velocity of B in W, expressed in B [rad/s, m/s].
+        stamp_ns: time of the message [ns].
     """
     twist = (V_WB_B.translational(), V_WB_B.rotational())
     return ros_types.make_message(
@@ -173,7 +177,13 @@ def make_odometry(
 def make_tf(
     parent: str, X_PCs: dict[str, RigidTransform], stamp_ns: int
 ) -> Any:
-    """Returns a TFMessage with the poses X_PC of frames C in one parent P."""
+    """Returns a TFMessage with the poses of frames C in one parent frame P.
+
+    Args:
+        parent: name of P.
+        X_PCs: name of a frame C -> its pose X_PC.
+        stamp_ns: time of the poses [ns].
+    """
     header = make_header(parent, stamp_ns)
     return ros_types.make_message(
         ros_types.TF,
@@ -229,9 +239,12 @@ def make_image(
 def make_compressed_image(
     pixels: np.ndarray, frame_id: str, stamp_ns: int
 ) -> Any:
-    """Returns a CompressedImage message, a JPEG, of (height, width, 3) uint8.
+    """Returns a CompressedImage message with an image as JPEG.
 
-    The camera's frame has z ahead and y down.
+    Args:
+        pixels: (height, width, 3) uint8 red, green and blue.
+        frame_id: name of the camera's frame, z ahead and y down.
+        stamp_ns: time of the image [ns].
     """
     # Slow to import, and few recordings have cameras.
     from PIL import Image

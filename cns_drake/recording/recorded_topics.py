@@ -32,6 +32,10 @@ def recording_topics(
     """Returns the topics of a recording with their types and encodings.
 
     Args:
+        lidar_names: names of the LiDARs.
+        camera_names: names of the cameras.
+        with_imu: whether an IMU is recorded.
+        with_odometry: whether odometry is recorded.
         layouts: LiDAR name -> layout of its points, if not `cns`.
         with_objects: whether boxes of moving objects are recorded.
         further: topics of sensors of other kinds.
@@ -91,9 +95,11 @@ def image_topic(camera_name: str, kind: str) -> Topic:
 
 
 def camera_topic(camera_name: str, kind: str) -> Topic:
-    """Returns the topic of a kind of a camera's messages.
+    """Returns one of the topics of a camera.
 
-    The kind is `image`, `depth`, `label` or `camera_info`.
+    Args:
+        camera_name: name of the camera.
+        kind: kind of messages: `image`, `depth`, `label` or `camera_info`.
     """
     message_type = {
         "image": ros_types.COMPRESSED_IMAGE,

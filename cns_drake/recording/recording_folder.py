@@ -87,8 +87,8 @@ class PartFile(io.BufferedRandom):
         """Opens the file, or creates it.
 
         Raises:
-            OSError: it cannot be opened or locked.
-            InputError: another process is writing it.
+            OSError: the file cannot be opened or locked.
+            InputError: another process is writing the file.
         """
         descriptor = open_plain(path, os.O_RDWR)
         super().__init__(io.FileIO(descriptor, "r+b"))

@@ -35,9 +35,13 @@ BytesCallback = Callable[[int, int], None]
 class Repair:
     """The result of a repair: the new file, and the messages recovered.
 
-    `seconds` is the time between the earliest and the latest recovered message.
-    Faults are parts of the file that could not be read; there are none if the
-    file was whole. The first fault is described in words.
+    Attributes:
+        output: the new file.
+        num_messages: number of recovered messages.
+        seconds: time between the earliest and the latest of them [s].
+        num_faults: number of parts of the file that could not be read; 0 if the
+            file was whole.
+        first_fault: description of the first such part.
     """
 
     output: Path

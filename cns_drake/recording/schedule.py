@@ -19,7 +19,13 @@ _FINEST = 10**9
 def frame_stamp_ns(
     frame: int, *, start_ns: int = START_NS, period: float = FRAME_PERIOD
 ) -> int:
-    """Returns the stamp of a frame [ns]."""
+    """Returns the time stamp of a frame [ns].
+
+    Args:
+        frame: number of the frame, from 0.
+        start_ns: time stamp of frame 0 [ns].
+        period: time between two frames [s].
+    """
     return start_ns + round(frame * period * 1e9)
 
 

@@ -22,12 +22,17 @@ from cns_drake.scenarios.scenario import Scenario
 
 @dataclass(frozen=True)
 class DriveRow:
-    """A drive and its figures; `sequence` is the name of the drive.
+    """A drive, as a row of the table of a map's drives.
 
     Attributes:
-        checksum: checksum of the files on which the figures depend.
+        sequence: name of the drive.
+        map: name of the map.
+        stage: stage through which the drive goes.
+        title: one line on what the drive shows.
+        checksum: checksum of the files on which the numbers depend.
         length: length of the path [m].
         duration: duration of the drive [s].
+        frames: number of frames that are recorded.
         structures, triangles: numbers of structures and triangles in the stage.
     """
 
@@ -51,6 +56,8 @@ def drive_rows(
     """Returns the table rows of those drives of a map whose stage exists.
 
     Args:
+        folder: folder of the map.
+        progress: called with a line of text before slow steps.
         sizes: stage -> its numbers of structures and triangles, if known. For a
             stage without an entry, the world is loaded to count them, which
             takes long.

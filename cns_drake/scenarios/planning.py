@@ -49,8 +49,9 @@ def plan_drive(
 
     Args:
         positions: (N,) distances along the path at evenly spaced times [m], for
-            a car that keeps its distance to other vehicles; see `TrafficPlan`.
-            By default the car drives as fast as the limits allow.
+            a car that keeps its distance to other vehicles, see
+            `cns_drake.traffic.traffic_plan.TrafficPlan`. By default the car
+            drives as fast as the limits allow.
 
     Raises:
         InputError: the roads, the waypoints or the vehicle's springs cannot

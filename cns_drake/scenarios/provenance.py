@@ -45,7 +45,8 @@ def digest_inputs(
     the files that these meshes and models name.
 
     Args:
-        watch: records the status of each file before the file is read.
+        watch: records size and time of each file before the file is read, so
+            that a later change can be noticed; None records nothing.
 
     Returns:
         Kind of file -> hexadecimal digest. The kinds are `world` and `vehicle`
@@ -85,7 +86,7 @@ def digest_inputs(
 
 
 def combined_digest(inputs: dict[str, str]) -> str:
-    """Returns one digest that combines the results of `digest_inputs`."""
+    """Returns one digest of all digests that `digest_inputs` returns."""
     return hashlib.sha256(json.dumps(inputs).encode()).hexdigest()
 
 
@@ -94,6 +95,10 @@ def recording_fingerprint(scenario: Scenario, inputs: dict[str, str]) -> str:
 
     The hash does not depend on the folder of the files or on settings that
     affect only the drive's web page.
+
+    Args:
+        scenario: the scenario.
+        inputs: digests of its files, see `digest_inputs`.
     """
     places: dict[str, object] = {
         field: Path(place).name
@@ -127,7 +132,8 @@ def digest_file(path: Path, watch: FileWatch | None = None) -> str:
     """Returns the SHA-256 digest of a model and of the files that it names.
 
     Args:
-        watch: records the status of each file before the file is read.
+        watch: records size and time of each file before the file is read, so
+            that a later change can be noticed; None records nothing.
 
     Raises:
         InputError: a file cannot be read.

@@ -519,7 +519,11 @@ class Scenario(Section):
         )
 
     def with_transient(self, **changes: float | str) -> Scenario:
-        """Returns the scenario with some switches of `transient` set.
+        """Returns the scenario with other values of some temporary changes.
+
+        Args:
+            changes: values of switches in the section `transient`, such as
+                `snow=0.25`.
 
         Raises:
             InputError: there is no such switch, or its value is not usable.
@@ -543,9 +547,12 @@ class Scenario(Section):
         return self.replaced(driver=chosen)
 
     def with_lidar_preset(self, preset: str) -> Scenario:
-        """Returns the scenario with every LiDAR replaced by a unit of a preset.
+        """Returns the scenario with every LiDAR replaced by another model.
 
-        The LiDARs keep their poses and measurement settings.
+        The LiDARs keep their poses and the settings of their measurements.
+
+        Args:
+            preset: name of the model's preset, such as `vlp-16`.
 
         Raises:
             InputError: there is no such preset.

@@ -132,9 +132,12 @@ def _find_base(
 
 
 def find_files(values: dict, path: Path) -> None:
-    """Makes the paths among the fields of a scenario or family absolute.
+    """Makes the paths in a scenario's or family's fields absolute, in place.
+
+    Names of shipped maps stay as they are.
 
     Args:
+        values: the fields, which are changed.
         path: the file that contains the fields; relative paths start at its
             folder.
 
@@ -176,10 +179,15 @@ def world_file(scenario: Scenario) -> Path:
 
 
 def check_files(scenario: Scenario, source: object = None) -> None:
-    """Checks that a scenario's map, stage, world and waypoints exist.
+    """Checks that all files that a scenario names exist.
 
-    With traffic, the roads of the map must exist, too. Error messages begin
-    with `source`, by default the scenario's file.
+    These are its map, stage, world, waypoints, IMU file and SUMO trace. With
+    traffic, the map must have roads or lanes.
+
+    Args:
+        scenario: the scenario.
+        source: file or argument that error messages name; by default the file
+            of the scenario.
 
     Raises:
         InputError: one of these files does not exist.
@@ -226,13 +234,12 @@ def check_files(scenario: Scenario, source: object = None) -> None:
 def describe_scenario(scenario: Scenario, folder: Path | None = None) -> dict:
     """Returns the scenario's fields that are set, ready for JSON.
 
-    The folders of map, world and waypoints are left out, because digests
-    identify the content of these files (see `provenance`). The noise of an IMU
-    is in a separate file of a fixed name next to the scenario.
+    The noise of an IMU is in a separate file of a fixed name next to the
+    scenario.
 
     Args:
-        folder: folder to which the paths of files are made relative. By
-            default, paths are reduced to the names of the files.
+        folder: folder to which the paths of map, world, waypoints and SUMO
+            trace are made relative. None keeps only their names.
     """
     values = scenario.model_dump(mode="json", exclude_none=True)
     for fields, field in (

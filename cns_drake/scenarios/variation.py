@@ -135,7 +135,9 @@ def load_family(path: Path, redraw: Redraw | None = None) -> list[Scenario]:
     they vary.
 
     Args:
-        redraw: function that generates a city from a seed; only a family with
+        redraw: function that generates cities along the streets of a map. Its
+            arguments are the map's folder, its complete stage and the seeds; it
+            returns seed -> folder of the new map. Only a family with
             `city_seeds` needs it. It is called last, after all checks.
 
     Raises:
@@ -160,7 +162,13 @@ def vary(
     source: Path | str,
     redraw: Redraw | None = None,
 ) -> list[Scenario]:
-    """Returns the members of a family; `source` is its file.
+    """Returns the members of a family as scenarios.
+
+    Args:
+        base: the drive that all members are made from.
+        family: what varies among the members.
+        source: file of the family, for error messages.
+        redraw: see `load_family`.
 
     Raises:
         InputError: see `load_family`.

@@ -166,7 +166,8 @@ class FilmStage(Step):
         scenario: the drive in that stage, with the cameras of the film.
         times: times at which images are taken [s].
         folder: folder to which the images are written.
-        first: number of each camera's first image in the film.
+        first: for each camera, the number of its first image in the film;
+            further images of the camera follow.
     """
 
     scenario: Scenario

@@ -51,7 +51,8 @@ class LoadedDrive:
 
     Attributes:
         scenario: the scenario; its field `frames` is never None.
-        inputs: file -> digest of its content.
+        inputs: kind of file -> digest of its content, see
+            `cns_drake.scenarios.provenance.digest_inputs`.
         fingerprint: fingerprint of the recording, for `fingerprint.txt`.
         trajectory: motion of the vehicle.
         world: world of the stage, with the vehicle in it.
@@ -117,10 +118,16 @@ def load_drive(scenario: Scenario) -> LoadedDrive:
 def load_stage_and_traffic(
     scenario: Scenario, trajectory: Trajectory
 ) -> tuple[World, traffic_plan.TrafficPlan | None, Trajectory]:
-    """Returns the stage of a scenario, its traffic, and the trajectory.
+    """Returns the world of a scenario's stage, its traffic, and the trajectory.
 
-    If the vehicle keeps its distance to vehicles of the traffic
-    (`driver.follows`), the returned trajectory is slower than the given one.
+    The world contains the vehicle and all objects of the traffic. The traffic
+    is None for a scenario without traffic. If the vehicle keeps its distance to
+    the vehicle ahead (field `driver.follows`), the returned trajectory is
+    slower than the given one; otherwise it is the same.
+
+    Args:
+        scenario: the scenario.
+        trajectory: motion of its vehicle, planned without traffic.
 
     Raises:
         InputError: the scenario cannot be run.
@@ -145,7 +152,13 @@ def load_stage(
     with_vehicle: bool = True,
     trajectory: Trajectory | None = None,
 ) -> World:
-    """Loads the stage of a scenario, with the vehicle in it.
+    """Loads the world of a scenario's stage, with its temporary changes.
+
+    Args:
+        scenario: the scenario.
+        with_vehicle: whether the world contains the vehicle.
+        trajectory: motion of the vehicle, near which the temporary changes
+            (field `transient`) are made; by default it is planned if needed.
 
     Raises:
         InputError: the scenario's files cannot be used.

@@ -52,7 +52,10 @@ def _camera_rates(scenario: Scenario) -> dict[Topic, int]:
 
 
 def first_points_topic(scenario: Scenario) -> str:
-    """Returns the topic of the first LiDAR, each of whose scans is a frame."""
+    """Returns the name of the topic with the scans of the first LiDAR.
+
+    Each message on this topic begins a frame.
+    """
     return scenario_topics(scenario)[0].name
 
 

@@ -26,10 +26,16 @@ def scan_world(
     pattern: BeamPattern,
     returns: CalibratedReturns | None = None,
 ) -> np.ndarray:
-    """Returns one scan of the world's models in their initial state.
+    """Returns one LiDAR scan of a world in its initial state.
+
+    Args:
+        world: the world.
+        X_WS: pose of the LiDAR in the world.
+        pattern: directions and ranges of the LiDAR's beams.
+        returns: model of calibrated returns; None for ideal ones.
 
     Returns:
-        Structured array of `POINT_DTYPE`, in the sensor frame.
+        Structured array (N,) of `POINT_DTYPE`, in the LiDAR's frame S.
     """
     lidar, context = _stand(world, X_WS, pattern, returns)
     return lidar.GetOutputPort("scan").Eval(context)
@@ -38,9 +44,13 @@ def scan_world(
 def still_scene(
     world: World, X_WS: RigidTransform, pattern: BeamPattern
 ) -> RayCastingScene:
-    """Returns a scene of the world's models in their initial state.
+    """Returns a scene for ray casting: a world in its initial state.
 
-    Rays can be cast on the scene; they must start within a few kilometres of S.
+    Args:
+        world: the world.
+        X_WS: pose in the world near which rays will start. Rays must start
+            within a few kilometres of it.
+        pattern: directions and ranges of a LiDAR's beams.
     """
     lidar, context = _stand(world, X_WS, pattern)
     return lidar.EvalScene(context)
@@ -60,10 +70,15 @@ def check_ending(path: Path) -> None:
 
 
 def save_scan(scan: np.ndarray, path: Path) -> None:
-    """Saves x, y, z and intensity of a scan; the ending sets the format.
+    """Saves x, y, z and intensity of a scan to a file.
 
-    `.bin` is KITTI's format (float32 x y z intensity), `.npy` the same numbers
-    as an N x 4 array, and `.pcd` a binary PCD file.
+    The ending of the file name sets the format: `.bin` is KITTI's (float32 x y
+    z intensity), `.npy` an array (N, 4) of the same numbers, `.pcd` a binary
+    PCD file.
+
+    Args:
+        scan: structured array (N,) with these four fields.
+        path: the file.
 
     Raises:
         InputError: the file has another ending or cannot be written.

@@ -69,7 +69,8 @@ def add_mcap_recorder(
     Raises:
         InputError: the folder contains a finished recording or other files.
         ValueError: `rates` names an unknown sensor, neither a period nor a
-            LiDAR is given, or a LiDAR is causal.
+            LiDAR is given, or a LiDAR is causal (its scan covers the turn
+            before its time stamp).
 
     Example:
         from cns_drake import add_mcap_recorder

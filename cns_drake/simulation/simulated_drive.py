@@ -35,7 +35,7 @@ from cns_drake.simulation.station import make_station
 
 @dataclass(frozen=True)
 class DriveSimulation:
-    """A function object: when called, it simulates a scenario's drive.
+    """A function without arguments that simulates a scenario's drive.
 
     The call returns a `SimulatedDrive` of the scenario's first LiDAR.
     """
@@ -46,7 +46,11 @@ class DriveSimulation:
         return SimulatedDrive(self.scenario)
 
     def identity(self) -> dict:
-        """Returns a key: scenario, and digests of its files and the code."""
+        """Returns everything on which the simulated scans depend, for JSON.
+
+        That is the scenario, and the digests of its files and of the code.
+        Equal results mean equal scans.
+        """
         return {
             "simulated": self.scenario.model_dump(mode="json"),
             "inputs": digest_inputs(self.scenario),
@@ -57,9 +61,12 @@ class DriveSimulation:
 class SimulatedDrive(Drive):
     """A drive whose scans are simulated; they equal those of a recording.
 
-    Each access to a scan simulates it. `period` is the time between two frames
-    [s]. X_BS is the pose of the first LiDAR in base_link. `structures` contains
-    the names of all structures in the world.
+    Each access to a scan simulates it.
+
+    Attributes:
+        X_BS: pose of the first LiDAR in base_link.
+        structures: names of all structures in the world.
+        period: time between two frames [s].
     """
 
     def __init__(self, scenario: Scenario):
@@ -154,10 +161,10 @@ class SimulatedDrive(Drive):
         return self._lidar.GetOutputPort("scan").Eval(self._at(index))
 
     def look(self, index: int) -> tuple[RayCastingScene, RigidTransform]:
-        """Returns a scene on which rays can be cast, and the pose X_WS.
+        """Returns the world for ray casting, and the LiDAR's pose X_WS.
 
-        The scene is that at the stamp of scan `index`, and X_WS the pose of the
-        LiDAR then. The scene is valid until the next call of `look` or `scan`.
+        Both belong to the time stamp of scan `index`. The scene is valid until
+        the next call of `look` or `scan`.
         """
         scene = self._lidar.EvalScene(self._at(index))
         return scene, self.X_WBs[index] @ self.X_BS

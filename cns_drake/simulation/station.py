@@ -76,7 +76,8 @@ def make_station(
             passes to the Diagram.
         trajectory: the drive, if already planned.
         traffic: the scenario's traffic, if already planned. The structure table
-            of `world` must then include the traffic (see `with_traffic`).
+            of `world` must then include the traffic (see
+            `cns_drake.simulation.loaded_drive.with_traffic`).
         bag: open recording with the scenario's topics, if any.
         page: recorder of a web page of the same world, if any.
         num_threads: number of threads that cast the rays of a LiDAR.

@@ -71,7 +71,8 @@ class Compared:
         protocol: protocol of the queries.
         distractors: number of places of other cities that are added to the
             database, to make recognition harder.
-        asked: fields of the protocol that the condition sets.
+        asked: field -> value, for the fields of the protocol that the condition
+            sets.
     """
 
     database: Scenario
@@ -113,7 +114,11 @@ class PairOfDrives:
         same_route: whether the database drive follows the query's route, with
             its LiDAR at another viewpoint.
         source: file of the experiment, for errors.
-        age, redraw: functions that age a drive's city, or draw it anew.
+        age: function of a drive, a number of years, the rates of change and a
+            seed. It returns the folder and the stage of the drive's map, aged
+            by these years.
+        redraw: function of a drive and a seed. It returns the folder and the
+            stage of a map with another city along the same streets.
         on_note: is called with a note on everything that is left out.
     """
 
@@ -145,7 +150,7 @@ class PairOfDrives:
         }
 
     def build(self, condition: Condition, seed: int) -> Compared:
-        """Returns the database drive and the query drive of a condition.
+        """Returns the two drives of a condition, changed as it says.
 
         Raises:
             MissingError: the map lacks what the condition needs.
@@ -473,11 +478,14 @@ class PairOfDrives:
 
 
 def control_drive(drive: Scenario, stage: str) -> Scenario:
-    """Returns a drive on the same route through another stage.
+    """Returns a drive on the same route, by the same driver, in another stage.
 
-    The drive serves as a control: it sees the same city as the usual drive of
-    that stage, and differs from it only in the route. The driver stays the
-    same.
+    Compared with the usual drive of that stage, it shows the effect of the
+    route alone: the city is the same.
+
+    Args:
+        drive: the drive.
+        stage: the other stage of its map.
     """
     driver = drive.driver
     if driver.departs and driver.seed is None:
@@ -507,14 +515,25 @@ def _ending(side: str, condition: Condition, seed: int) -> str:
 
 
 def beside(drive: Scenario) -> Scenario:
-    """Returns a drive with LiDARs at the default viewpoint of a database."""
+    """Returns a drive with its LiDARs moved 1.25 m ahead and 0.5 m to the left.
+
+    This is the default viewpoint of a database on the same route as the
+    queries, so that the two drives do not coincide.
+    """
     return moved(drive, _AHEAD, *VIEWPOINTS["near"])
 
 
 def moved(
     drive: Scenario, ahead: float, left: float, heading_deg: float
 ) -> Scenario:
-    """Returns a drive with LiDARs moved [m] and turned to the left [deg]."""
+    """Returns a drive whose LiDARs are mounted elsewhere on the vehicle.
+
+    Args:
+        drive: the drive.
+        ahead: how far the LiDARs are moved forwards [m].
+        left: how far they are moved to the left [m].
+        heading_deg: angle by which they are turned to the left [deg].
+    """
     lidars = {}
     for name, config in drive.lidars.items():
         (x, y, z), (roll, pitch, yaw) = config.xyz, config.rpy_deg
@@ -526,13 +545,14 @@ def moved(
 
 
 def frozen_drives(table: str) -> dict[tuple[str, int], str]:
-    """Returns the fingerprint of each frozen condition, by map and level.
-
-    A fingerprint is a hash of the two drives of a condition. A level is the
-    strength of its change.
+    """Returns the fingerprints of drives that must not change.
 
     Args:
         table: name of a file in the folder of the shipped worlds.
+
+    Returns:
+        (map, level of the change) -> fingerprint, a hash of the compared
+        drives.
 
     Raises:
         InputError: there is no such file.
@@ -544,16 +564,14 @@ def frozen_drives(table: str) -> dict[tuple[str, int], str]:
 def check_frozen(
     table: str, compared: Mapping[tuple[str, int], Sequence[str]]
 ) -> None:
-    """Checks that drives of frozen conditions have not changed.
+    """Checks that drives still have the fingerprints in a table.
 
-    They have not changed if their fingerprints, which are hashes, are still
-    those of a table.
-
-    Maps that the table lacks are not checked.
+    Maps that are not in the table are not checked.
 
     Args:
-        table: a file in the folder of the shipped worlds.
-        compared: (map, level) -> fingerprints of the compared drives.
+        table: name of a file in the folder of the shipped worlds.
+        compared: (map, level of the change) -> fingerprints of the compared
+            drives.
 
     Raises:
         InputError: a fingerprint differs from the table's.

@@ -34,7 +34,14 @@ from evaluation.recognition.seen_surfaces import TOLERANCE
 
 @dataclass(frozen=True)
 class Sight:
-    """A LiDAR at a place of a simulated drive, and the world around it."""
+    """A LiDAR at a place of a simulated drive, and the world around it.
+
+    Attributes:
+        scene: the world, on which rays can be cast.
+        X_WS: pose of the LiDAR.
+        pattern: directions and ranges of its beams.
+        coverage: directions that the beams cover.
+    """
 
     scene: RayCastingScene
     X_WS: RigidTransform
@@ -44,14 +51,17 @@ class Sight:
     def reached(
         self, p_S: np.ndarray
     ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        """Returns which points are in range, and in the field of view.
+        """Returns the points that the beams of the LiDAR can reach.
+
+        These points are within the LiDAR's ranges and in its field of view.
+        Surfaces that hide them are not considered.
 
         Args:
-            p_S: (N, 3) points in the LiDAR's frame [m].
+            p_S: (N, 3) points in the LiDAR's frame S [m].
 
         Returns:
-            (K,) row numbers of these points; (K, 3) directions to these points
-            in S; and (K,) their distances [m].
+            (K,) row numbers of these points; (K, 3) unit directions to them in
+            S; and (K,) their distances [m].
         """
         distances = np.linalg.norm(p_S, axis=1)
         rows = np.flatnonzero(
@@ -65,7 +75,11 @@ class Sight:
 
 
 def sights(drive: SimulatedDrive) -> Callable[[int], Sight]:
-    """Returns a function: frame of a drive -> what its LiDAR can see there."""
+    """Returns a function: frame of a drive -> the LiDAR there, and its world.
+
+    Args:
+        drive: the drive.
+    """
 
     @functools.lru_cache(maxsize=1)
     def coverage(turn: int) -> BeamCoverage:
@@ -96,9 +110,10 @@ class VisibleSurfaces:
         return min(farthest, math.sqrt(3.0) * self.max_range)
 
     def share_of(self, points: np.ndarray) -> float:
-        """Returns which share of points (N, 3) is visible.
+        """Returns the share of points that the LiDAR sees; NaN without points.
 
-        Points are in the sensor's frame [m].
+        Args:
+            points: (N, 3) points in the LiDAR's frame [m].
         """
         if len(points) == 0:
             return math.nan
@@ -121,10 +136,16 @@ def exact_overlaps(
     protocol: RetrievalProtocol,
     track: Track = silent,
 ) -> np.ndarray:
-    """Returns the exact overlap of every query with every place, (Q, D).
+    """Returns the exact overlap of Q queries with D places, (Q, D).
 
-    The overlap is the share of the query's points that the LiDAR at the place
+    The overlap is the share of a query's points that the LiDAR at the place
     sees. It is NaN for a query without points.
+
+    Args:
+        database: the drive of the places, in whose world rays are cast.
+        query: the drive of the queries, through the same map.
+        protocol: protocol that determines queries, places and range.
+        track: reports progress.
 
     Raises:
         InputError: the drives are through different maps.

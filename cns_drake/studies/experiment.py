@@ -267,9 +267,9 @@ class Experiment(Section):
 
     @property
     def fresh(self) -> list[int]:
-        """Numbers of the freshly drawn versions of maps to use.
+        """Numbers of the freshly drawn versions of the maps to use, if any.
 
-        Each version has its own baseline.
+        They come from the field `both.fresh`.
         """
         found = self.both.get("fresh", [])
         return found if isinstance(found, list) else [found]
@@ -359,9 +359,10 @@ def _override(text: str) -> dict[str, Any]:
 
 
 def merged(values: Any, changes: Any) -> Any:
-    """Returns a tree of values with changes applied.
+    """Returns settings with changes applied.
 
-    Mappings are changed field by field, other values as a whole.
+    Mappings, also nested ones, are changed field by field. All other values are
+    replaced as a whole.
     """
     if not (isinstance(values, Mapping) and isinstance(changes, Mapping)):
         return changes
@@ -399,7 +400,7 @@ class Condition:
 
 
 def conditions(experiment: Experiment) -> list[Condition]:
-    """Returns the conditions, the baseline first.
+    """Returns the conditions of an experiment, the baseline first.
 
     Raises:
         ValueError: a factor has no values or the same value twice, the baseline
@@ -649,13 +650,13 @@ _ProtocolFields = create_model(  # type: ignore[call-overload]  # Fields are com
 def base_protocol(
     fields: Changes, source: object, place: str = "protocol"
 ) -> RetrievalProtocol:
-    """Returns the protocol that some fields describe.
+    """Returns the protocol that some fields of an experiment describe.
 
     Args:
-        fields: field -> value. The field `base` names the protocol from which
-            all fields come that are not given.
-        source: file of the experiment, for errors.
-        place: place of the fields in this file, for errors.
+        fields: field -> value. The field `base` names a protocol, by default
+            `fair`, that provides the values of all other fields.
+        source: file of the experiment, for error messages.
+        place: name of the section with these fields, for error messages.
 
     Raises:
         InputError: a field is unknown or out of range.
@@ -681,8 +682,13 @@ def method_variants(
 ) -> list[tuple[str, tuple[tuple[str, str | tuple[str, ...]], ...], Changes]]:
     """Returns each method with each combination of its varied settings.
 
+    Args:
+        methods: name of a method -> its settings. A setting with a list of
+            values is varied.
+
     Returns:
-        Name, settings, and the varied ones as columns of a table.
+        For each variant: the method's name; all its settings, as pairs of name
+        and value; and the varied settings as columns of a table, path -> value.
 
     Raises:
         ValueError: a setting has no values, or the same value twice.

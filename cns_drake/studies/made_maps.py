@@ -51,7 +51,14 @@ _NOTED_DRIVES = 20
 
 @dataclass(frozen=True)
 class AgeCity(MakeMap):
-    """Ages a city, with a stage after each given number of years."""
+    """A job step that ages a city and makes a map with a stage for each age.
+
+    Attributes:
+        source: folder of the city's map.
+        years: the ages: numbers of years from today.
+        seed: seed of the events.
+        rates: events and their rates per year.
+    """
 
     source: Path
     years: tuple[int, ...]
@@ -81,7 +88,12 @@ class AgeCity(MakeMap):
 
 @dataclass(frozen=True)
 class ImportCity(MakeMap):
-    """Imports the file of a real city."""
+    """A job step that makes a map from the file of a real city.
+
+    Attributes:
+        source: the file.
+        options: options of the import.
+    """
 
     source: Path
     options: ImportOptions
@@ -122,7 +134,14 @@ class MadeMaps:
     def want_age(
         self, drive: Scenario, years: Any, rates: Any, seed: int
     ) -> tuple[str, str]:
-        """Notes that a drive's city must be aged by some years.
+        """Registers that `make` ages a drive's city by some years.
+
+        Args:
+            drive: the drive.
+            years: number of years.
+            rates: factor by which all rates of change are multiplied, or event
+                -> rate per year.
+            seed: seed of the events.
 
         Returns:
             The drive's own map and stage, because the aged map does not exist
@@ -138,7 +157,7 @@ class MadeMaps:
         return str(drive.map), str(drive.stage)
 
     def want_redrawn(self, drive: Scenario, seed: Any) -> tuple[str, str]:
-        """Notes that a drive's city must be generated anew, from a seed.
+        """Registers that `make` generates a drive's city anew from a seed.
 
         Returns:
             The drive's own map and stage, because the new map does not exist
@@ -158,18 +177,25 @@ class MadeMaps:
     def aged(
         self, drive: Scenario, years: int, rates: Any, seed: int
     ) -> tuple[str, str]:
-        """Returns the map folder and stage of a drive's aged city."""
+        """Returns the map folder and the stage of a drive's aged city.
+
+        The arguments must have been given to `want_age` before.
+        """
         key = self._key(drive, rates, seed)
         number = sorted(self._ages[key]).index(years)
         return str(self._aged_folder(*key)), f"{number + 2:02d}"
 
     def redrawn(self, drive: Scenario, seed: int) -> tuple[str, str]:
-        """Returns the map folder and stage of a drive's city, drawn anew."""
+        """Returns the map folder and the stage of another city for a drive.
+
+        The city has the same streets as the drive's own, and is generated from
+        a seed.
+        """
         source = map_folder(drive).path.resolve()
         return str(self.folder / f"{source.name}_c{seed}"), _STAGE
 
     def make(self, cluster: Cluster) -> None:
-        """Makes all maps that were noted and do not exist yet.
+        """Makes all registered maps that do not exist yet.
 
         Raises:
             InputError: maps could not be made; the error names all of them.
@@ -217,7 +243,13 @@ class MadeMaps:
 def made_map_step(
     made: MadeMap, experiment: Experiment, folder: Path, shipped: Mapping
 ) -> MakeMap:
-    """Returns the step that makes a map of an experiment in a folder.
+    """Returns the job step that makes a map which an experiment describes.
+
+    Args:
+        made: description of the map.
+        experiment: the experiment.
+        folder: folder of the map to make.
+        shipped: name -> folder of the shipped maps.
 
     Raises:
         InputError: the file to import is missing or has another digest, or the
@@ -258,13 +290,14 @@ def distracting_drives(
     cluster: Cluster,
     on_note: Callable[[str], None] = lambda text: None,
 ) -> list[Scenario]:
-    """Returns drives through other cities, whose places distract a method.
+    """Returns drives through other cities than the query's.
 
-    Together, the drives have about the wanted number of places. They come in
-    this order: the shipped drives of other maps, each through its own stage; if
-    the query's map is shipped, drives along its streets between other
-    buildings; the drives of other maps through their other stages; and the
-    drives of other maps through their cities drawn anew.
+    Their places make recognition harder if they are added to a database. The
+    drives come in this order, until they have about the wanted number of
+    places: the shipped drives of other maps, each through its own stage; if the
+    query's map is shipped, drives along its streets between other buildings;
+    the drives of other maps through their other stages; and the drives of other
+    maps through their cities drawn anew.
 
     Args:
         query: the query drive. The returned drives have its LiDARs, and do not

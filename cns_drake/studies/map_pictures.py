@@ -38,12 +38,13 @@ class _ShownDrive:
 
 
 def plan_pictures(folder: Path, pictures: Path) -> list[Job]:
-    """Returns the jobs that draw a map.
+    """Returns the jobs that draw pictures of a map.
 
     Args:
-        pictures: folder to write: `<map>_drives.png`, the drives from above;
-            `<map>_stages.png`, a street in the first and the last stage, if
-            the map has a `views.yaml`.
+        folder: folder of the map.
+        pictures: folder to which the jobs write `<map>_drives.png`, the drives
+            from above, and, if the map has a `views.yaml`, `<map>_stages.png`,
+            a street in the first and the last stage.
     """
     # Workers may run elsewhere.
     source, pictures = MapFolder(folder.resolve()), pictures.absolute()

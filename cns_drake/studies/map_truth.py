@@ -2,13 +2,11 @@
 
 Rays that are cast in the worlds of both drives decide.
 
-- A drive **observes** a point if, from one of its poses, the point is within
-  the LiDAR's ranges, its beams cover the direction, and no surface hides it. A
-  surface hides a point that lies more than `NEAR` behind it along the line of
-  sight. There is an exception at grazing angles: if the point lies less than
-  `_GRAZING` behind the surface along that line, it is hidden only if it also
-  lies more than `_SKIN` behind, measured perpendicular to the surface. A wall
-  that has moved a little therefore does not hide its old position.
+- A drive **observes** a point if the LiDAR can see it from one of the drive's
+  poses: the point is within the LiDAR's ranges and field of view, and no
+  surface hides it. A surface hides a point that lies more than `NEAR` behind it
+  along the line of sight. At grazing angles the point must lie farther behind,
+  so that a wall that has moved a little does not hide its old position.
 - A surface is **there** if it passes within `NEAR` of the point, measured
   perpendicular to the surface. Moving objects do not count.
 
@@ -66,7 +64,8 @@ from evaluation.results.drawing import GONE, NEW
 
 # A surface this near to a point is its own [m].
 NEAR = 0.1
-# A surface hides points that lie this far behind, perpendicular to it [m].
+# At grazing angles, a surface hides points that lie this far behind,
+# perpendicular to it [m].
 _SKIN = 0.3
 # Greatest distance behind a surface, along the line of sight, up to which
 # `_SKIN` applies [m].
@@ -119,16 +118,22 @@ _MOST_ROWS = 200
 
 @dataclass(frozen=True)
 class Survey:
-    """A drive whose map is labelled, with the simulation of its world."""
+    """A drive whose map is labelled, with the simulation of its world.
+
+    Attributes:
+        drive: the drive whose scans make the map: a recording, or `simulated`.
+        simulated: the same drive, simulated, for rays cast in its world.
+        scenario: the scenario of the drive.
+    """
 
     drive: Drive
     simulated: SimulatedDrive
     scenario: Scenario
 
     def still(self) -> RayCastingScene:
-        """Returns the drive's world for ray casting, without moving objects.
+        """Returns the drive's world without moving objects, for ray casting.
 
-        The recording vehicle is left out, too.
+        The recording vehicle is left out as well.
         """
         if self.scenario.traffic.is_off:
             # The LiDAR does not see its own vehicle.
@@ -144,7 +149,11 @@ class Survey:
 
 
 def open_survey(place: str | Path) -> Survey:
-    """Opens a recording, or simulates a shipped drive or a scenario's file.
+    """Opens a drive whose world is known, for exact labels of its map.
+
+    Args:
+        place: a recording of cns-drake; or the name of a shipped drive or a
+            scenario file, which is then simulated.
 
     Raises:
         InputError: the drive cannot be used, its points do not name their
@@ -176,7 +185,7 @@ def open_survey(place: str | Path) -> Survey:
 
 
 def simulate_survey(scenario: Scenario) -> Survey:
-    """Returns a drive that is simulated only when its scans are read.
+    """Returns a drive that is simulated while its scans are read.
 
     Raises:
         InputError: the scenario cannot be run.
@@ -194,20 +203,24 @@ def write_truth(
     *,
     across_maps: bool = False,
 ) -> tuple[Mapping[str, Counter[int]], list[StructureChange]]:
-    """Writes the maps of two drives with their labels.
+    """Writes the maps of two drives, with exact labels of what changed.
 
-    See `evaluation.map_update.sessions` for the files; `structures.csv` and
-    `index.html` show how much of each structure is gone or new.
+    The files are described in `evaluation.map_update.sessions`. In addition,
+    `structures.csv` and `index.html` show how much of each structure is gone or
+    new.
 
     Args:
-        output: the folder, new or empty.
+        a: the older drive A.
+        b: the newer drive B.
+        output: the folder to write, new or empty.
         spacing: distance driven between two scans [m].
+        track: reports progress.
         across_maps: whether the drives' maps may have different names, as an
             aged map has.
 
     Returns:
-        The number of points with each label, for A and for B; and the change of
-        each structure.
+        The number of points with each label: A or B -> label -> number. And the
+        change of each structure.
 
     Raises:
         InputError: the drives are of different worlds, or the folder cannot be
@@ -255,10 +268,13 @@ def write_truth(
 def label_points(
     session: Session, other: Survey, frames: np.ndarray, track: Track = silent
 ) -> np.ndarray:
-    """Returns a label for each point of a map, (N,) uint8.
+    """Returns the exact label of each point of a drive's map, (N,) uint8.
 
-    A point counts as observed if the drive `other` sees it from one of its
-    frames `frames` (K,).
+    Args:
+        session: the map whose points are labelled.
+        other: the other drive, which observes these points or not.
+        frames: (K,) frames of the other drive from which it looks.
+        track: reports progress.
     """
     unobserved, kept, changed = SIDES[session.side]
     labels = np.full(len(session.points), unobserved, np.uint8)
@@ -275,9 +291,16 @@ def observed(
     frames: np.ndarray,
     track: Track = silent,
 ) -> np.ndarray:
-    """Returns which points (N, 3) in W [m] a drive observes, (N,) bool.
+    """Returns which points a simulated drive observes, (N,) bool.
 
-    Only the drive's frames `frames` (K,) count.
+    A point is observed if the LiDAR can see it from one of the drive's frames:
+    it is within the LiDAR's ranges and field of view, and no surface hides it.
+
+    Args:
+        points: (N, 3) points in W [m].
+        drive: the drive.
+        frames: (K,) frames of the drive from which it looks.
+        track: reports progress.
     """
     result = np.zeros(len(points), bool)
     look = sights(drive)
@@ -360,7 +383,7 @@ def _spiral() -> np.ndarray:
 def is_there(points: np.ndarray, scene: RayCastingScene) -> np.ndarray:
     """Returns which points (N, 3) in W [m] lie on a surface, (N,) bool.
 
-    A point lies on a surface if it is at most `NEAR` away from it.
+    A point lies on a surface of the scene if it is at most `NEAR` away from it.
     """
     result = np.zeros(len(points), bool)
     left = np.arange(len(points))
@@ -447,11 +470,11 @@ def write_page(
     table: Sequence[StructureChange],
     names: tuple[str, str],
 ) -> None:
-    """Writes the page: both maps from above, and the changed structures.
+    """Writes a web page with two labelled maps and their changed structures.
 
     Args:
         path: path of the page.
-        pair: both maps.
+        pair: the maps of A and B, which the page shows from above.
         truth: labels of the points of each map.
         table: the changed structures.
         names: names of the two drives.

@@ -62,9 +62,10 @@ class ExportOptions:
     """Settings of the export of each drive.
 
     Attributes:
-        format: data format, that of the training program.
+        format: program that reads the data: `pointnetvlad`, or `overlap` for
+            OverlapNet and its like.
         spacing: distance between two clouds, along the path [m].
-        scans: consecutive scans that are merged into a cloud.
+        scans: number of consecutive scans that are merged into a cloud.
         max_range: points that are farther away than this along x, y or z are
             left out [m].
     """
@@ -187,7 +188,17 @@ def export_run(
     folder: Path,
     options: ExportOptions,
 ) -> np.ndarray:
-    """Simulates a drive and writes its clouds; returns poses X_WS (N, 4, 4)."""
+    """Simulates a drive and writes its clouds as files `<number>.bin`.
+
+    Args:
+        reporter: reports progress.
+        simulation: the drive.
+        folder: folder for the files.
+        options: format and spacing of the clouds.
+
+    Returns:
+        (N, 4, 4) poses X_WS of the LiDAR at the clouds.
+    """
     drive = simulation()
     frames = sample_frames(drive.X_WS[:, :3, 3], options.spacing)
     make_folder(folder)
@@ -234,10 +245,16 @@ def compare_runs(
     database: DriveSimulation,
     options: ExportOptions,
 ) -> np.ndarray:
-    """Returns the exact overlap of each query with each place, (Q, D).
+    """Returns the exact overlap of Q queries with D places, (Q, D).
 
     The overlap is the share of a query's points that the LiDAR at the place
     sees.
+
+    Args:
+        reporter: reports progress.
+        query: the drive of the queries.
+        database: the drive of the places.
+        options: the spacing of queries and places, and the greatest range.
     """
     protocol = RetrievalProtocol(
         query_spacing=options.spacing,
@@ -254,7 +271,7 @@ class Run:
     Attributes:
         folder: folder of its clouds, relative to that of the data set.
         X_WS: (N, 4, 4) poses of the LiDAR.
-        city: number of the city.
+        city: number of the city; cities are put `CITY_DISTANCE` apart.
     """
 
     folder: str
@@ -263,7 +280,7 @@ class Run:
 
     @property
     def positions(self) -> np.ndarray:
-        """(N, 2) northing and easting [m]."""
+        """(N, 2) northing and easting of the clouds [m]."""
         north_east = self.X_WS[:, [1, 0], 3]
         return north_east + np.array([CITY_DISTANCE * self.city, 0.0])
 
@@ -360,7 +377,14 @@ def _evaluation_fault(drives: Sequence[Run]) -> str | None:
 
 
 def training_tuples(runs: Sequence[Run]) -> dict[int, Any]:
-    """Returns number -> `TrainingTuple` of all clouds of some drives."""
+    """Returns the training data of PointNetVLAD: number of a cloud -> tuple.
+
+    A `TrainingTuple` names the cloud's file, its position, and the numbers of
+    the clouds that are near enough to be positives or too near to be negatives.
+
+    Args:
+        runs: drives whose clouds are numbered one after the other.
+    """
     files = [file for run in runs for file in run.files]
     positions = np.concatenate([run.positions for run in runs])
     tree = cKDTree(positions)
@@ -381,7 +405,16 @@ def training_tuples(runs: Sequence[Run]) -> dict[int, Any]:
 
 
 def evaluation_sets(runs: Sequence[Run]) -> tuple[list[dict], list[dict]]:
-    """Returns the database and the queries of each drive."""
+    """Returns the evaluation data of PointNetVLAD: databases and queries.
+
+    Args:
+        runs: drives; each is a database and a set of queries.
+
+    Returns:
+        Two lists with a dictionary for each drive, number of a cloud -> its
+        file, northing and easting. In the second list, each query also
+        contains, for each other drive, the numbers of the clouds that match it.
+    """
     trees = [cKDTree(run.positions) for run in runs]
 
     def entries(run: Run) -> dict[int, dict]:

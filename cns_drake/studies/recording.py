@@ -43,7 +43,13 @@ def record_all(
     """Records scenarios as `<output>/<name>/`, with progress on stderr.
 
     A finished recording of the same scenario and world is kept; an interrupted
-    one goes on.
+    one is continued.
+
+    Args:
+        scenarios: the scenarios to record.
+        output: folder of the recordings.
+        cluster: runs the jobs.
+        overwrite: whether other recordings of these names may be replaced.
 
     Raises:
         InputError: scenarios could not be recorded (the error names all of
@@ -61,11 +67,16 @@ def plan_recordings(
     overwrite: bool = True,
     pages: Mapping[str, Path] | None = None,
 ) -> list[Job]:
-    """Returns a job for each unfinished recording; notes the finished ones.
+    """Returns a job for each recording that is not finished yet.
 
-    Each job has the recording's name. `overwrite` allows it to replace another
-    recording of this name. If `pages` (name of a recording -> file of its web
-    page) is given, a recording counts as finished only if its page exists.
+    Each job has the name of its recording. A note says which are finished.
+
+    Args:
+        scenarios: the scenarios to record.
+        output: folder of the recordings.
+        overwrite: whether a job may replace another recording of the same name.
+        pages: name of a recording -> file of its web page. If given, a
+            recording counts as finished only if its page exists.
 
     Raises:
         InputError: two scenarios have the same name, or a folder must not be
@@ -108,7 +119,14 @@ def plan_recordings(
 
 @dataclass(frozen=True)
 class Record(Step):
-    """Records a scenario, and saves a web page of the drive."""
+    """A job step that records a drive.
+
+    Attributes:
+        scenario: the drive.
+        folder: folder of the recording.
+        overwrite: whether another recording in this folder may be replaced.
+        page: file for a web page of the drive, if any.
+    """
 
     scenario: Scenario
     folder: Path
@@ -180,8 +198,12 @@ class Record(Step):
 def is_recorded(scenario: Scenario, folder: Path) -> bool:
     """Returns whether a finished recording of exactly this scenario exists.
 
-    It counts only if the world, the roads and the program have not changed
+    The result is false if the world, the roads or the program have changed
     since it was recorded.
+
+    Args:
+        scenario: the scenario.
+        folder: folder of the recording.
 
     Raises:
         InputError: the scenario's files cannot be read.

@@ -65,7 +65,7 @@ def redraw_cities(
 
     Args:
         map_folder: folder of the map, with `roads.yaml` and `city.yaml`.
-        stage: the stage that is drawn.
+        stage: name of the only stage of each new map.
         seeds: a seed for each city.
         output: folder for the cities.
         cluster: runs the jobs.
@@ -89,7 +89,10 @@ def redraw_cities(
 
 @dataclass(frozen=True)
 class MakeMap(Step):
-    """Makes the folder of a map, and replaces an older one that it made."""
+    """A job step that makes the folder of a map.
+
+    An older map that the step has made is replaced if its inputs have changed.
+    """
 
     folder: Path
 
@@ -114,10 +117,10 @@ class MakeMap(Step):
             )
 
     def check(self) -> bool:
-        """Returns whether an older version of the map exists.
+        """Returns whether the folder of the map exists already.
 
         Raises:
-            InputError: anything else has its name.
+            InputError: another file or folder has its name.
         """
         with files.user_errors(self.folder):
             is_there = os.path.lexists(self.folder)
@@ -130,7 +133,13 @@ class MakeMap(Step):
 
     @abc.abstractmethod
     def make(self, finish: Callable[[Path], None], reporter: Reporter) -> None:
-        """Makes the map's folder; `finish` completes it before it is named."""
+        """Makes the map's folder.
+
+        Args:
+            finish: function that must be called with the complete folder before
+                it gets its final name.
+            reporter: reports progress.
+        """
 
     @abc.abstractmethod
     def sources(self) -> dict[str, object]:
@@ -138,7 +147,12 @@ class MakeMap(Step):
 
 
 def make_maps(steps: Sequence[MakeMap], output: Path, cluster: Cluster) -> None:
-    """Makes maps in a folder, with progress on stderr; finished ones are kept.
+    """Makes maps, with progress on stderr; finished maps are kept.
+
+    Args:
+        steps: a step for each map.
+        output: folder of the maps, which is created if needed.
+        cluster: runs the steps as jobs.
 
     Raises:
         InputError: another file or folder has the name of a map, or maps could
@@ -155,7 +169,15 @@ def make_maps(steps: Sequence[MakeMap], output: Path, cluster: Cluster) -> None:
 
 @dataclass(frozen=True)
 class RedrawCity(MakeMap):
-    """Draws a map's city anew; its only stage contains the whole city."""
+    """A job step that makes a map with another city along a map's streets.
+
+    The new map has one stage, which contains the whole city.
+
+    Attributes:
+        map_folder: folder of the map with the streets.
+        stage: name of the new map's stage.
+        seed: seed of the new city.
+    """
 
     map_folder: Path
     stage: str
@@ -176,7 +198,11 @@ class RedrawCity(MakeMap):
         return redrawn_inputs(self.map_folder, self.stage, self.seed)
 
     def finish_inputs(self, draft: Path) -> None:
-        """Writes the inputs that can be made only after the city is drawn."""
+        """Writes the inputs that depend on the city, after it is drawn.
+
+        Args:
+            draft: folder of the map, before it gets its final name.
+        """
 
     def sources(self) -> dict[str, object]:
         """Returns everything on which the city depends, ready for JSON."""
@@ -190,12 +216,15 @@ class RedrawCity(MakeMap):
 
 
 def redrawn_inputs(map_folder: Path, stage: str, seed: int) -> dict[str, bytes]:
-    """Returns the inputs of a map's city drawn anew: name -> content.
+    """Returns name -> content of the input files of a map's new city.
 
-    The inputs are the map's own `roads.yaml`, a `city.yaml` with the new seed,
-    and a `stages.yaml` with one stage that contains the whole city. The map's
-    own stages cannot be used, because they name structures that the new city
-    may lack.
+    The files are the map's own `roads.yaml`, a `city.yaml` with the new seed,
+    and a `stages.yaml` with one stage that contains the whole city.
+
+    Args:
+        map_folder: folder of the map.
+        stage: name of the stage.
+        seed: seed of the new city.
 
     Raises:
         InputError: a file of the map cannot be read, or is no plan.
@@ -216,7 +245,12 @@ def redrawn_inputs(map_folder: Path, stage: str, seed: int) -> dict[str, bytes]:
 
 
 def to_yaml(title: str, values: dict) -> bytes:
-    """Returns values as YAML, with a title in comments."""
+    """Returns a YAML file with a title in its first comment.
+
+    Args:
+        title: the title.
+        values: the content.
+    """
     comment = (
         f"{_MARK.decode()} {__version__}: {title}.\n"
         "# `cns-drake generate --vary` writes it anew when the map changes.\n"
@@ -231,8 +265,12 @@ def to_yaml(title: str, values: dict) -> bytes:
 class Version:
     """A freshly drawn version of a shipped map.
 
-    Its number begins with 1. Its city is rotated about the origin by
-    `turn_deg`.
+    Attributes:
+        map_name: name of the shipped map.
+        number: number of the version, from 1.
+        seed: seed of its city.
+        turn_deg: angle by which its city is rotated about the world's origin
+            [deg].
     """
 
     map_name: str
@@ -242,7 +280,7 @@ class Version:
 
 
 def fresh_versions() -> list[Version]:
-    """Returns the versions of shipped maps in `worlds/fresh.csv`."""
+    """Returns all versions of shipped maps that can be drawn freshly."""
     rows = read_records(worlds_folder() / "fresh.csv", _COLUMNS)
     return [
         Version(
@@ -258,7 +296,13 @@ def fresh_versions() -> list[Version]:
 def draw_fresh_cities(
     maps: Sequence[str], numbers: Sequence[int], output: Path, cluster: Cluster
 ) -> list[Path]:
-    """Draws fresh cities; returns their map folders, `<output>/<map>_fNN`.
+    """Draws fresh versions of shipped maps; returns their map folders.
+
+    Args:
+        maps: names of the maps; all maps if empty.
+        numbers: numbers of the versions; all versions if empty.
+        output: folder for the maps, which are named `<map>_f<number>`.
+        cluster: runs the jobs.
 
     Raises:
         InputError: a version is unknown or could not be drawn.
@@ -292,7 +336,7 @@ def draw_fresh_cities(
 
 @dataclass(frozen=True)
 class DrawFreshCity(RedrawCity):
-    """Draws a fresh version of a map, with its stages and drives."""
+    """A job step that draws a fresh version of a map, with its drives."""
 
     turn_deg: float = 0.0
 
@@ -331,8 +375,10 @@ class DrawFreshCity(RedrawCity):
 def turned(values: Any, turn_deg: float) -> Any:
     """Returns the content of `roads.yaml` or `city.yaml`, with a turned city.
 
-    All positions and headings are turned anticlockwise about the world's origin
-    [deg].
+    Args:
+        values: the content of the file.
+        turn_deg: angle by which all positions and headings are turned
+            anticlockwise about the world's origin [deg].
     """
     if isinstance(values, list):
         return [turned(one, turn_deg) for one in values]
@@ -368,10 +414,14 @@ def _turned_bounds(bounds: Sequence[float], turn_deg: float) -> list[float]:
 
 
 def kept_names(stages: Any, names: Sequence[str]) -> Any:
-    """Returns a `stages.yaml` without the structures that a city lacks.
+    """Returns the content of `stages.yaml` without structures that are missing.
 
-    A row can have fewer houses if it is drawn anew. Groups that would have no
-    structure are left out.
+    A city that is drawn anew can have fewer houses in a row than the stages of
+    the map name. Groups without any remaining structure are left out.
+
+    Args:
+        stages: the content of the file.
+        names: names of the structures that the city has.
     """
     if isinstance(stages, list):
         return [

@@ -124,8 +124,9 @@ def _drives(folder: Path) -> list[Scenario]:
 def control_drives(drives: Sequence[Scenario]) -> list[Scenario]:
     """Returns the control drives of a map's drives.
 
-    A control drive follows the route of one drive through the stage of another,
-    so that a comparison with the latter contains no change of the city.
+    Each follows the route of one of the other drives through the stage of the
+    last drive. Compared with the last drive, it shows the effect of the route
+    alone, because the city is the same.
     """
     last = max(drives, key=lambda drive: drive.stage or "")
     return [
@@ -138,7 +139,13 @@ def control_drives(drives: Sequence[Scenario]) -> list[Scenario]:
 def recording_info(
     scenario: Scenario, output: Path, is_waiting: bool
 ) -> RecordingInfo:
-    """Returns the description of a recording before it is made."""
+    """Returns the description of a recording that need not exist yet.
+
+    Args:
+        scenario: scenario of the recording.
+        output: folder of the recordings.
+        is_waiting: whether a job of the recording's name must make it first.
+    """
     assert scenario.stage is not None  # It has a map.
     return RecordingInfo(
         name=scenario.name,

@@ -135,11 +135,11 @@ def run_study(
     source: str = "",
     on_note: Callable[[str], None] = lambda text: None,
 ) -> Path:
-    """Measures all conditions of an experiment; writes its table and page.
+    """Measures all conditions of an experiment; writes tables and a page.
 
-    `<output>/results.csv` and `queries.csv` are the tables, and `index.html` is
-    the page. `<output>/cities` holds maps that were made. Finished work is not
-    repeated.
+    The folder `output` then contains the tables `results.csv` and
+    `queries.csv`, the page `index.html`, and in `cities` the maps that were
+    made. Finished work is not repeated.
 
     Args:
         experiment: the experiment.
@@ -169,7 +169,15 @@ def run_study(
 
 @dataclass
 class Study:
-    """An experiment that is being measured on maps."""
+    """An experiment that is being measured on maps.
+
+    Attributes:
+        experiment: the experiment.
+        output: folder of the results.
+        source: file of the experiment, for error messages.
+        cluster: runs the jobs.
+        on_note: is called with notes on what is left out.
+    """
 
     experiment: Experiment
     output: Path
@@ -193,7 +201,14 @@ class Study:
         self._made = MadeMaps(self.output / "cities")
 
     def run(self, maps: Sequence[str] = ()) -> Path:
-        """Runs the study; returns the path of its page."""
+        """Measures all conditions; returns the path of the study's page.
+
+        Args:
+            maps: names or folders of maps that replace those of the experiment.
+
+        Raises:
+            InputError: a map or the folder cannot be used, or a step failed.
+        """
         for name in _FORMER:
             if (self.output / name).exists():
                 raise InputError(

@@ -76,13 +76,13 @@ class TrainingScans:
     """Scans of several drives through several cities.
 
     Attributes:
-        images: (N, RINGS, SECTORS, CHANNELS) uint8.
+        images: (N, RINGS, SECTORS, CHANNELS) uint8 polar images, see
+            `evaluation.methods.learned.polar_image`.
         xy: (N, 2) positions of the sensors [m].
         cities: (N,) number of the city.
         drives: (N,) number of the drive in its city.
         overlaps: (N, N) share of each scan that is visible from the place of
-            each other scan. Without it, distance decides which places are
-            right.
+            each other scan. None if distances decide which places are right.
     """
 
     images: np.ndarray
@@ -93,7 +93,10 @@ class TrainingScans:
 
     @classmethod
     def of(cls, parts: Sequence["TrainingScans"]) -> "TrainingScans":
-        """Joins scans of several cities; numbers the cities in their order."""
+        """Joins the scans of several cities, one item for each city.
+
+        The cities are numbered in the order of the items.
+        """
         overlaps = [part.overlaps for part in parts]
         return cls(
             np.concatenate([part.images for part in parts]),
@@ -109,7 +112,8 @@ class Batch:
     """Images of Q queries and P places, with the truth.
 
     Attributes:
-        images: (Q + P, RINGS, SECTORS, CHANNELS) uint8, queries first.
+        images: (Q + P, RINGS, SECTORS, CHANNELS) uint8 polar images, queries
+            first.
         weights: (Q, P) weights of right places, with sum 1 in each row.
         counts: (Q, P) whether a place takes part in the softmax.
     """
@@ -120,13 +124,20 @@ class Batch:
 
 
 class Sampler:
-    """Draws batches; each depends only on the seed and the step's number."""
+    """Draws batches of scans for training.
+
+    A batch depends only on the seed and on the number of its step.
+    """
 
     def __init__(self, scans: TrainingScans, seed: int):
-        """Finds the pairs of drives that meet.
+        """Finds the drives that share a city.
+
+        Args:
+            scans: all scans.
+            seed: seed of the draws.
 
         Raises:
-            InputError: no city has two drives that meet.
+            InputError: no city has two drives.
         """
         self._scans = scans
         self._seed = seed
@@ -148,7 +159,11 @@ class Sampler:
             raise InputError("training: no city has two drives that meet")
 
     def batch(self, step: int) -> Batch:
-        """Returns the scans and targets of one training step."""
+        """Returns the batch of a training step.
+
+        Args:
+            step: number of the step.
+        """
         rng = np.random.default_rng([self._seed, step])
         queries: list[int] = []
         places: list[int] = []
@@ -247,7 +262,10 @@ def import_jax() -> None:
 
 
 def start_parameters(seed: int) -> Parameters:
-    """Returns the weights before training (He et al., ICCV 2015)."""
+    """Returns random weights of the network, as training starts from them.
+
+    Their variance is that of He et al., ICCV 2015.
+    """
     rng = np.random.default_rng([seed, 0xC0DE])
     found: Parameters = {}
     for number, (before, after, _, _) in enumerate(LAYERS):
@@ -259,7 +277,15 @@ def start_parameters(seed: int) -> Parameters:
 
 
 def features(parameters: Parameters, images: Any) -> Any:
-    """Returns feature maps (N, TURNS, FEATURES) of unit length, in JAX."""
+    """Returns the network's feature maps of images, as a JAX array.
+
+    Args:
+        parameters: weights of the network.
+        images: (N, RINGS, SECTORS, CHANNELS) polar images.
+
+    Returns:
+        (N, TURNS, FEATURES), of unit length for each image.
+    """
     import jax
     from jax import lax
     import jax.numpy as jnp
@@ -286,9 +312,13 @@ def features(parameters: Parameters, images: Any) -> Any:
 
 
 def scores(queries: Any, places: Any) -> Any:
-    """Returns the similarity of queries and places, (Q, P), in JAX.
+    """Returns the similarity of Q queries and P places, (Q, P), as a JAX array.
 
-    Queries and places are feature maps.
+    It is the correlation of their feature maps at the best heading.
+
+    Args:
+        queries: (Q, TURNS, FEATURES) feature maps, see `features`.
+        places: (P, TURNS, FEATURES) feature maps.
     """
     import jax.numpy as jnp
 
@@ -310,19 +340,22 @@ def train(
     track: Track = silent,
     on_step: Callable[[int, Parameters], None] = lambda step, values: None,
 ) -> tuple[Parameters, np.ndarray]:
-    """Trains a network; an interrupted training goes on from its `state` file.
-
-    Returns the weights; and, for each step, the loss and the share of queries
-    whose best place is right, (steps, 2).
+    """Trains the network of the method `learned`; can continue a training.
 
     Args:
         scans: images of the scans, and which scans show the same place.
         steps: number of batches.
         seed: seed of all draws.
-        state: file from which an interrupted training goes on.
-        digest: digest of the scans; a state of other scans is refused.
+        state: file with the state of the training. If it exists, the training
+            continues from there.
+        digest: digest of the scans; a state that belongs to other scans is
+            refused.
         track: reports progress.
-        on_step: takes the number of a step and the weights.
+        on_step: is called with the number of each step and the weights.
+
+    Returns:
+        The weights; and (steps, 2), for each step the loss and the share of
+        queries whose best place is right.
 
     Raises:
         InputError: there is nothing to pair, the state is another training's,
@@ -433,8 +466,12 @@ def write_weights(
 ) -> None:
     """Writes a file of weights, as the method `learned` reads it.
 
-    `seen` describes the training scans: the least and the greatest share of a
-    scan's sectors that contain a point.
+    Args:
+        path: the file.
+        values: name -> weights, as `train` returns them.
+        seen: least and greatest share of a training scan's sectors that contain
+            a point.
+        made_by: description of the training, ready for JSON.
     """
     arrays: dict[str, Any] = {
         "version": np.int64(WEIGHTS_VERSION),
@@ -456,11 +493,16 @@ _CITIES_A_MINUTE, _STEPS_A_MINUTE = 0.3, 60
 class TrainingPlan:
     """The data and the length of a training.
 
-    With `change`, drives see different stages and temporary changes. With
-    `returns`, some drives have calibrated returns and weather. With `driver`,
-    drivers wander and change lanes. With `drawn_streets`, the streets of the
-    cities are drawn at random. With `graded`, the exact overlap decides which
-    places are right.
+    Attributes:
+        cities: number of cities.
+        steps: number of batches.
+        seed: seed of all random draws.
+        change: whether drives see different stages and temporary changes.
+        returns: whether some drives have calibrated returns and weather.
+        driver: whether drivers wander and change lanes.
+        drawn_streets: whether the streets of the cities are drawn at random.
+        graded: whether exact overlaps decide which places are right, instead of
+            distances.
     """
 
     cities: int
@@ -480,7 +522,7 @@ class TrainingPlan:
         return cls(**{"cities": cities, "steps": steps, **fields})
 
     def drawn(self) -> list[DrawnCity]:
-        """Returns the cities of the training, with their drives."""
+        """Returns the cities on which the network is trained."""
         return [
             DrawnCity(
                 DRAWN_STREETS
@@ -504,10 +546,10 @@ def make_weights(
     cluster: Cluster,
     track: Track = silent,
 ) -> Path:
-    """Draws cities, trains on them and writes weights.
+    """Trains the method `learned` on random cities; writes its weights.
 
-    `<output>.training` keeps the scans and the state: an interrupted training
-    goes on there.
+    The folder `<output>.training` keeps the scans and the state, so that an
+    interrupted training can be continued.
 
     Args:
         plan: cities, drives and steps.
@@ -517,7 +559,8 @@ def make_weights(
         track: reports progress.
 
     Returns:
-        The picture of the curve, `<output>` with the ending `.png`.
+        Path of the picture of the training curve: `output` with the ending
+        `.png`.
 
     Raises:
         InputError: JAX is not installed, a file cannot be written, or cities

@@ -60,9 +60,17 @@ _OVERLAP_POINTS = 1000
 class DrawnCity:
     """A city with its drives, all drawn from a seed.
 
-    `map_name` is the shipped map whose streets the city has, or
-    `DRAWN_STREETS`. With `graded`, the overlap of each scan with the places of
-    the other scans is computed.
+    Attributes:
+        map_name: the shipped map whose streets the city has, or `DRAWN_STREETS`
+            for streets drawn at random.
+        seed: seed of the training.
+        number: number of the city in the training.
+        num_drives: number of drives along one route.
+        change: whether drives see different stages and temporary changes.
+        returns: whether some drives have calibrated returns and weather.
+        driver: whether drivers wander and change lanes.
+        graded: whether the overlap of each scan with the places of the other
+            scans is computed.
     """
 
     map_name: str
@@ -76,7 +84,7 @@ class DrawnCity:
 
     @property
     def city_seed(self) -> int:
-        """Seed of the city without its drives."""
+        """Seed from which the city is generated; drives do not depend on it."""
         return _FIRST_SEED + self.seed * _MOST_CITIES + self.number
 
     def write(self, folder: Path) -> None:
@@ -102,7 +110,11 @@ class DrawnCity:
             generate_city(draft)
 
     def drives(self, folder: Path) -> list[Scenario]:
-        """Returns the drives through the city."""
+        """Returns the drives through the city.
+
+        Args:
+            folder: folder to which `write` has written the map.
+        """
         rng = self._rng(1)
         drawn = self.map_name == DRAWN_STREETS
         source = MapFolder(shipped_maps()[_CAR_OF if drawn else self.map_name])
@@ -155,12 +167,18 @@ class DrawnCity:
 def scan_city(
     reporter: Reporter, drawn: DrawnCity, folder: Path
 ) -> dict[str, np.ndarray]:
-    """Simulates the drives of a city; nothing is recorded.
+    """Simulates the drives through a city, without recording them.
+
+    Args:
+        reporter: reports progress.
+        drawn: the city.
+        folder: folder in which the map of the city is written.
 
     Returns:
-        `images` (N, RINGS, SECTORS, CHANNELS) uint8, `xy` (N, 2) places of the
-        sensors [m], `drives` (N,) number of the drive, and, for a graded city,
-        `overlaps` (N, N) float16, see `_overlaps`.
+        `images` (N, RINGS, SECTORS, CHANNELS) uint8 polar images of the scans,
+        `xy` (N, 2) positions of the sensors [m] and `drives` (N,) number of
+        each scan's drive. For a graded city also `overlaps` (N, N) float16, the
+        share of each scan that is visible from the place of each other scan.
     """
     images, xy, numbers = [], [], []
     taken: list[_Taken] = []
@@ -230,7 +248,7 @@ def _overlaps(scans: Sequence[_Taken], reporter: Reporter) -> np.ndarray:
 
 
 def draw_streets(rng: np.random.Generator) -> dict[str, Any]:
-    """Returns the content of a `roads.yaml` that no map has.
+    """Returns the content of a `roads.yaml` with random streets.
 
     Streets run along the lines of a bent grid with random spacings; the whole
     grid has a random orientation. Some cross streets are missing, others are
@@ -288,12 +306,14 @@ def draw_streets(rng: np.random.Generator) -> dict[str, Any]:
 
 
 def draw_stages(city: City, rng: np.random.Generator) -> dict[str, dict]:
-    """Returns random stages: buildings are missing or lower, trees smaller.
+    """Returns random stages of a city, as the content of `stages.yaml`.
 
-    The last stage is the whole city.
+    Before the last stage, which is the whole city, buildings are missing or
+    lower, and trees are smaller.
 
-    Returns:
-        The content of `stages.yaml`.
+    Args:
+        city: the city.
+        rng: random generator.
     """
     buildings = [s for s in city.structures if s.semantic_class == "building"]
     trees = [s for s in city.structures if s.name.startswith("tree_")]

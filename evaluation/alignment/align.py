@@ -75,12 +75,14 @@ class AlignmentReport:
     Attributes:
         held: name of the drive that stays fixed; its world is the common one.
         moved: name of the other drive.
-        frames: names of the original world frames of both drives.
+        frames: names of the original world frames of the fixed and of the moved
+            drive.
         guess: source of the first guess.
-        candidates: pairs of places that look alike; None if not needed.
-        attempts: registrations tried.
-        loops: registrations that fit.
-        inliers: loops that agree with the result.
+        candidates: number of pairs of places that look alike; None if they were
+            not needed for the guess.
+        attempts: number of registrations that were tried.
+        loops: number of registrations that fit; each is a loop.
+        inliers: number of loops that agree with the result.
         distance_median: median distance between inliers and result [m].
         distance_95: distance below which 95 % of the inliers lie [m].
         angle_median_deg: median angle between inliers and result [deg].
@@ -90,9 +92,9 @@ class AlignmentReport:
         turn_deg: angle by which that frame was turned about the vertical [deg].
         bend: greatest difference between the move of a frame and that of the
             middle frame [m].
-        straightened: upper quartile of the errors of the drives' loops with
-            themselves, before the drives were straightened [m]; 0 if they were
-            not straightened.
+        straightened: for the fixed and the moved drive, the error where the
+            drive passes a place again (upper quartile), before this error was
+            corrected [m]; 0 for a drive that was not corrected.
         ground: height of the ground that was subtracted from both drives'
             heights [m].
     """
@@ -380,14 +382,14 @@ def _motion(X_WS: np.ndarray, X_TS: np.ndarray) -> dict:
 
 
 def make_consistent(drive: Drive, track: Track) -> tuple[Submaps, float]:
-    """Returns a drive's submaps, with poses that agree with its own loops.
+    """Returns a drive's submaps, with poses that are corrected for drift.
 
-    If the drive has drifted, its poses are corrected so that they agree at
-    places that it passes more than once.
+    The poses of a drive that has drifted are corrected so that they agree at
+    places which the drive passes more than once.
 
     Returns:
-        The submaps; and the error of the drive's loops with itself before the
-        correction, see `AlignmentReport.straightened`.
+        The submaps; and the error at such places before the correction (upper
+        quartile) [m], or 0 without a correction.
 
     Raises:
         InputError: if a scan cannot be read.

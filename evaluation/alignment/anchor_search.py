@@ -63,7 +63,7 @@ class Ties:
     Attributes:
         i: (M,) index of the first pose.
         j: (M,) index of the second pose.
-        Z: (M, 4, 4).
+        Z: (M, 4, 4) measured relative poses.
         covariance: (M, 6, 6) covariance of a small motion applied to Z from the
             left: rotation [rad], then translation [m].
         is_doubtful: whether the ties may be wrong.
@@ -76,7 +76,11 @@ class Ties:
     is_doubtful: bool
 
     def errors(self, V: np.ndarray) -> np.ndarray:
-        """Returns the errors (M, 6) of the measured relative poses [rad, m]."""
+        """Returns the errors (M, 6) of the measured relative poses [rad, m].
+
+        Args:
+            V: (N, 4, 4) poses to which `i` and `j` refer.
+        """
         E = poses.inverse(V[self.i]) @ V[self.j] @ poses.inverse(self.Z)
         turn = Rotation.from_matrix(E[:, :3, :3]).as_rotvec()
         return np.concatenate([turn, E[:, :3, 3]], axis=1)
@@ -85,17 +89,18 @@ class Ties:
 def optimise(
     V: np.ndarray, all_ties: list[Ties], num_held: int = 0
 ) -> np.ndarray:
-    """Returns poses that fit the ties best, by least squares.
+    """Returns poses that fit measured relative poses best, by least squares.
 
-    Gauss-Newton on SE(3) with sparse normal equations, as in Grisetti et al.,
-    "A tutorial on graph-based SLAM" (2010). Ties that may be wrong are weighted
-    by Cauchy's kernel, whose width shrinks step by step to its final value
-    (graduated non-convexity), so that a poor start does not decide which ties
-    count as right.
+    The method is Gauss-Newton on SE(3) with sparse normal equations, as in
+    Grisetti et al., "A tutorial on graph-based SLAM" (2010). Measurements
+    (ties) that may be wrong are weighted by Cauchy's kernel, whose width
+    shrinks step by step to its final value (graduated non-convexity), so that a
+    poor start does not decide which measurements count as right.
 
     Args:
         V: (N, 4, 4) poses from which the optimisation starts.
-        all_ties: the ties, which together must determine every pose.
+        all_ties: the measured relative poses, which together must determine
+            every pose.
         num_held: number of fixed poses; these are the last ones.
     """
     information = [np.linalg.inv(ties.covariance) for ties in all_ties]
@@ -185,7 +190,7 @@ class Guess:
 
     Attributes:
         X_TS: (4, 4) pose, whose z axis is vertical.
-        pairs: indices of the candidates that agree.
+        pairs: (A,) indices of the candidates that agree.
     """
 
     X_TS: np.ndarray
@@ -236,8 +241,8 @@ def find_candidates(
 def find_guesses(candidates: Candidates) -> list[Guess]:
     """Returns the guesses with the most agreeing candidates, best first.
 
-    Each is the consensus of two pairs, refined with all agreeing pairs. A pair
-    that agrees with one guess does not vote for the next.
+    A guess is computed from two candidates, and refined with all candidates
+    that agree with it. These candidates are not used for further guesses.
     """
     trials = _trials(candidates)
     is_left = np.ones(len(candidates.turn), dtype=bool)
@@ -375,9 +380,10 @@ def fit_bent(
 
     Args:
         loops: one or more loops (M) from the source to a target.
-        X_TL: poses of the target's keyframes in its world.
+        X_TL: (L, 4, 4) poses of the target's keyframes in its world T.
         source: the drive.
-        X_TS: (4, 4) anchor to start from.
+        X_TS: (4, 4) pose of the source's world in T, from which the
+            optimisation starts.
     """
     ties = _loop_ties(loops)
     ties = replace(ties, i=len(source) + ties.i)
@@ -400,7 +406,13 @@ def straighten(loops: list[Loop], drive: Submaps) -> np.ndarray:
 def agreeing(
     loops: list[Loop], X_TL: np.ndarray, X_TK: np.ndarray
 ) -> np.ndarray:
-    """Returns which loops agree with the poses, (M,) bool."""
+    """Returns which loops agree with given poses of the keyframes, (M,) bool.
+
+    Args:
+        loops: the M loops.
+        X_TL: (L, 4, 4) poses of the target's keyframes.
+        X_TK: (K, 4, 4) poses of the source's keyframes.
+    """
     distances, angles = loop_errors(loops, X_TL, X_TK)
     return (distances < AGREEMENT[0]) & (angles < AGREEMENT[1])
 

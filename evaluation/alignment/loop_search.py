@@ -96,7 +96,15 @@ def loop_errors(
 
 
 def implied_poses(loops: list[Loop], X_WL: np.ndarray) -> np.ndarray:
-    """Returns, per loop, the pose X_WK that it implies: (M, 4, 4)."""
+    """Returns the pose of each loop's source keyframe, as the loop measures it.
+
+    Args:
+        loops: the M loops.
+        X_WL: (L, 4, 4) poses of the target's keyframes.
+
+    Returns:
+        (M, 4, 4) poses X_WK.
+    """
     X_LK = np.array([loop.X_LK for loop in loops]).reshape(-1, 4, 4)
     return X_WL[[loop.target for loop in loops]] @ X_LK
 
@@ -122,12 +130,17 @@ class LoopSearch:
     def near(self, X_TK: np.ndarray) -> np.ndarray:
         """Returns the source's keyframes (M,) that are near the target drive.
 
-        `X_TK` has the guessed poses (K, 4, 4) of all keyframes.
+        Args:
+            X_TK: (K, 4, 4) guessed poses of all keyframes of the source.
         """
         return np.flatnonzero([self._place(X) is not None for X in X_TK])
 
     def attempt(self, k: int, X_TK: np.ndarray) -> bool:
-        """Registers the source's keyframe k to the target, from a guess X_TK.
+        """Registers one keyframe of the source to the target.
+
+        Args:
+            k: number of the keyframe.
+            X_TK: (4, 4) guess of its pose.
 
         Returns:
             Whether a loop was found.
@@ -145,9 +158,10 @@ class LoopSearch:
         return True
 
     def grow(self, track: Track) -> None:
-        """Tries all keyframes, outwards along the path from known loops.
+        """Tries to register all keyframes, outwards from known loops.
 
-        Each keyframe is first moved like the nearest keyframe that has a loop.
+        The guess for a keyframe follows from the nearest keyframe that has a
+        loop and the drive's own motion between the two.
         """
         path = self.source.path
         away = np.full(len(path), np.inf)

@@ -75,7 +75,7 @@ class Registration:
     """The pose of a cloud S on a cloud T, and its fit.
 
     Attributes:
-        X_TS: (4, 4).
+        X_TS: (4, 4) pose of S in T.
         fitness: share of a cloud's points that have a counterpart in the other
             cloud. It is the greater share of the two clouds, because one of
             them may show much that was built or torn down in between.

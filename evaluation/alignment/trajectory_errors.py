@@ -171,7 +171,9 @@ def trajectory_errors(
 
 
 def aligned_offsets(p: np.ndarray, q: np.ndarray) -> np.ndarray:
-    """Returns distances (N,) of true and estimated positions, aligned [m].
+    """Returns the distances (N,) of estimated positions from true ones [m].
+
+    The estimated positions are first moved and turned so that they fit best.
 
     Args:
         p: (N, 3) true positions [m].

@@ -51,11 +51,11 @@ class Surveyed:
 
     Attributes:
         name: name of the drive or file.
-        voxels: the map in cells of `CELL_SIZE`, which are merged into the
-            voxels of the TCR on any grid.
+        voxels: the map in voxels of 1 m, from which the larger voxels of the
+            TCR are made.
         positions: (N, 3) positions of the sensor [m]; None for a map file.
-        drive: the drive, or only its names of world frame and map; None for a
-            map file.
+        drive: the drive, or an object with the names of its world frame and
+            map; None for a map file.
         notes: notes on how the drive or the file was read.
     """
 
@@ -74,11 +74,11 @@ class ChangeReport:
         source: name of A.
         target: name of B.
         change: change over the whole maps.
-        spread: least and greatest TCR_sym over the default grid and `GRIDS`.
+        spread: least and greatest TCR_sym if the grid of voxels is shifted.
         masked: change over the parts that both drives passed within the
             coverage radius; None if a map has no drive.
-        control: change between two drives on the two routes in one stage; None
-            if no control was given.
+        control: apparent change between two drives in the same stage, one on
+            A's route and one on B's; None if it was not measured.
         control_names: names of the two drives that `control` compares.
         alignment: alignment of A and B; None if they were in one world already.
     """
@@ -157,7 +157,8 @@ def survey_in_one_world(
     Args:
         paths: paths of drives or map files; map files must be in the common
             world.
-        when: whether later drives are aligned with the first one.
+        when: whether all other drives are aligned with the first one: `auto`
+            (if their world frames differ), `always` or `never`.
         track: reports progress.
         lidar: name of the LiDAR, for recordings with several.
         columns: number of columns of `.bin` files; by default guessed from the
@@ -208,10 +209,10 @@ def compare(
     Args:
         source: the map A.
         target: the map B.
-        control: a drive on A's route in B's stage, or on B's route in A's
-            stage; which of the two follows from its route. The control is
-            compared with the drive of its own stage. That comparison contains
-            both routes but no change.
+        control: a drive on A's route in B's stage, which is compared with B; or
+            a drive on B's route in A's stage, which is compared with A. The
+            result shows the effect of the routes without a change of the city.
+            None leaves it out.
         alignment: alignment of A and B, for the report.
         grids: shifts of the grid [m] over which `spread` is taken.
 
@@ -339,7 +340,13 @@ def _summary(change: TemporalChange) -> dict:
 
 @dataclass(frozen=True)
 class ChangeResult:
-    """The change between two stages of a map."""
+    """The change between two stages of a map.
+
+    Attributes:
+        map_name: name of the map.
+        stages: names of the earlier and the later stage.
+        report: the change.
+    """
 
     map_name: str
     stages: tuple[str, str]
@@ -349,7 +356,10 @@ class ChangeResult:
 def symmetric_changes(
     changes: Iterable[ChangeResult],
 ) -> dict[tuple[str, str, str], float]:
-    """Returns TCR_sym by map and two stages, in either order of the stages."""
+    """Returns (map, stage, other stage) -> TCR_sym.
+
+    Each pair of stages is contained in both orders.
+    """
     values = {}
     for result in changes:
         value = result.report.change.symmetric

@@ -3,8 +3,9 @@
 Source: "The City that Never Settles", equations 1 to 3. The paper leaves the
 following choices open; this module makes them.
 
-- X is the map of a whole drive in world coordinates, as the centroids of
-  the voxels of a grid that is fixed in the world (see `evaluation.maps`).
+- X is the map of a whole drive in world coordinates, as the centroids of the
+  voxels of a grid that is fixed in the world (see
+  `evaluation.maps.voxel_maps`).
 - TCR_sym changes if that grid is shifted. The least and the greatest value over
   `GRIDS`, shifts that are spread evenly over a voxel, show by how much.
 - The hull is widened by `HULL_MARGIN` on all sides. Flat ground is a face of
@@ -129,7 +130,7 @@ def _is_flat(
 
 @dataclass(frozen=True)
 class DirectedChange:
-    """The part of one map (the source) that is missing in another (the target).
+    """Which points of a map, the source, are unchanged in another, the target.
 
     Attributes:
         in_hull: (N,) bool, the set H: source points in the target's hull.
@@ -250,7 +251,7 @@ def temporal_change(
         source: (N, 3) float64 voxel centroids, in the common world frame [m].
         target: (M, 3) float64 voxel centroids of the other map [m].
         tau: distance up to which a point is unchanged, inclusive [m].
-        margin: margin of the hulls, see `in_convex_hull` [m].
+        margin: distance by which the convex hulls are widened [m].
         restrict_to_hull: whether O is counted inside H. False is the literal
             equation 2, under which values may be negative.
 

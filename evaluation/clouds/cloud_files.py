@@ -449,7 +449,7 @@ def _read_ply_header(path: Path) -> tuple[str, list[_Element], int]:
 
 
 def no_note(note: str) -> None:
-    """Does nothing with a note for the user."""
+    """Ignores a note for the user: the default where no notes are wanted."""
 
 
 def read_cloud(

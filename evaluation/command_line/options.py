@@ -95,7 +95,14 @@ def open_noted(
 def aligned(
     drives: Sequence[Drive], when: When, *, across_maps: bool = False
 ) -> tuple[Drive, Drive]:
-    """Returns two drives in one world; shows a note if a drive was moved."""
+    """Returns two drives in one world; shows a note if a drive was moved.
+
+    Args:
+        drives: the two drives.
+        when: whether to align them: `auto` (if their world frames differ),
+            `always` or `never`.
+        across_maps: whether the drives may be of maps of different names.
+    """
     from evaluation.alignment import in_one_world
 
     first, second = drives
@@ -119,7 +126,13 @@ def show(
 
 
 def overlap_of(truth: str) -> float | None:
-    """Returns PART of `overlap:PART`; None for `radius`.
+    """Returns the least overlap of a match, from the option --truth.
+
+    Args:
+        truth: `radius` or `overlap:PART`.
+
+    Returns:
+        PART, from above 0 to 1; None for `radius`.
 
     Raises:
         InputError: the text is neither.

@@ -55,7 +55,11 @@ class CnsFolderDrive(FileDrive):
     """
 
     def __init__(self, path: Path, columns: int | None = None):
-        """Opens a drive; PCD files themselves name their columns.
+        """Opens a drive.
+
+        Args:
+            path: its folder.
+            columns: has no effect, because PCD files name their columns.
 
         Raises:
             InputError: there is no such drive, or its poses cannot be used.

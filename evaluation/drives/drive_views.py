@@ -54,7 +54,8 @@ class MovedDrive(DriveView):
             drive: drive of N scans.
             X_WS: (N, 4, 4) new poses of the LiDAR in the world.
             world_frame: name of W.
-            datum: see `Drive.datum`.
+            datum: name of the survey grid in which W lies; None if there is
+                none.
         """
         super().__init__(drive)
         self.world_frame = world_frame

@@ -73,8 +73,8 @@ class HeliprDrive(FileDrive):
     """The scans of one LiDAR of HeLiPR on a drive.
 
     If there is a `global_*_gt.txt`, W is the UTM grid with a nearer origin (see
-    `scan_files.to_world`). Otherwise W is the frame of the drive's own
-    `*_gt.txt`. Points without a return are left out.
+    `evaluation.drives.scan_files.to_world`). Otherwise W is the frame of the
+    drive's own `*_gt.txt`. Points without a return are left out.
     """
 
     def __init__(self, path: Path, lidar: str | None = None):
@@ -112,9 +112,13 @@ class HeliprDrive(FileDrive):
 
 
 def read_scan(lidar: str, path: Path, stamp_ns: int = 2**63) -> np.ndarray:
-    """Returns the points (N,) of a scan file of a LiDAR.
+    """Returns the points of a scan file as a structured array (N,).
 
-    Aeva's format depends on the time of the scan [ns].
+    Args:
+        lidar: name of the LiDAR: `Ouster`, `Velodyne`, `Avia` or `Aeva`.
+        path: the file.
+        stamp_ns: time of the scan [ns], on which the format of the Aeva
+            depends.
 
     Raises:
         ValueError: if the file is not of that LiDAR.

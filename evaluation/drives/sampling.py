@@ -2,8 +2,8 @@
 
 - Places d metres apart: frame i is a place when the length of the path so far
   first reaches a multiple of d. The first frame is a place.
-- Points are limited to a range, 100 m in the paper: each of x, y, z in the
-  frame of the sensor.
+- Points are limited to a range, 100 m in the paper. It is the greatest absolute
+  value of x, y and z in the frame of the sensor.
 """
 
 from __future__ import annotations
@@ -25,7 +25,7 @@ _LEAST_SPACING = 1e-6
 
 @dataclass(frozen=True, eq=False)
 class QuerySensor:
-    """A sensor Q that replaces the recorded sensor S in a query.
+    """A turned sensor Q that replaces the recorded sensor S in a query.
 
     Both are at the same position.
 
@@ -50,10 +50,8 @@ class QuerySensor:
     ) -> QuerySensor:
         """Draws a query's random turn, tilt and hidden sector.
 
-        The draw depends on the frame's number but not on the drive, so that a
-        query of a drive and the same query of its control are turned alike. The
-        draw of each effect does not depend on whether the other effects are
-        used.
+        The result depends on the frame's number but not on the drive, so that
+        queries at the same frames of two drives are turned alike.
 
         Args:
             seed: seed of the draws.
@@ -127,18 +125,19 @@ def gather(
     num_before: int = 0,
     sensor: QuerySensor | None = None,
 ) -> np.ndarray:
-    """Returns the cloud that a method describes at a frame.
+    """Returns the point cloud at a frame: one scan, or several scans merged.
 
     Args:
         drive: the drive.
-        frame: frame of the described place.
+        frame: number of the frame.
         num_scans: number of consecutive scans that are merged; fewer at the
             ends of the drive.
-        max_range: see `within_range`.
-        fields: fields of the points, beside their coordinates.
+        max_range: greatest absolute x, y and z of a point in the sensor's frame
+            [m].
+        fields: names of further fields of the points, besides x, y and z.
         num_before: how many of the scans come before the frame.
-        sensor: sensor by which the frame's sensor is turned and a sector of
-            each merged scan is hidden; None for the cloud as recorded.
+        sensor: turn and hidden sector that are applied to the sensor; None for
+            the sensor as recorded.
 
     Returns:
         (N, 3) float64 points in the sensor's frame at that frame. If fields are
@@ -178,20 +177,17 @@ def cropped(
 ) -> np.ndarray:
     """Returns the points of a scan that are finite and within range.
 
-    Products and sums are computed one by one, because they are then rounded in
-    the same way on every processor; a matrix product is not.
-
     Args:
         scan: structured array (N,) in the frame S of a sensor.
-        max_range: see `within_range`, in the frame F of the cloud.
+        max_range: greatest absolute x, y and z of a point in F [m].
         X_FS: (4, 4) pose of the sensor in the frame F of the result; by default
             F is S.
-        fields: fields of the points, beside their coordinates.
-        source: name of the drive, for messages.
+        fields: names of further fields of the points, besides x, y and z.
+        source: name of the drive, for error messages.
 
     Returns:
-        (K, 3) float64 in F; with fields, a structured array (K,) of float64
-        x, y, z and the fields.
+        (K, 3) float64 in F; with fields, a structured array (K,) of float64 x,
+        y, z and the fields.
 
     Raises:
         InputError: if the scan lacks a field.
@@ -206,6 +202,8 @@ def cropped(
     p_F = clouds.xyz(scan)
     if X_FS is not None:
         x, y, z = p_F.T
+        # Unlike a matrix product, products and sums that are computed one by
+        # one are rounded in the same way on every processor.
         with np.errstate(invalid="ignore"):
             rows = [r[0] * x + r[1] * y + r[2] * z + r[3] for r in X_FS[:3]]
         p_F = np.stack(rows, axis=1)

@@ -24,7 +24,10 @@ _LIMITS = ((100_000.0, 900_000.0), (0.0, 10_000_000.0))
 
 
 def is_local(X_WB: np.ndarray) -> bool:
-    """Returns whether poses (N, 4, 4) are too near the origin for UTM."""
+    """Returns whether poses (N, 4, 4) are in local coordinates, not in UTM.
+
+    They are if all of them are near the origin.
+    """
     return bool((np.abs(X_WB[:, :2, 3]) < _LIMITS[0][0]).all())
 
 
@@ -83,9 +86,10 @@ class FileDrive(Drive):
             read: function that returns the points in the file of a scan,
                 unchanged. Its arguments are the file and the time of the scan
                 [ns]. It raises ValueError if the file has another format.
-            notes: see `Drive.notes`.
-            datum: see `Drive.datum`.
-            scenario: see `Drive.scenario`.
+            notes: notes for the user on how the drive was read.
+            datum: name of the survey grid in which W lies; None if there is
+                none.
+            scenario: see `evaluation.drives.Drive.scenario`.
             unit: name of the LiDAR's unit, if the data set has only one.
         """
         self.name = name
@@ -141,8 +145,9 @@ class BinDrive(FileDrive):
         """Describes a drive.
 
         Args:
-            columns: see `find_layout`.
-            drive: see `FileDrive`.
+            columns: number of float32 values per point; None to guess it from
+                the values.
+            drive: all arguments of `FileDrive` except `read`.
         """
         super().__init__(read=self._read_bin, **drive)
         self._columns = columns
@@ -170,7 +175,7 @@ def list_stamped(
     Args:
         folder: folder of the files.
         suffix: suffix of their names.
-        parse: function that returns the times [ns] of texts.
+        parse: function that converts an array of texts to times [ns].
 
     Returns:
         The files in order of time; (N,) int64 times [ns]; N >= 1.
@@ -196,7 +201,13 @@ def list_stamped(
 def keep_spanned(
     files: list[Path], spanned: np.ndarray, poses_path: Path
 ) -> tuple[list[Path], tuple[str, ...]]:
-    """Leaves out scan files before the first or after the last pose.
+    """Leaves out the scan files that lie outside the time of the poses.
+
+    Args:
+        files: files of N scans.
+        spanned: (N,) bool, whether a scan is between the first and the last
+            pose.
+        poses_path: file of the poses, for the note.
 
     Returns:
         The remaining files; a note if scans were left out.
@@ -228,9 +239,12 @@ def read_packed(path: Path, dtype: np.dtype) -> np.ndarray:
 
 
 def check_below(points: np.ndarray, name: str, limit: int) -> None:
-    """Raises an error for points whose field exceeds a sensor's limit.
+    """Raises an error if a field shows that a file is from another sensor.
 
-    The error shows that a file is from another sensor.
+    Args:
+        points: structured array (N,).
+        name: name of the field.
+        limit: number that the values of the sensor do not reach.
 
     Raises:
         ValueError: if `points[name]` reaches `limit`.

@@ -138,6 +138,11 @@ def parse_microseconds(texts: np.ndarray) -> np.ndarray:
 def check_increasing(path: Path, stamps_ns: np.ndarray, what: str) -> None:
     """Raises an error for times that do not increase.
 
+    Args:
+        path: file of the times, for the error message.
+        stamps_ns: (N,) int64 times [ns].
+        what: word for a row in the error message, such as `pose`.
+
     Raises:
         InputError: the times do not increase; the error names the first such
             row.
@@ -152,7 +157,7 @@ def check_increasing(path: Path, stamps_ns: np.ndarray, what: str) -> None:
 
 
 def check_finite(path: Path, values: np.ndarray) -> None:
-    """Raises an error for a table (N, width) with NaN or infinity.
+    """Raises an error for an array (N, width) that contains NaN or infinity.
 
     Raises:
         InputError: a number is not finite; the error names the first such row.
@@ -192,7 +197,7 @@ class Trajectory:
     Attributes:
         path: the file it comes from, for messages.
         stamps_ns: (N,) int64 [ns], strictly increasing.
-        X_WB: (N, 4, 4) float64.
+        X_WB: (N, 4, 4) float64 poses.
     """
 
     path: Path
@@ -248,10 +253,11 @@ class Trajectory:
 
         Args:
             stamps_ns: (M,) int64 [ns].
-            tolerance_ns: greatest difference of two equal times [ns].
+            tolerance_ns: greatest difference between a given time and that of a
+                stored pose [ns].
 
         Returns:
-            (M, 4, 4).
+            (M, 4, 4) poses.
 
         Raises:
             InputError: there is no pose at one of the times.
@@ -274,7 +280,7 @@ class Trajectory:
 
 
 def read_matrices(path: Path, separator: str | None) -> Trajectory:
-    """Returns a trajectory of rows with a time and a 3 x 4 matrix.
+    """Reads a trajectory: rows with a time and a 3 x 4 matrix.
 
     The matrix is the upper part of a pose, row by row.
 
@@ -291,15 +297,17 @@ def read_quaternions(
     separator: str | None,
     parse: Callable[[np.ndarray], np.ndarray] | None = None,
 ) -> Trajectory:
-    """Returns a trajectory of rows with a time, a position and a quat_xyzw.
+    """Reads a trajectory: rows with a time, x y z [m] and quaternion x y z w.
 
     Args:
         path: the file.
-        separator: see `read_stamped_rows`.
-        parse: see `read_stamped_rows`.
+        separator: text between columns; None for white space.
+        parse: function that converts an array of texts to times [ns]; by
+            default `parse_stamps_ns`.
 
     Raises:
-        InputError: like `read_matrices`.
+        InputError: if the table does not have that form, a quaternion is not of
+            unit length, or the poses are out of order.
     """
     stamps_ns, values = read_stamped_rows(path, 7, separator, parse)
     with np.errstate(over="ignore"):
@@ -316,7 +324,7 @@ def read_quaternions(
 
 
 def read_angles(path: Path, width: int) -> tuple[Trajectory, tuple[str, ...]]:
-    """Returns a trajectory of rows with a time, position and angles.
+    """Reads a trajectory: rows with a time, a position and three angles.
 
     Times are in microseconds, roll, pitch and yaw in radians.
 
@@ -331,7 +339,8 @@ def read_angles(path: Path, width: int) -> tuple[Trajectory, tuple[str, ...]]:
         left out because a number in them is NaN.
 
     Raises:
-        InputError: like `read_matrices`, except for NaN.
+        InputError: if the table does not have that form, or the poses are out
+            of order.
     """
     columns = [("stamp", "U40"), ("values", "f8", width)]
     rows = read_numbers(path, columns, ",")
@@ -358,7 +367,8 @@ def read_poses(path: Path) -> np.ndarray:
     """Returns poses (N, 4, 4) from rows with a 3 x 4 matrix, row by row.
 
     Raises:
-        InputError: like `read_numbers`, or a matrix is no rotation.
+        InputError: if there is no such table, it is empty, a row has another
+            length, or a matrix is no rotation.
     """
     values = read_numbers(path, float)
     if values.shape[1] != 12:
@@ -376,7 +386,8 @@ def pose_matrices(path: Path, values: np.ndarray) -> np.ndarray:
         values: (N, 12) numbers.
 
     Returns:
-        (N, 4, 4) with the rotations as they are in the text, rounded.
+        (N, 4, 4) poses. The rotations are as in the text, and exact only to its
+        digits.
 
     Raises:
         InputError: if a number is not finite or a matrix is no rotation.

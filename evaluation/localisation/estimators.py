@@ -86,7 +86,10 @@ class Settings:
     iterations: int = 50
 
     def with_values(self, values: Iterable[tuple[str, Any]]) -> "Settings":
-        """Returns the settings with some replaced; values are numbers or text.
+        """Returns the settings with other values of some of them.
+
+        Args:
+            values: pairs of a name and its value, a number or text.
 
         Raises:
             InputError: if a setting is unknown, or a value does not fit.
@@ -133,10 +136,13 @@ class LocalisationMap:
         return {}
 
     def voxels(self, resolution: float) -> small_gicp.GaussianVoxelMap:
-        """Returns the map as one Gaussian per voxel, for VGICP.
+        """Returns the map with one Gaussian per voxel, for VGICP.
 
-        The side of a voxel is `resolution` [m]. The frame is W, shifted by
-        `_voxel_shift`.
+        Its frame is W, shifted by a fraction of a voxel, so that walls and
+        ground at round coordinates do not lie on the border of voxels.
+
+        Args:
+            resolution: side of a voxel [m].
         """
         if resolution not in self._voxels:
             voxels = small_gicp.GaussianVoxelMap(resolution)
@@ -145,12 +151,21 @@ class LocalisationMap:
         return self._voxels[resolution]
 
     def around(self, p_W: np.ndarray, distance: float) -> np.ndarray:
-        """Returns the points (M, 3) in a box around a point [m]."""
+        """Returns the map points (M, 3) in a box around a position.
+
+        Args:
+            p_W: (3,) the position [m].
+            distance: half the side of the box [m].
+        """
         offsets = self.surface.points - p_W
         return self.surface.points[within_range(offsets, distance)]
 
     def distances(self, points_W: np.ndarray) -> np.ndarray:
-        """Returns each point's distance (N,) to the nearest map point [m]."""
+        """Returns the distances (N,) of points from the nearest map point [m].
+
+        Args:
+            points_W: (N, 3) the points [m].
+        """
         _, squares = self.surface.tree.batch_nearest_neighbor_search(points_W)
         return np.sqrt(np.asarray(squares))
 
@@ -179,8 +194,9 @@ def make_map(
         source: the drive, or the cloud's file.
         settings: settings for thinning and for normals.
         track: reports progress.
-        columns: see `read_cloud`, for a cloud's file.
-        on_note: see `read_cloud`.
+        columns: number of columns of a `.bin` file; by default guessed from the
+            values.
+        on_note: is called with notes on how a cloud's file was read.
 
     Raises:
         InputError: the source cannot be read, or has too few points.
@@ -216,9 +232,12 @@ def _scans(
 def map_of(
     points: np.ndarray, name: str, settings: Settings
 ) -> LocalisationMap:
-    """Returns a localisation map of points (M, 3) in W [m].
+    """Returns a localisation map made of points.
 
-    M must be at least `FEWEST_POINTS`.
+    Args:
+        points: (M, 3) points in W [m], at least `FEWEST_POINTS`.
+        name: name of the map.
+        settings: settings for thinning and for normals.
     """
     surface = make_surface(points, settings.neighbours)
     return LocalisationMap(name, surface)
@@ -257,8 +276,8 @@ class Fit:
             pairs [m]; NaN without a pair.
         covariance: (6, 6) covariance of a small motion about the LiDAR, in axes
             of W: turn [rad], move [m]. It is the inverse Hessian of the
-            point-to-plane error times the square of the residual. What the
-            noise of the normals adds to the Hessian is subtracted first.
+            point-to-plane error, corrected for the noise of the normals, times
+            the square of the residual.
     """
 
     share: float
@@ -267,7 +286,13 @@ class Fit:
 
 
 def judge(surface: Surface, scan: np.ndarray, X_WS: np.ndarray) -> Fit:
-    """Returns how well a scan (N, 3) in S fits a map at a given pose."""
+    """Returns how well a scan fits a map at a given pose.
+
+    Args:
+        surface: surface of the map.
+        scan: (N, 3) points in the LiDAR's frame S [m].
+        X_WS: (4, 4) the pose.
+    """
     p_W = poses.transform(X_WS, scan)
     found, squares = surface.tree.batch_nearest_neighbor_search(p_W)
     is_pair = np.asarray(squares) < _PAIR**2
@@ -437,15 +462,16 @@ _DEFAULTS = {
 
 
 def default_settings(method: str) -> Settings:
-    """Returns the settings of a method."""
+    """Returns the default settings of a shipped method."""
     return _DEFAULTS.get(method, Settings())
 
 
 def make_estimator(method: str, settings: Settings) -> Estimator:
-    """Returns an estimator.
+    """Returns the function that registers a scan by a given method.
 
     Args:
-        method: one of `METHODS`, or the name of a Python file.
+        method: a shipped method, one of `METHODS`, or the path of a Python
+            file.
         settings: settings of a shipped method. A file with a method of your own
             contains its settings.
 
@@ -491,7 +517,12 @@ def make_estimator(method: str, settings: Settings) -> Estimator:
 
 
 def thinned(measured: np.ndarray, settings: Settings, where: str) -> np.ndarray:
-    """Returns a scan (N, 3) with at most one point per voxel.
+    """Returns a scan with at most one point per voxel, (M, 3).
+
+    Args:
+        measured: (N, 3) points of the scan [m].
+        settings: settings with the side of a voxel, `scan_voxel`.
+        where: name of the scan, for the error message.
 
     Raises:
         InputError: too few points are left.

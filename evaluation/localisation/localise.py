@@ -120,11 +120,12 @@ class Starts:
             raise InputError(f"--seed: {self.seed} is below 0")
 
     def draw(self, frame: int) -> tuple[np.ndarray, np.ndarray]:
-        """Returns the error of a frame's initial pose, equal for all methods.
+        """Returns the random error of a frame's initial pose.
 
         Returns:
             (3,) offset of the position in W, in a random direction [m]; (3,)
-            turn about a random axis, as a rotation vector in S [rad].
+            turn about a random axis, as a rotation vector in S [rad]. Both
+            depend only on the seed and the frame.
         """
         rng = np.random.default_rng([self.seed, frame])
         offset, axis = rng.normal(size=(2, 3))
@@ -135,10 +136,16 @@ class Starts:
 
 
 class OneScan(FileDrive):
-    """A point cloud as a drive of one scan, at the origin of its world."""
+    """A point cloud that is read as a drive: one scan at the origin of W."""
 
     def __init__(self, path: Path, columns: int | None = None):
-        """Reads the cloud, with its columns if it is a `.bin` file."""
+        """Opens the point cloud.
+
+        Args:
+            path: its file.
+            columns: number of columns of a `.bin` file; by default guessed from
+                the values.
+        """
         notes: list[str] = []
         scan = read_cloud(path, columns, notes.append)
         super().__init__(
@@ -165,6 +172,14 @@ def mapped_frames(
 ) -> np.ndarray:
     """Returns which frames of a query drive lie within the map, (N,) bool.
 
+    A frame lies within the map if it is at most `NEAR` [m] from the map's drive
+    or, if the map is a file, from a point of the map.
+
+    Args:
+        place: drive or file from which the map was made.
+        surroundings: the map.
+        query: the query drive.
+
     Raises:
         InputError: no frame lies within the map.
     """
@@ -186,9 +201,9 @@ def mapped_frames(
 
 
 def way_axes(p_WS: np.ndarray, X_WS: np.ndarray) -> np.ndarray:
-    """Returns rotations R_WT (N, 3, 3) to axes along, left of and above a path.
+    """Returns the axes of a path at N poses, as rotations R_WT (N, 3, 3).
 
-    Columns point along the path, to its left, and up.
+    The columns of a rotation point along the path, to its left, and up.
 
     Args:
         p_WS: (N, 3) positions of a drive [m].
@@ -215,7 +230,8 @@ class Localiser:
 
     Attributes:
         surroundings: the map.
-        estimator: see `make_estimator`.
+        estimator: function that registers a scan, see
+            `evaluation.localisation.estimators.make_estimator`.
         settings: settings for thinning scans.
     """
 
@@ -240,16 +256,16 @@ class Localiser:
             frame: number of the scan.
             stamp_ns: time of the scan [ns].
             scan: structured array, in S.
-            X_WS: the true pose.
-            R_WT: see `way_axes`.
-            offset: (3,) offset of the initial from the true position, in W [m].
+            X_WS: (4, 4) true pose.
+            R_WT: (3, 3) axes of the path: along, to the left, and up.
+            offset: (3,) vector from the true to the initial position, in W [m].
             turn: (3,) rotation vector from the true to the initial orientation,
                 in S [rad].
             X_WS0: the initial pose; by default it follows from `offset` and
                 `turn`.
 
         Returns:
-            A record of `QUERY`; the estimated X_WS, or None.
+            A record of `QUERY`; and the estimated pose X_WS (4, 4), or None.
 
         Raises:
             InputError: the scan has too few points.
@@ -315,7 +331,7 @@ def localise(
         track: reports progress.
 
     Returns:
-        (K,) of `QUERY`, in the order of the frames.
+        (K,) records of `QUERY`, in the order of the frames.
 
     Raises:
         InputError: a scan cannot be read, or has too few points.
@@ -357,7 +373,13 @@ def is_right(
     translation: float = RIGHT_TRANSLATION,
     rotation_deg: float = RIGHT_ROTATION_DEG,
 ) -> np.ndarray:
-    """Returns which results are within limits of the error, (K,) bool."""
+    """Returns which results have errors within given limits, (K,) bool.
+
+    Args:
+        rows: (K,) results, records of `QUERY`.
+        translation: greatest error of the position [m].
+        rotation_deg: greatest error of the orientation [deg].
+    """
     return (rows["translation_error"] <= translation) & (
         rows["rotation_error_deg"] <= rotation_deg
     )
@@ -372,9 +394,12 @@ def _believed_from(rows: np.ndarray) -> float:
 
 
 def summary(rows: np.ndarray) -> dict[str, float | int | None]:
-    """Returns a summary of results (K,) of `QUERY`, for JSON.
+    """Returns a summary of localised scans, for JSON.
 
     Success rates count all queries; quantiles count queries with a pose.
+
+    Args:
+        rows: (K,) results, records of `QUERY`.
     """
     right = is_right(rows)
     posed = rows[~np.isnan(rows["translation_error"])]
@@ -424,7 +449,12 @@ def summary(rows: np.ndarray) -> dict[str, float | int | None]:
 
 
 def numbers(rows: np.ndarray, method: str) -> Iterator[Number]:
-    """Yields the numbers of the summary that go into tables of results."""
+    """Yields the numbers of a method's results that go into `results.csv`.
+
+    Args:
+        rows: (K,) results, records of `QUERY`.
+        method: name of the method.
+    """
     found = summary(rows)
     for name in _SHOWN:
         if (value := found[name]) is not None:
@@ -432,7 +462,11 @@ def numbers(rows: np.ndarray, method: str) -> Iterator[Number]:
 
 
 def columns(rows: np.ndarray) -> dict[str, np.ndarray]:
-    """Returns the columns of `queries.csv` of results (K,) of `QUERY`."""
+    """Returns the columns of `queries.csv` from results: name -> (K,) values.
+
+    Args:
+        rows: (K,) results, records of `QUERY`.
+    """
     scores = rows["own_score"]
     return {
         "query_frame": rows["frame"],
@@ -447,7 +481,7 @@ def columns(rows: np.ndarray) -> dict[str, np.ndarray]:
 
 
 def write_rows(rows: np.ndarray, path: Path) -> None:
-    """Writes the result of each query as CSV; unknown numbers are empty."""
+    """Writes results as CSV, one row per query; unknown numbers are empty."""
     cells = (
         [
             ""
@@ -463,7 +497,16 @@ def write_rows(rows: np.ndarray, path: Path) -> None:
 def query_frames(
     query: Drive, is_mapped: np.ndarray, spacing: float
 ) -> list[int]:
-    """Returns frames of a query drive within the map, `spacing` apart [m]."""
+    """Returns the frames of a query drive that are localised in the map.
+
+    Args:
+        query: the drive of N frames.
+        is_mapped: (N,) bool, whether a frame lies within the map.
+        spacing: distance driven between two chosen frames [m].
+
+    Returns:
+        Increasing frame numbers, at least one.
+    """
     frames = sample_frames(query.X_WS[:, :3, 3], spacing)
     chosen = frames[is_mapped[frames]]
     # A short pass through the map may lie between two sampled frames.

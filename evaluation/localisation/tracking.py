@@ -83,7 +83,7 @@ def track_drive(
     Args:
         localiser: the map and the estimator.
         query: the drive.
-        is_mapped: (N,) see `mapped_frames`.
+        is_mapped: (N,) bool, which frames lie within the map.
         starts: how the initial pose of a section's first scan is drawn.
         drift: see `drifting_steps`.
         track: reports progress.
@@ -151,10 +151,16 @@ def track_drive(
 
 
 def losses(tracked: np.ndarray) -> list[tuple[float, bool]]:
-    """Returns, for each loss, its length [m] and whether it ended.
+    """Returns how far the track was lost, each time that it was lost.
 
-    The length is that of the path from the loss to the next scan with an error
-    of at most `LOST`, or else to the end of the mapped section.
+    The track is lost while the position is off by more than `LOST`.
+
+    Args:
+        tracked: records of `TRACKED`.
+
+    Returns:
+        For each loss, the length of path [m] until the track was found again,
+        and true; or the length until the end of the mapped section, and false.
     """
     found = []
     for stretch in np.unique(tracked["stretch"]):
@@ -170,7 +176,13 @@ def losses(tracked: np.ndarray) -> list[tuple[float, bool]]:
 
 
 def summary(tracked: np.ndarray) -> dict[str, float | int | None]:
-    """Returns a summary of records of `TRACKED`, weighted by path length."""
+    """Returns a summary of a tracked drive, for JSON.
+
+    Shares of the drive are shares of its length.
+
+    Args:
+        tracked: records of `TRACKED`.
+    """
     way = float(tracked["step"].sum())
     within = tracked["translation_error"] <= RIGHT_TRANSLATION
     found = losses(tracked)

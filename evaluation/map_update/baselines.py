@@ -62,7 +62,7 @@ _BLOCK, _PART, _AT = 1.0, 0.2, 0.12
 
 
 def run_baseline(name: str, pair: Pair, track: Track = silent) -> Labels:
-    """Returns a change detector's labels of both maps.
+    """Returns the labels of both maps by a shipped change detector.
 
     Raises:
         InputError: the sessions lack data that the detector needs, or its
@@ -80,7 +80,13 @@ def run_baseline(name: str, pair: Pair, track: Track = silent) -> Labels:
 def by_distance(
     mine: Session, theirs: Session, track: Track = silent
 ) -> np.ndarray:
-    """Returns labels (N,) of a map's points by distance from the other map."""
+    """Returns the labels (N,) uint8 of a map by the baseline `distance`.
+
+    Args:
+        mine: the map with N points, and its drive.
+        theirs: the map of the other drive.
+        track: reports progress.
+    """
     _, kept, changed = SIDES[mine.side]
     far = np.isinf(nearest(mine.points, theirs.points, _APART))
     return np.where(far, changed, kept).astype(np.uint8)
@@ -89,7 +95,13 @@ def by_distance(
 def by_free_space(
     mine: Session, theirs: Session, track: Track = silent
 ) -> np.ndarray:
-    """Returns labels (N,) of a map by the baseline `free-space`."""
+    """Returns the labels (N,) uint8 of a map by the baseline `free-space`.
+
+    Args:
+        mine: the map with N points, and its drive.
+        theirs: the map of the other drive.
+        track: reports progress.
+    """
     unobserved, kept, changed = SIDES[mine.side]
     _check_scans(theirs)
     labels = np.full(len(mine.points), kept, np.uint8)
@@ -177,7 +189,13 @@ def _slopes(p_S: np.ndarray) -> np.ndarray:
 def by_m3c2(
     mine: Session, theirs: Session, track: Track = silent
 ) -> np.ndarray:
-    """Returns labels (N,) of a map by the method M3C2 of py4dgeo."""
+    """Returns the labels (N,) uint8 of a map by the baseline `m3c2`.
+
+    Args:
+        mine: the map with N points, and its drive.
+        theirs: the map of the other drive.
+        track: reports progress.
+    """
     py4dgeo = _py4dgeo()
     unobserved, kept, changed = SIDES[mine.side]
     epochs = [py4dgeo.Epoch(one.points) for one in (mine, theirs)]

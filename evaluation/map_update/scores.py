@@ -5,10 +5,11 @@ have this class by truth with those that have it by prediction, over both maps
 together. The class `unobserved` includes points that B is the first to see. A
 class that does not occur in the truth is left out of the mean, `miou`.
 
-Precision and recall of gone (in A) and new (in B) exist in three forms: by
-points; within 0.2 m and 0.5 m, where a predicted point is right if a truly
-changed point lies within this distance, and the reverse for recall; and by
-structure, see `structures.verdicts`.
+Precision and recall of gone (in A) and new (in B) exist in three forms. By
+points, a predicted point is right if it has changed itself. Within 0.2 m and
+0.5 m, it is right if a truly changed point lies within this distance; recall
+exchanges prediction and truth. By structure, verdicts on whole structures are
+compared, see `evaluation.map_update.structures.verdicts`.
 
 The predictions also give an updated map: A without the points that are
 predicted gone, plus the points of B that are predicted new or newly seen. Its
@@ -46,7 +47,12 @@ _DISTANCES = (0.0, 10.0, 20.0, 40.0, math.inf)
 
 
 class Labels(NamedTuple):
-    """Labels of the points of both maps, A (N,) and B (M,)."""
+    """Labels of the points of both maps.
+
+    Attributes:
+        A: (N,) uint8 labels of the older map.
+        B: (M,) uint8 labels of the newer map.
+    """
 
     A: np.ndarray
     B: np.ndarray
@@ -55,9 +61,15 @@ class Labels(NamedTuple):
 def score(
     pair: Pair, truth: Labels, predicted: Labels, names: Mapping[int, str]
 ) -> dict:
-    """Returns all scores, ready for JSON; None where one is undefined.
+    """Returns all scores of predicted labels, ready for JSON.
 
-    `names` maps the number of a class to its name.
+    A score that is undefined is None.
+
+    Args:
+        pair: the two maps.
+        truth: their true labels.
+        predicted: their predicted labels.
+        names: number of a class of points -> its name, for scores by class.
 
     Raises:
         InputError: the truth leaves out every point.

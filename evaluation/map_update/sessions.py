@@ -58,8 +58,9 @@ MOVES = (*range(252, 260), 10, 11, 13, 15, 18, 20, 30, 31, 32)
 class Label(IntEnum):
     """What happened to a point of a map: kept, gone, new or not observed.
 
-    Points of A have the labels 0, 1 and 2; points of B have 1, 3 and 4. IGNORED
-    occurs only in your own true labels; scores leave out such points.
+    Points of the older map A are unobserved (0), kept (1) or gone (2). Points
+    of the newer map B are kept (1), new (3) or newly seen (4). IGNORED (255)
+    occurs only in true labels of your own; scores leave out such points.
     """
 
     UNOBSERVED = 0
@@ -117,8 +118,8 @@ class Session:
 class MapBuilder:
     """Merges scans into a map with one point in each cell of 0.1 m.
 
-    The first point of a cell represents it: a mean might lie beside the
-    surface.
+    The first point of a cell represents it, because the mean of its points may
+    lie off the surface.
     """
 
     def __init__(self, origin: np.ndarray):

@@ -19,8 +19,8 @@ class StructureChange:
         side: map in which the structure is, A or B.
         instance: number of the structure in this map.
         structure: name of the structure; empty if unknown.
-        semantic_class: class of the structure; empty if unknown.
-        label: the class as a number.
+        semantic_class: name of the structure's class; empty if unknown.
+        label: number of the structure's class.
         points: number of the structure's points in the map.
         observed: number of these points that the other drive observed.
         changed: number of the observed points that are gone (A) or new (B).
@@ -54,7 +54,8 @@ def verdicts(
 
     Args:
         instances: (N,) number of the structure of each point; 0 for none.
-        labels: (N,) see `Label`.
+        labels: (N,) label of each point, see
+            `evaluation.map_update.sessions.Label`.
         side: A or B.
 
     Returns:
@@ -143,7 +144,9 @@ def write_structures(
 
 
 def class_names(folder: Path) -> dict[int, str]:
-    """Returns class number -> name from the table in a folder, if any.
+    """Returns class number -> name, from the table of structures in a folder.
+
+    The result is empty if the folder has no such table.
 
     Raises:
         InputError: the table cannot be read.

@@ -79,7 +79,14 @@ def move(
     larger: np.ndarray,
     larger_sampled: np.ndarray,
 ) -> None:
-    """Moves all voxels of a table into a larger, empty table."""
+    """Moves all voxels of a hash table into a larger, empty table.
+
+    Args:
+        table: (S,) slots of type `SLOT`.
+        sampled: (S, B) uint8, see `enter`.
+        larger: (L,) empty slots, to which the voxels are copied.
+        larger_sampled: (L, B) uint8, to which `sampled` is copied.
+    """
     for i in range(len(table)):
         if table[i].count != 0:
             slot = _find(larger, table[i].ix, table[i].iy, table[i].iz)
@@ -271,15 +278,12 @@ class VoxelMap:
 
 
 class VoxelAccumulator:
-    """Sums points into voxels; its memory grows with the number of voxels.
+    """Makes a voxel map of clouds that are added one by one.
 
-    Sums are kept relative to each voxel's corner, so that coordinates far
-    from the origin (UTM) lose nothing. The result depends only on the points
-    and their order.
+    Coordinates far from the origin (UTM) lose no precision. Memory grows with
+    the number of voxels, not of points.
 
-    For pictures, one sample per cell of a finer grid can be kept. Centroids on
-    that grid would take twice as long, because their table would not fit into
-    the cache.
+    For pictures, one point per cell of a finer grid can be kept.
     """
 
     def __init__(self, voxel_size: float = VOXEL_SIZE, divisions: int = 0):
@@ -287,8 +291,9 @@ class VoxelAccumulator:
 
         Args:
             voxel_size: length of a voxel's side [m].
-            divisions: number of parts of a voxel's side, of which each keeps a
-                sample; 0 for no samples.
+            divisions: number of cells of a finer grid along a voxel's side,
+                each of which keeps one point, see `samples`; 0 for no finer
+                grid.
         """
         self._voxel_size = voxel_size
         self._divisions = divisions
@@ -359,10 +364,11 @@ class VoxelAccumulator:
         )
 
     def samples(self) -> np.ndarray:
-        """Returns the first point in each subdivision of a voxel.
+        """Returns the first point in each cell of the finer grid.
 
         Returns:
-            (K, 3), in the order in which they came [m].
+            (K, 3) points in the world [m], in the order in which they were
+            added.
         """
         lift = np.array([0.0, 0.0, Z_ORIGIN])
         return self._samples[: self._num_samples] + lift

@@ -89,8 +89,9 @@ class BtcConfig(MethodConfig):
             another plane with which it is merged [m]; [O] 0.3.
         image_axes: axes of the image on a plane, in which keypoints are found.
             `public` copies the authors' program, in which a wrong term tilts
-            the second axis out of the plane (see `btc_triangles.image_axes`).
-            `orthogonal` corrects it. [P] public.
+            the second axis out of the plane (see
+            `evaluation.methods.btc_triangles.image_axes`). `orthogonal`
+            corrects it. [P] public.
         resolution: side of a cell of the image on a plane [m]; [O] 0.5.
         height_range: lowest and highest height above the ground of the points
             that are used [m]; [O] -1, 4.
@@ -167,7 +168,7 @@ class BtcDescription:
 
 @dataclass(frozen=True)
 class BtcDatabase:
-    """D places.
+    """Descriptions of D places, prepared for the search.
 
     Attributes:
         places: descriptions of the places.
@@ -266,9 +267,10 @@ class Btc(Method[BtcDescription, BtcDatabase]):
         database: BtcDatabase,
         places: Sequence[int],
     ) -> list[np.ndarray | None]:
-        """Returns the poses on which most matching triangles agree.
+        """Returns, for each of several places, the pose of the query's LiDAR.
 
-        A pose is None if too few triangles match or agree.
+        It is the pose on which most of the matching triangles agree; None if
+        too few triangles match or agree.
         """
         some = self.build_database([database.places[place] for place in places])
         found = dict(self._motions(query, some, None))
@@ -320,7 +322,7 @@ def align(query: np.ndarray, place: np.ndarray) -> np.ndarray:
         place: (..., 3, 3) the partners of these vertices [m].
 
     Returns:
-        (..., 4, 4) X_PQ.
+        (..., 4, 4) pose X_PQ of the query's frame in that of the place.
     """
     query_mean = query.mean(axis=-2)
     place_mean = place.mean(axis=-2)

@@ -270,8 +270,7 @@ def suppress(keypoints: Keypoints, radius: float, max_number: int) -> Keypoints:
 def count_bits(words: np.ndarray) -> np.ndarray:
     """Returns the number of set bits in int64 numbers from 0 to 2^62 - 1.
 
-    It sums neighbouring bits, then pairs, then nibbles, and finally all bytes
-    at once.
+    The result has the shape of the argument.
     """
     words = words - ((words >> 1) & 0x5555555555555555)
     words = (words & 0x3333333333333333) + ((words >> 2) & 0x3333333333333333)
@@ -425,8 +424,8 @@ def match(
     Two triangles are similar in two respects: the difference of their sides is
     small relative to the sides (as Euclidean norms of three numbers), and their
     vertices have about the same heights (by the mean Dice similarity of the
-    three). Only cells of the table near those of the query are searched. Large
-    triangles must therefore be more similar than the tolerance requires.
+    three). Only cells of the table near those of the query are searched. For
+    large triangles, this is a stricter limit than `side_tolerance`.
 
     Args:
         query: triangles of one cloud.

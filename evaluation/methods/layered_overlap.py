@@ -205,9 +205,10 @@ class LayeredOverlap(Method[LayeredScan, LayeredDatabase]):
         database: LayeredDatabase,
         places: Sequence[int],
     ) -> list[np.ndarray | None]:
-        """Returns poses with the query's heading and horizontal translation.
+        """Returns, for each of several places, the pose of the query's LiDAR.
 
-        A pose is None if one of the two scans has no filled cell.
+        A pose consists of a heading and a horizontal translation; None if one
+        of the two scans has no filled cell.
         """
         scans = [database.places[place] for place in places]
         poses: list[np.ndarray | None] = [None] * len(scans)

@@ -162,7 +162,8 @@ class LearnedDatabase:
     """Descriptors of D places.
 
     Attributes:
-        spectra: (FREQUENCIES, FEATURES, D) complex64.
+        spectra: (FREQUENCIES, FEATURES, D) complex64 Fourier transforms of the
+            places' features over the heading.
         filled: (D,) bool, whether a place has a point.
     """
 
@@ -172,7 +173,10 @@ class LearnedDatabase:
 
 @register("learned")
 class Learned(Method[LearnedScan, LearnedDatabase]):
-    """The network; the score of two scans is their cosine at the best turn."""
+    """A learned descriptor: a small network on polar images of scans.
+
+    The score of two scans is the cosine of their features at the best heading.
+    """
 
     Config = LearnedConfig
     skips_places = True
@@ -189,7 +193,11 @@ class Learned(Method[LearnedScan, LearnedDatabase]):
         )
 
     def describe_image(self, image: np.ndarray) -> LearnedScan:
-        """Returns the description of a polar image."""
+        """Returns the descriptor of a polar image.
+
+        Args:
+            image: (RINGS, SECTORS, CHANNELS) uint8, see `polar_image`.
+        """
         if not image.any():
             return LearnedScan(np.zeros((TURNS, FEATURES), np.float32))
         self._check_seen(image)
@@ -222,9 +230,10 @@ class Learned(Method[LearnedScan, LearnedDatabase]):
     def relative_pose(
         self, query: LearnedScan, database: LearnedDatabase, place: int
     ) -> np.ndarray | None:
-        """Returns a pose with the query's heading, in steps of 3.75 deg.
+        """Returns the query's heading relative to a place, as a pose (4, 4).
 
-        Returns None if one of the two scans has no points within reach.
+        The heading is a multiple of 3.75 deg; the translation is zero. The
+        result is None if one of the two scans has no points within reach.
         """
         if not (query.features.any() and database.filled[place]):
             return None
@@ -257,8 +266,10 @@ def load_weights(path: Path) -> Mapping[str, np.ndarray]:
     """Returns the weights in a file, after checking them.
 
     Returns:
-        `kernel_0` (9 x channels in, channels out) float32, `bias_0`, and so on;
-        `seen` (2,).
+        Name -> array: `kernel_0` (9 x channels in, channels out) float32,
+        `bias_0` (channels out,) and so on for each layer; and `seen` (2,), the
+        least and greatest share of a training scan's sectors that contain a
+        point.
 
     Raises:
         InputError: the file cannot be read, or has another version or size.

@@ -5,11 +5,7 @@ that agree on a motion in the plane are inliers; their number is the score. The
 package `map-closures` does all of this. It is an optional extra, because it
 needs an older NumPy.
 
-The package offers a single operation: it stores a local map under a number, and
-aligns it with all stored maps of lower numbers. Queries are therefore stored as
-well, as in the package's own program. Here numbers descend, and all places have
-lower numbers than queries. A new place is then aligned with no map, and a query
-with all places but no other query.
+A query is compared with all places of the database.
 """
 
 from collections.abc import Callable, Sequence
@@ -24,6 +20,11 @@ from cns_drake.base.errors import InputError
 from evaluation.maps.voxel_maps import thin
 from evaluation.methods.method import Method, MethodConfig, PlaceScan, register
 
+# The package offers a single operation: it stores a local map under a number,
+# and aligns it with all stored maps of lower numbers. Queries are therefore
+# stored as well, as in the package's own program. Here numbers descend, and all
+# places have lower numbers than queries. A new place is then aligned with no
+# map, and a query with all places but no other query.
 # Number of the first query, larger than any count of local maps. Numbers of
 # later queries descend, but stay far above those of places, because the package
 # skips the maps numbered just below.

@@ -125,14 +125,23 @@ class Method(abc.ABC, Generic[Descriptor, Database]):
         return [one(cloud) for cloud in clouds]
 
     def for_lidar(self, field: LidarField | None) -> "Method":
-        """Returns the method adapted to a LiDAR; None is an unknown LiDAR.
+        """Returns the method adapted to a LiDAR; by default the method itself.
 
-        By default, the method itself is returned.
+        Args:
+            field: number of rings and vertical field of view of the LiDAR; None
+                if they are unknown.
         """
         return self
 
     def assumption(self, field: LidarField | None) -> str | None:
-        """Returns what the method assumes about a LiDAR, in words, or None."""
+        """Returns a note on what the method assumes about a LiDAR.
+
+        By default, and if there is nothing to say, the result is None.
+
+        Args:
+            field: number of rings and vertical field of view of the LiDAR; None
+                if they are unknown.
+        """
         return None
 
     @property
@@ -233,10 +242,16 @@ class Method(abc.ABC, Generic[Descriptor, Database]):
 def check_number(
     method: Method, function: str, found: object, number: int
 ) -> None:
-    """Checks that a method has returned as many values as it was asked for.
+    """Checks that a method has returned the right number of values.
+
+    Args:
+        method: the method.
+        function: name of the method's function, for the error message.
+        found: the returned values.
+        number: number of values that are right.
 
     Raises:
-        InputError: it has returned something else.
+        InputError: the function has returned something else.
     """
     count = len(found) if isinstance(found, Sequence | np.ndarray) else None
     if count != number:
@@ -446,9 +461,13 @@ def run_module(path: Path) -> ModuleType:
 
 
 def with_named_faults(function: Callable, path: Path) -> Callable:
-    """Returns a function whose exceptions become one-line errors.
+    """Wraps a function of a user's file so that its exceptions name the file.
 
-    The errors name the file of the method.
+    Every exception becomes an `InputError` of one line.
+
+    Args:
+        function: the function.
+        path: the file.
     """
 
     @functools.wraps(function)

@@ -56,9 +56,7 @@ def layer_cells(
 ) -> tuple[np.ndarray, np.ndarray]:
     """Returns the occupied cells of each layer of a scan.
 
-    Layers are low, middle, high, poles and kerbs. Cells are computed by sums,
-    products, quotients and square roots only. IEEE 754 defines these to the
-    last bit, so that cells are the same on every processor.
+    The layers are low, middle and high points, poles and kerbs.
 
     Args:
         points: (N, 3) in the frame of the LiDAR [m].
@@ -72,6 +70,8 @@ def layer_cells(
         last one ends. Rows are along x, columns along y; the sensor is in the
         middle.
     """
+    # Sums, products, quotients and square roots are the same on every
+    # processor: IEEE 754 defines them to the last bit.
     half = 0.5 * GRID * cell
     x, y, z = points.T
     is_inside = (-half <= x) & (x < half) & (-half <= y) & (y < half)
@@ -159,7 +159,14 @@ def _poles(is_tall: np.ndarray) -> np.ndarray:
 
 
 def turns(number: int) -> np.ndarray:
-    """Returns (H, 2) int64 cosines and sines of a full turn in H steps."""
+    """Returns the cosines and sines of H angles that divide a turn evenly.
+
+    Args:
+        number: H.
+
+    Returns:
+        (H, 2) int64, in units of 2^-14.
+    """
     unit = 1 << _UNIT_BITS
     angles = [2.0 * math.pi * step / number for step in range(number)]
     return np.array(

@@ -183,9 +183,10 @@ class ProbeMethod(Method[Probe, ProbeDatabase]):
     def relative_pose(
         self, query: Probe, database: ProbeDatabase, place: int
     ) -> np.ndarray | None:
-        """Returns a pose with the query's heading, in steps of one sector.
+        """Returns the query's heading relative to a place, as a pose (4, 4).
 
-        Returns None if one of the two scans has no points within range.
+        The heading is a multiple of a sector; the translation is zero. The
+        result is None if one of the two scans has no points within range.
         """
         cosines = self._cosines(query, database.spectra[place, None])[0]
         if np.isnan(cosines).any():

@@ -336,9 +336,12 @@ def dpa_net(weights: Weights, cloud: np.ndarray) -> np.ndarray:
 def farthest_points(points: np.ndarray, number: int) -> np.ndarray:
     """Returns indices of points that are far apart from each other.
 
-    Each point is the one that is farthest from all points chosen before.
+    The first point comes first. Each further point is the one that is farthest
+    from all points before it.
 
-    The first index is 0.
+    Args:
+        points: (N, 3) points [m].
+        number: number of indices.
     """
     points = points.astype(np.float64)
     norms = (points * points).sum(axis=1)

@@ -190,9 +190,10 @@ class RingPlusPlus(Method[Ring, RingDatabase]):
     def relative_poses(
         self, query: Ring, database: RingDatabase, places: Sequence[int]
     ) -> list[np.ndarray | None]:
-        """Returns poses with the query's heading and horizontal translation.
+        """Returns, for each of several places, the pose of the query's LiDAR.
 
-        A pose is None if the map of one of the two scans is empty.
+        A pose consists of a heading and a horizontal translation; None if the
+        map of one of the two scans is empty.
         """
         if len(query.filled) == 0:
             return [None] * len(places)

@@ -68,7 +68,13 @@ class SolidConfig(MethodConfig):
         return self
 
     def field(self, lidar: LidarField = _CNS) -> LidarField:
-        """Returns the field of view of the settings, or else of the LiDAR."""
+        """Returns the beams and the field of view that the method assumes.
+
+        Values that the settings do not give are those of the LiDAR.
+
+        Args:
+            lidar: number of rings and field of view of the LiDAR.
+        """
         elevations, lowest_deg, highest_deg = lidar
         if self.elevations is not None:
             elevations = self.elevations
@@ -193,9 +199,10 @@ class SolidMethod(Method[Solid, SolidDatabase]):
     def relative_pose(
         self, query: Solid, database: SolidDatabase, place: int
     ) -> np.ndarray | None:
-        """Returns a pose with the query's heading, in steps of one cell.
+        """Returns the query's heading relative to a place, as a pose (4, 4).
 
-        Returns None if one of the two scans has no points within range.
+        The heading is a multiple of a cell of azimuth; the translation is zero.
+        The result is None if one of the two scans has no points within range.
         """
         azimuths = database.azimuths[place]
         if not (query.azimuths.any() and azimuths.any()):

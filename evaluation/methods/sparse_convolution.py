@@ -45,8 +45,12 @@ def convolve(
 
 
 def coarser(cells: np.ndarray, step: int) -> np.ndarray:
-    """Returns the occupied cells (M, 3) of a coarser grid.
+    """Returns the occupied cells (M, 3) of a coarser grid, without repetition.
 
-    Like the finer cells, they are identified by their lower corners.
+    Args:
+        cells: (N, 3) int64 cells of the finer grid, each given by its lower
+            corner.
+        step: side of a coarser cell; the corners of these cells are multiples
+            of it.
     """
     return np.unique(cells // step * step, axis=0)

@@ -71,8 +71,8 @@ def paper() -> Reference:
     Downtown 01-04 the value of 02-04, and one R@1 of RING++ on Riverside 02->01
     contradicts the F1 beside it. The paper does not state whether a method was
     scored on all queries or only on queries with a match (the mode, see
-    `recognition.metrics`). This is inferred from the relation between R@1, F1
-    and AUC in all rows of the method.
+    `evaluation.recognition.metrics`). This is inferred from the relation
+    between R@1, F1 and AUC in all rows of the method.
     """
     changes = {
         (row["map"], row["sequence_a"], row["sequence_b"]): float(
@@ -132,12 +132,14 @@ def _judge(
 
 @dataclass(frozen=True)
 class Trend:
-    """The trend of AUC over TCR_sym of some pairs.
+    """How the AUC of a method depends on the change (TCR_sym), over some pairs.
 
-    It consists of Spearman's rank correlation, its two-sided p-value under the
-    hypothesis of no correlation, and a slope. The correlation is NaN if AUC or
-    TCR_sym is constant. The slope is that of the least-squares line: the change
-    of AUC per 0.1 of TCR_sym.
+    Attributes:
+        rho: Spearman's rank correlation; NaN if AUC or TCR_sym is constant.
+        p_value: its two-sided p-value under the hypothesis of no correlation.
+        slope: change of AUC per 0.1 of TCR_sym, by the least-squares line.
+        spread: greatest minus least AUC.
+        num_pairs: number of pairs of drives.
     """
 
     rho: float
@@ -189,9 +191,11 @@ def findings(
 
 
 def trend(change: Sequence[float], auc: Sequence[float]) -> Trend:
-    """Returns the trend of AUC over TCR_sym.
+    """Returns how AUC depends on TCR_sym, over three or more pairs of drives.
 
-    There must be three or more pairs of drives.
+    Args:
+        change: TCR_sym of each pair.
+        auc: AUC of each pair.
     """
     x, y = np.asarray(change), np.asarray(auc)
     spread = float(np.ptp(y))
@@ -211,7 +215,7 @@ def trend(change: Sequence[float], auc: Sequence[float]) -> Trend:
 
 
 def paper_trend(method: str) -> Trend:
-    """Returns a method's trend of AUC over TCR_sym in the paper's Table II."""
+    """Returns how a method's AUC depends on TCR_sym in the paper's Table II."""
     return trend(*zip(*paper().auc_over_change(method), strict=True))
 
 
@@ -393,11 +397,11 @@ def _part(number: int, total: int) -> str:
 def aims(
     results: Sequence[PlaceRecognition], changes: Sequence[ChangeResult]
 ) -> list[Finding]:
-    """Returns whether each aim of the shipped cities is met.
+    """Returns whether the shipped cities meet each target set for them.
 
     The list is empty unless the results of all the paper's pairs are present.
 
-    RING++ is evaluated on queries with a match and all other methods on all
+    RING++ is scored on the queries with a match, all other methods on all
     queries, as the paper seems to have done.
     """
     differences = _differences(results)

@@ -1,8 +1,8 @@
 """Public data sets of few scans: where each file is from, and how it is read.
 
-Nothing is shipped. A folder holds a folder for each data set, as `docs/real.md`
-lays them out. A data set is recognised by its folder's name. The digest of its
-scans tells whether they are the same scans as in earlier measurements.
+The data sets are not shipped. Each is a folder with a given name in a common
+folder, see `docs/real.md`. The digest of its scans shows whether they are the
+same as in earlier measurements.
 """
 
 from collections.abc import Callable, Sequence
@@ -37,10 +37,11 @@ class DataSet(NamedTuple):
         origin: repository of the data set, and the path in it.
         licence: terms of use.
         digest: SHA-256 of all scans, concatenated in the order of their names.
-        poses: where the poses are: `drive` for a folder that `open_drive`
-            reads; `matrices` for a file `poses.txt` with the upper 3 x 4 part
-            of X_WS in each row; `named` for a `poses.txt` with a scan's name, x
-            y z and quat_xyzw in each row; "" for a data set without poses.
+        poses: where the poses are: `drive` for a folder that
+            `evaluation.drives.open_drive` reads; `matrices` for a file
+            `poses.txt` with the upper 3 x 4 part of X_WS in each row; `named`
+            for a `poses.txt` with a scan's name, x y z and quat_xyzw in each
+            row; "" for a data set without poses.
         read: function that reads a scan.
         whole: whether the scans contain all points that the LiDAR measured.
     """
@@ -147,7 +148,12 @@ DATA_SETS = (
 
 
 class RealScans(NamedTuple):
-    """The existing scans of a data set, as a drive."""
+    """The scans of a data set that are there, as a drive.
+
+    Attributes:
+        data_set: the data set.
+        drive: its scans and poses.
+    """
 
     data_set: DataSet
     drive: Drive

@@ -70,7 +70,11 @@ def scan_table(scan: np.ndarray) -> np.ndarray:
 
 
 def places_of(drive: Drive) -> list[list[np.ndarray]]:
-    """Returns the scans of a drive by place, at most 40 scans in all."""
+    """Returns the scans of a drive, at most 40, grouped by place.
+
+    Scans less than 30 m from the first scan of a place belong to this place.
+    Each scan is a table as `scan_table` returns it.
+    """
     step = -(-len(drive) // _MOST_SCANS)
     places: list[list[np.ndarray]] = []
     first = np.full(3, np.inf)
@@ -84,7 +88,12 @@ def places_of(drive: Drive) -> list[list[np.ndarray]]:
 
 
 def patches(scan: np.ndarray, rng: np.random.Generator) -> Iterator[np.ndarray]:
-    """Yields small pieces of a scan, at random places."""
+    """Yields up to sixteen square pieces of a scan, at random positions.
+
+    Args:
+        scan: (N, 5) the scan, see `scan_table`.
+        rng: random generator of the positions.
+    """
     ranges = np.linalg.norm(scan[:, :3], axis=1)
     near = np.flatnonzero((ranges > _NEAREST) & (ranges < _FARTHEST))
     found = 0
@@ -99,10 +108,14 @@ def patches(scan: np.ndarray, rng: np.random.Generator) -> Iterator[np.ndarray]:
 
 
 def describe(patch: np.ndarray, rng: np.random.Generator) -> dict[str, float]:
-    """Returns name -> feature of a patch.
+    """Returns the features of a piece of a scan: name -> value.
 
-    A name begins with the name of the group of features, such as all features
-    of intensity.
+    A name begins with the group of the feature, such as `intensity`.
+
+    Args:
+        patch: (M, 5) the piece, see `scan_table`.
+        rng: random generator, by which the points are chosen whose
+            neighbourhoods are described.
     """
     p, bright, ring = patch[:, :3], patch[:, 3], patch[:, 4]
     tree = cKDTree(p)
@@ -276,7 +289,13 @@ class Features:
         self.place = np.array(numbers)
 
     def of(self, names: list[str]) -> np.ndarray:
-        """Returns features (N, F) by their names; NaN if a patch lacks one."""
+        """Returns some features of all patches as an array (N, F).
+
+        A feature that a patch lacks is NaN.
+
+        Args:
+            names: names of the F features.
+        """
         return np.array(
             [[row.get(name, np.nan) for name in names] for row in self.rows]
         )
@@ -292,9 +311,9 @@ class Features:
 
 
 def common_names(sets: list[Features]) -> list[str]:
-    """Returns the names of features that at least a tenth of patches have.
+    """Returns the names of the features that are common in all of several sets.
 
-    That must be so in each of the sets.
+    A feature is common if at least a tenth of a set's patches have it.
     """
     names = list(dict.fromkeys(n for s in sets for row in s.rows for n in row))
     shares = [np.isfinite(one.of(names)).mean(axis=0) for one in sets]
@@ -303,10 +322,15 @@ def common_names(sets: list[Features]) -> list[str]:
 
 
 def tell_apart(real: Features, simulated: Features, names: list[str]) -> float:
-    """Returns how well a classifier tells real from simulated patches.
+    """Returns how well a classifier tells real from simulated patches, as AUC.
 
-    The result is the mean AUC over folds of places; NaN if a set has only one
+    The result is the mean over folds of places; NaN if a set has only one
     place.
+
+    Args:
+        real: features of real patches.
+        simulated: features of simulated patches.
+        names: names of the features that the classifier uses.
     """
     sets = [_in_folds(one) for one in (real, simulated)]
     folds = min(_MOST_FOLDS, *(fold.max() + 1 for fold in sets))
@@ -373,7 +397,13 @@ def judge_draws(
 ) -> dict:
     """Returns how well a classifier tells real from simulated scans.
 
-    The result is that of `judge`, averaged over several draws of patches.
+    The result is that of `judge`, averaged over several random draws of
+    patches.
+
+    Args:
+        real, simulated: scans by place, see `places_of`.
+        draws: number of draws.
+        track: reports progress.
     """
     results = []
     for seed in track(range(draws), "judging", draws):

@@ -4,9 +4,9 @@ Each scan of a data set with poses is a query. The places among which it is
 searched are all other scans of the same model of LiDAR: from its data set, from
 other data sets and from simulated recordings. A place is a single scan; queries
 are turned and tilted as in the protocol `fair`. Each scan is also localised,
-from a random start, in a map of the scans around it. A classifier (see `judge`)
-also tries to tell each data set from simulated scans of the same model of
-LiDAR.
+from a random start, in a map of the scans around it. A classifier (see
+`evaluation.real.judge`) also tries to tell each data set from simulated scans
+of the same model of LiDAR.
 """
 
 from collections.abc import Iterable, Mapping, Sequence
@@ -117,7 +117,7 @@ class Measuring:
         """Runs all measurements on the data sets in a folder.
 
         Args:
-            folder: see `open_data_sets`.
+            folder: folder that contains a folder for each data set.
             simulated: folder of simulated recordings. Their scans are added as
                 places, and a classifier tries to tell the real scans from them.
 

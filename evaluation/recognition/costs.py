@@ -58,7 +58,7 @@ def measure_cost(
         database: described drive with places.
         query: described drive with queries, of which as many are measured as
             there are clouds.
-        gate_radius: see `score_places`.
+        gate_radius: radius of a match for the gate [m]; None without a gate.
     """
     describing = [cpu_ms(method.describe, cloud) for cloud in clouds]
     places = database.places
@@ -94,7 +94,7 @@ def query_ms(
         places: described places, all of them candidates.
         queries: described queries.
         number: number of queries to measure, two or more.
-        gate_radius: see `score_places`.
+        gate_radius: radius of a match for the gate [m]; None without a gate.
         with_pose: whether the pose of the best place is estimated, too.
     """
     indexed = method.build_database(places.descriptors)

@@ -40,7 +40,8 @@ class DescribedScans:
         clouds: the K described clouds if the method has a second stage;
             otherwise empty.
         blocks: (K,) block of the route in which each place or query lies, see
-            `route_blocks`; None if the route is unknown.
+            `evaluation.recognition.metrics.route_blocks`; None if the route is
+            unknown.
     """
 
     frames: np.ndarray
@@ -61,11 +62,14 @@ def joined_scans(
     worlds: Iterable[int],
     most: int | None = None,
 ) -> DescribedScans:
-    """Returns the scans of several drives, by default all of them.
+    """Returns the places or queries of several drives as one list.
 
-    `worlds` contains the number of each drive's world. Different worlds are
-    moved so far apart that their scans never match. At most `most` scans are
-    returned.
+    Args:
+        every: scans of each drive, with a method's descriptions.
+        worlds: number of the world of each drive. Different worlds are moved so
+            far apart that their scans never match.
+        most: greatest number of scans that are returned, the first ones; None
+            for all.
     """
     poses = []
     for one, world in zip(every, worlds, strict=True):

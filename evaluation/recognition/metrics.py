@@ -109,7 +109,7 @@ class PrCurve:
 
     @property
     def recall_at_full_precision(self) -> float:
-        """Greatest recall without a false positive; 0 if none."""
+        """Greatest recall at a precision of 1; 0 if no threshold has it."""
         return float(self.recall[self.false_positives == 0].max(initial=0.0))
 
 
@@ -155,7 +155,12 @@ def weighted_counts(
 
 
 def areas_under(precision: np.ndarray, recall: np.ndarray) -> np.ndarray:
-    """Returns the areas (B,) under B precision-recall curves; K can be 0."""
+    """Returns the areas (B,) under B precision-recall curves.
+
+    Args:
+        precision: (B, K) precision at K thresholds; K can be 0.
+        recall: (B, K) recall at these thresholds, increasing.
+    """
     if precision.shape[1] == 0:
         return np.zeros(len(precision))
     start = precision[:, 0] * recall[:, 0]
@@ -165,7 +170,10 @@ def areas_under(precision: np.ndarray, recall: np.ndarray) -> np.ndarray:
 
 
 def recall_of(tp: np.ndarray, fn: np.ndarray) -> np.ndarray:
-    """Returns the recall TP / (TP + FN); 0 if TP + FN is 0."""
+    """Returns the recall TP / (TP + FN), an array of the same shape.
+
+    It is 0 where TP + FN is 0.
+    """
     return tp / np.maximum(tp + fn, 1)
 
 
@@ -257,11 +265,15 @@ def resampled_metrics(
 def own_samples(
     outcomes: QueryOutcomes, seed: int = 0
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Returns AUC, R@1 and strict AUC of bootstrap samples of queries.
+    """Returns AUC, R@1 and strict AUC of bootstrap samples, each (B,).
 
-    The samples draw blocks of the queries' route, see `resampled_metrics`.
+    The samples draw whole blocks of the queries' route, see
+    `resampled_weights`. They are cached, so that several comparisons use the
+    same samples.
 
-    The samples are cached, so that several comparisons use the same ones.
+    Args:
+        outcomes: outcomes of the queries.
+        seed: seed of the draws.
     """
     weights = resampled_weights(len(outcomes), seed, outcomes.blocks)
     return resampled_metrics(outcomes, weights)
@@ -270,12 +282,17 @@ def own_samples(
 def paired_samples(
     outcomes: QueryOutcomes, other: QueryOutcomes
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Returns metrics of bootstrap samples, paired with those of `other`.
+    """Returns metrics of bootstrap samples that are paired with others.
 
-    Both outcomes must have the same number of queries. The samples of
-    `outcomes` draw the same blocks as `own_samples(other)`, so that the two
-    results can be compared sample by sample. The metrics are AUC, R@1 and
-    strict AUC.
+    The samples draw the same blocks as `own_samples(other)`, so that the two
+    results can be compared sample by sample.
+
+    Args:
+        outcomes: outcomes of Q queries.
+        other: other outcomes of as many queries.
+
+    Returns:
+        AUC, R@1 and strict AUC of the samples of `outcomes`, each (B,).
     """
     if np.array_equal(outcomes.own_blocks, other.own_blocks):
         return own_samples(outcomes)
@@ -284,7 +301,10 @@ def paired_samples(
 
 
 def percentile_interval(samples: np.ndarray) -> Interval:
-    """Returns the interval of the middle 95 % of samples; NaN is left out."""
+    """Returns the interval that contains the middle 95 % of samples.
+
+    NaN does not count as a sample.
+    """
     known = samples[~np.isnan(samples)]
     if len(known) == 0:
         return UNKNOWN
@@ -296,7 +316,14 @@ def percentile_interval(samples: np.ndarray) -> Interval:
 def bootstrap_intervals(
     outcomes: QueryOutcomes, seed: int
 ) -> tuple[Interval, Interval]:
-    """Returns percentile intervals of AUC and R@1 over resampled blocks."""
+    """Returns 95 % intervals of AUC and of R@1, by bootstrap.
+
+    Each bootstrap sample draws whole blocks of the queries' route.
+
+    Args:
+        outcomes: outcomes of the queries.
+        seed: seed of the draws.
+    """
     if len(outcomes) == 0:
         return UNKNOWN, UNKNOWN
     areas, recalls, _ = own_samples(outcomes, seed)
@@ -411,7 +438,8 @@ class PlaceRecognitionMetrics:
     """The scores of one method on one pair of drives.
 
     Attributes:
-        mode: which queries the precision-recall curve counts.
+        mode: which queries the precision-recall curve counts: `all`, or only
+            those with a match (`filtered`).
         curve: exact precision-recall curve.
         auc: area under the curve.
         auc_strict: area under the curve with recall = TP / N at each of its
@@ -463,7 +491,8 @@ def evaluate(
 
     Args:
         outcomes: outcome of each query.
-        mode: which queries the precision-recall curve counts.
+        mode: which queries the precision-recall curve counts: `all`, or only
+            those with a match (`filtered`).
         seed: seed of the bootstrap.
 
     Example:

@@ -1,9 +1,9 @@
 """Truth by overlap: the share of a query's scan that a place's scan shows.
 
 Poses are exact. A point of the query's scan counts as shown if it lies on a
-surface of the place's scan, see `seen_surfaces`. The overlap is the share of
-the query's points that are shown. Points that were hidden from the place's
-sensor, or absent when it passed, are not shown.
+surface of the place's scan, see `evaluation.recognition.seen_surfaces`. The
+overlap is the share of the query's points that are shown. Points that were
+hidden from the place's sensor, or absent when it passed, are not shown.
 
 The idea is that of OverlapNet (Chen et al., RSS 2020), which compares range
 images pixel by pixel.
@@ -41,9 +41,10 @@ class Seen(Protocol):
     def reach(self) -> float: ...
 
     def share_of(self, points: np.ndarray) -> float:
-        """Returns which share of points (N, 3) is visible.
+        """Returns the share of points that the sensor sees.
 
-        Points are in the sensor's frame [m].
+        Args:
+            points: (N, 3) points in the sensor's frame [m].
         """
         ...
 
@@ -114,7 +115,16 @@ def overlap_matrix(
 def compared_frames(
     database: Drive, query: Drive, protocol: RetrievalProtocol
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Returns the frames of the queries (Q,), and of the places (D,)."""
+    """Returns the frames that are compared: those of queries, and of places.
+
+    Args:
+        database: the drive of the places.
+        query: the drive of the queries.
+        protocol: protocol with the spacings of queries and places.
+
+    Returns:
+        (Q,) increasing frame numbers of the query drive; (D,) of the database.
+    """
     return (
         sample_frames(query.X_WS[:, :3, 3], protocol.query_spacing),
         sample_frames(database.X_WS[:, :3, 3], protocol.place_spacing),
@@ -135,7 +145,7 @@ def best_overlaps(
         X_WPs: (D, 4, 4) poses of these sensors.
         query_scans: Q scans.
         X_WQs: (Q, 4, 4) poses of their sensors.
-        matches: (Q, D) bool, the truth.
+        matches: (Q, D) bool, whether a place is a true match of a query.
 
     Returns:
         (Q,) greatest share of the query's scan that the scan of a match shows;
@@ -179,7 +189,8 @@ def write_overlaps(
         path: CSV file to write.
         query_frames: (Q,) frames of the queries.
         database_frames: (D,) frames of the places.
-        overlaps: (Q, D) overlaps, see `overlap_truth`.
+        overlaps: (Q, D) share of each query's scan that each place's scan
+            shows.
 
     Raises:
         InputError: if the file cannot be written.

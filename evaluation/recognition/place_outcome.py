@@ -76,7 +76,8 @@ class PlaceOutcome:
                 drive through the query's own city; distances to places of all
                 other drives are unknown.
             overlaps: (Q,) how much of the query's scan the best of its matches
-                shows, see `overlap_truth`; NaN without a match.
+                shows, see `evaluation.recognition.overlap_truth`; NaN without a
+                match.
             radius: radius of a match [m].
         """
         best = retrieval.best_places.tolist()
@@ -116,9 +117,13 @@ class PlaceOutcome:
         interval: Interval = UNKNOWN,
         n: int | None = None,
     ) -> Number:
-        """Returns a metric as a row of results; by default, n is Q.
+        """Returns a number as a result of the outcome's method and gate.
 
-        Method and gate are those of the outcome.
+        Args:
+            metric: name of the number.
+            value: the number.
+            interval: its 95 % interval.
+            n: number of queries from which it is computed; by default all.
         """
         count = len(self.outcomes) if n is None else n
         return Number(

@@ -139,7 +139,8 @@ def run(
     Args:
         database, query: the drives.
         method: the method.
-        mode: which queries count.
+        mode: which queries count: `all`, or only those with a match
+            (`filtered`).
         protocol: protocol of the comparison.
         track: reports progress.
         across_maps: whether the drives may be of maps of different names.
@@ -148,7 +149,9 @@ def run(
             overlap.
 
     Raises:
-        InputError: as `retrieve` does, or if no query has a match.
+        InputError: if a drive cannot be read, the drives are not in the same
+            world, the method returns an invalid result, or no query has a
+            match.
     """
     retrieval = retrieve(
         database,
@@ -180,8 +183,10 @@ def judge_retrieval(
         database, query: names of the drives.
         retrieval: scores and truth of all pairs of a query and a place.
         protocol: protocol of the retrieval.
-        mode: which queries count.
-        pair: see `PlaceRecognition`.
+        mode: which queries count: `all`, or only those with a match
+            (`filtered`).
+        pair: names of the map and of the stages of database and query, if the
+            result is for a report.
 
     Raises:
         InputError: if no query has a match.

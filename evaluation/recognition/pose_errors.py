@@ -86,7 +86,11 @@ def pose_error(
 
 
 def checked_pose(method: Method, X_PQ: object) -> np.ndarray | None:
-    """Returns the result of `relative_pose` if it is a pose or None.
+    """Returns a pose estimated by a method, after checking that it is one.
+
+    Args:
+        method: the method, for the error message.
+        X_PQ: result of `Method.relative_pose`: a pose (4, 4) or None.
 
     Raises:
         InputError: the result is something else.

@@ -47,8 +47,9 @@ class RetrievalProtocol:
             compared only with places that the drive passed at least this time
             before [s]. None if two drives are compared.
         overlap: share of a query's scan, up to 1, that the scan of a place must
-            show to be a match, at any distance (see `overlap_truth`). None if
-            places within `radius` are matches.
+            show to be a match, at any distance (see
+            `evaluation.recognition.overlap_truth`). None if places within
+            `radius` are matches.
         gate: whether to reject top-ranked places that lie beyond the radius
             according to the method's own pose estimate.
         turn_queries: whether each query is turned by a random yaw. Places stay
@@ -57,8 +58,7 @@ class RetrievalProtocol:
             tilted, from 0 to 90 [deg].
         hide_sector: angle of a random sector that is hidden from each query,
             from 0 to below 360 [deg].
-        seed: seed of the turns, tilts and hidden sectors, see
-            `QuerySensor.draw`.
+        seed: seed of the random turns, tilts and hidden sectors.
 
     Raises:
         InputError: a value is out of range; the message names the command-line
@@ -105,13 +105,19 @@ class RetrievalProtocol:
             raise InputError(f"--seed: {self.seed} is negative")
 
     def scans(self, method: Method) -> int:
-        """Returns how many scans are merged for one place with a method."""
+        """Returns how many scans are merged for one place.
+
+        That is `scans_per_place` or, if it is None, the method's own number.
+        """
         if self.scans_per_place is not None:
             return self.scans_per_place
         return method.scans_per_place
 
     def scans_before(self, method: Method) -> int:
-        """Returns how many of a place's scans precede the scan at its pose."""
+        """Returns how many of the merged scans come before the place's scan.
+
+        The place's scan is the one that gives the place its pose.
+        """
         is_middle = self.of(method).place == "middle"
         return self.scans(method) // 2 if is_middle else 0
 
@@ -196,7 +202,7 @@ class RetrievalProtocol:
         )
 
     def asked_like(self, other: RetrievalProtocol) -> RetrievalProtocol:
-        """Returns the protocol with queries made as by another protocol.
+        """Returns the protocol with the queries of another protocol.
 
         The choice of the scan that stands for a place is also taken from
         `other`.
@@ -204,7 +210,7 @@ class RetrievalProtocol:
         return replace(self, place=other.place, **other._asked)
 
     def described(self, *, queries: bool = True) -> dict[str, object]:
-        """Returns the options on which the descriptions of a drive depend.
+        """Returns name -> value of the options that affect descriptions.
 
         Args:
             queries: whether the drive has queries, and not only places.

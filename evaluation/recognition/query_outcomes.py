@@ -20,7 +20,8 @@ class QueryOutcomes:
             infinite if no candidate is a true match.
         num_places: size of the database.
         blocks: (Q,) block of the route in which each query lies, see
-            `route_blocks`; None if each is a block of its own.
+            `evaluation.recognition.metrics.route_blocks`; None if each is a
+            block of its own.
 
     Example:
         from evaluation import judge

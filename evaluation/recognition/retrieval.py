@@ -37,9 +37,11 @@ class Retrieval:
         matches: (Q, D) bool, whether a place is a true match of a query.
         pose_errors: errors of the estimated pose at each query's best place.
         is_known: (Q, D) bool, whether a place is allowed as an answer to a
-            query.
+            query; with `exclude_recent`, places that the drive has passed just
+            before are not.
         overlaps: (Q, D) float64 share of a query's scan that a place's scan
-            shows (see `overlap_truth`); None if matches are by the radius.
+            shows (see `evaluation.recognition.overlap_truth`); None if matches
+            are by the radius.
         query_blocks: (Q,) block of the route in which each query lies.
 
     Example:
@@ -143,8 +145,8 @@ def compare(
         query: drive with described queries, in the same world frame.
         protocol: protocol by which both drives were described.
         track: reports progress.
-        overlaps: (Q, D) overlaps, see `overlap_matrix`; needed for matches by
-            overlap.
+        overlaps: (Q, D) share of each query's scan that each place's scan
+            shows; needed for matches by overlap.
 
     Raises:
         InputError: if the method returns an invalid result.
@@ -166,10 +168,10 @@ def compare_with_gates(
     overlaps: np.ndarray | None = None,
     is_known: np.ndarray | None = None,
 ) -> list[Retrieval]:
-    """Returns the result of each gate; queries are scored only once.
+    """Returns the scores after each of several gates.
 
-    A gate rejects places that lie beyond a radius by the method's own pose
-    estimate.
+    A gate rejects places that lie beyond a radius according to the method's own
+    pose estimate. Queries are described and scored only once.
 
     Args:
         method, database, query, track, overlaps: see `compare`.

@@ -37,7 +37,7 @@ def gate_weight(
 ) -> np.ndarray:
     """Returns the factor from 1 to 0 by which the gate scales a score.
 
-    It depends on the distance of the place.
+    The factor is 1 for near places, 0 for far ones, and 1/2 at the radius.
 
     Args:
         distance: distances from query to place according to the method's own
@@ -128,7 +128,8 @@ def score_places(
             place, the query is compared with every place, because a search for
             a few best places might return only excluded ones.
         gate_radius: radius of a match for `gated` [m]; None without a gate.
-        exhaustive: see `Method.score`.
+        exhaustive: whether to compare also with places that a search would skip
+            only to save time.
         where: the name of the current query, for errors.
 
     Raises:

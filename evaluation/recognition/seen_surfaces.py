@@ -38,7 +38,7 @@ _UNKNOWN, _SHOWN, _BEHIND = range(3)
 
 
 class Shares(NamedTuple):
-    """How much of other points a scan shows and hides; NaN without points.
+    """Which shares of given points a scan shows and hides; NaN without points.
 
     Attributes:
         shown: share of points on surfaces that this scan shows.
@@ -55,10 +55,12 @@ class SeenSurfaces:
     """The returns of a scan, by direction.
 
     Attributes:
-        points: (N, 3) in the frame of the sensor [m], sorted by cell.
+        points: (N, 3) in the frame of the sensor [m], sorted by cells of
+            directions.
         angles_deg: (N, 2) elevation plus 90 deg, and azimuth counted from the
             back.
-        starts: index of each cell's first point, row by row, followed by N.
+        starts: index in `points` at which each cell of directions begins, row
+            by row; N at the end.
     """
 
     points: np.ndarray
@@ -69,7 +71,8 @@ class SeenSurfaces:
     def of(cls, points: np.ndarray) -> SeenSurfaces:
         """Returns the surfaces that a scan shows.
 
-        The scan is (N, 3) in the sensor's frame [m].
+        Args:
+            points: (N, 3) points of the scan in the sensor's frame [m].
         """
         x, y, z = points.T.astype(np.float64)
         elevation = np.degrees(np.arctan2(z, np.hypot(x, y))) + 90.0

@@ -20,14 +20,16 @@ def along_the_way(
 ) -> np.ndarray:
     """Returns scores (Q, D) that are averaged along the path.
 
-    The score of a query q and a place p becomes a mean over q and the queries
-    up to `length` before it. An earlier query at distance d from q along its
-    path contributes its score for the place at distance d from p along the
-    database's path: before p, or after p if the query drive goes in the
-    opposite direction. The direction with the better mean counts. An earlier
-    query is left out of the mean if it has no candidate, or if the database's
-    path has no place at distance d. If an earlier query has no score for the
-    place, its least score is used.
+    The score of a query and a place becomes the mean of this score and those of
+    earlier queries. An earlier query, at the distance d before the query along
+    its path, contributes its score for the place at the same distance d along
+    the database's path. This place lies before the first place if both drives
+    go in the same direction, otherwise after it; the direction with the better
+    mean counts.
+
+    An earlier query is left out of the mean if it has no candidate, or if the
+    database's path has no place at the distance d. If it has candidates, but no
+    score for this place, its least score is used.
 
     Args:
         scores: (Q, D) scores of single queries; NaN for places that are no
@@ -35,8 +37,8 @@ def along_the_way(
         is_known: (Q, D) bool, places that are allowed as answers.
         p_WQs: (Q, 3) positions of the queries, in the order of the drive [m].
         p_WPs: (D, 3) positions of the places in the world [m].
-        length: greatest distance of an earlier query that votes, along its path
-            [m].
+        length: greatest distance of an earlier query that counts, along its
+            path [m].
     """
     of_query, of_place = travelled(p_WQs), travelled(p_WPs)
     between = (of_place[1:] + of_place[:-1]) / 2.0

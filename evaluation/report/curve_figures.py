@@ -19,9 +19,15 @@ from evaluation.results.table_forms import by_pair, in_table_order, title
 def draw_pr_curves(
     map_name: str, results: Sequence[PlaceRecognition], stem: Path
 ) -> None:
-    """Draws precision-recall curves: a row per pair of drives.
+    """Draws precision-recall curves of all methods and saves the figure.
 
-    The columns are the modes: all queries, or only those with a match.
+    Each row of the figure is a pair of drives, each column a mode: all queries,
+    or only those with a match.
+
+    Args:
+        map_name: name of the map, for the titles.
+        results: results on the pairs of drives of this map.
+        stem: path of the files without the ending.
     """
     pairs = by_pair(results)
     style_of = styles(in_table_order(result.method for result in results))
@@ -83,11 +89,14 @@ def _draw_curve(
 
 
 def draw_track(rows: np.ndarray, stem: Path) -> None:
-    """Draws, along a tracked drive, position errors and unmapped points.
+    """Draws the results of a tracked drive over its length, and saves them.
 
-    The unmapped points are the share of each scan's points that the map lacks.
+    The figure shows errors of the position, and the share of each scan's points
+    that the map lacks.
 
-    The rows are of the type `TRACKED`.
+    Args:
+        rows: records of `evaluation.localisation.tracking.TRACKED`.
+        stem: path of the files without the ending.
     """
     figure = Figure(figsize=(6.4, 4.2), layout="constrained")
     top, bottom = figure.subplots(2, 1, sharex=True, height_ratios=(2, 1))

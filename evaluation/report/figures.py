@@ -67,8 +67,11 @@ _STEP_LIMIT = 4.0
 class View:
     """An orthographic camera that looks at the ground.
 
-    The azimuth is the direction from the scene to the camera, seen from above;
-    the elevation is the camera's height above the horizon, up to 90 [deg].
+    Attributes:
+        azimuth_deg: direction from the scene to the camera, seen from above,
+            anticlockwise from the x axis [deg].
+        elevation_deg: height of the camera above the horizon, up to 90 [deg].
+        pixels_per_metre: scale of the picture.
     """
 
     azimuth_deg: float = -60.0
@@ -90,9 +93,12 @@ class View:
 
 @dataclass(frozen=True)
 class Picture:
-    """An image (height, width, 3) uint8 of a cloud, white where it is empty.
+    """An image of a cloud, white where it is empty.
 
-    The origin is the lower left corner, along right and up [m].
+    Attributes:
+        image: (height, width, 3) uint8 pixels.
+        origin: (2,) lower left corner of the image, along right and up [m].
+        view: the camera.
     """
 
     image: np.ndarray
@@ -123,14 +129,17 @@ _FROM_ABOVE = View(azimuth_deg=-90.0, elevation_deg=90.0, pixels_per_metre=2.5)
 def judge_points(
     points: np.ndarray, other: np.ndarray, tau: float = TAU
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Applies the two tests of the TCR to points (N, 3) of a fine map [m].
+    """Returns how the change ratio (TCR) counts the points of a fine map.
 
-    `other` has the voxel centroids (M, 3) of the other map, M > 0.
+    Args:
+        points: (N, 3) points of the map [m].
+        other: (M, 3) voxel centroids of the other map, M > 0 [m].
+        tau: distance up to which a point has a counterpart [m].
 
     Returns:
-        (N,) bool, whether a point lacks a counterpart within the distance tau
-        [m]; and (N,) bool, whether the point is in the other map's hull and
-        therefore counts.
+        (N,) bool, whether a point lacks a counterpart in the other map; and
+        (N,) bool, whether it is in the other map's convex hull and therefore
+        counts.
     """
     # A distance beyond the bound only counts as far away, so the search stops
     # there.
@@ -141,7 +150,9 @@ def judge_points(
 def top_view(points: np.ndarray, positions: np.ndarray) -> Picture:
     """Returns a picture of a route's surroundings from above, x to the right.
 
-    The cloud (K, 3) and the positions (N, 3) of the sensor are in W [m].
+    Args:
+        points: (K, 3) cloud in W [m].
+        positions: (N, 3) positions of the sensor along the route in W [m].
     """
     low, high = positions[:, :2].min(axis=0), positions[:, :2].max(axis=0)
     near = (
@@ -161,11 +172,13 @@ def draw_routes(
     routes: Sequence[np.ndarray],
     stem: Path,
 ) -> None:
-    """Draws routes over views from above, from red to blue, and saves them.
+    """Draws routes on pictures from above, and saves the figure.
+
+    Each route is red at its start and blue at its end.
 
     Args:
         map_name: name of the map, for the titles.
-        stages: stage of each view.
+        stages: stage of each picture.
         views: picture of each stage from above.
         routes: (M, 3) positions in W along the route through each stage [m].
         stem: path of the files without the ending.
@@ -189,16 +202,17 @@ def draw_change(
 ) -> None:
     """Draws what changed between two stages, in two figures.
 
-    The colours show how TCR counts each point. In the first figure, points
-    without a counterpart in the other map are red. They are pale red outside
-    the other map's hull: the other drive may not have passed there, and TCR
-    does not count these points. The second figure shows the sets H (points in
-    the other map's hull) and O (unchanged points) of TCR: for each of the two
-    maps, and for both together. A point has the colour of its voxel on the grid
-    of `maps`.
+    The first figure shows both maps. Points without a counterpart in the other
+    map are red; they are pale red outside the other map's convex hull, where
+    the change ratio (TCR) does not count them, because the other drive may not
+    have passed there. The second figure shows the sets of points from which TCR
+    is computed: points in the other map's hull, and unchanged points.
 
-    `clouds` are two clouds (K, 3) in W [m], and `maps` two voxel maps, in both
-    cases of the earlier and of the later stage.
+    Args:
+        result: the change between the stages.
+        clouds: (K, 3) clouds of the earlier and of the later stage in W [m].
+        maps: voxel maps of the earlier and of the later stage.
+        stems: paths of the two figures without the ending.
     """
     titles, pictures = [], []
     for one, other in ((0, 1), (1, 0)):
@@ -214,10 +228,14 @@ def draw_change(
 
 
 def voxel_of_each(points: np.ndarray, coarse: VoxelMap) -> np.ndarray:
-    """Returns the voxel of their map in which each point (N, 3) [m] lies.
+    """Returns the number (N,) of the voxel to which each point belongs.
 
-    Rounding can put a point on the other side of a border. The result is
-    therefore the occupied voxel with the nearest centre.
+    This is the voxel that contains the point or, if rounding has put the point
+    across a border, the occupied voxel with the nearest centre.
+
+    Args:
+        points: (N, 3) points from which the map was made [m].
+        coarse: the voxel map.
     """
     owners = coarse.find(points)
     elsewhere = np.flatnonzero(owners < 0)
@@ -347,9 +365,13 @@ def _draw_route(axes: Axes, line: np.ndarray) -> None:
 def render(
     points: np.ndarray, rgb: np.ndarray, view: View, size_px: int = 3
 ) -> Picture:
-    """Draws a cloud, N > 0 points (N, 3) in W [m], with colours (N, 3) uint8.
+    """Draws a cloud as an orthographic picture, with edges darkened.
 
-    Each point covers a square with sides of `size_px`.
+    Args:
+        points: (N, 3) points in W [m], N > 0.
+        rgb: (N, 3) uint8 colours.
+        view: direction and scale of the picture.
+        size_px: side of the square that each point covers [pixels].
     """
     seen = points @ view.axes().T
     # One column at a time: a minimum over rows takes many times as long.
@@ -384,7 +406,10 @@ def shade_by_height(
 ) -> np.ndarray:
     """Returns colours (N, 3) uint8 that are darker for lower points.
 
-    `darkest` is the factor at the lowest of the heights (N,) [m].
+    Args:
+        rgb: (N, 3) uint8 colours.
+        heights: (N,) heights [m].
+        darkest: factor by which the colour of the lowest points is multiplied.
     """
     factor = darkest + (1.0 - darkest) * _height_parts(heights)
     return (rgb * factor[:, None]).astype(np.uint8)
@@ -395,7 +420,13 @@ def colour_by_height(
     lowest: tuple[int, int, int],
     highest: tuple[int, int, int],
 ) -> np.ndarray:
-    """Returns colours (N, 3) uint8, blended between two colours by height."""
+    """Returns colours (N, 3) uint8, blended between two colours by height.
+
+    Args:
+        heights: (N,) heights [m].
+        lowest: colour of the lowest points, red, green and blue.
+        highest: colour of the highest points.
+    """
     part = _height_parts(heights)[:, None]
     return ((1.0 - part) * lowest + part * highest).astype(np.uint8)
 

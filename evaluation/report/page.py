@@ -83,17 +83,24 @@ class Report:
     """The contents of a report.
 
     Attributes:
-        pairs: results of all pairs of drives, each with those of its control:
-            the same routes without a change of the city.
+        changes: change between the stages of each map.
+        pairs: place recognition of all pairs of drives, each with that of its
+            control (the same routes without a change of the city), if any.
         recognitions: place recognition of all pairs without their controls, and
             of drives compared with themselves.
+        differences: AUC differences between methods.
         evidence: (database, query) -> evidence on why best places are wrong.
-        tracks: drive -> its track, also for the controls.
-        pages: drive -> address, relative to the page, of the page of its
-            recording; drives without a page may be left out.
+        tracks: drive -> time stamps and poses, also for the controls.
+        drives: drive -> what the page shows of it.
+        illustrations: figures, in the order of the page.
+        costs: time and memory of each method.
+        notes: notes for the reader.
+        made_by: version, protocol and settings of methods that made the report.
+        pages: drive -> address of the web page of its recording, relative to
+            the report; drives without a page may be left out.
+        reference: published numbers to compare with.
         repeated: results by the protocol of the published numbers, if this
             protocol differs from that of the report.
-        made_by: version, protocol and settings of methods that made the report.
     """
 
     changes: list[ChangeResult] = field(default_factory=list)
@@ -143,9 +150,17 @@ class Report:
 
 
 def chart_illustrations(report: Report, folder: Path) -> list[Illustration]:
-    """Draws charts of the results of all cities; returns those with data.
+    """Draws the charts with the results of all maps.
 
-    Charts of published numbers stand next to the charts of the report.
+    Charts of published numbers stand next to the charts of the report. A chart
+    without data is left out, with a note in the report.
+
+    Args:
+        report: the report.
+        folder: folder for the files.
+
+    Returns:
+        The figures that were drawn.
     """
     name = "AUC against TCR_sym"
     charts: list[tuple[str, str, Section, dict[str, str], Results]] = [
@@ -186,7 +201,14 @@ def chart_illustrations(report: Report, folder: Path) -> list[Illustration]:
 
 
 def write_report(report: Report, folder: Path) -> Path:
-    """Writes all files except figures; returns the path of `report.html`.
+    """Writes all files of a report, except figures.
+
+    Args:
+        report: the report.
+        folder: folder to write.
+
+    Returns:
+        The path of `report.html`.
 
     Raises:
         InputError: a file cannot be written.
@@ -368,10 +390,11 @@ def _drives_of_maps(report: Report) -> dict[str, list[str]]:
 
 
 def route_picture(drive: PageDrive) -> Markup:
-    """Returns an SVG element: the map, over it the route from red to blue.
+    """Returns a drive's route on its map from above, as an SVG element.
 
-    One unit is one metre, y points down. The element `image` in it has the
-    id `view-` and the drive's name, and serves the query browser as well.
+    The route is red at its start and blue at its end. One unit is one metre; x
+    points right and y down. The picture of the map is an element `image` with
+    the id `view-<name of the drive>`, which the query browser uses as well.
     """
     left, right, bottom, top = drive.extent
     width, height = right - left, top - bottom

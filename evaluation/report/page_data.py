@@ -1,4 +1,4 @@
-"""Drives and pairs, in the form that the page's script reads."""
+"""Data for the script of a report's page: drives, and pairs of drives."""
 
 import base64
 from collections.abc import Callable, Mapping, Sequence
@@ -44,11 +44,13 @@ class Illustration:
 
     Attributes:
         stem: path of the figure without ending.
-        page_kind: "svg" or "webp", the form in which the page holds it.
-        section: section of the page with the figure; "print" for none.
+        title: title of the figure.
+        page_kind: format of the figure on the page, "svg" or "webp".
+        section: section of the page that shows the figure; "print" for a figure
+            that the page does not show.
         num_panels: number of panels side by side; a phone shows one at a time.
-        legend: red, green, blue and meaning of the colours. The page repeats it
-            below the figure, in letters that a phone shows legibly.
+        legend: the colours (red, green, blue), each with its meaning. The page
+            shows them below the figure.
     """
 
     stem: Path
@@ -64,8 +66,8 @@ class CameraImages:
     """Images of a camera at K frames of a drive.
 
     Attributes:
-        stamps_ns: (K,) stamps of the frames.
-        times_ns: (M,) times of images, increasing.
+        stamps_ns: (K,) time stamps of the frames [ns].
+        times_ns: (M,) times of the images, increasing [ns].
         files: the M images as JPEG.
     """
 
@@ -74,9 +76,12 @@ class CameraImages:
     files: list[bytes]
 
     def to_data(self, step: int) -> dict:
-        """Returns every `step`-th image, and which of them each frame shows.
+        """Returns every `step`-th image, ready for JSON.
 
-        Each frame shows the image that is nearest in time.
+        Returns:
+            `files`, the images as base64; and, for each of the K frames,
+            `nearest`, the number of the image that is nearest in time, and
+            `later`, how much later than the frame this image is [s].
         """
         times_ns = self.times_ns[::step]
         nearest = _nearest(times_ns, self.stamps_ns)
@@ -154,9 +159,15 @@ def make_drive(
 def camera_images(
     drive: Drive, stamps_ns: np.ndarray, on_note: Callable[[str], None]
 ) -> CameraImages | None:
-    """Returns a drive's camera images that are nearest in time to frames.
+    """Returns the images of a drive's camera that are nearest to frames.
 
-    A note tells how many could not be decoded.
+    Nearest means nearest in time. The result is None for a drive without a
+    camera.
+
+    Args:
+        drive: the drive.
+        stamps_ns: (K,) time stamps of the frames [ns].
+        on_note: is called with a note if images could not be decoded.
 
     Raises:
         InputError: if the drive cannot be read.

@@ -13,7 +13,13 @@ from evaluation.results.table import Results, Row
 
 @dataclass(frozen=True)
 class Published:
-    """Published numbers of a method on a pair of drives."""
+    """Published numbers of a method on a pair of drives.
+
+    Attributes:
+        auc: area under the precision-recall curve.
+        recall_at_1: R@1.
+        f1_max: greatest F1 on the curve.
+    """
 
     auc: float
     recall_at_1: float
@@ -22,7 +28,15 @@ class Published:
 
 @dataclass(frozen=True)
 class Finding:
-    """A published claim, and whether the numbers of a report confirm it."""
+    """A published claim, and whether the numbers of a report confirm it.
+
+    Attributes:
+        claim: the claim in words.
+        verdict: whether it is confirmed, in a word or two.
+        evidence: the numbers behind the verdict, in words.
+        table: table or figure of the publication that makes the claim; may be
+            empty.
+    """
 
     claim: str
     verdict: str
@@ -32,7 +46,12 @@ class Finding:
 
 @dataclass(frozen=True)
 class Judgement:
-    """Findings under a heading that says whose claims they test."""
+    """Verdicts on several claims of one source.
+
+    Attributes:
+        heading: heading that names the source of the claims.
+        findings: the claims with their verdicts.
+    """
 
     heading: str
     findings: Sequence[Finding]
@@ -111,7 +130,7 @@ class Reference:
         return self.protocols[method]
 
     def covers(self, result: PlaceRecognition) -> bool:
-        """Returns whether the source has results like this one.
+        """Returns whether there are published numbers to compare with a result.
 
         The map must be in the source, and the method must have been run by the
         same protocol.

@@ -85,7 +85,14 @@ def change_table(
     reference: Reference = NO_REFERENCE,
     evidence: Evidence = MappingProxyType({}),
 ) -> Table:
-    """Returns Table I: the change between the drives of each pair."""
+    """Returns Table I of a report: the change between the drives of each pair.
+
+    Args:
+        results: change of each pair.
+        reference: published results to put next to them.
+        evidence: (database, query) -> evidence from scans, for the column with
+            the change that is visible from the query's route.
+    """
 
     def visible(one: ChangeResult) -> tuple[float | None, ...]:
         return _visible_change(evidence, one.report.source, one.report.target)
@@ -261,7 +268,14 @@ def _merging_text(results: Sequence[PlaceRecognition]) -> str:
 def audit_table(
     results: Sequence[PlaceRecognition], reference: Reference = NO_REFERENCE
 ) -> Table:
-    """Returns a table of all numbers with the counts behind them."""
+    """Returns a table of all metrics with the counts from which they follow.
+
+    It has a row for each result and mode (all queries, or those with a match).
+
+    Args:
+        results: results of methods on pairs of drives.
+        reference: published results to put next to them.
+    """
     return Table.of(
         [_Counted.of(r, mode, reference) for r in results for mode in MODES],
         {
@@ -323,10 +337,14 @@ def metric_numbers(results: Sequence[PlaceRecognition]) -> Table:
 
 
 class MethodDifference(NamedTuple):
-    """The AUC of one method minus that of another on a pair of drives.
+    """The AUC of one method minus that of another, on one pair of drives.
 
-    The p-value is corrected for the differences of that pair of drives, so that
-    it does not depend on the other pairs of a report; NaN if unknown.
+    Attributes:
+        result: result of the first method.
+        other: result of the second method.
+        difference: the difference.
+        p_value: p-value of the difference, corrected for the number of
+            differences on this pair of drives; NaN if unknown.
     """
 
     result: PlaceRecognition
@@ -537,17 +555,25 @@ def cost_numbers(costs: Sequence[Cost]) -> Table:
 
 @dataclass(frozen=True)
 class DriveTrack:
-    """Time stamps (N,) and sensor poses (N, 4, 4) of all frames of a drive."""
+    """Time stamps and sensor poses of all frames of a drive.
+
+    Attributes:
+        stamps_ns: (N,) int64 time stamps [ns].
+        X_WS: (N, 4, 4) poses of the sensor.
+    """
 
     stamps_ns: np.ndarray
     X_WS: np.ndarray
 
     def moments(self, frames: np.ndarray) -> list[np.ndarray]:
-        """Returns frame number, stamp and pose of the sensor at given frames.
+        """Returns number, time stamp and sensor pose of given frames.
 
-        The result consists of 9 arrays (Q,) of objects, one for each name in
-        `_MOMENT`. A missing frame is given as a number below 0; its values are
-        None.
+        Args:
+            frames: (Q,) frame numbers; a number below 0 stands for no frame.
+
+        Returns:
+            Nine arrays (Q,) of objects: frame, stamp [ns], x, y, z [m], and qx,
+            qy, qz, qw of the orientation. All are None where there is no frame.
         """
         X_WS = self.X_WS[frames]
         quats_xyzw = Rotation.from_matrix(X_WS[:, :3, :3]).as_quat()
@@ -612,10 +638,13 @@ def query_table(
     tracks: Mapping[str, DriveTrack],
     evidence: Evidence,
 ) -> Table:
-    """Returns a row for each result and query, in the queries' order.
+    """Returns a table with a row for each result and query, in their order.
 
-    `tracks` must have all drives. The columns with reasons for wrong places are
-    empty for pairs without evidence.
+    Args:
+        results: results of methods on pairs of drives.
+        tracks: drive -> its frames, for all drives in the results.
+        evidence: (database, query) -> evidence on why best places are wrong.
+            The columns with reasons are empty for a pair without evidence.
     """
 
     def queries(one: PlaceRecognition) -> _Queries:

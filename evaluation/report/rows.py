@@ -1,4 +1,4 @@
-"""The numbers of a report as rows of a table of results, and conclusions.
+"""The numbers of a report as rows of a table, and conclusions from them.
 
 The conclusions are the ranking of the methods, and the share of its result that
 each method keeps under structural change. Each pair of drives can have a
@@ -141,10 +141,10 @@ def ranked_methods(results: Results) -> tuple[list[Ranked], str]:
 def beside(results: Results) -> dict[str, dict[str, float]]:
     """Returns further columns of the ranking: column -> method -> mean.
 
-    The columns are three shares of the queries with a match: queries whose best
-    place is right; queries whose best place is wrong, but less than two radii
-    away; and queries with a correct pose. The means are over the pairs of
-    drives with results of all methods.
+    The columns are shares of the queries with a match: queries whose best place
+    is right; queries whose best place is wrong, but less than two radii away;
+    and queries with a correct pose. The means are over the pairs of drives with
+    results of all methods.
     """
     rows = results.where({STAGE: OWN})
     r1, far, matched, pose = (
@@ -204,19 +204,28 @@ class Survival(NamedTuple):
     after: Mapping[str, Row]
 
     def number(self, side: str, metric: str, end: str = "value") -> float:
-        """Returns a metric's value, or one limit of its 95 % interval.
+        """Returns a number of the method, with or without the change.
 
-        `side` is `before` (without the change) or `after` (with it). `end` is
-        `value`, or `low` or `high` for a limit of the interval.
+        Args:
+            side: `before` (without the change) or `after` (with it).
+            metric: name of the number.
+            end: `value`, or `low` or `high` for a limit of its 95 % interval.
+
+        Returns:
+            The number; NaN if it is unknown.
         """
         row = getattr(self, side).get(metric)
         return math.nan if row is None else getattr(row, end)
 
 
 def survivals(rows: Iterable[Row], stages: Mapping[str, str]) -> list[Survival]:
-    """Returns the results of each method on each pair, in order of tables.
+    """Returns the results of each method on each pair of drives.
 
-    `stages` maps the name of each drive to its stage.
+    They are sorted by pair, and then by method in the order of tables.
+
+    Args:
+        rows: rows of place recognition, with and without the change.
+        stages: name of a drive -> its stage.
     """
     found: dict[
         tuple[tuple[str, str, str], str],
@@ -238,7 +247,10 @@ def percent(share: float) -> str:
 
 
 def interval_text(kept: Row) -> str:
-    """Returns the interval of a kept share as text; empty if unknown."""
+    """Returns the interval of a share as text in per cent, such as `(81–90)`.
+
+    The text is empty if the interval is unknown.
+    """
     if math.isnan(kept.low):
         return ""
     return f"({100.0 * kept.low:.0f}–{100.0 * kept.high:.0f})"

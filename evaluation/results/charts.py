@@ -219,7 +219,11 @@ def check(chart: Mapping[str, Any]) -> dict[str, str]:
 
 
 def styles(labels: Sequence[str]) -> dict[str, tuple[str, str, str]]:
-    """Returns the colour, line style and marker of each method, by title."""
+    """Returns how each method is drawn: title -> colour, line style and marker.
+
+    Args:
+        labels: names of the methods, with their settings.
+    """
     others = [name for name in labels if name not in METHOD_STYLES]
     return {
         title(name): METHOD_STYLES.get(name)
@@ -485,12 +489,19 @@ def smooth(
     grid: np.ndarray,
     counts: np.ndarray | None = None,
 ) -> np.ndarray:
-    """Returns the local linear regression of y over x at places (M,).
+    """Returns the local linear regression of y over x, with Gaussian weights.
 
-    Weights are Gaussian (Fan and Gijbels, Local Polynomial Modelling, 1996,
-    equation 3.1 with p = 1). Not all x may be equal. `counts` (B, N) can say
-    how often each point counts in B samples; the result is then B regressions
-    (B, M).
+    Source: Fan and Gijbels, Local Polynomial Modelling, 1996, equation 3.1 with
+    p = 1.
+
+    Args:
+        x, y: (N,) coordinates of the points; not all x may be equal.
+        grid: (M,) values of x at which the regression is computed.
+        counts: (B, N) how often each point counts in each of B samples; None if
+            each point counts once.
+
+    Returns:
+        (M,) values of the regression; with `counts`, (B, M).
     """
     counts = np.ones(len(x)) if counts is None else counts
     width = _BANDWIDTH * max(np.ptp(grid), 1e-12)
@@ -508,9 +519,16 @@ def smooth(
 def smooth_band(
     x: np.ndarray, y: np.ndarray, grid: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Returns the 95 % band of the regression `smooth`, by bootstrap.
+    """Returns the 95 % band of the regression of y over x, by bootstrap.
 
-    The bootstrap resamples points.
+    The bootstrap draws points with replacement.
+
+    Args:
+        x, y: (N,) coordinates of the points.
+        grid: (M,) values of x at which the band is computed.
+
+    Returns:
+        Lower and upper limit of the band, each (M,).
     """
     draws = np.random.default_rng(0).integers(len(x), size=(_RESAMPLES, len(x)))
     counts = np.stack([np.bincount(d, minlength=len(x)) for d in draws])

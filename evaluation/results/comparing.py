@@ -72,8 +72,11 @@ class _Table:
 class Compared(NamedTuple):
     """The mean AUC of one method minus the mean AUC of another.
 
-    The p-value is corrected by Holm's method for the number of differences in
-    the comparison.
+    Attributes:
+        first, second: names of the two methods.
+        difference: the difference.
+        p_value: its p-value, corrected by Holm's method for the number of
+            differences in the comparison.
     """
 
     first: str
@@ -85,9 +88,13 @@ class Compared(NamedTuple):
 class Agreement(NamedTuple):
     """How similarly two tables rank the methods that both of them name.
 
-    `tau` is Kendall's tau-b (Kendall, Biometrika 33, 1945): 1 if the two tables
-    rank the methods in the same order, -1 if they rank them in opposite orders.
-    It is NaN if all values of a table are equal.
+    Attributes:
+        first, second: names of the two tables.
+        methods: names of these methods.
+        tau: Kendall's tau-b (Kendall, Biometrika 33, 1945): 1 if the two tables
+            rank the methods in the same order, -1 if they rank them in opposite
+            orders; NaN if all values of a table are equal.
+        interval: 95 % interval of `tau`.
     """
 
     first: str

@@ -49,12 +49,16 @@ def plain(text: str) -> str:
 
 
 def save(figure: Figure, stem: Path, kinds: Sequence[str] = LINES) -> None:
-    """Writes a figure as files for print and, as the last one, for the page.
+    """Writes a figure as one file for each of several formats.
 
-    Equal figures give equal bytes: no time of creation, no random ids. SVG and
-    WebP files leave out the legend of the whole figure: the page writes it
-    below the figure, in letters that can be read on a phone. `stem` is the path
-    of the files without the ending.
+    Equal figures give equal bytes. SVG and WebP files, which are for web pages,
+    leave out the legend of the whole figure: the page writes it below the
+    figure, in letters that can be read on a phone.
+
+    Args:
+        figure: the figure.
+        stem: path of the files without the ending.
+        kinds: endings of the files, such as `pdf`.
 
     Raises:
         InputError: if a file cannot be written.

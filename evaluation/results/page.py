@@ -58,7 +58,8 @@ def write_page(
     """Writes an experiment's page, `index.html`, which needs no other file.
 
     Next to it, the function writes the charts for print and, if there are
-    numbers behind the charts (see `summarised`), `summaries.csv`.
+    numbers behind the charts (see `evaluation.results.summaries.summarised`),
+    `summaries.csv`.
 
     Args:
         results: the table of results, written next to the page as
@@ -68,9 +69,9 @@ def write_page(
         folder: folder in which the page is written.
         title: title of the page.
         about: the question, in words.
-        charts: descriptions of the charts, see `charts`. The message of the
-            first chart is the headline. A chart without data in the table is
-            left out, with a note.
+        charts: descriptions of the charts, see `evaluation.results.charts`. The
+            message of the first chart is the headline. A chart without data in
+            the table is left out, with a note.
         experiment_text: the experiment as YAML.
         notes: further sentences for the page, such as on settings.
         on_note: is called with a note on each chart that is left out.

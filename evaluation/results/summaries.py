@@ -39,8 +39,12 @@ _SAMPLES = 1000
 class Mean(NamedTuple):
     """A mean over rows that have the same values in some columns.
 
-    `number` is the number of rows in the mean. Rows without a known value are
-    left out.
+    Attributes:
+        key: the values in these columns.
+        value: the mean.
+        least, greatest: least and greatest of the averaged values.
+        number: number of averaged values. Rows without a known value are left
+            out.
     """
 
     key: tuple
@@ -84,8 +88,15 @@ def means(rows: Iterable[Row], *columns: str) -> list[Mean]:
 class Summary(NamedTuple):
     """A number computed from a table, with its 95 % interval or range.
 
-    `n` is the number of conditions from which the number is computed; None if
-    unknown.
+    Attributes:
+        what: name of the number.
+        map: name of the map.
+        task: the task from whose results it is computed.
+        method: name of the method, with its settings.
+        gate: whether the gate was used.
+        value: the number.
+        low, high: its interval or range; NaN if unknown.
+        n: number of conditions from which it is computed; None if unknown.
     """
 
     what: str
@@ -107,7 +118,7 @@ class Summary(NamedTuple):
         low: float = math.nan,
         high: float = math.nan,
     ) -> Summary:
-        """Returns the summary of a number of one method on one map.
+        """Returns a number of one method on one map, with its interval.
 
         Args:
             what: name of the number.
@@ -185,11 +196,17 @@ def excesses(queries: QueryRows) -> list[Summary]:
 def lifetime(
     times: Sequence[float], kept: Sequence[float], left: float
 ) -> float:
-    """Returns the time until only a given share is left.
+    """Returns the time at which only a given share is left.
 
-    The times ascend. The share is 1 at the first time, and changes linearly
-    between two times. The result is infinite if more than `left` remains at the
-    last time, and NaN if a share is unknown.
+    Args:
+        times: (N,) ascending times.
+        kept: (N,) shares at these times, the first of which is 1. The share
+            changes linearly between two times.
+        left: the given share.
+
+    Returns:
+        The time; infinite if more than `left` remains at the last time, and NaN
+        if a share is unknown.
     """
     if any(math.isnan(share) for share in kept):
         return math.nan
@@ -436,9 +453,9 @@ def summarised(
 ) -> list[Summary]:
     """Returns the numbers behind an experiment's charts.
 
-    They are, for charts of the kind `lines`, lifetimes (metric `kept`) or
-    growth exponents (CPU times); for scatter plots, correlations; and, for two
-    kinds of change, what they cost together beyond expectation.
+    For charts of the kind `lines`, these are lifetimes (metric `kept`) or
+    growth exponents (CPU times); for scatter plots, they are correlations. For
+    combined kinds of change, excesses are added.
     """
     found = []
     for chart in charts:

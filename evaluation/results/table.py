@@ -121,7 +121,7 @@ class Key:
         task: `place`, `pose`, `localise`, `map`, `change`, `cost` or another.
         method: method, estimator or baseline; "" for the task `change`.
         gate: whether places were rejected by the method's own pose.
-        protocol: name of the protocol, see `RetrievalProtocol.name`.
+        protocol: name of the protocol: `fair`, `paper`, `recorded` or `own`.
     """
 
     experiment: str
@@ -153,10 +153,14 @@ class Key:
         return ", ".join((self.method, *settings))
 
     def but(self, *names: str) -> tuple[object, ...]:
-        """Returns the values of the key without those of some columns.
+        """Returns the values of all columns of the key except the given ones.
 
-        If `method` is left out, so are the method's settings, such as
-        `methods.ring++.crop`.
+        Rows with equal results belong to the same condition apart from these
+        columns.
+
+        Args:
+            names: names of the columns to leave out. With `method`, its
+                settings, such as `methods.ring++.crop`, are left out as well.
         """
         known = [name for name in KEYS if name not in names]
         without_settings = "method" in names
@@ -195,7 +199,12 @@ class Row(Key):
 
     @classmethod
     def of(cls, number: Number, **key: Any) -> Row:
-        """Returns a task's result as a row; `key` describes its condition."""
+        """Returns a task's result as a row of the table.
+
+        Args:
+            number: the result.
+            key: all other columns of the row, see `Key`.
+        """
         named = {"method": number.method, "gate": number.gate, **key}
         return cls(
             **named,
@@ -212,9 +221,9 @@ class Answers(Key):
     """The answers of a method to Q queries.
 
     Attributes:
-        columns: name -> (Q,) values, of the columns of `queries.csv`. NaN
-            stands for an empty cell with a real number; -1, NaN or infinity for
-            an empty cell with a whole number.
+        columns: name of a column of `queries.csv` -> (Q,) values. An empty cell
+            is NaN in a column of real numbers, and -1, NaN or infinity in a
+            column of whole numbers.
     """
 
     columns: Mapping[str, np.ndarray]
@@ -308,8 +317,11 @@ class Results:
     ) -> Results:
         """Returns the rows that have given values in given columns.
 
-        If the given value is a tuple, list or set, a row needs any one of its
-        values. Give the names of factors that contain dots in `columns`.
+        Args:
+            columns: name of a column -> value, or a tuple, list or set of
+                values of which a row must have one. Use this argument for names
+                that contain dots.
+            named: further columns, as keyword arguments.
         """
         wanted = {
             name: value if isinstance(value, tuple | list | set) else (value,)

@@ -67,11 +67,13 @@ _MARKDOWN = {ord(c): f"\\{c}" for c in "\\`*_[]|"} | {
 
 @dataclass(frozen=True)
 class Cell:
-    """A number, its rank in the row, and the paper's number next to it.
+    """A number in a table, next to the paper's number.
 
-    `value` is our number; None or NaN if there is none. `printed` is the
-    paper's number, or None. `rank` is 1 for the best number in the row, 2 for
-    the second best, and None for all others.
+    Attributes:
+        value: our number; None or NaN if there is none.
+        printed: the paper's number, or None.
+        rank: 1 for the best of our numbers in the row, 2 for the second best,
+            None for all others.
     """
 
     value: float | None
@@ -87,6 +89,7 @@ class Table:
     formats. Truth values are written as 0 or 1.
 
     Attributes:
+        header: name of each column.
         rows: one value for each column: text, a number, a `Cell`, or None for
             an empty cell.
         groups: headings above the columns, each with the number of columns that
@@ -104,7 +107,16 @@ class Table:
     def of(
         cls, items: Iterable[_Item], columns: Columns[_Item], caption: str = ""
     ) -> Table:
-        """Returns a table that has one or several rows for each item."""
+        """Returns a table with rows for a list of items.
+
+        Args:
+            items: the items, each of which makes one row, or several if a
+                column returns an array.
+            columns: name of a column -> function that returns the cell of an
+                item. A name can be a pair: a heading above several columns, and
+                the name.
+            caption: what the table shows.
+        """
         names = [n if isinstance(n, tuple) else ("", n) for n in columns]
         groups = groupby(group for group, _ in names)
         spans = tuple((group, len(list(same))) for group, same in groups)
@@ -221,9 +233,12 @@ def keyed(
     keys: Mapping[str | tuple[str, str], _Key],
     value: Callable[[_Item, _Key], object],
 ) -> Columns[_Item]:
-    """Returns one table column for each key.
+    """Returns table columns that differ only in a key, for `Table.of`.
 
-    `value` computes a cell from an item, which makes a row, and a key.
+    Args:
+        keys: name of a column -> its key.
+        value: function that returns a cell, given the item of the row and the
+            key of the column.
     """
 
     def column(key: _Key) -> Callable[[_Item], object]:
@@ -233,11 +248,13 @@ def keyed(
 
 
 def protocol_columns(path: str) -> Columns[Any]:
-    """Returns table columns for the fields of the protocol of an item.
+    """Returns table columns for the options of a protocol, for `Table.of`.
 
     The last column is the name of the protocol.
 
-    `path` leads from an item to its protocol, as in `result.protocol`.
+    Args:
+        path: attribute of an item that contains the protocol, such as
+            `result.protocol`.
     """
     columns = keyed(
         {name: name for name in PROTOCOL_COLUMNS},
@@ -257,9 +274,14 @@ def _rows(values: Sequence[object]) -> list[tuple[object, ...]]:
 def ranked(
     values: Sequence[float | None], printed: Sequence[float | None]
 ) -> list[Cell]:
-    """Returns the cells of a row; the greatest two numbers are marked.
+    """Returns the cells of a row, with the greatest two numbers ranked.
 
-    Values that are equal as printed, with four decimals, share a rank.
+    Numbers that are equal as printed, with four decimals, share a rank. A
+    single number has no rank.
+
+    Args:
+        values: our numbers.
+        printed: the paper's numbers, in the same order.
     """
     shown = [
         None if v is None or math.isnan(v) else round(v, 4) for v in values
@@ -276,7 +298,11 @@ def ranked(
 
 
 def title(label: str) -> str:
-    """Returns a method's name as its authors write it, with its settings."""
+    """Returns the name of a method as its authors write it, with its settings.
+
+    Args:
+        label: name of the method as on the command line, and its settings.
+    """
     method, comma, settings = label.partition(",")
     return f"{_METHOD_TITLES.get(method, method)}{comma}{settings}"
 
@@ -294,7 +320,10 @@ def in_table_order(methods: Iterable[str]) -> list[str]:
 
 
 def by_pair(items: Iterable[Any]) -> dict[Any, list[Any]]:
-    """Returns the items of each pair of drives, by pair."""
+    """Returns items grouped by pair of drives: pair -> its items.
+
+    Each item has an attribute `pair`.
+    """
     groups: dict[Any, list[Any]] = {}
     for one in items:
         groups.setdefault(one.pair, []).append(one)
@@ -302,7 +331,11 @@ def by_pair(items: Iterable[Any]) -> dict[Any, list[Any]]:
 
 
 def by_pair_and_method(items: Sequence[Any]) -> list[Any]:
-    """Returns items pair by pair, and by method in the order of tables."""
+    """Returns items sorted by pair of drives, and then by method.
+
+    Pairs keep their order; methods are in the order of tables. Each item has
+    the attributes `pair` and `method`.
+    """
     pairs = list(dict.fromkeys(one.pair for one in items))
     methods = in_table_order(one.method for one in items)
     return sorted(

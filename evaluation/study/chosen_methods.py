@@ -25,8 +25,11 @@ _FORM = "METHOD.NAME=VALUE"
 class MethodChoice:
     """A method with its settings, from which any process can make it.
 
-    A method of your own is registered by its Python file. Parameters without a
-    setting have their defaults.
+    Attributes:
+        name: name of the method.
+        file: Python file that registers it; None for a method of this package.
+        settings: name and value of each parameter that differs from its
+            default.
     """
 
     name: str
@@ -68,7 +71,11 @@ class MethodChoice:
 
 
 def parse_setting(text: str, form: str = "NAME=VALUE") -> tuple[str, Setting]:
-    """Returns name and value of a setting; commas separate several values.
+    """Returns the name and the value of a setting.
+
+    Args:
+        text: the setting, `NAME=VALUE`. Commas separate the values of a list.
+        form: how a setting must look, for the error message.
 
     Raises:
         InputError: if it has no name or no equals sign.
@@ -83,7 +90,7 @@ def choose_methods(
     files: Iterable[Path] = (),
     settings: Iterable[str] = (),
 ) -> tuple[MethodChoice, ...]:
-    """Returns the methods of this package, and your own from files.
+    """Returns the shipped methods, and further ones on request.
 
     Args:
         files: Python files that register a method each, or names of optional

@@ -30,9 +30,18 @@ _UNPLACED = "map and stage are unknown: no scenario, and no name <map>_<stage>"
 class RecordingInfo:
     """A recording that exists or will be made, with its map and stage.
 
-    Sorted by name, a map's stages are in the order of time. `way` describes the
-    route of the drive (see `driven_way`); None if unknown. The recording is
-    read from `path`, a file or folder, unless `made_by` opens it.
+    Attributes:
+        name: name of the recording.
+        path: file or folder from which it is read.
+        map_name: name of the map.
+        stage: name of the stage; a map's stages, sorted by name, are in the
+            order of time.
+        way: fields of the scenario that determine the path of the drive; None
+            if unknown.
+        needs: names of the jobs that make the recording; empty if it exists.
+        made_by: function that opens the drive instead of `path`, if any.
+        lidar_field: number of rings and field of view of the LiDAR; None if
+            unknown.
     """
 
     name: str
@@ -46,11 +55,14 @@ class RecordingInfo:
 
     @property
     def source(self) -> DriveSource:
-        """Function that opens the drive, see `DriveSource`."""
+        """Function that opens the drive."""
         return self.made_by or RecordedDrive(self.path.absolute())
 
     def drives_like(self, other: RecordingInfo) -> bool:
-        """Returns whether both drives have the same route."""
+        """Returns whether another drive follows the same route.
+
+        It is false if the route of a drive is unknown.
+        """
         return self.way is not None and self.way == other.way
 
 
@@ -62,9 +74,11 @@ Pair = tuple[RecordingInfo, RecordingInfo]
 class Run:
     """One measurement: a method on a pair of drives, by a protocol.
 
-    `places` names the method's descriptions of the places. `queries` names its
-    descriptions of the queries, and also the run. A run can repeat another run
-    by the protocol of published numbers.
+    Attributes:
+        method: the method.
+        protocol: the protocol.
+        places: key of the method's descriptions of the places.
+        queries: key of the method's descriptions of the queries.
     """
 
     method: MethodChoice
@@ -74,15 +88,18 @@ class Run:
 
     @property
     def repeats(self) -> bool:
-        """Whether the run repeats another run by the source's protocol.
+        """Whether the run repeats another run by another protocol.
 
-        The source is that of published numbers, see `City.runs`.
+        The other protocol is that of published numbers.
         """
         return self.queries != self.method.key
 
     @property
     def shares_places(self) -> bool:
-        """Whether the run uses places described by the study's own protocol."""
+        """Whether the places are described by the study's own protocol.
+
+        If not, they are described by the protocol of published numbers.
+        """
         return self.places == self.method.key
 
 
@@ -90,11 +107,13 @@ class Run:
 class City:
     """The drives through one map.
 
-    `stages` contains one drive per stage of the map. `others` are further
-    drives, such as controls, which follow the route of one stage through
-    another stage. `reference` contains published numbers: a pair of stages is
-    also compared in reverse, with database and query exchanged, if the
-    reference does so.
+    Attributes:
+        name: name of the map.
+        stages: stage -> the drive through this stage.
+        others: further drives, such as controls, which follow the route of one
+            stage through another stage.
+        reference: published numbers, to which pairs and runs are added for a
+            comparison.
     """
 
     name: str
@@ -138,13 +157,16 @@ class City:
         methods: Iterable[MethodChoice],
         protocol: RetrievalProtocol,
     ) -> list[Run]:
-        """Returns the runs of methods on a pair, then runs that repeat them.
+        """Returns the runs of methods on a pair of drives.
 
-        If a method has published numbers on the pair, measured by another
-        protocol, a second run repeats the method by that protocol.
+        There is a run of each method by the given protocol. If a method has
+        published numbers on the pair, measured by another protocol, a second
+        run by that protocol follows.
 
-        The second run uses the places of the first run if the two protocols
-        describe places in the same way.
+        Args:
+            pair: drive of the database, and of the queries.
+            methods: the methods.
+            protocol: the study's protocol.
         """
         database, query = (one.stage for one in pair)
         runs = [Run(one, protocol, one.key, one.key) for one in methods]
@@ -174,9 +196,16 @@ class City:
         """Returns the control of a pair: the same two routes, in one stage.
 
         One drive of the pair is replaced by a drive on the same route, but in
-        the stage of the other drive. If possible, the database is replaced, so
-        that the queries keep their scans. Returns None if there is no such
-        drive, or if a drive is compared with itself.
+        the stage of the other drive. If possible, this is the database, so that
+        the queries keep their scans.
+
+        Args:
+            database: drive of the database.
+            query: drive of the queries.
+
+        Returns:
+            The new database and query; None if there is no suitable drive, or
+            if a drive is compared with itself.
         """
         if database is query:
             return None
@@ -195,7 +224,7 @@ def find_recordings(
     lidar: str | None = None,
     columns: int | None = None,
 ) -> list[RecordingInfo]:
-    """Opens all recordings in a folder and its direct subfolders.
+    """Returns all recordings in a folder and its direct subfolders.
 
     They can be MCAP files or have the layout of a data set, such as MulRan or
     HeLiPR. Drives in the layout of CNS, and drives in the layout of KITTI that
@@ -205,6 +234,14 @@ def find_recordings(
     A recording states its map and stage in its scenario. Without a scenario,
     they are taken from its name: `<map>_<stage>`, or without `_` as in KAIST01.
     A recording without map and stage is left out, with a note.
+
+    Args:
+        folder: the folder.
+        on_note: is called with each note on how recordings are read or left
+            out.
+        lidar: name of the LiDAR, for recordings with several.
+        columns: number of columns of `.bin` files; by default guessed from the
+            values.
 
     Raises:
         InputError: if no recording has a map and a stage, or a recording cannot
@@ -227,7 +264,7 @@ def find_recordings(
 
 
 def nothing_to_compare(cities: Iterable[City]) -> list[str]:
-    """Returns a note for the user on each city without two stages."""
+    """Returns a note for the user on each map with drives in one stage only."""
     return [
         f"{city.name}: nothing to compare: all drives are through stage"
         f" {', '.join(city.stages)}. A report compares drives through two"
@@ -242,7 +279,7 @@ def nothing_to_compare(cities: Iterable[City]) -> list[str]:
 def group_cities(
     recordings: Iterable[RecordingInfo], reference: Reference = NO_REFERENCE
 ) -> list[City]:
-    """Groups recordings by map; returns a city for each map, sorted by name.
+    """Groups recordings by map, and sorts the maps by name.
 
     Raises:
         InputError: if two recordings have the same name, or the same map and

@@ -44,13 +44,15 @@ def explain_faults(
     results: tuple[Part, ...],
     protocol: RetrievalProtocol,
 ) -> PairEvidence | None:
-    """Returns evidence on why best places of a pair are wrong.
+    """Returns evidence on why the best places of queries are wrong.
 
-    Returns None if a drive is compared with itself and closes no loop.
+    The result is None if a drive is compared with itself and never passes a
+    place twice.
 
     Args:
         reporter: reports progress.
-        drives: files of the database and the query, each with a `KeptDrive`.
+        drives: files with the scans (`KeptDrive`) of the database and of the
+            query.
         methods: methods of the results.
         results: file with each method's result on the pair.
         protocol: protocol of the results.
@@ -73,7 +75,7 @@ def find_evidence(
     protocol: RetrievalProtocol,
     track: Track = silent,
 ) -> PairEvidence:
-    """Returns evidence on why best places of a pair are wrong.
+    """Returns evidence on why the best places of queries are wrong.
 
     The scan of each query is compared with those of its matches and of its
     wrong best places.

@@ -32,11 +32,18 @@ def draw_city(
     stages: tuple[tuple[str, Part, Part, DriveSource], ...],
     stem: Path,
 ) -> dict[str, PageDrive]:
-    """Draws the routes of a city; returns its drives for the page, by name.
+    """Draws the routes of a city's drives on its maps, and saves the figure.
 
-    Each stage consists of its name, a file with a `SurveyedDrive`, a file with
-    a cloud for pictures, and the source of the drive. If the source is a
-    recording, the page shows its camera images.
+    Args:
+        reporter: reports progress.
+        map_name: name of the map.
+        stages: for each stage, its name, the file with its `SurveyedDrive`, the
+            file with a cloud for pictures, and the source of the drive.
+        stem: path of the figure without the ending.
+
+    Returns:
+        Drive -> what the page shows of it. If a drive is recorded, this
+        includes the images of its camera.
     """
     names, views, routes, drives = [], [], [], {}
     for done, (name, surveyed, fine, source) in enumerate(stages):
@@ -99,7 +106,7 @@ def compare_stages(
 
 
 def figure_files(*stems: Path) -> tuple[Path, ...]:
-    """Returns the files that figures are drawn to."""
+    """Returns the paths of all files of figures, given their stems."""
     return tuple(
         stem.with_name(f"{stem.name}.{kind}")
         for stem in stems
@@ -108,9 +115,9 @@ def figure_files(*stems: Path) -> tuple[Path, ...]:
 
 
 def routes_stem(city: City) -> str:
-    """Returns the file name of the figure of a city's routes.
+    """Returns the file name of the figure with a city's routes.
 
-    The name is without ending.
+    The name has no ending.
     """
     return file_name(f"routes_{city.name}")
 
@@ -118,7 +125,7 @@ def routes_stem(city: City) -> str:
 def change_stems(
     city: City, pair: tuple[RecordingInfo, RecordingInfo]
 ) -> tuple[str, str]:
-    """Returns the file names of the two figures of a change, without ending.
+    """Returns the file names, without ending, of the two figures of a change.
 
     The first figure shows which points changed, the second figure the sets of
     points from which TCR is computed.
@@ -136,7 +143,10 @@ def change_stems(
 
 
 def curves_stem(city: City) -> str:
-    """Returns the file name of the figure of a city's precision and recall."""
+    """Returns the file name of a city's figure of precision-recall curves.
+
+    The name has no ending.
+    """
     return file_name(f"pr_{city.name}")
 
 

@@ -58,7 +58,8 @@ def recognise_places(
 ) -> PlaceRecognition | None:
     """Returns the result of a method on two drives of one world.
 
-    It is None if a drive is compared with itself and closes no loop.
+    The result is None if a drive is compared with itself and never passes a
+    place twice.
 
     Args:
         reporter: reports progress.
@@ -148,10 +149,10 @@ def measure_places(
     protocol: RetrievalProtocol,
     radii: tuple[float, ...],
 ) -> list[PlaceOutcome]:
-    """Returns two outcomes of each method for each radius of a match.
+    """Returns the outcomes of methods, for several radii of a match.
 
-    The first outcome is without the gate, the second with it; queries are
-    scored only once.
+    There are two outcomes for each method and radius: first without the gate,
+    then with it. Queries are scored only once.
 
     A method that would take more than an hour for all queries is left out.
 
@@ -160,7 +161,7 @@ def measure_places(
         database: described drive of the places.
         query: described drive in the same world whose scans are the queries.
         distractors: described drives through other cities, each with one file
-            per method.
+            for each method.
         num_distractors: number of places of these drives that are added to the
             database.
         methods: the methods.
@@ -253,7 +254,7 @@ def crowded(
     method: int,
     num_others: int,
 ) -> tuple[DescribedDrive, list[str]]:
-    """Returns a database drive with places of other cities appended.
+    """Returns a database to which places of other cities are added.
 
     The drives through other cities are moved so far away that none of their
     places is a match. Their first `num_others` places are appended, or all if
@@ -263,7 +264,7 @@ def crowded(
         database: the drive.
         distractors: described drives through other cities, each with one file
             per method.
-        method: number of the method.
+        method: index of the method whose files are read.
         num_others: number of places to append.
 
     Returns:

@@ -273,7 +273,11 @@ def _most(size: int) -> int:
 
 @dataclass(frozen=True)
 class Part:
-    """An intermediate result of a study, in a file that names its inputs."""
+    """An intermediate result of a study, in a file that names its inputs.
+
+    Attributes:
+        path: path of the file.
+    """
 
     path: Path
 
@@ -338,9 +342,13 @@ class Part:
             return decode(data)
 
     def fits(self, hint: object) -> bool:
-        """Returns whether the value in the file can be of an annotated type.
+        """Returns whether the value in the file can be of a given type.
 
-        Only the beginning of the file is read.
+        Only the beginning of the file is read. The result is false if the file
+        cannot be read.
+
+        Args:
+            hint: the type, as in an annotation.
         """
         with (
             contextlib.suppress(InputError),
@@ -389,12 +397,13 @@ class MakePart(Step):
     """A job step that writes the result of a function to a file.
 
     Attributes:
-        function: a function at the top of a module. Its code counts as an
-            input. Its first parameter is a `Reporter`; the arguments follow.
-        arguments: the inputs. Each is a plain value, a dataclass of plain
-            values, a path (of which only the name counts as input), an object
-            whose method `identity` returns what counts, or a tuple of such
-            values.
+        function: function whose result is written. Its first parameter is a
+            `Reporter`; the arguments follow. If its code changes, the file is
+            made again.
+        arguments: arguments of the function. If one changes, the file is made
+            again. Each is a plain value, a dataclass of plain values, a path
+            (of which only the name counts), an object whose method `identity`
+            returns what counts, or a tuple of such values.
         figures: further files that the function writes.
     """
 
@@ -450,9 +459,10 @@ def _identity(argument: Any) -> object:
 class SurveyFiles:
     """The files (`Part`) with the survey of a recording.
 
-    The descriptions by each method are in a file of their own, so that a job
-    reads only the descriptions that it needs. The key of a file is the name of
-    the method, or a `described_key` for a second protocol.
+    Each method's descriptions are in a file of their own.
+
+    Attributes:
+        folder: folder of the files.
     """
 
     folder: Path
@@ -480,13 +490,21 @@ class SurveyFiles:
         """Returns the file with a method's descriptions of the drive.
 
         The file contains a `PlacedDrive` and a `DescribedDrive`.
+
+        Args:
+            key: key of the method, for a second protocol with the name of the
+                protocol (see `evaluation.study.surveys.described_key`).
         """
         return Part(self.folder / f"described_{file_name(key)}.data")
 
 
 @dataclass(frozen=True)
 class StudyFiles:
-    """The paths of all files of a study."""
+    """The paths of all files of a study.
+
+    Attributes:
+        output: folder of the study.
+    """
 
     output: Path
 
@@ -501,6 +519,11 @@ class StudyFiles:
         return SurveyFiles(folder / file_name(recording))
 
     def part(self, kind: str, *names: str) -> Part:
-        """Returns the file of some drives for a kind, such as `changes`."""
+        """Returns the file of an intermediate result.
+
+        Args:
+            kind: kind of result, such as `changes`; the name of a folder.
+            names: names of the drives to which the result belongs.
+        """
         name = ",".join(map(file_name, names))
         return Part(self.output / "parts" / kind / f"{name}.data")

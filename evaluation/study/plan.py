@@ -41,13 +41,19 @@ _RECOGNITION_COST = 2.0
 
 @dataclass(frozen=True)
 class Study:
-    """A study that compares recordings, which need not exist yet.
+    """A comparison of recordings, with a report; recordings need not exist yet.
 
-    A recording that does not exist is made by the jobs that it `needs`. If one
-    drive follows the route of another stage's drive, it serves as a control: it
-    shows what the route changes while the city stays the same. By default, the
-    methods are those of this package. If wanted, their costs are measured after
-    all other jobs. `reference` contains published numbers for comparison.
+    A drive on the route of one stage through another stage serves as a control:
+    it shows what the route changes while the city stays the same.
+
+    Attributes:
+        recordings: the recordings. A recording that does not exist yet is made
+            by the jobs that its attribute `needs` names.
+        output: folder of the report.
+        methods: methods to run; by default those of this package.
+        protocol: protocol of place recognition.
+        with_costs: whether times and memory are measured, after all other jobs.
+        reference: published numbers to compare with.
     """
 
     recordings: Sequence[RecordingInfo]
@@ -388,19 +394,27 @@ def write_report(
     lidar: str | None = None,
     columns: int | None = None,
 ) -> Path:
-    """Measures all recordings in a folder; writes tables, figures, a page.
+    """Measures all recordings in a folder, and writes a report on them.
 
-    See `Study.assemble` for the files. Results of an earlier run, finished
-    or not, are used if they belong to the same recordings and methods.
+    The files of the report are described in `Study.assemble`. Results of an
+    earlier run, finished or not, are used if they belong to the same recordings
+    and methods.
 
     Args:
-        own_methods, settings: see `choose_methods`.
+        recordings: the folder.
+        output: folder of the report.
+        cluster: runs the jobs.
+        own_methods, settings: files and settings of methods, see
+            `evaluation.study.chosen_methods.choose_methods`.
+        protocol: protocol of place recognition.
         on_note: is called with notes: on how recordings are read or left out,
             on what methods assume, and on cities without a pair to compare.
+        with_costs: whether times and memory of methods are measured.
         reference_for: function that returns published numbers for the maps of a
             report.
         lidar: name of the LiDAR, for recordings with several.
-        columns: see `open_drive`.
+        columns: number of columns of `.bin` files; by default guessed from the
+            values.
 
     Returns:
         The path of `report.html`.

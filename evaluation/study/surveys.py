@@ -41,10 +41,10 @@ _KEPT_FIELDS = ("x", "y", "z", "instance")
 
 
 class MappedDrive(RecentScans):
-    """A drive that adds each scan to a map when it is first read.
+    """A drive that makes a map of its scans while they are read.
 
-    Reading and unpacking scans takes longer than mapping them. If scans are
-    requested in nearly increasing order, each scan is read only once.
+    If scans are requested in nearly increasing order, each scan is read only
+    once.
     """
 
     def __init__(self, drive: Drive, kept: int):
@@ -61,8 +61,8 @@ class MappedDrive(RecentScans):
         """Reads the remaining scans, so that the map is complete.
 
         Returns:
-            The map of all scans in cells of the TCR, equal to that of
-            `map_drive`; and a finer cloud (K, 3) for pictures, in W [m].
+            The map of all scans, in voxels of 1 m from which the change ratio
+            (TCR) is computed; and a finer cloud (K, 3) for pictures, in W [m].
         """
         left = range(self._num_mapped, len(self))
         for _ in track(left, f"mapping {self.name}", len(left)):
@@ -104,7 +104,14 @@ class DriveSource(Protocol):
 
 @dataclass(frozen=True)
 class RecordedDrive:
-    """A drive on disk, in any format that can be read."""
+    """A recorded drive, in any format that can be read; a call opens it.
+
+    Attributes:
+        path: file or folder of the recording.
+        lidar: name of the LiDAR, for recordings with several.
+        columns: number of columns of `.bin` files; by default guessed from the
+            values.
+    """
 
     path: Path
     lidar: str | None = None
@@ -114,12 +121,11 @@ class RecordedDrive:
         return open_drive(self.path, self.lidar, self.columns)
 
     def identity(self) -> list[list]:
-        """Returns the LiDAR, the columns, and each file's name, size and time.
+        """Returns what identifies the recording: its options and its files.
 
-        The content of the files would be the surest identity, but reading it
-        takes as long as evaluating the drive. A recording of cns-drake has a
-        fingerprint next to it, which is used instead of the times, so that a
-        copy counts as the same recording.
+        Each file counts by its name, its size and its time. A recording of
+        cns-drake counts by its fingerprint instead of times, so that a copy is
+        the same recording.
         """
         with user_errors(self.path):
             path = self.path.resolve(strict=True)
@@ -148,12 +154,18 @@ class RecordedDrive:
 
 @dataclass(frozen=True)
 class SurveyedDrive:
-    """A drive with its map in cells of the TCR.
+    """A drive with its map, and with its scans reduced to small pictures.
 
-    It contains the time stamps (N,) int64 and the sensor poses (N, 4, 4) of all
-    N frames. For the K frames that are places or queries, it also contains
-    reduced scans (see `evaluation.maps.thumbnails`). K is 0 if the drive has
-    neither places nor queries.
+    Attributes:
+        placed: names of the drive, its world frame and its map.
+        stamps_ns: (N,) int64 time stamps of all frames [ns].
+        X_WS: (N, 4, 4) poses of the sensor at all frames.
+        coarse: the map, in voxels of 1 m from which the change ratio (TCR) is
+            computed.
+        frames: (K,) frames that are places or queries; empty if the drive has
+            neither.
+        thumbnails: K reduced scans at these frames, see
+            `evaluation.maps.thumbnails`.
     """
 
     placed: PlacedDrive
@@ -180,8 +192,10 @@ class KeptDrive:
     Attributes:
         name: name of the drive.
         X_WS: (N, 4, 4) poses of the sensor at all frames.
-        instances: see `Drive.instances`.
-        scans: frame -> coordinates and instances of the points within range.
+        instances: instance id of a structure -> its name and class; None if
+            unknown.
+        scans: frame -> structured array (M,) with coordinates and instance ids
+            of the points within range.
     """
 
     name: str
@@ -190,14 +204,21 @@ class KeptDrive:
     scans: dict[int, np.ndarray] = field(default_factory=dict)
 
     def keep(self, frame: int, scan: np.ndarray, max_range: float) -> None:
-        """Keeps the scan of a frame, without the points beyond a range."""
+        """Keeps a scan.
+
+        Args:
+            frame: number of the frame.
+            scan: structured array (M,) in the sensor's frame.
+            max_range: points with a greater absolute x, y or z are left out
+                [m].
+        """
         names = [one for one in scan.dtype.names or () if one in _KEPT_FIELDS]
         kept = within_range(xyz(scan), max_range)
         # A view would hold all fields.
         self.scans[frame] = repack_fields(scan[names][kept])
 
     def scan(self, index: int) -> np.ndarray:
-        """Returns a scan that was kept."""
+        """Returns the scan of a frame, which must have been kept."""
         return self.scans[index]
 
 
@@ -205,14 +226,16 @@ class KeptDrive:
 class RecordingSurvey:
     """The results of reading a recording once: map, places and queries.
 
-    If the drive has places or queries, `described` contains each method's
-    descriptions of them; descriptions by a second protocol are under a
-    `described_key`. `scans` contains the scans of places and queries, or None
-    if they are not kept. `fine` is a cloud (K, 3) for pictures, in W [m].
-
-    If the drive is not mapped, `drive` and `fine` are None, and `scans` is a
-    list of arrays (N, 3) float32. The scans of queries are then turned, tilted
-    and hidden as the protocol says.
+    Attributes:
+        placed: names of the drive, its world frame and its map.
+        described: key of a method -> its descriptions of the places and
+            queries; empty if the drive has neither.
+        scans: scans of places and queries: a `KeptDrive` with scans as
+            recorded; or, for a drive without a map, a list of arrays (N, 3)
+            float32, turned, tilted and hidden as the protocol says. None if
+            scans are not kept.
+        drive: the drive with its map; None without a map.
+        fine: (K, 3) cloud for pictures in W [m]; None without a map.
     """
 
     placed: PlacedDrive
@@ -225,7 +248,9 @@ class RecordingSurvey:
 def described_key(method: str, protocol: RetrievalProtocol) -> str:
     """Returns the key of a method's descriptions by a second protocol.
 
-    It consists of the method's key and the name of the protocol.
+    Args:
+        method: key of the method.
+        protocol: the second protocol, whose name is appended.
     """
     return f"{method},{protocol.name}"
 
@@ -247,7 +272,7 @@ def survey_recording(
         recording: the drive.
         roles: whether the drive has places of the database, queries, or both;
             the set may be empty.
-        asked: name of a description -> method, roles and protocol; empty if the
+        asked: key of a description -> method, roles and protocol; empty if the
             drive has neither places nor queries.
         protocol: protocol of the frames that are shown and kept.
         track: reports progress.
@@ -301,7 +326,8 @@ def describe_recording(
 ) -> RecordingSurvey:
     """Describes the places or queries of a recording, and keeps their scans.
 
-    Only these scans are read, each once. See `survey_recording`.
+    No map is made. Only the scans of places and queries are read, each once.
+    The arguments are those of `survey_recording`.
     """
     drive = RecentScans(recording, _most_scans(asked))
     seen: list[np.ndarray] = []
@@ -336,9 +362,19 @@ def _described(
 class Survey(Step):
     """A job step that surveys a drive and writes the files that are missing.
 
-    A survey consists of the drive's map and the descriptions of its places and
-    queries; without a map, only the places and queries are read. If the drive
-    has places or queries, `further` requests descriptions by a second protocol.
+    A survey consists of the drive's map and of descriptions of its places and
+    queries.
+
+    Attributes:
+        source: opens the drive.
+        roles: whether the drive has places, queries, both or neither.
+        methods: methods that describe them.
+        protocol: protocol by which they are chosen.
+        files: the files to write.
+        with_scans: whether to keep the scans of places and queries.
+        with_map: whether to make a map; otherwise only the scans of places and
+            queries are read.
+        further: descriptions by a second protocol, if any.
     """
 
     source: DriveSource

@@ -28,9 +28,9 @@ _WHOLE_COST, _COST = 60.0, 20.0
 class ChangeTask(Task):
     """Measures the change (TCR_sym) between two drives or their cities.
 
-    If the query's route was also driven through the database's city, that drive
-    is compared with the query, so that only the city differs. Otherwise the
-    database is compared with the query.
+    The query drive is compared with a drive on its own route through the
+    database's city, so that only the city differs. If there is no such drive,
+    it is compared with the database drive.
     """
 
     name = "change"
@@ -66,12 +66,15 @@ class ChangeTask(Task):
 def map_city(
     reporter: Reporter, source: DriveSource, spacing: float | None
 ) -> tuple[VoxelMap, np.ndarray]:
-    """Maps a drive in cells of the TCR.
+    """Returns the voxel map of a drive, in cells for the change ratio (TCR).
 
-    Scans are `spacing` apart [m]; None takes all of them.
+    Args:
+        reporter: reports progress.
+        source: opens the drive.
+        spacing: distance between two scans in the map [m]; None for all scans.
 
     Returns:
-        The map, and positions (N, 3) of the sensor [m].
+        The map, and positions (N, 3) of the sensor at all frames [m].
     """
     drive = source()
     positions = drive.X_WS[:, :3, 3]
@@ -84,9 +87,15 @@ def map_city(
 def measure_change(
     reporter: Reporter, first: Part, second: Part
 ) -> dict[str, tuple[float, int]]:
-    """Returns how much changed between two mapped drives.
+    """Returns how much changed between two drives.
 
-    The result is metric -> value and number of voxels.
+    Args:
+        reporter: reports progress.
+        first, second: files with the results of `map_city` for the two drives.
+
+    Returns:
+        Metric, such as `tcr_sym` -> its value, and the number of voxels from
+        which it is computed.
     """
     a, b = (
         Surveyed(name, *part.read())

@@ -134,16 +134,17 @@ def measure_localisation(
         reporter: reports progress.
         database: the drive of the map.
         query: the drive whose scans are localised.
-        methods: names, or Python files.
-        texts: contents of those files; a job is done again if they change.
+        methods: names of registration methods, or Python files with your own.
+        texts: contents of those files, and "" for names. Results are computed
+            again if a text changes.
         starts: how the random initial poses of the scans are drawn, one entry
             for each size of their errors.
         spacing: distance between two queries [m].
 
     Returns:
-        (K,) records of `QUERY` for each method and start, all entries of
-        `starts` for one method before those of the next; empty if the query is
-        nowhere near the map.
+        For each method, an array for each entry of `starts`: (K,) records of
+        `evaluation.localisation.localise.QUERY`, one per scan. The list is
+        empty if the query is nowhere near the map.
     """
     mapped, asked = database(), query()
     maps: dict[tuple[float, int], estimators.LocalisationMap] = {}

@@ -70,7 +70,7 @@ class PlaceTask(PoseTask):
 
 
 class CostTask(Task):
-    """Measures the CPU time of a query, and of building a database."""
+    """Measures the CPU time to compare a query, and to build a database."""
 
     name = "cost"
     asks = True
@@ -104,17 +104,20 @@ def measure_costs(
     num_distractors: int,
     methods: tuple[MethodChoice, ...],
 ) -> dict[str, tuple[int, dict[str, float]]]:
-    """Returns key of a method -> number of places, and times [ms].
-
-    `query_ms` is the median CPU time of some queries, and `build_ms` the CPU
-    time to build a database from descriptions.
+    """Returns the CPU times of methods, and their numbers of places.
 
     Args:
         reporter: reports progress.
         database, query: described drives, one file (`Part`) for each method.
-        distractors: described drives through other cities.
-        num_distractors: number of places of these drives.
+        distractors: described drives through other cities, each with one file
+            for each method.
+        num_distractors: number of their places that are added to the database.
         methods: methods to measure.
+
+    Returns:
+        Key of a method -> number of places, and times [ms]: `query_ms` is the
+        median CPU time to compare a query with all places, `build_ms` the CPU
+        time to build the database from descriptions.
     """
     found = {}
     for k, choice in enumerate(reporter.track(methods, "", len(methods))):

@@ -30,7 +30,12 @@ Answered: TypeAlias = "tuple[str, bool, Mapping[str, np.ndarray]]"
 
 @dataclass(frozen=True)
 class NamedDrive:
-    """A drive that is measured: its unique name, and where to read it."""
+    """A drive that is measured.
+
+    Attributes:
+        name: its unique name.
+        source: function that opens it.
+    """
 
     name: str
     source: DriveSource
@@ -43,9 +48,9 @@ class Pair:
     Attributes:
         name: name of the pair. Only pairs that differ in nothing but the radius
             of a match have the same name.
-        way: the drive whose map is compared with the query's for TCR_sym. It
-            follows the query's route through the database's city, or is the
-            database itself if that has another route.
+        way: the drive whose map is compared with the query's for the change
+            (TCR_sym): a drive on the query's route through the database's city
+            or, if there is none, the database drive.
         is_as_before: whether the drives are those of the baseline, and the
             condition changes only the protocol or adds places. Tasks without
             queries then have nothing new to measure.
@@ -67,17 +72,18 @@ class Pair:
 
 @dataclass
 class Jobs:
-    """The jobs of a study.
+    """The jobs of a study, and what they share.
 
-    Each description of a drive serves all pairs that need it. If only one pair
-    needs the drive, the job of that pair describes it, and the description is
-    not kept.
+    Descriptions of a drive that several pairs of drives need are written to
+    files by a job of their own.
 
     Attributes:
+        files: paths of the study's files.
         methods: the methods that are run.
-        distractors: described drives through other cities, in the order in
-            which they are added.
-        notes: notes on what is left out.
+        distractors: drives through other cities, in the order in which their
+            places are added to databases.
+        jobs: name -> job.
+        notes: notes on what is left out, as keys.
         radii: name of a pair -> radii of a match [m].
     """
 
@@ -91,7 +97,11 @@ class Jobs:
     _uses: dict[str, set[str]] = field(default_factory=dict)
 
     def expect(self, pair: Pair) -> None:
-        """Registers a pair, so that its drives are described for its radius."""
+        """Registers a pair of drives.
+
+        Register all pairs before jobs are added: this shows which descriptions
+        of drives are needed by several pairs.
+        """
         self.radii.setdefault(pair.name, set()).add(pair.protocol.radius)
         for drive, role in pair.roles:
             name = _description_name(drive, role, pair.protocol)
@@ -108,17 +118,17 @@ class Jobs:
     ) -> DescribedSource:
         """Returns where a job finds the descriptions of a drive.
 
-        If several pairs need the drive, these are the files (`Part`) with its
-        descriptions. Otherwise it is the source of the drive, and the job
-        describes it.
+        If several pairs need the descriptions, the result is the files (`Part`)
+        with the scans and with each method's descriptions; a job that writes
+        them is added. Otherwise it is the source of the drive, and the job that
+        needs the descriptions makes them itself.
 
         Args:
             drive: the drive.
-            role: role of its scans.
+            role: role of its scans, `places` or `queries`.
             protocol: protocol of the pair.
-            needs: list to which the name of the job that writes the parts is
-                added.
-            kept: whether to write the parts even if only one pair needs them.
+            needs: list to which the name of the added job is appended.
+            kept: whether to write the files even if only one pair needs them.
         """
         name = _description_name(drive, role, protocol)
         if not (kept or len(self._uses.get(name, ())) > 1):
@@ -144,7 +154,15 @@ class Jobs:
     def elsewhere(
         self, pair: Pair, needs: list[str]
     ) -> tuple[tuple[Part, ...], ...]:
-        """Returns a pair's distractors: described drives in other cities."""
+        """Returns the described drives through other cities that a pair needs.
+
+        Args:
+            pair: the pair; without distractors, the result is empty.
+            needs: list to which the names of the added jobs are appended.
+
+        Returns:
+            For each drive, one file for each method.
+        """
         if not pair.distractors:
             return ()
         found = []
@@ -164,15 +182,16 @@ class Jobs:
         needs: Iterable[str] = (),
         cost: float = 20.0,
     ) -> Part:
-        """Adds the job that writes a part (file of results); returns the part.
+        """Adds a job that writes a file of results; returns the file.
 
-        The job has the name of the part.
+        The job is named by the file's folder and name.
 
         Args:
-            part: file and name of the part.
-            function: what the job runs.
-            arguments: arguments of the function.
-            needs: names of jobs that come first.
+            part: the file.
+            function: function whose result is written. It takes a `Reporter`
+                and the arguments.
+            arguments: the arguments that follow.
+            needs: names of jobs that must be finished before.
             cost: approximate cost of the job [s].
         """
         name = f"{part.path.parent.name} {part.path.stem}"
@@ -189,13 +208,15 @@ def _description_name(
 
 
 class Task(abc.ABC):
-    """A question about two drives.
+    """A kind of measurement on two drives, such as place recognition.
 
     Attributes:
         name: name of the task in files and on the command line.
-        asks: whether the task depends on the protocol of the queries and on the
-            places of the database. Other tasks depend only on the drives.
-        defaults: settings of an experiment's file, and their values.
+        asks: whether the results depend on the protocol of the queries and on
+            the places of the database. Otherwise they depend only on the
+            drives.
+        defaults: name -> default value of each setting of the task.
+        settings: name -> value of each setting.
     """
 
     name: ClassVar[str]
@@ -203,7 +224,12 @@ class Task(abc.ABC):
     defaults: ClassVar[Mapping[str, Any]] = {}
 
     def __init__(self, settings: Mapping[str, Any], source: str):
-        """Takes the settings of an experiment, whose file is the source.
+        """Takes and checks the settings of the task.
+
+        Args:
+            settings: name -> value, for settings that differ from their
+                defaults.
+            source: file of the experiment, for error messages.
 
         Raises:
             InputError: a setting is unknown or of another type.
@@ -222,18 +248,32 @@ class Task(abc.ABC):
             self.check(name, value, where)
 
     def check(self, name: str, value: Any, where: str) -> None:  # noqa: B027
-        """Raises an error if a setting has an impossible value.
+        """Checks a setting of the task; by default every value is right.
+
+        Args:
+            name: name of the setting.
+            value: its value.
+            where: file and field of the setting, for error messages.
 
         Raises:
-            InputError: its value is not usable.
+            InputError: the value is not usable.
         """
 
     @abc.abstractmethod
     def measure(self, pair: Pair, jobs: Jobs) -> Part:
-        """Adds the jobs that measure a pair; returns the file of the result."""
+        """Adds the jobs that measure a pair of drives.
+
+        Returns:
+            The file to which the last job writes the result.
+        """
 
     def found(self, part: Part, pair: Pair) -> Any:
-        """Returns the task's result for a pair, read from a file of results."""
+        """Returns the task's result for a pair of drives.
+
+        Args:
+            part: file that `measure` has returned for the pair.
+            pair: the pair.
+        """
         return part.read()
 
     @abc.abstractmethod
@@ -242,11 +282,19 @@ class Task(abc.ABC):
 
         Args:
             found: the task's result for the pair.
-            before: outcome in the baseline condition; None without a baseline.
+            before: the task's result for the same drives in the baseline
+                condition; None for the baseline itself, or if there is none.
         """
 
     def answers(self, found: Any) -> Iterable[Answered]:
-        """Yields the answers to each query; by default none."""
+        """Yields the answers of each method to all queries; by default none.
+
+        Each item is the method, whether its gate was used, and column of
+        `queries.csv` -> values (Q,).
+
+        Args:
+            found: the task's result for a pair of drives.
+        """
         return ()
 
 
@@ -268,6 +316,10 @@ def _names(value: Any, where: str) -> list[str]:
 
 def positive(value: Any, where: str) -> None:
     """Checks that a setting is a positive number.
+
+    Args:
+        value: its value.
+        where: file and field of the setting, for error messages.
 
     Raises:
         InputError: the value is not a positive number.

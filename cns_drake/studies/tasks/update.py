@@ -85,16 +85,16 @@ def measure_maps(
     methods: tuple[str, ...],
     spacing: float,
 ) -> dict[str, dict[str, float | None]]:
-    """Maps two drives; returns method -> name -> value of scores.
-
-    The methods are change detectors, which label what changed between the two
-    maps; the scores compare their labels with exact ones.
+    """Makes labelled maps of two drives, and scores change detectors on them.
 
     Args:
         reporter: reports progress.
-        database, query: the older and the newer drive.
-        methods: names of change detectors.
+        database, query: sources of the older and the newer drive.
+        methods: names of change detectors; see `score_methods`.
         spacing: distance driven between two scans [m].
+
+    Returns:
+        Method -> name of a score -> its value.
     """
     a, b = (
         map_truth.simulate_survey(source.scenario)
@@ -113,12 +113,20 @@ def measure_maps(
 def score_methods(
     maps: Path, methods: tuple[str, ...], track: Track = silent
 ) -> dict[str, dict[str, float | None]]:
-    """Returns method -> name -> value of scores of change detectors.
+    """Scores the labels of change detectors against exact labels.
 
-    The name `TRUTH` stands for the true labels as a method.
+    Args:
+        maps: folder with the maps of two drives and their exact labels.
+        methods: names of change detectors. The name `TRUTH` scores the exact
+            labels themselves.
+        track: reports progress.
+
+    Returns:
+        Method -> name of a score -> its value, or None if it is undefined.
+        `gone` and `new` are numbers of points with these exact labels.
 
     Raises:
-        InputError: the folder cannot be read, or a baseline cannot run.
+        InputError: the folder cannot be read, or a detector cannot run.
     """
     pair = read_pair(maps)
     truth = Labels(*read_truth(pair))
