@@ -387,9 +387,10 @@ class Condition:
             the tables.
         changes: fields that the condition sets, under `database`, `query`,
             `both` or `protocol`.
-        causes: the cases that are combined. Each contains its fields at the
-            wanted level (strength of the change), followed by those at lower
-            levels, for maps that cannot have the wanted level.
+        causes: the causes of change that are combined. For each cause, the
+            fields that it sets at the wanted level of change, then those that
+            it sets at each lower level. A map that cannot have a level takes
+            the next lower one.
         is_baseline: whether other conditions are compared with this one.
     """
 

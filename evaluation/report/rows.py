@@ -287,7 +287,11 @@ def survival_numbers(survivals: Sequence[Survival]) -> tables.Table:
 
 
 def survival_table(survivals: Sequence[Survival]) -> tables.Table:
-    """Returns the shares of results that methods keep, for print."""
+    """Returns a table of the share of its AUC that each method keeps.
+
+    The table is for print; the share is that of the result with change in the
+    result without change.
+    """
     return tables.Table.of(
         survivals,
         {

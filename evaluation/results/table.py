@@ -666,7 +666,7 @@ class _Cells:
     def keyed(
         self,
     ) -> Iterator[tuple[_Line, dict[str, Any], tuple[object, ...]]]:
-        """Yields the lines, the attributes of their `Key`, and its `but`."""
+        """Yields each line, the attributes of its `Key`, and `Key.but()`."""
         names = (*_BEFORE, *self.factors, *_BEHIND)
         known: dict[tuple[str, ...], tuple[dict, tuple[object, ...]]] = {}
         for number, cells in self.rows:

@@ -232,8 +232,8 @@ class RecordingSurvey:
             queries; empty if the drive has neither.
         scans: scans of places and queries: a `KeptDrive` with scans as
             recorded; or, for a drive without a map, a list of arrays (N, 3)
-            float32, turned, tilted and hidden as the protocol says. None if
-            scans are not kept.
+            float32, in which queries are turned, tilted and lose a sector if
+            the protocol says so. None if scans are not kept.
         drive: the drive with its map; None without a map.
         fine: (K, 3) cloud for pictures in W [m]; None without a map.
     """

@@ -281,7 +281,11 @@ _SQUARE = 50.0
 def paved_gaps(
     structures: Sequence[Imported], drives: Sequence[WaypointDrive]
 ) -> Iterator[Imported]:
-    """Yields sidewalks that fill gaps near drives, on level ground."""
+    """Yields sidewalks that fill narrow gaps beside sidewalks.
+
+    Such gaps lie between sidewalks, roads and buildings near drives, where the
+    imported file has no ground. The ground is level.
+    """
     near = near_drives(
         [one for one in structures if one.kind != "Tree"], drives
     )
