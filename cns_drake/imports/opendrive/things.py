@@ -149,8 +149,10 @@ def thing_structures(
 ) -> Iterator[Structure]:
     """Yields structures of the signals and objects beside a road.
 
-    `lanes` is the area of all lanes; signs inside this area are left out. What
-    is left out is counted in `faults`.
+    Args:
+        road: the road.
+        lanes: area of all lanes in W [m]; signs inside this area are left out.
+        faults: counts what is left out.
     """
     for thing in road.things:
         if not 0.0 <= thing.s <= road.length + 1.0:
