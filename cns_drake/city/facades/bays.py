@@ -25,7 +25,7 @@ def _centred(x0: float, x1: float, width: float) -> tuple[float, float]:
 
 
 def blank(x0: float, x1: float) -> list[Relief]:
-    """Returns no reliefs: a bay of plain wall."""
+    """A bay of plain wall: a function that returns no reliefs."""
     return []
 
 
@@ -298,7 +298,7 @@ def bounds(cells: Sequence[Span]) -> list[float]:
 
 
 def plain(edge: int, length: float) -> list[Relief]:
-    """Returns no reliefs: the layout of a wall without openings."""
+    """A layout for walls without openings: it returns no reliefs."""
     return []
 
 
@@ -353,10 +353,10 @@ def alone(bay: Bay, width: float) -> Layout:
 
 
 def by_edge(layouts: dict[int, Layout], otherwise: Layout) -> Layout:
-    """Returns a layout that uses a different layout for each of some edges.
+    """Returns a layout that chooses between other layouts by edge.
 
-    `layouts` maps the number of an edge to its layout. All other edges get the
-    layout `otherwise`.
+    `layouts` maps the number of an edge to the layout of its wall. Walls at all
+    other edges get the layout `otherwise`.
     """
 
     def layout(edge: int, length: float) -> Sequence[Relief]:

@@ -111,7 +111,7 @@ def front_canopy(
 def awning(x0: float, x1: float, reach: float, z0: float, z1: float) -> Mesh:
     """Returns a sloped shop awning with a hanging front edge.
 
-    Coordinates are those of the wall: x along it, y out of it.
+    The mesh is in wall coordinates: x along the wall, y outwards, z up.
 
     Args:
         x0: left end [m].
@@ -165,7 +165,7 @@ def balcony(
 ) -> Mesh:
     """Returns a slab with a solid balustrade on its three free sides.
 
-    Coordinates are those of the wall: x along it, y out of it.
+    The mesh is in wall coordinates: x along the wall, y outwards, z up.
 
     Args:
         x0: left end [m].
@@ -249,17 +249,18 @@ def pilasters(
     z1: float,
     skip: Collection[int] = (),
 ) -> Mesh:
-    """Returns pilasters between the bays that `bays.rhythm` lays out.
+    """Returns pilasters between the bays of a wall with a regular layout.
+
+    The layout is one from `cns_drake.city.facades.bays.rhythm`.
 
     Args:
         outline: (N, 2) corners of the walls in the building's frame,
             counter-clockwise [m].
-        pitch: width of a bay, as given to `bays.rhythm` [m].
-        margin: distance of the bays from corners, as given to `bays.rhythm`
-            [m].
+        pitch: width of a bay, as given to `rhythm` [m].
+        margin: distance of the bays from corners, as given to `rhythm` [m].
         every: number of bays from one pilaster to the next.
         width: width of a pilaster [m].
-        reach: how far it reaches out of the wall [m].
+        reach: how far a pilaster reaches out of the wall [m].
         z0: height of its foot [m].
         z1: height of its top [m].
         skip: edges of the outline that get no pilasters.
@@ -339,7 +340,7 @@ def _pier(
 def steps(x0: float, x1: float, reach: float, rise: float, count: int) -> Mesh:
     """Returns entrance steps that rise towards a wall.
 
-    Coordinates are those of the wall: x along it, y out of it.
+    The mesh is in wall coordinates: x along the wall, y outwards, z up.
 
     Args:
         x0: left end [m].
@@ -485,7 +486,7 @@ def add_railing(
 
     Args:
         out: the building under assembly, which gets the parts.
-        part: name of the visual.
+        part: name of the part.
         wall: the wall.
         start: first point: distances along the wall and out of it [m].
         end: last point: distances along the wall and out of it [m].

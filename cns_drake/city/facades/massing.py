@@ -59,9 +59,13 @@ def square(x: float, y: float, half: float) -> np.ndarray:
 def inset(points: ArrayLike, distance: ArrayLike) -> np.ndarray:
     """Returns an outline with each edge moved inwards.
 
-    `distance` is one number for all edges, or an array with one number per edge
-    [m]; a negative distance moves an edge outwards. The corners keep their
-    order. Distances must be small compared with the lengths of the edges.
+    The corners keep their order.
+
+    Args:
+        points: (N, 2) corners of the outline, counter-clockwise [m].
+        distance: one number for all edges, or (N,) one for each edge [m]; a
+            negative distance moves an edge outwards. Distances must be small
+            compared with the lengths of the edges.
     """
     points = np.asarray(points, dtype=float)
     distances = np.broadcast_to(np.asarray(distance, float), len(points))
@@ -218,8 +222,11 @@ def sloped_prism(
 ) -> Mesh:
     """Returns a solid over an outline, with a top that slopes up along y.
 
-    The bottom is at z0. The height above z0 is `height` at the outline's
-    greatest y, and `low` times `height` at its least y [m].
+    Args:
+        points: (N, 2) corners of the outline [m].
+        z0: height of the bottom [m].
+        height: height above z0 at the outline's greatest y [m].
+        low: height above z0 at the outline's least y, as a share of `height`.
     """
     points = np.asarray(points, dtype=float)
     n, y = len(points), points[:, 1]
@@ -399,7 +406,7 @@ def foundation(points: ArrayLike) -> Mesh:
 
 
 def chamfered(points: np.ndarray, cut: float) -> np.ndarray:
-    """Returns an outline with its convex corners cut off.
+    """Returns an outline (M, 2) with its convex corners cut off [m].
 
     Each cut starts `cut` metres from the corner on both edges.
     """
@@ -407,9 +414,9 @@ def chamfered(points: np.ndarray, cut: float) -> np.ndarray:
 
 
 def notched(points: np.ndarray, depth: float) -> np.ndarray:
-    """Returns an outline with a square cut out of each convex corner.
+    """Returns an outline (M, 2) with its convex corners notched [m].
 
-    The side of the square is `depth` [m].
+    A square with the side `depth` is cut out of each convex corner.
     """
     d = depth
     return _replaced(

@@ -252,7 +252,7 @@ def add_chimney(
 
     Args:
         out: the building under assembly, which gets the parts.
-        part: name of the visual.
+        part: name of the part.
         xyz: position of its foot, below the roof's surface, in the building's
             frame [m].
         rgb: colour.
@@ -281,7 +281,7 @@ def equip_roof(
         z: height of the roof [m].
         items: names of the equipment, the most important first.
         clear: least distance to the edge of the roof [m].
-        prefix: beginning of the visuals' names.
+        prefix: beginning of the names of the parts.
     """
     room, rng = Polygon(roof), out.rng
     x0, y0, x1, y1 = room.bounds

@@ -35,7 +35,7 @@ def divided(
     """Divides a height into equal storeys, and the storeys into groups.
 
     A storey is approximately `storey` high [m]. There are at most `most`
-    groups; each group becomes one visual.
+    groups; each group becomes one part.
 
     Returns:
         The number of groups, the number of storeys in a group, and the height
@@ -64,7 +64,7 @@ def add_ground(
             counter-clockwise [m].
         facade: the walls and their openings.
         extras: further meshes of the floor, in the building's frame.
-        part: name of the visual.
+        part: name of the part.
     """
     base = massing.foundation(outline)
     walls = facade_mesh(outline, facade)

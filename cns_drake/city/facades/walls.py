@@ -29,7 +29,11 @@ _NARROW_ARCH, _WIDE_ARCH, _WIDE_ARCH_M = 4, 6, 2.0
 
 
 class Band(NamedTuple):
-    """A strip of wall that runs around the building at one depth [m]."""
+    """A strip of wall that runs around the building at one depth [m].
+
+    It extends from the height z0 to the height z1. With a negative depth, it
+    protrudes.
+    """
 
     z0: float
     z1: float
@@ -39,7 +43,8 @@ class Band(NamedTuple):
 class Patch(NamedTuple):
     """A rectangle of the wall, pushed in by `depth` [m].
 
-    With a negative depth, the rectangle protrudes from the wall.
+    It extends from x0 to x1 along the wall, and from the height z0 to z1. With
+    a negative depth, it protrudes.
     """
 
     x0: float
@@ -52,8 +57,8 @@ class Patch(NamedTuple):
 class Arch(NamedTuple):
     """A recess [m] with a round head: half an ellipse from z_spring to z1.
 
-    The recess must lie where the wall has depth 0, and no later relief may
-    cover it.
+    It extends from x0 to x1 along the wall, and begins at the height z0. It
+    must lie where the wall has depth 0, and no later relief may cover it.
     """
 
     x0: float

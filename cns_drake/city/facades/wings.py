@@ -32,8 +32,8 @@ class Roof:
         kind: `gable`, `gambrel`, `barrel`, `shed`, `hip` or `flat`.
         along_y: whether the ridge runs from the front to the back. A shed roof
             rises across this direction.
-        eaves: overhang below the slopes [m].
-        verge: overhang beyond the gables [m].
+        eaves: overhang at the lower ends of the slopes [m].
+        verge: overhang at the gables [m].
         thickness: vertical thickness of the roof [m].
         ridge: place of a gable roof's ridge, as a share of the span.
         parapet: height of a flat roof's parapet [m].
@@ -170,7 +170,7 @@ class Wing:
         return (0, 2) if self.roof.along_y else (3, 1)
 
     def covers(self, x: float, y: float) -> bool:
-        """Returns whether a point on the ground lies within the walls."""
+        """Returns whether a place (x, y) lies within the walls of the wing."""
         return self.x0 < x < self.x1 and self.y0 < y < self.y1
 
 
@@ -512,14 +512,14 @@ class Openings:
     def clear(
         self, edge: int, x0: float, x1: float, z0: float, z1: float
     ) -> None:
-        """Removes the reliefs that touch a rectangle of a wall.
+        """Removes the openings that touch a rectangle of a wall.
 
         Args:
             edge: number of the wall.
             x0: start of the rectangle along the wall [m].
             x1: end of the rectangle along the wall [m].
-            z0: lower height of the rectangle [m].
-            z1: upper height of the rectangle [m].
+            z0: height of the rectangle's lower edge [m].
+            z1: height of the rectangle's upper edge [m].
         """
         self._reliefs[edge] = [
             r

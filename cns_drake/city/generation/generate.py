@@ -68,11 +68,15 @@ class _Row(NamedTuple):
 def find_renaming(
     stages: Path, table: Path, structures: Sequence[Structure]
 ) -> Renaming:
-    """Returns the new names of the structures that `stages.yaml` names.
+    """Finds out how names in `stages.yaml` must change for the current city.
 
-    `table` is the `structures.csv` of the city for which `stages.yaml` was
-    written, and `structures` are those of the current city. Structures at the
-    same place count as the same structure.
+    Structures at the same place, before and now, count as the same structure.
+
+    Args:
+        stages: the file `stages.yaml`.
+        table: the file `structures.csv` of the city for which `stages` was
+            written.
+        structures: the structures of the current city.
 
     Raises:
         InputError: a file cannot be read.

@@ -214,9 +214,9 @@ def bridge_structures(
 ) -> list[Structure]:
     """Returns the sides, undersides and piers of all bridges.
 
-    A bridge leads over a district of water: below a street that crosses it, and
-    below each patch of land in it. The street or the patch is the upper side of
-    the bridge.
+    There is a bridge wherever a street crosses a district of water, and
+    wherever such a district has a patch of land. The street or the patch is the
+    upper side of the bridge.
 
     Args:
         districts: all districts of the city.

@@ -88,8 +88,9 @@ class Draft:
     def rng(self, *words: str | int) -> np.random.Generator:
         """Returns the random generator of a task, such as placing trees.
 
-        `words` name the task. Each task has its own generator, so that a change
-        in one district does not change the random draws in other districts.
+        Each task has its own generator, so that a change in one district does
+        not change the random draws in other districts. `words` are the name of
+        the task.
         """
         key = "/".join(map(str, words)).encode()
         return np.random.default_rng([self.plan.seed, zlib.crc32(key)])
@@ -97,8 +98,8 @@ class Draft:
     def task(self, *words: str | int) -> np.random.Generator:
         """Starts a task: a new range of numbers for names, and a new generator.
 
-        `words` name the task. The result is its random generator, as from
-        `rng`; for the range of numbers, see `open_range`.
+        The result is the random generator, as from `rng`; for the range of
+        numbers, see `open_range`. `words` are the name of the task.
         """
         self.open_range()
         return self.rng(*words)

@@ -127,8 +127,9 @@ def lane_bands(road: ImportedRoad) -> Iterator[LaneBand]:
     """Yields all lanes of a road, section by section, from the middle outwards.
 
     Raises:
-        ValueError: the road has too many bends to be followed, or a lane leads
-            out of the world. The message names the road and the fault.
+        ValueError: the road bends so often that it would need too many places,
+            or a lane leads out of the world. The message names the road and the
+            fault.
     """
     for k, section in enumerate(road.sections):
         s, inside = _stations(road, section)

@@ -37,6 +37,9 @@ def read_things(
 ) -> Iterator[Thing]:
     """Yields the signals and objects beside a road.
 
+    `road` is the road in the file, and `name` its name. What is not read is
+    counted in `faults`.
+
     Raises:
         ValueError: a text is not a number; the error names its line.
     """
