@@ -163,8 +163,8 @@ class Draft:
         """Places an object on the finished ground, if there is room for it.
 
         Returns the new structure, or None if there is no room or the ground is
-        too steep. A number for the name is used up even then, so that the names
-        of later objects do not depend on it.
+        too steep. Even then, a number is used up for the name, so that the
+        names of later objects do not depend on whether this one fits.
 
         Args:
             name: kind of object, a key of `OBJECTS`.
