@@ -47,10 +47,9 @@ _DUTCH = ("oorspronkelijkbouwjaar", "bouwjaar")
 def year_of_date(text: str) -> int | None:
     """Returns the year that a text states; None if it states none.
 
-    For a period such as a century, the result is the year in the middle of the
-    period, or an earlier or later year if the text says "early" or "late". For
-    a range (`1914..1918`), it is the last year. For `before 1910` and `~1855`,
-    it is the year in the text.
+    For a range (`1914..1918`), the result is the last year; for `before 1910`
+    and `~1855`, the year in the text. For a period such as a century, it is the
+    middle year, or an earlier or later one if the text says "early" or "late".
     """
     text = text.strip().lower()[:255].split("..")[-1].strip()
     day = _DAY.fullmatch(text)
@@ -115,8 +114,8 @@ def _year(value: object) -> int | None:
 
 
 def stands_today(until: int | None) -> bool:
-    """Returns whether an object still stands, given its year of demolition.
+    """Returns whether an object that was demolished in `until` stands today.
 
-    It stands if this year, `until`, is None or in the future.
+    It does if this year is None (never demolished) or in the future.
     """
     return until is None or until > datetime.date.today().year

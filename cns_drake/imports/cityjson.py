@@ -47,12 +47,16 @@ _PLAIN = ("east [metre]", "north [metre]", "up [metre]")
 
 @dataclass(frozen=True, eq=False)
 class ReferenceSystem:
-    """The meaning of a file's three coordinates.
+    """The reference system of a CityJSON file: axes and units of coordinates.
 
-    `axes` describes each coordinate in words. `matrix` (3, 3) converts
-    coordinates to metres east, north and up. `name` is the name of the system
-    in the file, or "". If the system defines no heights, their unit is assumed
-    to be that of the first two coordinates.
+    If the system defines no heights, their unit is assumed to be that of the
+    first two coordinates.
+
+    Attributes:
+        name: name of the system in the file; "" if there is none.
+        axes: direction and unit of each of the three coordinates, in words.
+        matrix: (3, 3) converts coordinates to metres east, north and up.
+        heights_assumed: whether the unit of heights is assumed.
     """
 
     name: str = ""
@@ -62,7 +66,7 @@ class ReferenceSystem:
 
     @property
     def is_plain(self) -> bool:
-        """Whether the file's coordinates are already metres east, north, up."""
+        """Whether coordinates are already metres east, north and up."""
         return self.axes == _PLAIN
 
     @property
@@ -88,8 +92,9 @@ class ReferenceSystem:
     def has_place(self, first: float, second: float) -> bool:
         """Returns whether a place is in or near the system's area of use.
 
-        `first` and `second` are the first two coordinates of the place. The
-        result is False for a system without an area of use.
+        `first` and `second` are the first two coordinates of the place, in the
+        order of the system's definition. The result is False for a system
+        without an area of use.
         """
         system = pyproj.CRS.from_user_input(self.name)
         if system.area_of_use is None:
@@ -105,14 +110,16 @@ class ReferenceSystem:
 
 
 def reference_system(name: str, where: str) -> ReferenceSystem:
-    """Returns the axes and units of a reference system.
+    """Returns the axes and units of a reference system, by its name.
 
-    `name` is an EPSG code, or the URL or URN of an EPSG code. `where` names the
-    place in the file, for error messages.
+    Args:
+        name: EPSG code, or the URL or URN of an EPSG code; "" for metres east,
+            north and up.
+        where: place of the name in the file, for error messages.
 
     Raises:
-        InputError: naming the place and the system, if the system is unknown,
-            is in degrees, or has axes that are not east, north and up.
+        InputError: the system is unknown, is in degrees, or has axes that are
+            not east, north and up.
     """
     if not name:
         return ReferenceSystem()
@@ -202,10 +209,13 @@ _LONGEST_NAME = 80
 
 
 class CityGeometry(NamedTuple):
-    """One geometry of an object; the level of detail is 0 if unknown.
+    """One geometry of a CityJSON object.
 
-    `kinds` contains the type of each face, such as RoofSurface, or "" if
-    unknown. The faces of a solid enclose it.
+    Attributes:
+        lod: level of detail; 0 if unknown.
+        faces: the faces; those of a solid enclose it.
+        kinds: type of each face, such as RoofSurface; "" if unknown.
+        is_solid: whether the geometry is a solid.
     """
 
     lod: float
@@ -215,10 +225,14 @@ class CityGeometry(NamedTuple):
 
 
 class CityObject(NamedTuple):
-    """An object of a city: id, type, attributes, parents' ids, geometries.
+    """An object of a CityJSON file.
 
-    The attributes are as in the file. Geometries that cannot be read are left
-    out.
+    Attributes:
+        name: id of the object.
+        kind: type of the object, such as BuildingPart.
+        attributes: attributes, as in the file.
+        parents: ids of the objects of which this one is a part.
+        geometries: geometries, except those that cannot be read.
     """
 
     name: str
@@ -236,9 +250,9 @@ class CityFile:
         objects: id -> object.
         system: reference system of the coordinates.
         faults: counts of faulty parts.
-        order_is_open: whether it is uncertain if the first coordinate is east
-            or north, because both orders lead to places in the reference
-            system's area of use.
+        order_is_open: whether it is unknown in which order the file gives east
+            and north, because both orders lead to places in the system's area
+            of use.
     """
 
     objects: dict[str, CityObject] = field(default_factory=dict)
@@ -257,7 +271,7 @@ class CityFile:
         return points.min(axis=0), points.max(axis=0)
 
     def faces(self) -> Iterator[Face]:
-        """Yields the faces of all objects."""
+        """Yields the faces of all geometries of all objects."""
         for one in self.objects.values():
             for geometry in one.geometries:
                 yield from geometry.faces
@@ -680,9 +694,14 @@ def import_structures(
 ) -> list[Imported]:
     """Returns a structure for each object that has a surface.
 
-    A building with its parts is one structure. `origin` (3,) is the origin of
-    the world in the file's coordinates [m]. `lod` is the level of detail to
-    read; None for the highest of each object.
+    A building and its parts become one structure.
+
+    Args:
+        city: the content of the file.
+        origin: (3,) origin of the map in the file's coordinates [m].
+        lod: level of detail to read; None for the highest of each object.
+        year_attribute: attribute with the year of construction; None for the
+            usual names.
     """
     groups = _families(city)
     names = _unique_names(groups)

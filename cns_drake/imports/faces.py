@@ -134,7 +134,11 @@ def _filled(
 def flat_surface(
     polygon: Polygon, z: float, name: str, faults: ImportFaults
 ) -> np.ndarray:
-    """Returns a level area as triangles (M, 3, 3) that face upwards [m]."""
+    """Returns a level area at the height `z` as triangles (M, 3, 3) [m].
+
+    The triangles face upwards. Faults are counted in `faults`, with `name` as
+    the name of the object.
+    """
     return face_triangles(_rings(polygon, z), name, faults)
 
 
@@ -147,14 +151,16 @@ def extruded(
     roof: str = "flat",
     roof_height: float = 0.0,
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Returns walls and roof above a footprint, each (M, 3, 3) [m].
+    """Returns the walls and the roof of a solid, as triangles (M, 3, 3) [m].
 
     A roof that is impossible on the footprint is replaced by a flat roof, and
     counted as a fault.
 
     Args:
         polygon: the footprint.
-        low, high: heights of the lowest and the highest point [m].
+        low: height of the lowest point [m]; above 0, the walls include an
+            underside.
+        high: height of the highest point [m].
         name: name of the object, as an example in `faults`.
         faults: counts roofs and areas that were replaced or left out.
         roof: `flat`; `pyramidal`, on any footprint; `gabled` or `hipped`, on a
@@ -235,7 +241,7 @@ def _ridge(
 
 
 def parts_of(geometry: BaseGeometry) -> Iterator[Polygon]:
-    """Yields the polygons of a geometry."""
+    """Yields the polygons of a geometry, except tiny ones."""
     if isinstance(geometry, Polygon):
         if geometry.area > _LEAST_PART:
             yield geometry
@@ -247,7 +253,11 @@ def parts_of(geometry: BaseGeometry) -> Iterator[Polygon]:
 def sound_parts(
     polygon: Polygon, name: str, faults: ImportFaults
 ) -> list[Polygon]:
-    """Returns the valid parts of a polygon, in whole millimetres."""
+    """Returns the valid parts of a polygon, in whole millimetres.
+
+    An outline that crosses itself is repaired, and counted in `faults` with
+    `name` as the name of the object.
+    """
     geometry: BaseGeometry = polygon
     if not polygon.is_valid:
         faults.add("outline that crosses itself, repaired", name)
@@ -266,11 +276,11 @@ def surface_samples(
     spacing: float,
     window: tuple[np.ndarray, np.ndarray] | None = None,
 ) -> Iterator[np.ndarray]:
-    """Yields points (N, 3) on triangles (M, 3, 3), edges included [m].
+    """Yields blocks of points (N, 3) that cover triangles (M, 3, 3) [m].
 
-    Every place on a triangle is at most `spacing` from one of the points.
-    Points outside of a window (least and greatest x and y, (2,) each) are left
-    out.
+    Every place on a triangle, up to its edges, is at most `spacing` [m] from
+    one of the points. `window` contains the least and the greatest x and y,
+    (2,) each; points outside of it are left out.
     """
     while len(triangles):
         if window is not None:

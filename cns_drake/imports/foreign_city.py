@@ -29,12 +29,18 @@ LAWN: Rgb = (0.42, 0.55, 0.30)
 
 
 def random_share(seed: int, purpose: str, name: str) -> float:
-    """Returns a random number from 0 to 1 that depends on the arguments."""
+    """Returns a random number from 0 to 1 that depends only on the arguments.
+
+    `purpose` and `name` say for what the number is used, and for which object.
+    """
     return _number(seed, purpose, name) / 2.0**64
 
 
 def random_generator(seed: int, purpose: str, name: str) -> np.random.Generator:
-    """Returns a random generator whose seed depends only on the arguments."""
+    """Returns a random generator whose seed depends only on the arguments.
+
+    `purpose` and `name` say for what it is used, and for which object.
+    """
     return np.random.default_rng(_number(seed, purpose, name))
 
 
@@ -76,14 +82,17 @@ class Imported:
 
     @property
     def draw_name(self) -> str:
-        """Name on which the random draws for the structure depend."""
+        """Name on which the random draws for the structure depend.
+
+        A variant of a structure has the same one as the original.
+        """
         return self.original or self.structure.name
 
     @property
     def is_ground(self) -> bool:
-        """Whether the structure is ground on which a car could drive.
+        """Whether the class of the structure is ground for cars, such as road.
 
-        This only concerns its class: it may be too steep.
+        The structure may still be too steep to drive on.
         """
         return self.structure.semantic_class in _GROUND_CLASSES
 
@@ -92,9 +101,12 @@ class Imported:
 class Thing:
     """A small object from a city's file, such as a bench.
 
-    `source` is the object's id in the file, and `element` its type in the file.
-    `kind` is a key of `cns_drake.city.placement.objects.OBJECTS`. The position
-    is in [m]. The heading `yaw` [rad] is None if unknown.
+    Attributes:
+        source: id of the object in the file.
+        element: type of the object in the file.
+        kind: a key of `cns_drake.city.placement.objects.OBJECTS`.
+        xy: position in W [m].
+        yaw: heading in W [rad]; None if unknown.
     """
 
     source: str
@@ -108,10 +120,16 @@ class Thing:
 class Street:
     """A street, on which cars drive forwards, backwards or both.
 
-    `line` (N, 2) is the middle of the street [m]. Each of its points has a
-    node; streets with a common node meet there. `aside` is the distance from
-    the middle to the outermost lane [m]. `width` [m] is 0 if unknown. Name and
-    tags come from the file.
+    Attributes:
+        line: (N, 2) middle of the street, from start to end [m].
+        nodes: a node for each point of `line`; streets with a common node meet
+            there.
+        forward: whether cars drive in the direction of `line`.
+        backward: whether cars drive against this direction.
+        aside: distance from the middle to the outermost lane [m].
+        width: width of the carriageway [m]; 0 if unknown.
+        name: name of the street in the file.
+        tags: tags of the street in the file.
     """
 
     line: np.ndarray
@@ -140,10 +158,11 @@ def ends_at_nodes(streets: Iterable[Street]) -> Counter[int]:
 def cut_at_nodes(
     streets: Sequence[Street], also: AbstractSet[int] = frozenset()
 ) -> Iterator[tuple[Street, np.ndarray, tuple[int, int]]]:
-    """Cuts streets; yields for each piece: street, line (N, 2), end nodes.
+    """Cuts streets where they meet, and at the nodes in `also`.
 
-    Streets are cut where they meet and at the nodes in `also`. The end nodes
-    are the first and the last node of the piece.
+    Yields:
+        For each piece: its street, its middle line (N, 2) [m], and its first
+        and its last node.
     """
     uses = Counter(node for street in streets for node in street.nodes)
     for street in streets:
@@ -162,9 +181,10 @@ def cut_at_nodes(
 class StreetPlaces:
     """Crossings, traffic signals and footpaths of a city.
 
-    `crossed` contains the nodes of streets at which people cross, `signals` (N,
-    2) the places of traffic signals [m], and `paths` the middle lines (M, 2) of
-    ways for people [m].
+    Attributes:
+        crossed: nodes of streets at which people cross.
+        signals: (N, 2) places of traffic signals [m].
+        paths: middle lines of footpaths, (M, 2) each [m].
     """
 
     crossed: AbstractSet[int] = frozenset()
@@ -217,16 +237,16 @@ def make_imported(
 
     Args:
         name: name of the structure, unique in the city.
-        semantic_class: a key of `scene.semantics.CLASS_IDS`.
+        semantic_class: a key of `cns_drake.scene.semantics.CLASS_IDS`.
         kind: type of the object in its file.
         surfaces: part of the surface -> triangles (M, 3, 3) [m]. Empty parts
             are left out; at least one part must not be empty.
-        colours: part -> colour. Parts without an entry have the colour of the
-            class.
-        year: year in which it was built; None if unknown.
-        until: year in which it was demolished; None if unknown.
+        colours: part of the surface -> colour. Parts without an entry have the
+            colour of the class.
+        year: year in which the structure was built; None if unknown.
+        until: year in which the structure was demolished; None if unknown.
         tags: tags of the object in its file.
-        lod: level of detail of the object.
+        lod: level of detail of the object; 0 if unknown.
     """
     filled = {part: some for part, some in surfaces.items() if len(some)}
     triangles = np.concatenate(list(filled.values()))
@@ -243,7 +263,10 @@ def make_imported(
 
 
 def boxes_of(structures: Sequence[Imported]) -> np.ndarray:
-    """Returns (N, 2, 3) least and greatest coordinates of structures [m]."""
+    """Returns the bounding boxes (N, 2, 3) of structures [m].
+
+    Each box is given by its least and its greatest coordinates.
+    """
     return np.array(
         [
             (one.triangles.min(axis=(0, 1)), one.triangles.max(axis=(0, 1)))

@@ -38,9 +38,10 @@ _EVERY_CORNER = 7
 
 
 class Ground:
-    """The ground as heights z (R, C) on a grid of xs (C,) and ys (R,) [m].
+    """The ground of an imported city: heights on an evenly spaced grid.
 
-    The grid is evenly spaced.
+    The constructor takes the coordinates `xs` (C,) and `ys` (R,) of the grid in
+    W, and the heights `z` (R, C) at its points [m].
     """
 
     def __init__(self, xs: np.ndarray, ys: np.ndarray, z: np.ndarray):
@@ -50,7 +51,8 @@ class Ground:
     def height(self, xy: np.ndarray) -> np.ndarray:
         """Returns the heights (N,) of the ground at places (N, 2) [m].
 
-        Between the points of the grid, heights are interpolated.
+        Heights are interpolated between the points of the grid. A place outside
+        of the grid has the height of the nearest edge.
         """
         column = np.clip(
             (xy[:, 0] - self.xs[0]) / self.cell, 0, len(self.xs) - 1.001
@@ -69,9 +71,9 @@ class Ground:
         )
 
     def below(self, places: Iterable[np.ndarray]) -> Ground:
-        """Returns the ground, lowered where needed to be below given places.
+        """Returns the ground, lowered where it would cover one of given places.
 
-        Each array contains places (N, 3) [m].
+        `places` contains arrays of places (N, 3) [m].
         """
         z = self.z.copy()
         for points in places:
@@ -83,7 +85,10 @@ class Ground:
         return Ground(self.xs, self.ys, z)
 
     def to_mesh(self) -> Mesh:
-        """Returns the surface, with two triangles per cell."""
+        """Returns the ground as a mesh, lowered by 0.1 m.
+
+        It is lower so that pavements at the same height can be seen.
+        """
         x, y = np.meshgrid(self.xs, self.ys)
         vertices = np.stack([x, y, self.z - _DEPTH], axis=-1).reshape(-1, 3)
         number = np.arange(len(vertices)).reshape(self.z.shape)
@@ -94,9 +99,13 @@ class Ground:
 
 
 def guess_ground(feet: np.ndarray, corners: np.ndarray) -> Ground:
-    """Returns a smooth ground through the feet (N, 3) of structures [m].
+    """Returns a smooth ground through given points.
 
-    The ground extends beyond the corners (M, 3) of all structures [m].
+    Args:
+        feet: (N, 3) points on the ground, such as the lowest points of
+            structures [m].
+        corners: (M, 3) corners of all structures, which the ground must extend
+            beyond [m].
     """
     low, high = corners[:, :2].min(axis=0), corners[:, :2].max(axis=0)
     cell = CELL * np.ceil(max(1.0, (high - low).max() / CELL / _MOST_CELLS))
@@ -132,10 +141,10 @@ def feet_of(solids: Sequence[np.ndarray]) -> np.ndarray:
 def ground_of(
     structures: Sequence[Imported], below_bridges: bool = False
 ) -> Ground:
-    """Returns the ground of a city: its terrain, or else a guessed ground.
+    """Returns the ground of a city: its terrain or, without one, a guess.
 
-    The guess follows the lowest points ("feet") of the structures. With
-    `below_bridges`, the feet of bridges and tunnels do not count, unless the
+    The guess is a smooth ground through the lowest points of the structures.
+    With `below_bridges`, those of bridges and tunnels do not count, unless the
     city has no other structures.
     """
     corners = joined(one.triangles for one in structures).reshape(-1, 3)
@@ -160,7 +169,7 @@ def ground_of(
 def bottom_of(
     structures: Sequence[Imported], ground: Ground
 ) -> list[Structure]:
-    """Returns structures for the ground, if it is guessed; none otherwise.
+    """Returns the structures of a guessed ground; none if there is a terrain.
 
     A terrain from the file is already among `structures`.
     """

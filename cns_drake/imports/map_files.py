@@ -54,13 +54,14 @@ def write_world(
 
     Args:
         draft: folder of the map.
-        source: imported file, named in error messages.
+        source: imported file, named in comments.
         city: the structures of each stage.
         bottom: structures of the guessed ground, which are in all stages.
-        dressing: what was added to buildings and streets.
+        dressing: details that were added to buildings and streets; None if none
+            were.
 
     Returns:
-        Stage -> numbers of its structures and triangles.
+        Name of a stage -> numbers of its structures and of its triangles.
     """
     structures = [*bottom, *(one.structure for one in city.kept)]
     table = structure_table(structures)
@@ -103,10 +104,10 @@ def triangles_in(obj: str) -> int:
 
 
 def stage_size(sdf: str, triangles: Mapping[str, int]) -> tuple[int, int]:
-    """Returns the numbers of structures and of triangles in a stage's SDF.
+    """Counts the structures and the triangles in the SDF text of a stage.
 
-    Only structures with a surface count. `triangles` maps a mesh's path in the
-    map's folder to its number of triangles.
+    Only structures with a surface count. `triangles` maps the path of a mesh in
+    the map's folder to its number of triangles.
     """
     structures = set(re.findall('visual name="([^"/]+)', sdf))
     meshes = re.findall("<uri>([^<]+)</uri>", sdf)
@@ -121,15 +122,16 @@ def city_facts(
     changes: Mapping[str, object] | None,
     dressing: Dressing | None = None,
 ) -> dict:
-    """Returns facts about a map: its place, and counts of random parts.
+    """Returns facts about a map: its origin, and counts of random parts.
 
     Args:
         city: the city as in its file.
         options: options of the import.
         stages: names of the stages.
-        changes: changes in an additional first stage drawn at random, if there
-            is one.
-        dressing: what was added to buildings and streets.
+        changes: changes in an additional first stage drawn at random; None if
+            there is no such stage.
+        dressing: details that were added to buildings and streets; None if none
+            were.
     """
     facts: dict[str, object] = {
         "reference_system": city.reference_system or "unknown",
@@ -157,7 +159,7 @@ def write_facts(
     comment: str = "# Where this map comes from. A place of the map plus the"
     " origin is one of the\n# source [m].\n",
 ) -> None:
-    """Writes the facts of an import to the map's folder.
+    """Writes the facts of an import to `import.yaml` in the map's folder.
 
     Args:
         draft: folder of the map.
@@ -181,7 +183,7 @@ def write_facts(
 
 
 def write_report(draft: Path, report: ImportReport) -> None:
-    """Writes all counts of an import; the command prints only some of them."""
+    """Writes all counts of an import to `import.txt` in the map's folder."""
     lines = [f"{kind}: {number}" for kind, number in report.kinds.items()]
     lines += [
         f"{kind}: {number}, such as {example}"
@@ -191,7 +193,10 @@ def write_report(draft: Path, report: ImportReport) -> None:
 
 
 def with_column(table: str, name: str, values: Sequence[str]) -> str:
-    """Returns a CSV table with one more column on the right."""
+    """Returns a CSV table with one more column on the right.
+
+    `name` is the head of the column, and `values` are its other cells.
+    """
     lines = table.splitlines()
     rows = zip(lines, [name, *values], strict=True)
     return "".join(f"{line},{value}\n" for line, value in rows)
@@ -205,9 +210,12 @@ def write_drives(
 ) -> None:
     """Writes the routes of a map, and a scenario for each route and stage.
 
-    `stages` maps the name of a stage to words for its time, which end the
-    titles of drives. There are at most two routes. Each route consists of
-    waypoints (N, 3) [m]; `cruise` contains its speed [m/s].
+    Args:
+        folder: folder of the map.
+        stages: name of a stage -> words that end the titles of its drives, such
+            as the year.
+        routes: waypoints (N, 3) of at most two routes [m].
+        cruise: speed on each route [m/s].
     """
     for letter, waypoints in zip("ab", routes, strict=False):
         rows = [f"{x:.3f},{y:.3f},{z:.3f}" for x, y, z in waypoints]
@@ -242,6 +250,12 @@ def draw_overview(
 
     Where two drives share a street, the second drive is a thinner line on top
     of the first, so that both can be seen.
+
+    Args:
+        path: image file to write.
+        structures: the structures.
+        space: the free space; None to draw none.
+        drives: the drives, at most two.
     """
     corners = joined(one.triangles for one in structures).reshape(-1, 3)
     low, high = corners[:, :2].min(axis=0), corners[:, :2].max(axis=0)

@@ -15,9 +15,9 @@ _LONGEST = 100
 
 
 class ImportFaults:
-    """Counts of repaired and omitted parts of a file, by kind of fault.
+    """Counts the repaired and omitted parts of a file, by kind of fault.
 
-    Each kind has the name of one object as an example.
+    For each kind, it keeps the name of one object as an example.
     """
 
     def __init__(self) -> None:
@@ -35,14 +35,14 @@ class ImportFaults:
         self._examples.setdefault(kind, _printable(example))
 
     def take_back(self, kind: str) -> None:
-        """Reduces the count of a kind of fault by one."""
+        """Lowers the count of a kind of fault by one."""
         kind = _printable(kind)
         self._counts[kind] -= 1
         if not self._counts[kind]:
             del self._counts[kind], self._examples[kind]
 
     def rows(self) -> list[tuple[str, int, str]]:
-        """Returns kind, number and example of faults, most frequent first."""
+        """Returns kind, count and example of faults, most frequent first."""
         return [
             (kind, number, self._examples[kind])
             for kind, number in sorted(
@@ -69,16 +69,17 @@ class ImportOptions:
         undated: first stage with the buildings whose year is unknown: `first`,
             `last` or `never`.
         lod: level of detail to read; None for the highest of each object.
-        seed: seed of the random draws of `grow`, and of buildings along a
-            file's roads.
-        along: file with the waypoints of a drive that replaces the two proposed
-            drives.
-        within: greatest distance of structures from the drives [m]; no limit if
-            None.
-        drive_on: side of the street on which traffic keeps; if None, the side
-            in the file, or right if it has none.
+        seed: seed of everything that is drawn at random: the changes of `grow`,
+            the details of `dressed`, and the buildings of a town that is built
+            along a file's roads.
+        along: CSV file with the waypoints of a drive, which replaces the two
+            proposed drives; None for the proposed ones.
+        within: greatest distance of structures from the drives [m]; None for no
+            limit.
+        drive_on: side of the street on which traffic keeps; None for the side
+            in the file, or right if the file names none.
         grow: share of the buildings that are missing or lower in an additional
-            first stage, drawn at random; no such stage if None.
+            first stage, drawn at random; None for no such stage.
         dressed: whether to add details, such as windows and parked cars, that
             are not in the file.
     """
@@ -102,10 +103,11 @@ class ImportReport:
     Attributes:
         kinds: type of object -> number of structures.
         triangles: number of triangles.
-        stages: stage -> number of structures.
-        undated, dated: numbers of buildings without a year, and with one.
+        stages: name of a stage -> number of its structures.
+        undated: number of buildings without a year.
+        dated: number of buildings with a year.
         drives: lengths of the proposed drives [m].
-        faults: kind, number and example of faults.
+        faults: kind, count and example of each fault.
     """
 
     kinds: dict[str, int]

@@ -83,13 +83,15 @@ def _cropped(one: Imported, ways: BaseGeometry, distance: float) -> Imported:
 def with_gone(
     gone: Sequence[Imported], others: Iterable[Imported]
 ) -> list[Imported]:
-    """Returns the city of the past: former buildings, and what stood then.
+    """Returns the past city: former buildings, and all else that stood then.
 
-    `gone` contains buildings that were demolished at an unknown date, and
-    `others` the structures of today. Where a building of today stands in the
-    place of a former building, the result contains only one of the two: the
-    building of today if its year of construction is known, and otherwise the
-    former building.
+    Where a building of today stands in the place of a former building, the
+    result contains only one of the two: the building of today if its year of
+    construction is known, and otherwise the former building.
+
+    Args:
+        gone: buildings that were demolished at an unknown date.
+        others: the structures of today.
     """
     others = list(others)
     later = [one for one in others if one.kind.startswith("Building")]
@@ -117,14 +119,15 @@ def _shares(one: BaseGeometry, other: BaseGeometry) -> bool:
 
 @dataclass(frozen=True)
 class StagedCity:
-    """The structures of a city, by stage.
+    """The structures of an imported city, by stage.
 
     Attributes:
-        standing: stage -> structures that exist in it.
+        standing: name of a stage -> structures that exist in it.
         kept: structures that exist in at least one stage.
-        undated, dated: numbers of buildings without a year, and with one.
-        gone: buildings that no longer exist; empty unless the only stage is
-            today.
+        undated: number of buildings without a year.
+        dated: number of buildings with a year.
+        gone: buildings that no longer exist, for `grow`; empty if the options
+            of the import do not include `grow`.
     """
 
     standing: dict[str, list[Imported]]
@@ -173,7 +176,10 @@ class StagedCity:
     def replaced(
         self, changed: Mapping[Imported, Imported | None]
     ) -> StagedCity:
-        """Returns the city with some structures replaced or removed."""
+        """Returns the city with some structures replaced or removed.
+
+        `changed` maps a structure to its replacement, or to None to remove it.
+        """
 
         def new(some: Iterable[Imported]) -> list[Imported]:
             others = (changed.get(one, one) for one in some)
@@ -183,7 +189,7 @@ class StagedCity:
         return replace(self, standing=standing, kept=new(self.kept))
 
     def joined(self, added: Sequence[Imported]) -> StagedCity:
-        """Returns the city with more structures, at all stages."""
+        """Returns the city with more structures, which exist in all stages."""
         standing = {
             stage: [*some, *added] for stage, some in self.standing.items()
         }
@@ -193,10 +199,14 @@ class StagedCity:
 def stage_city(
     source: object, city: ForeignCity, options: ImportOptions
 ) -> StagedCity:
-    """Assigns the structures of a city to the stages of the options.
+    """Assigns the structures of an imported city to the stages of a map.
 
-    Structures that exist in no stage are counted in the faults of the city.
-    Error messages name `source`.
+    Structures that exist in no stage are counted in `city.faults`.
+
+    Args:
+        source: the imported file, named in error messages.
+        city: the city as in its file.
+        options: options of the import, such as the years of the stages.
 
     Raises:
         InputError: if all stages together have no structure, or too many.
@@ -273,9 +283,9 @@ def _stands(one: Imported, stage: int, options: ImportOptions) -> bool:
 
 
 def stage_names(years: Sequence[int]) -> list[str]:
-    """Returns the name of each year's stage, from 01 on.
+    """Returns the names of the stages: a number from 01 for each year.
 
-    Without years there is one stage.
+    Without years there is one stage, 01.
 
     Raises:
         InputError: if years do not increase.
@@ -333,17 +343,23 @@ def _has_years(one: Imported) -> bool:
 def grow(
     city: StagedCity, part: float, seed: int
 ) -> tuple[StagedCity, dict[str, Any]]:
-    """Adds a first stage with fewer buildings; returns it and its changes.
+    """Returns a city with an additional first stage, and what differs in it.
 
-    In the first stage, the share `part` of the buildings is missing or lower.
-    The random draws depend on the names of buildings, so that changes elsewhere
-    in the file do not affect them. Buildings in the file that no longer exist
-    today exist in the first stage, in place of the structures that replaced
-    them.
+    In the first stage, buildings that no longer exist today stand in place of
+    the structures that replaced them. Some of the other buildings, drawn at
+    random, are missing or lower. A draw depends only on the seed and the
+    building's name, so that changes elsewhere in the file do not affect it.
 
-    The changes are a mapping: `missing` contains the names of missing
-    buildings, `part_of_height` the relative heights of lower buildings, and
-    `gone_since`, if there are any, the buildings that no longer exist today.
+    Args:
+        city: the city, with one stage.
+        part: share of the buildings that are missing or lower.
+        seed: seed of the random draws.
+
+    Returns:
+        The city with the stages 01 and 02, and a mapping: `missing` contains
+        the names of missing buildings, `part_of_height` the relative heights of
+        lower buildings, and `gone_since`, if there are any, the names of
+        buildings that no longer exist today.
     """
     (last,) = city.standing.values()
     buildings = [one for one in last if one.kind.startswith("Building")]

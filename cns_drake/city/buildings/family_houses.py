@@ -24,11 +24,17 @@ _SIDE_PITCH_M = 3.8
 def storeys_for(
     height: float, floor: float, span: float, pitch_deg: float
 ) -> int:
-    """Returns the number of storeys that gives a roof the wanted pitch.
+    """Returns how many storeys (1 to 4) suit a house with a pitched roof.
 
-    The pitch is met as closely as possible. The roof spans `span` [m] and fills
-    the height between the storeys and its ridge, which is at `height` [m]. The
-    ground floor is at the height `floor` [m].
+    The roof fills the height between the topmost storey and the ridge. The
+    number of storeys makes the pitch of this roof as close to `pitch_deg` as
+    possible.
+
+    Args:
+        height: height of the ridge [m].
+        floor: height of the ground floor [m].
+        span: width of the roof across the ridge [m].
+        pitch_deg: wanted pitch of the roof [deg].
     """
     wanted = wings.ridge_rise(span, pitch_deg)
     room = height - ROOF_M - floor - 0.15
@@ -39,9 +45,16 @@ def storeys_for(
 def wall_top_for(
     height: float, floor: float, span: float, storeys: int
 ) -> float:
-    """Returns the height of the walls below a ridge at `height` [m].
+    """Returns the height of the top of the walls of a house [m].
 
-    The other arguments are as in `storeys_for`.
+    The walls are as high as the storeys need, but lower if the roof would
+    otherwise be too low.
+
+    Args:
+        height: height of the ridge [m].
+        floor: height of the ground floor [m].
+        span: width of the roof across the ridge [m].
+        storeys: number of storeys, as from `storeys_for`.
     """
     wanted = floor + storeys * STOREY_M + 0.15
     return min(wanted, height - ROOF_M - 0.08 * span)
@@ -101,13 +114,17 @@ _WING_ENDS = {
 class DetachedHouse(Building):
     """The detached house: wings under gables or hips, a porch, a garage.
 
-    `plan` is `box`, `ell` (a wing to the front), `tee` (a wing to the
-    back) or `cross` (both). The garage stands on the right, the front wing
-    on the left, unless `mirrored`.
+    The parameter `plan` is `box` (one main wing), `ell` (with a second wing in
+    front), `tee` (with a second wing at the back) or `cross` (with both). The
+    garage is on the right and the front wing on the left; if `mirrored`, they
+    change sides.
     """
 
     def build(self) -> None:
-        """Builds the house on the rectangular site, its porch in front."""
+        """Adds all parts of the detached house, with the porch in front.
+
+        The building's site must be a rectangle.
+        """
         self._lay_out()
         _add_main(self)
         for wing in self.wings:
@@ -241,7 +258,10 @@ class Bungalow(Building):
     """The bungalow: one long low storey, a carport or a garage."""
 
     def build(self) -> None:
-        """Builds the bungalow along the front of the rectangular site."""
+        """Adds all parts of the bungalow, which lies along the front.
+
+        The building's site must be a rectangle.
+        """
         self._lay_out()
         main, *fronts = self.boxes
         openings = _window_rows(self, main, 1)
@@ -343,7 +363,10 @@ class SemiDetached(Building):
     """The pair of semi-detached houses: mirrored halves under one roof."""
 
     def build(self) -> None:
-        """Builds the pair on the rectangular site."""
+        """Adds all parts of the two semi-detached houses.
+
+        The building's site must be a rectangle.
+        """
         x0, y0, x1, y1 = self.site.bounds
         left, right, back = x0 + _MARGIN, x1 - _MARGIN, y1 - _MARGIN
         front = y0 + min(2.4, 0.25 * (y1 - y0))

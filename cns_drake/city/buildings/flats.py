@@ -31,9 +31,9 @@ class CourtBlock(Building):
     """The court block: wings around a court, a mansard roof with dormers."""
 
     def build(self) -> None:
-        """Builds the block on the rectangular site.
+        """Adds all parts of the court block, whose court is open to the back.
 
-        Its court is open to the back.
+        The building's site must be a rectangle.
         """
         form = massing.u_shape if self.shape == "U" else massing.l_shape
         plan = form(*self.site.bounds, self.wing, self.back)
@@ -151,7 +151,10 @@ class WalkUp(Building):
     """The walk-up: brick flats around a stair, behind a raised entrance."""
 
     def build(self) -> None:
-        """Builds the flats on the rectangular site."""
+        """Adds all parts of the walk-up flats.
+
+        The building's site must be a rectangle.
+        """
         site = self.site
         x0, y0, x1, y1 = site.bounds
         left = x0 + 0.5 * (3 not in site.blind_edges)
@@ -294,7 +297,10 @@ class GardenFlats(Building):
     """Flats in a garden: staggered houses under gables, stacks of verandas."""
 
     def build(self) -> None:
-        """Builds the group along the front of the rectangular site."""
+        """Adds all parts of the houses, side by side along the front.
+
+        The building's site must be a rectangle.
+        """
         x0, y0, x1, y1 = self.site.bounds
         left, right = x0 + _MARGIN, x1 - _MARGIN
         count = max(1, round((right - left) / self.section))

@@ -28,7 +28,10 @@ class Barn(Building):
     """The barn or boat house: timber boards, wide doors, a lean-to."""
 
     def build(self) -> None:
-        """Builds the barn along the longer side of the rectangular site."""
+        """Adds all parts of the barn, which lies along the site's longer sides.
+
+        The building's site must be a rectangle.
+        """
         x0, y0, x1, y1 = self.site.bounds
         along_y = y1 - y0 >= x1 - x0
         left, right = x0 + _MARGIN, x1 - _MARGIN
@@ -172,7 +175,10 @@ class SportsHall(Building):
     """The sports hall: a wide roof on frames, a low front, high windows."""
 
     def build(self) -> None:
-        """Builds the hall on the rectangular site, its entrance in front."""
+        """Adds all parts of the sports hall, with the entrance in front.
+
+        The building's site must be a rectangle.
+        """
         x0, y0, x1, y1 = self.site.bounds
         front = y0 + (self.annex + 1.6 if self.annex else 1.8)
         area = (x0 + _RIM, front, x1 - _RIM, y1 - _RIM)
@@ -283,7 +289,10 @@ class WaterfrontHall(Building):
     """
 
     def build(self) -> None:
-        """Builds the hall on the rectangular site, its dock at the front."""
+        """Adds all parts of the waterfront hall, with its dock in front.
+
+        The building's site must be a rectangle.
+        """
         x0, y0, x1, y1 = self.site.bounds
         front = y0 + self.dock_depth
         plan = massing.rectangle(x0, front, x1, y1)

@@ -1,16 +1,19 @@
 """Landmarks: archetypes whose buildings are a few fixed models from files.
 
-Each folder in `landmark_models` contains one model; its name consists of the
-archetype and a letter. In it are the meshes of the model as OBJ files, and
-`model.yaml`:
+Each folder in `landmark_models` contains one model. The folder's name is the
+name of the archetype, an underscore and a letter. The folder contains the
+model's meshes as OBJ files, and `model.yaml`:
 
-    size: [50, 30]        # of its lot, about the origin [m]
-    overhang: [1.5, 1.5]  # of its eaves beyond the lot, along x and y [m]
-    height: 17            # [m]
+    size: [50, 30]        # lengths of the model's lot along x and y [m]; the
+                          # origin is the middle of the lot
+    overhang: [1.5, 1.5]  # how far eaves reach beyond the lot, x and y [m]
+    height: 17            # height of the model [m]
     parts:
-    - name: walls         # of the visual
-      mesh: walls         # in the folder, or one of the `object_meshes`
-      xyz: [0, 0, 1.8]    # [m]; also `yaw`, in quarter turns [rad]; `scale`
+    - name: walls         # name of the part
+      mesh: walls         # an OBJ file in the folder or in `object_meshes`
+      xyz: [0, 0, 1.8]    # position of the part [m]
+      yaw: 1.5708         # heading, a multiple of pi/2 [rad]; 0 by default
+      scale: [1, 1, 2]    # scale of a mesh in `object_meshes`; 1 by default
       rgb: [0.8, 0.74, 0.64]
 """
 
@@ -57,10 +60,14 @@ LANDMARKS = _folders()
 
 
 class Landmark(Building):
-    """One of the models of a landmark, stretched to the size of the lot."""
+    """A landmark: a fixed model from a file, stretched to fit its site."""
 
     def build(self) -> None:
-        """Adds the parts of the model, on a rectangle."""
+        """Adds the parts of one of the landmark's models, drawn at random.
+
+        The model is stretched to the size of the building's site, which must be
+        a rectangle, and to the building's height.
+        """
         x0, y0, x1, y1 = self.site.bounds
         folder = self.pick(LANDMARKS[self.kind.name])
         model = _read(folder)

@@ -25,7 +25,10 @@ class ShopStrip(Building):
     """The strip of shops: low flat-roofed units side by side, all different."""
 
     def build(self) -> None:
-        """Builds the strip along the front of the rectangular site."""
+        """Adds all parts of the shops, side by side along the front.
+
+        The building's site must be a rectangle.
+        """
         site = self.site
         x0, y0, x1, y1 = site.bounds
         count = max(1, round((x1 - x0) / self.unit_width))
@@ -107,7 +110,10 @@ class KioskRow(Building):
     """The row of kiosks: small stalls with counters behind a common arcade."""
 
     def build(self) -> None:
-        """Builds the row along the front of the rectangular site."""
+        """Adds all parts of the kiosks, side by side along the front.
+
+        The building's site must be a rectangle.
+        """
         x0, y0, x1, y1 = self.site.bounds
         left, right = x0 + 0.5, x1 - 0.5
         front = y0 + 2.2 if self.arcade == 0.0 else y0 + self.arcade + 0.5
@@ -200,7 +206,10 @@ class Supermarket(Building):
     """The supermarket: a low hall, a glazed front under a canopy, a dock."""
 
     def build(self) -> None:
-        """Builds the hall on the rectangular site, its entrance in front."""
+        """Adds all parts of the supermarket, with the entrance in front.
+
+        The building's site must be a rectangle.
+        """
         x0, y0, x1, y1 = self.site.bounds
         left = x0 + 0.3 + self.dock_depth * self.dock_left
         right = x1 - 0.3 - self.dock_depth * (not self.dock_left)

@@ -26,7 +26,10 @@ class BandedTower(Building):
     """The banded office tower: round corners, ribbon windows, garden floors."""
 
     def build(self) -> None:
-        """Builds the tower on the rectangular site."""
+        """Adds all parts of the banded office tower.
+
+        The building's site must be a rectangle.
+        """
         x0, y0, x1, y1 = self.site.bounds
         base = massing.rectangle(x0 + 0.8, y0 + 0.8, x1 - 0.8, y1 - 0.8)
         step = max(2.8, 0.5 * self.radius)
@@ -158,11 +161,14 @@ class GridTower(Building):
 
     @property
     def margin(self) -> float:
-        """Width of solid wall at corners, which keeps recesses apart [m]."""
+        """Width of the plain wall between a corner and the first window [m]."""
         return self.recess + 0.15
 
     def build(self) -> None:
-        """Builds the tower on the rectangular site."""
+        """Adds all parts of the gridded office tower.
+
+        The building's site must be a rectangle.
+        """
         plan = np.round(_plan(self, self.site), 2)
         top = _add_grid_tower_lobby(self, plan)
         if self.waist > 0:
@@ -256,7 +262,10 @@ class UnfinishedTower(Building):
     """The tower under construction: core, frame, scaffolds, cladding."""
 
     def build(self) -> None:
-        """Builds the tower on the rectangular site."""
+        """Adds all parts of the tower under construction.
+
+        The building's site must be a rectangle.
+        """
         site = massing.rectangle(*self.site.bounds)
         plan = np.round(massing.inset(site, _SCAFFOLD_M + 0.2), 2)
         _add_frame(self, plan)

@@ -29,7 +29,10 @@ class GasStation(Building):
     """The gas station: pumps under a canopy, shop, car wash and price sign."""
 
     def build(self) -> None:
-        """Builds the station on the rectangular site, behind a forecourt."""
+        """Adds all parts of the gas station: a shop behind a canopy with pumps.
+
+        The building's site must be a rectangle.
+        """
         x0, y0, x1, y1 = self.site.bounds
         shop_front = y1 - self.shop_depth - 0.3
         room = shop_front - 3.0 - (y0 + 1.5)
@@ -156,7 +159,10 @@ class ParkPavilion(Building):
     """The park pavilion: a bandstand, a shelter with tables, or a tea house."""
 
     def build(self) -> None:
-        """Builds the pavilion in the middle of the rectangular site."""
+        """Adds all parts of the pavilion.
+
+        The building's site must be a rectangle.
+        """
         x0, y0, x1, y1 = self.site.bounds
         if self.form == "shelter":
             _add_shelter(self, (x0, y0, x1, y1))

@@ -27,7 +27,10 @@ class School(Building):
     """The school: classroom wings, a glazed entrance, a gymnasium."""
 
     def build(self) -> None:
-        """Builds the school on the rectangular site, its entrance in front."""
+        """Adds all parts of the school, with the entrance in front.
+
+        The building's site must be a rectangle.
+        """
         x0, y0, x1, y1 = self.site.bounds
         front = y0 + 3.2
         left, right, back = x0 + _MARGIN, x1 - _MARGIN, y1 - _MARGIN
@@ -156,9 +159,10 @@ class Chapel(Building):
     """The chapel: a nave with a steep roof, a tower or bell cote, a porch."""
 
     def build(self) -> None:
-        """Builds the chapel along the longer side of the rectangular site.
+        """Adds all parts of the chapel, parallel to the site's longer sides.
 
-        Its door is in front, or on the left if the longer side lies along x.
+        The door is at the front of the site, or on its left if the longer sides
+        lie along x. The building's site must be a rectangle.
         """
         x0, y0, x1, y1 = self.site.bounds
         if y1 - y0 >= x1 - x0:

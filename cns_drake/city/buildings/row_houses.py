@@ -225,7 +225,10 @@ class RowHouse(Building):
     """The row house: one narrow house between its neighbours, with a stoop."""
 
     def build(self) -> None:
-        """Builds the house on the rectangular site."""
+        """Adds all parts of the row house.
+
+        The building's site must be a rectangle.
+        """
         _, y0, _, y1 = self.site.bounds
         left, right, blind = _front_site(self)
         front, back = y0 + self.stoop, y1 - 0.35
@@ -258,7 +261,10 @@ class Terrace(Building):
     """The terrace: a row of narrow houses, similar but not the same."""
 
     def build(self) -> None:
-        """Builds the terrace along the front of the rectangular site."""
+        """Adds all parts of the houses, side by side along the front.
+
+        The building's site must be a rectangle.
+        """
         x0, y0, x1, y1 = self.site.bounds
         front = y0 + self.stoop
         back = min(y1 - 0.35, front + 10.5)
@@ -297,7 +303,10 @@ class ShopHouse(Building):
     """The shop house: shops on the ground floor, flats above them."""
 
     def build(self) -> None:
-        """Builds the house on the rectangular site."""
+        """Adds all parts of the shop house.
+
+        The building's site must be a rectangle.
+        """
         _, y0, _, y1 = self.site.bounds
         left, right, blind = _front_site(self)
         area = (left, y0 + self.stoop, right, y1 - 0.35)

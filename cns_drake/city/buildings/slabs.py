@@ -30,7 +30,10 @@ class SlabTower(Building):
     """The concrete slab block: loggias, a stair tower, pillars, a pavilion."""
 
     def build(self) -> None:
-        """Builds the slab along x on the rectangular site."""
+        """Adds all parts of the slab block, whose longer sides lie along x.
+
+        The building's site must be a rectangle.
+        """
         x0, y0, x1, y1 = self.site.bounds
         front = y1 - self.depth if self.at_back else y0
         back = front + self.depth
@@ -122,7 +125,10 @@ class BalconyFlats(Building):
     """The white slab block: stacks of balconies, staggered sections."""
 
     def build(self) -> None:
-        """Builds the slab along the front of the rectangular site."""
+        """Adds all parts of the slab block, which lies along the front.
+
+        The building's site must be a rectangle.
+        """
         sections = _sections(self, self.site)
         plan, fronts = _outline(sections)
         storeys = max(2, round((self.height - 1.9) / self.storey))
@@ -314,7 +320,10 @@ class GalleryFlats(Building):
     """The gallery block: walkways along the doors, loggias at the back."""
 
     def build(self) -> None:
-        """Builds the bar along x on the rectangular site."""
+        """Adds all parts of the gallery block, whose longer sides lie along x.
+
+        The building's site must be a rectangle.
+        """
         x0, y0, x1, y1 = self.site.bounds
         front = y0 + (self.gallery if self.gallery_front else 0.1)
         back = min(

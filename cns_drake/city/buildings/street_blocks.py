@@ -25,7 +25,7 @@ class BrickBlock(Building):
     """The old brick block: punched windows, fire stairs, a water tower."""
 
     def build(self) -> None:
-        """Builds the block on a site of any outline."""
+        """Adds all parts of the brick block on a site of any outline."""
         outline, blind = self.site.outline, self.site.blind_edges
         bottom = _add_shops(self)
         room = self.height - self.ground_height - (self.parapet + 1.4)
@@ -112,7 +112,10 @@ class CornerBuilding(Building):
     """
 
     def build(self) -> None:
-        """Builds the house on the rectangular site."""
+        """Adds all parts of the corner house.
+
+        The building's site must be a rectangle.
+        """
         site = self.site
         if self.corner not in site.free_corners:
             site = site.detached(self.kind.overhang)
@@ -250,7 +253,7 @@ class Office(Building):
     """
 
     def build(self) -> None:
-        """Builds the office on a site of any outline."""
+        """Adds all parts of the office; its site can have any outline."""
         outline, blind = self.site.outline, self.site.blind_edges
         top = _add_ground(self)
         goal = self.height - self.penthouse_height - self.parapet - 0.5
@@ -325,7 +328,10 @@ class CornerStore(Building):
     """The corner store: a door across the corner, flats above the shop."""
 
     def build(self) -> None:
-        """Builds the store on the rectangular site."""
+        """Adds all parts of the corner store.
+
+        The building's site must be a rectangle.
+        """
         site = self.site
         if self.corner not in site.free_corners:
             site = site.detached(self.kind.overhang)

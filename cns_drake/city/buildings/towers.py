@@ -20,7 +20,10 @@ class ArtDecoTower(Building):
     """The art-deco tower: symmetric setbacks, tall piers, a stepped crown."""
 
     def build(self) -> None:
-        """Builds the tower on the rectangular site."""
+        """Adds all parts of the art-deco tower.
+
+        The building's site must be a rectangle.
+        """
         base = self.site.outline
         plan = massing.notched(base, self.notch) if self.notch else base
         top = _add_ground(self, plan)
@@ -73,7 +76,7 @@ class GlassSkyscraper(Building):
     """The glass skyscraper: curtain walls with fins, setbacks, a crown."""
 
     def build(self) -> None:
-        """Builds the skyscraper on a site of any outline."""
+        """Adds all parts of the skyscraper; its site can have any outline."""
         base = self.site.outline
         plan = _shaped(self, base)
         top = _add_lobby(self, plan)
@@ -157,7 +160,10 @@ class Hotel(Building):
     """The hotel: balconies along rounded walls, a forecourt, a roof-top bar."""
 
     def build(self) -> None:
-        """Builds the hotel on the rectangular site, behind a forecourt."""
+        """Adds all parts of the hotel, which stands behind a forecourt.
+
+        The building's site must be a rectangle.
+        """
         x0, y0, x1, y1 = self.site.bounds
         front = y0 + _FORECOURT_M
         if self.round_ends:
@@ -238,7 +244,10 @@ class PodiumTower(Building):
     """The podium tower: a block of shops with a tower set back on its roof."""
 
     def build(self) -> None:
-        """Builds the podium and the tower on the rectangular site."""
+        """Adds all parts of the podium and of the tower on it.
+
+        The building's site must be a rectangle.
+        """
         (x0, y0, x1, y1), base = self.site.bounds, self.site.outline
         top, walls = _add_shops(self), _podium_storey(self)
         top = tiers.add_storeys(

@@ -38,10 +38,15 @@ def pick(rng: np.random.Generator, choices: Sequence[T]) -> T:
 class Site:
     """The ground of a building, a simple polygon in the building's frame S [m].
 
-    The front is the edge between the first two corners; for a rectangle, the
-    edge of least y. Edges are numbered counter-clockwise from the front, which
-    is 0. Walls on `blind_edges` are built against a neighbour. The names of the
-    building's own meshes begin with `<name>_`.
+    Edges are numbered counter-clockwise from the front, which is edge 0. The
+    front is the edge between the first two corners; in a rectangle along the
+    axes, the edge of least y.
+
+    Attributes:
+        footprint: the polygon.
+        name: name of the building, with which the names of its meshes begin.
+        blind_edges: numbers of the edges whose walls are built against a
+            neighbour.
     """
 
     footprint: Polygon
@@ -50,7 +55,10 @@ class Site:
 
     @property
     def outline(self) -> np.ndarray:
-        """The (N, 2) corners [m], counter-clockwise from the front edge."""
+        """Corners (N, 2) of the ground [m], counter-clockwise from the front.
+
+        Those of a rectangle are rounded inwards to whole centimetres.
+        """
         exterior = self.footprint.exterior
         points = np.array(exterior.coords[:-1], dtype=float)
         if not exterior.is_ccw:
@@ -83,7 +91,7 @@ class Site:
 
     @property
     def open_length(self) -> float:
-        """Length of all walls that get windows [m]."""
+        """Total length of all walls except blind ones [m]."""
         outline = self.outline
         ends = np.roll(outline, -1, axis=0)
         lengths = np.linalg.norm(ends - outline, axis=1)
@@ -94,16 +102,20 @@ class Site:
 
     @property
     def free_corners(self) -> list[int]:
-        """The front corners (0 left, 1 right) that no neighbour hides."""
+        """The front corners (0 left, 1 right) that no blind wall touches."""
         flanks = {0: {3, 0}, 1: {0, 1}}
         return [k for k, e in flanks.items() if not e & self.blind_edges]
 
     def blind_in(self, number: int, count: int) -> frozenset[int]:
-        """Returns the blind edges of unit `number` of `count` units in a row.
+        """Returns the blind edges of one of several units side by side.
 
-        Units are numbered from left to right. A unit is blind towards its
-        neighbours in the row. The first and the last unit are also blind at the
-        outer end of the row, if the site is blind there.
+        A unit is blind where it touches the next unit. The two outermost units
+        are also blind where the site is. The result contains 3 for a blind edge
+        on the left, and 1 for one on the right.
+
+        Args:
+            number: number of the unit, counted from 0 on the left.
+            count: number of all units in the row.
         """
         outer = {3: number == 0, 1: number + 1 == count}
         return frozenset(
@@ -115,8 +127,8 @@ class Site:
     def detached(self, gap: float) -> Site:
         """Returns the site with its blind edges moved inwards by `gap` [m].
 
-        With a gap at least as wide as its overhangs, a building on this site
-        touches no neighbour.
+        The resulting site has no blind edges. If `gap` is at least the overhang
+        of a building, the building touches no neighbour.
         """
         outline = self.outline
         gaps = [gap * (k in self.blind_edges) for k in range(len(outline))]
@@ -145,9 +157,25 @@ class Site:
 
 
 class Archetype(BaseModel, frozen=True, extra="forbid"):
-    """An archetype: the fields of one entry of `archetypes.yaml`.
+    """A kind of building: one entry of `buildings/archetypes.yaml`.
 
-    That file explains the fields.
+    Attributes:
+        name: name of the archetype.
+        heights: least and greatest height of a building [m].
+        widths: least and greatest length of a side of the footprint [m].
+        overhang: greatest distance by which eaves, balconies and canopies reach
+            outside the footprint [m].
+        any_outline: whether the footprint can be any simple polygon; otherwise
+            it must be a rectangle.
+        party_walls: whether a building can stand wall to wall with a neighbour;
+            otherwise it keeps the distance `overhang` from blind edges.
+        colours: name of a part -> colours, of which each building draws one.
+            The name of another part stands for its colour. The first entry is
+            the colour of all parts without a colour of their own.
+        choices: name -> colours that are drawn while the building is made.
+        materials: names in `colours` whose pieces become one part each.
+        parameters: name -> value or formula of each parameter, in the order in
+            which they are computed (see `cns_drake.city.formulas.value_of`).
     """
 
     name: str
@@ -227,30 +255,51 @@ class Assembly:
             self.place(part, shape, (0.0, 0.0, z), rgb=rgb)
 
     def paint(self, **colours: Rgb) -> None:
-        """Sets the colours of the building's materials, by name."""
+        """Declares the building's materials and their colours, by keyword.
+
+        `add_to` accepts only these materials.
+        """
         self._colours = colours
         self._pieces = {material: [] for material in colours}
 
     def add_to(self, material: str, *meshes: Mesh) -> None:
-        """Adds meshes to the part of a material."""
+        """Adds meshes in the building's frame to the part of a material.
+
+        Raises:
+            ValueError: the material was not declared with `paint`.
+        """
         if material not in self._pieces:
             raise ValueError(f"unknown material {material}")
         self._pieces[material] += meshes
 
     def turn(self, translation: ArrayLike, yaw: float) -> None:
-        """Rotates the building about z by `yaw` [rad], and translates it."""
+        """Turns the meshes of all materials about z, and then moves them.
+
+        `yaw` is the angle [rad] and `translation` (3,) the shift [m]. Parts
+        that are already complete, such as those from `add`, stay where they
+        are.
+        """
         for material, pieces in self._pieces.items():
             mesh = merge_meshes(*pieces).moved(translation, yaw)
             self._pieces[material] = [mesh]
 
     def finish(self, footprint: BaseGeometry) -> Model:
-        """Returns the finished building, with one part for each material."""
+        """Returns the finished building, with one part for each material.
+
+        `footprint` is the ground of the building in its frame S [m].
+        """
         for material, pieces in self._pieces.items():
             self.add(material, *pieces, rgb=self._colours[material])
         return Model(tuple(self.parts), self.meshes, footprint)
 
     def define(self, key: str, mesh: Mesh) -> str:
-        """Adds a mesh to this building; returns the mesh's full name."""
+        """Adds a mesh to this building, and returns the mesh's full name.
+
+        The full name consists of the name of the site, an underscore and `key`.
+
+        Raises:
+            ValueError: the building already has a mesh of this name.
+        """
         name = f"{self.site.name}_{key}"
         if name in self.meshes:
             raise ValueError(f"mesh {name} is defined twice")
@@ -269,7 +318,7 @@ class Assembly:
         """Adds a mesh, and places several copies of it above one another.
 
         Args:
-            part: beginning of the visuals' names.
+            part: beginning of the names of the copies, which are parts.
             mesh: the mesh in the building's frame [m].
             z0: height of the lowest copy [m].
             step: vertical distance from one copy to the next [m].
@@ -284,7 +333,11 @@ class Assembly:
     def shared(
         self, mesh: str, scale: tuple[float, float, float] = (1.0, 1.0, 1.0)
     ) -> MeshShape:
-        """Returns one of the shared `object_meshes` as a shape."""
+        """Returns a mesh of the folder `object_meshes` as a shape for `place`.
+
+        `mesh` is the name of its file without `.obj`. `scale` contains the
+        scale factors along x, y and z.
+        """
         self.meshes[mesh] = object_mesh(mesh)
         return MeshShape(mesh, scale)
 
@@ -296,10 +349,10 @@ class Assembly:
         yaw: float = 0.0,
         rgb: Rgb | None = None,
     ) -> None:
-        """Adds a part: one visual of a shape, at a place.
+        """Adds one part to the building: a shape at a place.
 
         Args:
-            part: name of the visual.
+            part: name of the part.
             shape: the shape.
             xyz: position of the shape in the building's frame [m].
             yaw: heading of the shape [rad].
@@ -311,10 +364,10 @@ class Assembly:
 
 
 class Building(Assembly, abc.ABC):
-    """A building of an archetype: draws its parameters and builds itself.
+    """The base class of buildings; each archetype has a subclass.
 
-    Functions that add something to a building have the building as argument
-    `p`; they read its parameters, and add parts and meshes to it. Only roof
+    The constructor draws the parameters of the archetype at random. They become
+    attributes, from which `build` makes the parts of the building. Only roof
     equipment and chimneys may rise above its `height` [m].
     """
 
@@ -356,4 +409,4 @@ class Building(Assembly, abc.ABC):
 
     @abc.abstractmethod
     def build(self) -> None:
-        """Adds all parts of the building."""
+        """Adds all parts of the building; to be called once."""

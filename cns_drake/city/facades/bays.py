@@ -25,7 +25,7 @@ def _centred(x0: float, x1: float, width: float) -> tuple[float, float]:
 
 
 def blank(x0: float, x1: float) -> list[Relief]:
-    """Returns no reliefs: a bay of plain wall."""
+    """A bay of plain wall: a function that returns no reliefs."""
     return []
 
 
@@ -77,11 +77,15 @@ def window(
 
 
 def ribbon(sill: float, head: float, depth: float, post: float) -> Bay:
-    """Returns a bay of a ribbon window, with a post at its ends [m].
+    """Returns a bay of a ribbon window, with half a post at each end.
 
-    `sill` and `head` are the heights of the bottom and the top of the glass,
-    `depth` is its distance behind the wall, and `post` the width of the post
-    between two such bays.
+    Two such bays side by side have a whole post between them.
+
+    Args:
+        sill: height of the bottom of the glass [m].
+        head: height of the top of the glass [m].
+        depth: distance of the glass behind the wall [m].
+        post: width of a whole post [m].
     """
     return window(1e3, sill, head, depth, pier=post / 2)
 
@@ -160,7 +164,15 @@ def shop_front(
 def entrance(
     width: float, height: float, depth: float = 0.9, *, surround: float = 0.2
 ) -> Bay:
-    """Returns a bay with a deep doorway, whose frame stands out of the wall."""
+    """Returns a bay with a deep doorway in a frame that protrudes.
+
+    Args:
+        width: width of the doorway [m]; the doorway is narrower in a bay that
+            is too narrow.
+        height: height of the doorway [m].
+        depth: distance of the door behind the wall [m].
+        surround: how far the frame protrudes from the wall [m].
+    """
 
     def bay(x0: float, x1: float) -> list[Relief]:
         a, b = _centred(x0, x1, min(width, x1 - x0 - 1.0))
@@ -176,9 +188,16 @@ def entrance(
 
 
 def house_door(width: float, z0: float, z1: float, depth: float) -> Bay:
-    """Returns a bay with a doorway from z0 to z1, for a door above steps [m].
+    """Returns a bay with the doorway of a house, which can be above steps.
 
     The door has two leaves, a fanlight and a flat surround.
+
+    Args:
+        width: width of the doorway [m]; the doorway is narrower in a bay that
+            is too narrow.
+        z0: height of the threshold [m].
+        z1: height of the top of the doorway [m].
+        depth: distance of the door behind the wall [m].
     """
 
     def bay(x0: float, x1: float) -> list[Relief]:
@@ -195,7 +214,15 @@ def house_door(width: float, z0: float, z1: float, depth: float) -> Bay:
 
 
 def bar(width: float, z0: float, z1: float, depth: float) -> Bay:
-    """Returns a bay with an upright bar in its middle, at a depth [m]."""
+    """Returns a bay with an upright bar in its middle.
+
+    Args:
+        width: width of the bar [m].
+        z0: height of its lower end [m].
+        z1: height of its upper end [m].
+        depth: distance of its front behind the wall [m]; negative if the bar
+            protrudes.
+    """
 
     def bay(x0: float, x1: float) -> list[Relief]:
         a, b = _centred(x0, x1, width)
@@ -205,7 +232,11 @@ def bar(width: float, z0: float, z1: float, depth: float) -> Bay:
 
 
 def gate(width: float, height: float, depth: float = 0.3) -> Bay:
-    """Returns a bay with a ribbed roller shutter."""
+    """Returns a bay with a ribbed roller shutter in its middle.
+
+    The shutter is `width` wide (less in a narrow bay), `height` high, and
+    `depth` behind the wall [m].
+    """
 
     def bay(x0: float, x1: float) -> list[Relief]:
         a, b = _centred(x0, x1, min(width, x1 - x0 - 0.6))
@@ -259,20 +290,26 @@ def stretches(length: float, pitch: float, margin: float) -> list[Span]:
 
 
 def bounds(cells: Sequence[Span]) -> list[float]:
-    """Returns the boundaries of adjoining cells, from first to last [m]."""
+    """Returns the N + 1 boundaries of N adjoining cells, in order [m].
+
+    `cells` contains the start and the end of each cell.
+    """
     return [cells[0][0], *(end for _, end in cells)]
 
 
 def plain(edge: int, length: float) -> list[Relief]:
-    """Returns no reliefs: the layout of a wall without openings."""
+    """A layout for walls without openings: it returns no reliefs."""
     return []
 
 
 def rhythm(pitch: float, bays: Sequence[Bay], margin: float = 0.5) -> Layout:
     """Returns a layout that repeats a sequence of bays along each wall.
 
-    `bays` is repeated from both ends of the wall towards the middle. They are
-    about `pitch` wide, and keep `margin` away from the ends of the wall [m].
+    Args:
+        pitch: approximate width of a bay [m].
+        bays: the bays, which alternate from both ends of the wall towards the
+            middle.
+        margin: distance of the outermost bays from the ends of the wall [m].
     """
 
     def layout(edge: int, length: float) -> list[Relief]:
@@ -308,15 +345,18 @@ def with_middle(layout: Layout, bay: Bay, width: float) -> Layout:
 
 
 def alone(bay: Bay, width: float) -> Layout:
-    """Returns a layout with one bay, in the middle of a plain wall."""
+    """Returns a layout with one bay, `width` wide [m], in each wall's middle.
+
+    Walls shorter than the bay have no bay.
+    """
     return with_middle(plain, bay, width)
 
 
 def by_edge(layouts: dict[int, Layout], otherwise: Layout) -> Layout:
-    """Returns a layout that uses other layouts for some edges.
+    """Returns a layout that chooses between other layouts by edge.
 
-    `layouts` maps the number of an edge to its layout. All other edges get the
-    layout `otherwise`.
+    `layouts` maps the number of an edge to the layout of its wall. Walls at all
+    other edges get the layout `otherwise`.
     """
 
     def layout(edge: int, length: float) -> Sequence[Relief]:
@@ -326,8 +366,11 @@ def by_edge(layouts: dict[int, Layout], otherwise: Layout) -> Layout:
 
 
 def with_door(layout: Layout, door: Bay, width: float) -> Layout:
-    """Returns a layout with one more bay, a door in the middle of the front.
+    """Returns a layout with a door added in the middle of the front.
 
-    The door replaces the reliefs that it touches.
+    Args:
+        layout: the layout to which the door is added.
+        door: the bay of the door, which replaces the reliefs that it touches.
+        width: width of this bay [m].
     """
     return by_edge({0: with_middle(layout, door, width)}, layout)

@@ -21,7 +21,10 @@ FIRE_STAIRS_STOREY_M = 3.4
 class WallFrame:
     """Converts geometry from wall coordinates to the building's frame [m].
 
-    In wall coordinates, x runs along the wall, y outwards and z up.
+    In wall coordinates, x runs along the wall, y outwards and z up. The origin
+    is on the ground at the start of the wall: at the left, as seen from
+    outside. The wall is the edge number `edge` of `outline` (N, 2), which
+    contains the corners of all walls, counter-clockwise [m].
     """
 
     def __init__(self, outline: ArrayLike, edge: int):
@@ -36,8 +39,8 @@ class WallFrame:
     def place(self, mesh: Mesh, z: float = 0.0) -> Mesh:
         """Converts a mesh from wall coordinates to the building's frame [m].
 
-        Wall coordinates (x along, y outwards, z up) are left-handed, so the
-        faces are reversed.
+        The mesh is also raised by `z` [m]. As wall coordinates are left-handed,
+        the order of the corners of each face is reversed.
         """
         x, y, height = mesh.vertices.T
         xy = self._start + np.outer(x, self._along) + np.outer(y, self._outward)
@@ -47,15 +50,16 @@ class WallFrame:
     def box(self, *limits: float, bottom: bool = True) -> Mesh:
         """Returns a box in the building's frame, given in wall coordinates.
 
-        The limits are x0, x1, y0, y1, z0 and z1 in wall coordinates [m].
+        The limits are x0, x1, y0, y1, z0 and z1 in wall coordinates [m]. The
+        box has a lower side if `bottom` is set.
         """
         return self.place(massing.box(*limits, bottom=bottom))
 
     def standing(self, *limits: float, bottom: bool = False) -> Mesh:
-        """Returns a box on the ground, given in wall coordinates.
+        """Returns a box that stands on the ground, in the building's frame.
 
-        The box is in the building's frame. The limits are x0, x1, y0, y1 and z1
-        in wall coordinates [m].
+        The limits are x0, x1, y0, y1 and z1 in wall coordinates [m]. The box
+        reaches below the ground, and has a lower side if `bottom` is set.
         """
         return self.place(massing.standing(*limits, bottom=bottom))
 
@@ -68,10 +72,10 @@ class WallFrame:
         return math.atan2(self._along[1], self._along[0])
 
     def point(self, x: float, y: float) -> np.ndarray:
-        """Converts a point on the ground from wall coordinates [m].
+        """Returns a place in the building's frame as x and y [m].
 
-        The result is x and y in the building's frame. The point is `x` along
-        the wall and `y` outwards from it.
+        The place is given in wall coordinates: `x` along the wall, and `y`
+        outwards from it.
         """
         return self._start + x * self._along + y * self._outward
 
@@ -107,7 +111,7 @@ def front_canopy(
 def awning(x0: float, x1: float, reach: float, z0: float, z1: float) -> Mesh:
     """Returns a sloped shop awning with a hanging front edge.
 
-    Coordinates are those of the wall: x along it, y out of it.
+    The mesh is in wall coordinates: x along the wall, y outwards, z up.
 
     Args:
         x0: left end [m].
@@ -140,11 +144,11 @@ def awnings(
         cells: start and end of each shop along the wall [m].
         rng: random generator that chooses the shops with an awning.
         share: probability that a shop has an awning.
-        shape: four lengths [m]: by how much an awning is narrower than its shop
-            on each side; how far it reaches out of the wall; the heights of its
-            lower edge and its upper edge.
-        door: shops that are closer than this to the wall's middle get no awning
-            [m].
+        shape: four lengths of an awning [m]: how much narrower it is than its
+            shop on each side; how far it reaches out of the wall; height of its
+            lower edge; height of its upper edge.
+        door: a shop whose middle is closer than this to the wall's middle,
+            where the door is, gets no awning [m].
     """
     narrower, reach, z0, z1 = shape
     middle, pieces = wall.length / 2, []
@@ -161,7 +165,7 @@ def balcony(
 ) -> Mesh:
     """Returns a slab with a solid balustrade on its three free sides.
 
-    Coordinates are those of the wall: x along it, y out of it.
+    The mesh is in wall coordinates: x along the wall, y outwards, z up.
 
     Args:
         x0: left end [m].
@@ -245,17 +249,18 @@ def pilasters(
     z1: float,
     skip: Collection[int] = (),
 ) -> Mesh:
-    """Returns pilasters between the bays that `bays.rhythm` lays out.
+    """Returns pilasters between the bays of a wall with a regular layout.
+
+    The layout is one from `cns_drake.city.facades.bays.rhythm`.
 
     Args:
         outline: (N, 2) corners of the walls in the building's frame,
             counter-clockwise [m].
-        pitch: width of a bay, as given to `bays.rhythm` [m].
-        margin: distance of the bays from corners, as given to `bays.rhythm`
-            [m].
+        pitch: width of a bay, as given to `rhythm` [m].
+        margin: distance of the bays from corners, as given to `rhythm` [m].
         every: number of bays from one pilaster to the next.
         width: width of a pilaster [m].
-        reach: how far it reaches out of the wall [m].
+        reach: how far a pilaster reaches out of the wall [m].
         z0: height of its foot [m].
         z1: height of its top [m].
         skip: edges of the outline that get no pilasters.
@@ -335,7 +340,7 @@ def _pier(
 def steps(x0: float, x1: float, reach: float, rise: float, count: int) -> Mesh:
     """Returns entrance steps that rise towards a wall.
 
-    Coordinates are those of the wall: x along it, y out of it.
+    The mesh is in wall coordinates: x along the wall, y outwards, z up.
 
     Args:
         x0: left end [m].
@@ -481,7 +486,7 @@ def add_railing(
 
     Args:
         out: the building under assembly, which gets the parts.
-        part: name of the visual.
+        part: name of the part.
         wall: the wall.
         start: first point: distances along the wall and out of it [m].
         end: last point: distances along the wall and out of it [m].
@@ -603,10 +608,17 @@ def casings(
     style: str,
     reach: float = 0.05,
 ) -> list[Mesh]:
-    """Returns frames around a wall's windows, in wall coordinates [m].
+    """Returns frames, sills or shutters for a wall's windows.
 
-    Reliefs whose depth is in `glass` are windows. `style` is `frame` (a ring of
-    boards), `sill` or `shutters`. The boards reach out of the wall by `reach`.
+    The meshes are in wall coordinates [m].
+
+    Args:
+        reliefs: the reliefs of the wall.
+        glass: depths of glazed reliefs; a relief with one of these depths is a
+            window.
+        style: `frame` (a ring of boards), `sill` or `shutters`.
+        reach: how far the boards reach out of the wall [m]; sills reach twice
+            as far.
     """
     pieces = []
     for r in reliefs:
@@ -641,14 +653,14 @@ def _ring(r: walls.Relief, width: float, reach: float) -> Mesh:
 
 
 def board(x0: float, x1: float, z0: float, z1: float, reach: float) -> Mesh:
-    """Returns a board on a wall, without its back, in wall coordinates.
+    """Returns a board on a wall, in wall coordinates, without its back.
 
     Args:
-        x0: left end along the wall [m].
-        x1: right end along the wall [m].
-        z0: lower height [m].
-        z1: upper height [m].
-        reach: thickness out of the wall [m].
+        x0: left end [m].
+        x1: right end [m].
+        z0: height of the lower edge [m].
+        z1: height of the upper edge [m].
+        reach: thickness of the board [m].
     """
     v = [(x, y, z) for y in (0.0, reach) for z in (z0, z1) for x in (x0, x1)]
     faces = ((4, 6, 7, 5), (0, 4, 5, 1), (2, 3, 7, 6),

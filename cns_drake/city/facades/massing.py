@@ -24,7 +24,7 @@ FOUNDATION_M = 0.5
 
 
 def rectangle(x0: float, y0: float, x1: float, y1: float) -> np.ndarray:
-    """Returns the corners (4, 2) of a rectangle; the first edge is at y0."""
+    """Returns the corners (4, 2) of a rectangle [m], first the edge at y0."""
     return np.array([(x0, y0), (x1, y0), (x1, y1), (x0, y1)], dtype=float)
 
 
@@ -34,7 +34,14 @@ def regular_polygon(
     center: ArrayLike = (0.0, 0.0),
     phase: float = 0.0,
 ) -> np.ndarray:
-    """Returns (count, 2) points on a circle, the first one at angle `phase`."""
+    """Returns the corners (count, 2) of a regular polygon [m].
+
+    Args:
+        radius: distance of the corners from the centre [m].
+        count: number of corners.
+        center: x and y of the centre [m].
+        phase: direction from the centre to the first corner [rad].
+    """
     angles = phase + np.arange(count) * 2 * math.pi / count
     return np.asarray(center) + radius * np.column_stack(
         [np.cos(angles), np.sin(angles)]
@@ -42,16 +49,23 @@ def regular_polygon(
 
 
 def square(x: float, y: float, half: float) -> np.ndarray:
-    """Returns the corners of a square about (x, y)."""
+    """Returns the corners (4, 2) of a square with the centre (x, y) [m].
+
+    `half` is half the length of a side.
+    """
     return rectangle(x - half, y - half, x + half, y + half)
 
 
 def inset(points: ArrayLike, distance: ArrayLike) -> np.ndarray:
     """Returns an outline with each edge moved inwards.
 
-    `distance` is one number for all edges, or an array with one number per edge
-    [m]; a negative distance moves an edge outwards. The corners keep their
-    order. Distances must be small compared with the lengths of the edges.
+    The corners keep their order.
+
+    Args:
+        points: (N, 2) corners of the outline, counter-clockwise [m].
+        distance: one number for all edges, or (N,) one for each edge [m]; a
+            negative distance moves an edge outwards. Distances must be small
+            compared with the lengths of the edges.
     """
     points = np.asarray(points, dtype=float)
     distances = np.broadcast_to(np.asarray(distance, float), len(points))
@@ -69,7 +83,10 @@ def inset(points: ArrayLike, distance: ArrayLike) -> np.ndarray:
 
 
 def inset_limit(points: ArrayLike) -> float:
-    """Returns the inset at which some edge has lost 70 % of its length [m]."""
+    """Returns the inset at which an edge first loses 70 % of its length [m].
+
+    `points` contains the corners (N, 2) of an outline [m].
+    """
     points = np.asarray(points, dtype=float)
     probe = 1e-3
     length = np.linalg.norm(np.roll(points, -1, axis=0) - points, axis=1)
@@ -84,9 +101,14 @@ def rounded(
 ) -> np.ndarray:
     """Returns an outline whose convex corners are rounded by chords.
 
-    Chords are at most `step` long [m]. `corners` maps the number of a corner to
-    its radius [m]. The first edge of the result is the part of the outline's
-    first edge that remains between the arcs.
+    The first edge of the result is the part of the outline's first edge that
+    remains between the arcs.
+
+    Args:
+        points: (N, 2) corners of the outline [m].
+        corners: number of a corner -> its radius [m]; all other corners stay as
+            they are.
+        step: greatest length of a chord [m].
     """
 
     def arc(
@@ -114,8 +136,7 @@ def rounded(
 def flat(points: ArrayLike, z: float, *, up: bool = True) -> Mesh:
     """Returns a horizontal surface that fills an outline, at the height z.
 
-    A convex outline is divided into quadrilaterals and at most one triangle,
-    and any other outline into triangles.
+    The surface faces upwards, or downwards unless `up` is set.
     """
     points = np.asarray(points, dtype=float)
     if _is_convex(points):
@@ -154,9 +175,9 @@ def _is_convex(points: np.ndarray) -> bool:
 def skirt(lower: ArrayLike, upper: ArrayLike, z0: float, z1: float) -> Mesh:
     """Returns the walls from an outline at z0 to another at z1.
 
-    The faces face outwards. The two outlines must have the same number of
-    corners, and each edge must be parallel to the same edge of the other
-    outline, so that the faces are plane.
+    The walls face outwards. The two outlines, `lower` and `upper` (N, 2) [m],
+    must have the same number of corners, and each edge must be parallel to the
+    same edge of the other outline, so that the walls are plane.
     """
     lower, upper = np.asarray(lower, float), np.asarray(upper, float)
     n = len(lower)
@@ -177,7 +198,10 @@ def skirt(lower: ArrayLike, upper: ArrayLike, z0: float, z1: float) -> Mesh:
 def prism(
     points: ArrayLike, z0: float, z1: float, *, bottom: bool = False
 ) -> Mesh:
-    """Returns an upright solid over an outline; by default without bottom."""
+    """Returns an upright solid over an outline, from z0 to z1 [m].
+
+    It has a lower side only if `bottom` is set.
+    """
     pieces = [skirt(points, points, z0, z1), flat(points, z1)]
     if bottom:
         pieces.append(flat(points, z0, up=False))
@@ -185,7 +209,11 @@ def prism(
 
 
 def frustum(lower: ArrayLike, upper: ArrayLike, z0: float, z1: float) -> Mesh:
-    """Returns a tapering solid between two outlines, without a bottom."""
+    """Returns a tapering solid between two outlines, without a lower side.
+
+    The outlines are `lower` (N, 2) at the height z0, and `upper` (N, 2) at z1
+    [m]. Each edge must be parallel to the same edge of the other outline.
+    """
     return merge_meshes(skirt(lower, upper, z0, z1), flat(upper, z1))
 
 
@@ -194,8 +222,11 @@ def sloped_prism(
 ) -> Mesh:
     """Returns a solid over an outline, with a top that slopes up along y.
 
-    The bottom is at z0. The height above z0 is `height` at the outline's
-    greatest y, and `low` times `height` at its least y [m].
+    Args:
+        points: (N, 2) corners of the outline [m].
+        z0: height of the bottom [m].
+        height: height above z0 at the outline's greatest y [m].
+        low: height above z0 at the outline's least y, as a share of `height`.
     """
     points = np.asarray(points, dtype=float)
     n, y = len(points), points[:, 1]
@@ -209,7 +240,11 @@ def sloped_prism(
 
 
 def spire(points: ArrayLike, tip: ArrayLike, z0: float, z1: float) -> Mesh:
-    """Returns a pyramid over an outline, without a bottom."""
+    """Returns a pyramid over an outline, without a lower side.
+
+    The outline `points` (N, 2) is at the height z0; the tip is at the place
+    `tip` (2,) and the height z1 [m].
+    """
     points = np.asarray(points, dtype=float)
     n = len(points)
     apex = [*np.asarray(tip, dtype=float), z1]
@@ -218,7 +253,11 @@ def spire(points: ArrayLike, tip: ArrayLike, z0: float, z1: float) -> Mesh:
 
 
 def tent(eaves: ArrayLike, tip: ArrayLike, z0: float, z1: float) -> Mesh:
-    """Returns a pyramid over an outline that also has a bottom."""
+    """Returns a pyramid over an outline, with a lower side.
+
+    The outline `eaves` (N, 2) is at the height z0; the tip is at the place
+    `tip` (2,) and the height z1 [m].
+    """
     return merge_meshes(flat(eaves, z0, up=False), spire(eaves, tip, z0, z1))
 
 
@@ -270,7 +309,10 @@ def extruded(profile: Sequence[Point], x0: float, x1: float) -> Mesh:
 
 
 class Faces:
-    """Collects faces, given by corners, and drops faces without area."""
+    """Builds a mesh face by face; faces without area are left out.
+
+    `add` takes the corners of one face, and `mesh` returns the mesh.
+    """
 
     def __init__(self) -> None:
         self._vertices: list[tuple[float, float, float]] = []
@@ -289,7 +331,7 @@ class Faces:
 
 
 def swapped(mesh: Mesh) -> Mesh:
-    """Returns the mesh with its x and y axes exchanged."""
+    """Returns a mirrored mesh: x and y are exchanged, and it faces outwards."""
     return Mesh(mesh.vertices[:, [1, 0, 2]], mesh.faces).turned()
 
 
@@ -307,7 +349,14 @@ def extent(points: np.ndarray) -> Area:
 def roof_pan(
     points: ArrayLike, z_floor: float, z_top: float, thickness: float
 ) -> Mesh:
-    """Returns a flat roof inside a parapet: coping, inner walls, floor."""
+    """Returns the coping, the inner walls and the floor of a flat roof.
+
+    Args:
+        points: (N, 2) outer corners of the parapet [m].
+        z_floor: height of the roof's surface [m].
+        z_top: height of the parapet's top [m].
+        thickness: thickness of the parapet [m].
+    """
     points = np.asarray(points, dtype=float)
     inner = inset(points, thickness)
     coping = skirt(points, inner, z_top, z_top)
@@ -323,9 +372,10 @@ def box(*limits: float, bottom: bool = True) -> Mesh:
 
 
 def standing(*limits: float, bottom: bool = False) -> Mesh:
-    """Returns a box with x0, x1, y0, y1 and z1 that stands on the ground [m].
+    """Returns a box that stands on the ground, from x0, x1, y0, y1, z1 [m].
 
-    The box reaches down to `FOUNDATION_M` below the ground.
+    The box reaches down to `FOUNDATION_M` below the ground. It has a lower side
+    if `bottom` is set.
     """
     *spot, z1 = limits
     return box(*spot, -FOUNDATION_M, z1, bottom=bottom)
@@ -347,12 +397,16 @@ def post(
 
 
 def foundation(points: ArrayLike) -> Mesh:
-    """Returns the walls below the ground under an outline."""
+    """Returns the walls of a foundation, below the outline of a building.
+
+    They reach from the ground down to `FOUNDATION_M` below it. `points`
+    contains the corners (N, 2) of the outline [m].
+    """
     return skirt(points, points, -FOUNDATION_M, 0.0)
 
 
 def chamfered(points: np.ndarray, cut: float) -> np.ndarray:
-    """Returns an outline with its convex corners cut off.
+    """Returns an outline (M, 2) with its convex corners cut off [m].
 
     Each cut starts `cut` metres from the corner on both edges.
     """
@@ -360,9 +414,9 @@ def chamfered(points: np.ndarray, cut: float) -> np.ndarray:
 
 
 def notched(points: np.ndarray, depth: float) -> np.ndarray:
-    """Returns an outline with a square cut out of each convex corner.
+    """Returns an outline (M, 2) with its convex corners notched [m].
 
-    The side of the square is `depth` [m].
+    A square with the side `depth` is cut out of each convex corner.
     """
     d = depth
     return _replaced(
@@ -425,17 +479,16 @@ def stadium(
 def u_shape(
     x0: float, y0: float, x1: float, y1: float, wing: float, back: float
 ) -> np.ndarray:
-    """Returns the outline (8, 2) of a building with a court open to the back.
-
-    Its wings are left and right of the court [m].
+    """Returns the outline (8, 2) of a U, whose court is open to the back [m].
 
     Args:
         x0: left end [m].
         y0: front [m].
         x1: right end [m].
         y1: back [m].
-        wing: width of each wing [m].
-        back: depth of the part in front of the court [m].
+        wing: width of the two wings, left and right of the court [m].
+        back: depth of the part in front of the court, which joins the wings
+            [m].
     """
     a, b, c = x0 + wing, x1 - wing, y0 + back
     xs = (x0, x1, x1, b, b, a, a, x0)
@@ -445,14 +498,14 @@ def u_shape(
 def l_shape(
     x0: float, y0: float, x1: float, y1: float, wing: float, back: float
 ) -> np.ndarray:
-    """Returns the L-shaped outline (6, 2) of a front part and a left wing [m].
+    """Returns the outline (6, 2) of an L: a front part and a left wing [m].
 
     Args:
         x0: left end [m].
         y0: front [m].
         x1: right end [m].
         y1: back [m].
-        wing: width of the wing [m].
+        wing: width of the wing behind the front part [m].
         back: depth of the front part [m].
     """
     a, c = x0 + wing, y0 + back
@@ -460,9 +513,10 @@ def l_shape(
 
 
 def mirrored(points: np.ndarray) -> np.ndarray:
-    """Returns an outline mirrored left to right about its middle.
+    """Returns an outline (N, 2) mirrored left to right about its middle.
 
-    The front edge stays first, and the corners counter-clockwise.
+    The front edge is still the first one, and the corners are still
+    counter-clockwise.
     """
     points = np.asarray(points, dtype=float)
     middle = (points[:, 0].min() + points[:, 0].max()) / 2
@@ -474,9 +528,16 @@ def mirrored(points: np.ndarray) -> np.ndarray:
 def edges_on(
     plan: np.ndarray, outline: np.ndarray, edges: Collection[int]
 ) -> frozenset[int]:
-    """Returns the numbers of a plan's edges that lie on given edges.
+    """Returns which edges of a plan lie along given edges of an outline.
 
-    The given edges are `edges` of the outline `outline`.
+    Args:
+        plan: (M, 2) corners of the plan [m].
+        outline: (N, 2) corners of the outline [m].
+        edges: numbers of the outline's edges.
+
+    Returns:
+        Numbers of the plan's edges that are at most 1 cm from the straight line
+        through one of the given edges.
     """
     found = set()
     ends = np.roll(plan, -1, axis=0)

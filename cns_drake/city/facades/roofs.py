@@ -27,7 +27,7 @@ _INTO_ROOF = 0.03
 def gable_line(
     a: float, b: float, z: float, top: float, ridge: float = 0.5
 ) -> list[tuple[float, float]]:
-    """Returns (across, height) points [m] of a roof with two slopes.
+    """Returns the roof line of a gable roof as (across, height) points [m].
 
     Args:
         a: where the line begins across the roof [m].
@@ -42,7 +42,7 @@ def gable_line(
 def gambrel_line(
     a: float, b: float, z: float, top: float, knee: bays.Span = (0.24, 0.66)
 ) -> list[tuple[float, float]]:
-    """Returns (across, height) points [m] of a gambrel roof.
+    """Returns the roof line of a gambrel roof: (across, height) points [m].
 
     The slopes are steep up to a knee, and flatter above.
 
@@ -51,7 +51,8 @@ def gambrel_line(
         b: where the line ends across the roof [m].
         z: height of both ends [m].
         top: height of the ridge [m].
-        knee: place of the knee, as shares of the half span and of the rise.
+        knee: distance of the knee from the end as a share of half the span, and
+            its height as a share of the rise.
     """
     half = (b - a) / 2
     run, up = knee[0] * half, z + knee[1] * (top - z)
@@ -61,7 +62,7 @@ def gambrel_line(
 def barrel_line(
     a: float, b: float, z: float, top: float, count: int = 8
 ) -> list[tuple[float, float]]:
-    """Returns (across, height) points [m] of a circular vault.
+    """Returns the roof line of a barrel roof as (across, height) points [m].
 
     Args:
         a: where the line begins across the roof [m].
@@ -80,10 +81,10 @@ def barrel_line(
 
 
 def with_eaves(line: Line, low: float, high: float) -> list[bays.Span]:
-    """Returns a roof line with its two end slopes lengthened [m].
+    """Returns a roof line whose two end slopes are extended, as eaves.
 
-    `low` and `high` are how far the slopes extend beyond the first and the last
-    point.
+    `low` and `high` are the horizontal lengths by which the first and the last
+    slope are extended [m].
     """
     (a, za), (b, zb) = line[0], line[1]
     (c, zc), (d, zd) = line[-2], line[-1]
@@ -93,7 +94,7 @@ def with_eaves(line: Line, low: float, high: float) -> list[bays.Span]:
 
 
 def line_height(line: Line, across: float) -> float:
-    """Returns the height of a roof line at the place `across` [m]."""
+    """Returns the height of a roof line at a place across the roof [m]."""
     us, zs = np.transpose(line)
     return float(np.interp(across, us, zs))
 
@@ -106,12 +107,12 @@ def shell(
     *,
     along_y: bool = False,
 ) -> Mesh:
-    """Returns a roof of even vertical thickness over a roof line.
+    """Returns a roof of even vertical thickness along a roof line.
 
     Args:
         line: (across, height) points of the roof's upper surface [m].
         start: where the roof begins along its ridge [m].
-        end: where it ends along its ridge [m].
+        end: where the roof ends along its ridge [m].
         thickness: vertical thickness [m].
         along_y: whether the ridge is along y instead of x.
     """
@@ -143,15 +144,15 @@ def shell(
 def gable_wall(
     line: Line, a: float, b: float, z: float, holes: Sequence[Patch] = ()
 ) -> Mesh:
-    """Returns the wall between a height and a roof line, in wall coordinates.
+    """Returns the wall below a gable roof, in wall coordinates.
 
     Args:
         line: underside of the roof as (along the wall, height) points [m]. It
             runs from a to b, and nowhere below z.
-        a: left end along the wall [m].
-        b: right end along the wall [m].
+        a: left end of the wall [m].
+        b: right end of the wall [m].
         z: height of the wall's foot [m].
-        holes: openings, side by side; `gable_glass` returns their panes.
+        holes: windows side by side; `gable_glass` returns their panes.
     """
     bounds = {a, b, *(u for u, _ in line if a < u < b)}
     bounds.update(x for hole in holes for x in (hole.x0, hole.x1))
@@ -179,7 +180,7 @@ def gable_wall(
 
 
 def gable_glass(holes: Sequence[Patch]) -> Mesh:
-    """Returns the panes of a gable wall's windows, in wall coordinates."""
+    """Returns the panes of the windows `holes`, in wall coordinates."""
     faces = massing.Faces()
     for h in holes:
         low, high = (h.x0, -h.depth, h.z0), (h.x1, -h.depth, h.z1)
@@ -190,13 +191,13 @@ def gable_glass(holes: Sequence[Patch]) -> Mesh:
 def hip(
     outline: ArrayLike, z: float, top: float, eaves: ArrayLike, fascia: float
 ) -> Mesh:
-    """Returns a hipped roof over a rectangle, closed below its eaves.
+    """Returns a hipped roof over a rectangle, with an underside at its eaves.
 
     Args:
-        outline: (4, 2) corners in the building's frame [m].
+        outline: (4, 2) corners of the walls in the building's frame [m].
         z: height of the underside of the eaves [m].
         top: height of the ridge [m].
-        eaves: overhang [m], one for all edges or one per edge.
+        eaves: overhang [m], one number for all edges or one per edge.
         fascia: height of the vertical edge of the eaves [m].
     """
     outer = massing.inset(outline, -np.asarray(eaves))
@@ -251,7 +252,7 @@ def add_chimney(
 
     Args:
         out: the building under assembly, which gets the parts.
-        part: name of the visual.
+        part: name of the part.
         xyz: position of its foot, below the roof's surface, in the building's
             frame [m].
         rgb: colour.
@@ -280,7 +281,7 @@ def equip_roof(
         z: height of the roof [m].
         items: names of the equipment, the most important first.
         clear: least distance to the edge of the roof [m].
-        prefix: beginning of the visuals' names.
+        prefix: beginning of the names of the parts.
     """
     room, rng = Polygon(roof), out.rng
     x0, y0, x1, y1 = room.bounds

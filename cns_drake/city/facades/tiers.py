@@ -1,4 +1,4 @@
-"""Builds a building from ground floor, storeys, top walls and roof."""
+"""Adds the ground floor, the storeys, the top walls and the roof."""
 
 from collections.abc import Sequence
 import math
@@ -19,7 +19,11 @@ _PANE_OVERLAP = 0.004
 
 
 def add_awnings(p: Building, pieces: Sequence[Mesh]) -> None:
-    """Adds awnings to a building, as a material with a colour of its own."""
+    """Adds awnings to a building, all in one colour drawn at random.
+
+    `pieces` contains the awnings in the building's frame. Without any, nothing
+    is added.
+    """
     if pieces:
         rgb = pick(p.rng, p.kind.choices["awnings"])
         p.add("awnings", *pieces, rgb=rgb)
@@ -31,7 +35,7 @@ def divided(
     """Divides a height into equal storeys, and the storeys into groups.
 
     A storey is approximately `storey` high [m]. There are at most `most`
-    groups; each group becomes one visual.
+    groups; each group becomes one part.
 
     Returns:
         The number of groups, the number of storeys in a group, and the height
@@ -60,7 +64,7 @@ def add_ground(
             counter-clockwise [m].
         facade: the walls and their openings.
         extras: further meshes of the floor, in the building's frame.
-        part: name of the visual.
+        part: name of the part.
     """
     base = massing.foundation(outline)
     walls = facade_mesh(outline, facade)
@@ -81,9 +85,8 @@ def add_storeys(
 ) -> float:
     """Adds `groups` times `per_group` storeys; returns the top's height [m].
 
-    If all glass has the same depth, one pane behind the walls closes all
-    windows; no other relief may then be deeper. Glass of several depths is
-    repeated with every storey.
+    If all glass has the same depth, a single pane behind the walls closes all
+    windows; no other relief may then be deeper.
 
     Args:
         out: the building under assembly, which gets the parts.
@@ -91,10 +94,10 @@ def add_storeys(
             counter-clockwise [m].
         facade: the walls of one storey.
         z0: height of the lowest floor [m].
-        groups: number of visuals, one above another.
-        per_group: number of storeys in the mesh of one visual.
+        groups: number of parts, one above another.
+        per_group: number of storeys in each part.
         extras: further meshes of each storey, with z measured from its floor.
-        part: beginning of the visuals' names.
+        part: beginning of the names of the parts.
     """
     pieces = [facade_mesh(outline, facade.stacked(per_group))]
     for k in range(per_group):
@@ -137,23 +140,22 @@ def add_grooved(
     """Adds storeys with windows between upright piers.
 
     Returns the height of the top [m], which is a few millimetres below `goal`.
-    Bands around the building and piers of full height need far fewer faces than
-    single windows.
 
     Args:
         p: the building. Of its parameters, these lengths are used [m]:
             `storey_height`; `spandrel`, the height of the wall under the
             windows; `ledge`, how far a lip on the spandrel protrudes; `recess`,
             the depth of the windows; `pitch`, the distance between piers;
-            `pier`, their width (may be 0); `pier_reach`, how far they protrude;
-            `solid_corner`, the width of solid corners (0 for glass around the
-            corner).
+            `pier`, the width of a pier (may be 0); `pier_reach`, how far a pier
+            protrudes; `solid_corner`, the width of solid corners (0 for glass
+            around the corner).
         outline: (N, 2) corners of the walls, counter-clockwise [m].
-        z0, goal: height of the bottom, and approximate height of the top [m].
-        part: beginning of the visuals' names.
+        z0: height of the bottom [m].
+        goal: wanted height of the top [m].
+        part: beginning of the names of the parts.
         rise: how far the piers rise above the storeys [m].
-        most: greatest number of visuals.
-        plain: edges without any relief.
+        most: greatest number of parts, one above another.
+        plain: numbers of the edges whose walls are plain.
     """
     groups, per_group, storey = divided(goal - z0, p.storey_height, most)
     depth = p.recess
@@ -181,7 +183,13 @@ def add_grooved(
 
 
 def block(outline: ArrayLike, facade: Facade, z0: float) -> Mesh:
-    """Returns walls, their glass and a flat lid, as one mesh."""
+    """Returns walls with their glass and a flat lid, as one mesh.
+
+    Args:
+        outline: (N, 2) corners of the walls, counter-clockwise [m].
+        facade: the walls.
+        z0: height of their foot [m].
+    """
     pieces = [
         facade_mesh(outline, facade, z0),
         massing.flat(outline, z0 + facade.height),
@@ -199,16 +207,16 @@ def shaft_walls(
     rim: tuple[float, float],
     glass: tuple[float, ...] = (),
 ) -> Facade:
-    """Returns the walls of a stair tower, with a bay in front and behind.
+    """Returns the walls of a stair tower: one bay in front and one behind.
 
-    Each of the two bays is in the middle of its wall.
+    Each bay is in the middle of its wall; the other walls are plain.
 
     Args:
         height: height of the walls [m].
         entry: the bay in front.
         slit: the bay behind.
         room: width of each bay [m].
-        rim: height and reach of the band at the top [m].
+        rim: height of the band around the top, and how far it protrudes [m].
         glass: depths of the openings that are glazed [m].
     """
     layouts = {0: bays.alone(entry, room), 2: bays.alone(slit, room)}
@@ -235,11 +243,12 @@ def add_crown(
         outline: (N, 2) corners of the walls in the building's frame,
             counter-clockwise [m].
         facade: the topmost walls.
-        z0: height of their foot [m].
+        z0: height of the foot of these walls [m].
         parapet: height of the walls above the roof [m].
-        part: name of the visual.
+        part: name of the part.
         thickness: thickness of the parapet [m].
-        items: equipment on the roof, as for `equip_roof`.
+        items: names of the equipment on the roof, the most important first (see
+            `cns_drake.city.facades.roofs.equip_roof`).
     """
     roof = round(facade.height - parapet, 3)
     mesh = merge_meshes(
@@ -264,9 +273,13 @@ def _add_glass(
 def cornice(
     height: float, reach: float, *, thickness: float = 0.9, steps: int = 3
 ) -> tuple[Band, ...]:
-    """Returns bands that step outwards up to a height.
+    """Returns bands that form a cornice: each protrudes more than the last.
 
-    The topmost band ends at `height` and protrudes by `reach` [m].
+    Args:
+        height: height of the cornice's upper edge [m].
+        reach: how far the topmost band protrudes [m].
+        thickness: height of all bands together [m].
+        steps: number of bands.
     """
     step = thickness / steps
     return tuple(

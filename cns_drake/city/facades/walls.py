@@ -29,7 +29,11 @@ _NARROW_ARCH, _WIDE_ARCH, _WIDE_ARCH_M = 4, 6, 2.0
 
 
 class Band(NamedTuple):
-    """A strip of wall that runs around the building at one depth [m]."""
+    """A strip of wall that runs around the building at one depth [m].
+
+    It extends from the height z0 to the height z1. With a negative depth, it
+    protrudes.
+    """
 
     z0: float
     z1: float
@@ -39,7 +43,8 @@ class Band(NamedTuple):
 class Patch(NamedTuple):
     """A rectangle of the wall, pushed in by `depth` [m].
 
-    With a negative depth, the rectangle protrudes from the wall.
+    It extends from x0 to x1 along the wall, and from the height z0 to z1. With
+    a negative depth, it protrudes.
     """
 
     x0: float
@@ -50,10 +55,10 @@ class Patch(NamedTuple):
 
 
 class Arch(NamedTuple):
-    """A round-headed recess [m]; its head is half an ellipse above z_spring.
+    """A recess [m] with a round head: half an ellipse from z_spring to z1.
 
-    The recess must lie where the wall has depth 0, and no later relief may
-    cover it.
+    It extends from x0 to x1 along the wall, and begins at the height z0. It
+    must lie where the wall has depth 0, and no later relief may cover it.
     """
 
     x0: float
@@ -68,7 +73,10 @@ Relief = Patch | Arch
 
 
 class Corner(NamedTuple):
-    """A corner of a wall's face [m]; `row` is the face's row of cells."""
+    """A corner of a face of a wall, in panel coordinates [m].
+
+    `row` is the number of the row of cells to which the face belongs.
+    """
 
     x: float
     z: float
@@ -78,10 +86,16 @@ class Corner(NamedTuple):
 
 @dataclass(frozen=True)
 class WallCells:
-    """The cells of one wall: their boundaries, their depths, and its arches.
+    """The cells of one wall, in R rows and C columns.
 
-    A face may only span rows of the same group, because rows of different
-    groups end at different places.
+    Attributes:
+        xs: boundaries of the columns along the wall, increasing [m].
+        zs: boundaries of the rows, increasing [m].
+        groups: (R,) number of the group of each row. A face can span several
+            rows only if they are in the same group.
+        depths: (R, C) depth of each cell [m].
+        hidden: (R, C) whether an arch covers the cell.
+        arches: the arches of the wall.
     """
 
     xs: list[float]
@@ -99,12 +113,13 @@ class WallCells:
         bands: Sequence[Band],
         reliefs: Sequence[Relief],
     ) -> WallCells:
-        """Returns the cells of a wall with its bands, reliefs and arches.
+        """Returns the cells of a wall with its bands, openings and arches.
 
         Args:
             length: length of the wall [m].
-            zs: increasing heights that divide the wall into rows [m].
-            groups: (rows,) number of each row's group; see `WallCells`.
+            zs: increasing heights that divide the wall into R rows [m].
+            groups: (R,) number of the group of each row; a face can span
+                several rows only if they are in the same group.
             bands: strips along the whole wall.
             reliefs: openings and arches; later ones cover earlier ones.
 
@@ -144,9 +159,10 @@ Quads = Iterator[list[Corner]]
 
 
 def wall_quads(grid: WallCells, glass: tuple[float, ...]) -> Quads:
-    """Yields the quadrilaterals of a wall, without its panes.
+    """Yields the four corners of each face of a wall, without its panes.
 
-    Corners are counter-clockwise as seen from outside.
+    The corners are counter-clockwise as seen from outside. Panes are the faces
+    at the depths `glass` [m].
     """
     for arch in grid.arches:
         yield from _arch_reveals(arch)
@@ -158,9 +174,10 @@ def wall_quads(grid: WallCells, glass: tuple[float, ...]) -> Quads:
 
 
 def glass_quads(grid: WallCells, glass: tuple[float, ...]) -> Quads:
-    """Yields the quadrilaterals of the panes of a wall.
+    """Yields the four corners of each pane of a wall.
 
-    `wall_quads` leaves them out.
+    The corners are counter-clockwise as seen from outside. Panes are the faces
+    at the depths `glass` [m].
     """
     for arch in grid.arches:
         if arch.depth in glass:
@@ -324,13 +341,16 @@ class Facade:
 
     Attributes:
         height: height of the walls [m].
-        bands: strips around the building, painted in order; all other wall has
-            depth 0.
-        layout: (edge index, edge length [m]) -> patches, painted in order.
-        glass: depths of reliefs whose fronts are glass. `facade_mesh` leaves
-            these fronts open, and `glass_mesh` returns their panes.
-        plain: edges without any relief, such as walls against a neighbour.
-            Bands of other walls end flush with such a wall.
+        bands: strips around the building; a later one covers an earlier one.
+            The rest of the wall has depth 0.
+        layout: function that takes the number and the length [m] of an edge,
+            and returns the reliefs of its wall. A later relief covers an
+            earlier one.
+        glass: depths of reliefs whose fronts are glass [m]. `facade_mesh`
+            leaves these fronts open, and `glass_mesh` returns their panes.
+        plain: numbers of the edges whose walls have no relief, such as walls
+            against a neighbour. Bands of other walls end flush with such a
+            wall.
     """
 
     height: float
@@ -368,10 +388,13 @@ def lifted(item: _Strip, dz: float) -> _Strip:
 def facade_mesh(points: ArrayLike, facade: Facade, z0: float = 0.0) -> Mesh:
     """Returns the walls around an outline, without their glass.
 
-    `points` contains the corners (N, 2), counter-clockwise [m]. The walls start
-    at z0 [m] and are open at the bottom and the top. At these two edges, every
-    cell is closed back to depth 0, so that walls stacked on the same outline
-    join without gaps.
+    The walls are open at the bottom and the top. Walls stacked on the same
+    outline join without gaps.
+
+    Args:
+        points: (N, 2) corners of the outline, counter-clockwise [m].
+        facade: the walls.
+        z0: height of the foot of the walls [m].
 
     Raises:
         ValueError: a patch extends beyond its wall.
@@ -380,7 +403,10 @@ def facade_mesh(points: ArrayLike, facade: Facade, z0: float = 0.0) -> Mesh:
 
 
 def glass_mesh(points: ArrayLike, facade: Facade, z0: float = 0.0) -> Mesh:
-    """Returns the glass that `facade_mesh` leaves out."""
+    """Returns the panes for the windows that `facade_mesh` leaves open.
+
+    The arguments are the same as those of `facade_mesh`.
+    """
     return _quads_mesh(points, facade, z0, glass_quads)
 
 
@@ -390,11 +416,17 @@ def single_wall(
     reliefs: Sequence[Relief],
     fronts: Sequence[Iterable[float]],
 ) -> list[Mesh]:
-    """Returns a wall that touches no other wall, in wall coordinates.
+    """Returns a wall that touches no other wall, and its panes.
 
-    Reliefs are painted in order; they must not touch the ends of the wall. The
-    first mesh of the result is the wall without its glass. Then follows one
-    mesh of panes for each set of depths in `fronts`.
+    The first mesh is the wall, without panes. Then follows one mesh of panes
+    for each entry of `fronts`. All meshes are in wall coordinates.
+
+    Args:
+        length: length of the wall [m].
+        height: height of the wall [m].
+        reliefs: reliefs, of which later ones cover earlier ones. They must not
+            touch the ends of the wall.
+        fronts: for each mesh of panes, the depths of its reliefs [m].
 
     Raises:
         ValueError: a relief extends beyond the wall.

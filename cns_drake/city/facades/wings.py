@@ -32,8 +32,8 @@ class Roof:
         kind: `gable`, `gambrel`, `barrel`, `shed`, `hip` or `flat`.
         along_y: whether the ridge runs from the front to the back. A shed roof
             rises across this direction.
-        eaves: overhang below the slopes [m].
-        verge: overhang beyond the gables [m].
+        eaves: overhang at the lower ends of the slopes [m].
+        verge: overhang at the gables [m].
         thickness: vertical thickness of the roof [m].
         ridge: place of a gable roof's ridge, as a share of the span.
         parapet: height of a flat roof's parapet [m].
@@ -55,9 +55,11 @@ class Roof:
 class Wing:
     """A box-shaped part of a house with its own roof; all lengths in [m].
 
-    `wall_top` is the height of the walls. `top` is the height of the ridge or,
-    for a flat roof, of the parapet. `blind` contains the edges that are built
-    against a neighbour, whose walls are flush and plain.
+    The walls stand on the rectangle from (x0, y0) to (x1, y1) in the building's
+    frame. `wall_top` is the height of the walls. `top` is the height of the
+    ridge or, for a flat roof, of the parapet. The walls at the edges `blind`
+    are built against a neighbour: they are plain, and the roof does not
+    overhang them.
     """
 
     x0: float
@@ -74,16 +76,14 @@ class Wing:
         area: massing.Area, wall_top: float, top: float, roof: Roof,
         blind: Collection[int] = (),
     ) -> Wing:  # fmt: skip
-        """Returns a wing whose walls stand on whole centimetres.
-
-        Whole centimetres make the text of the meshes shorter.
+        """Returns a wing, with lengths rounded to centimetres.
 
         Args:
             area: x0, y0, x1, y1 in the building's frame [m].
             wall_top: height of the walls [m].
-            top: height of the ridge [m].
+            top: height of the ridge or, for a flat roof, of the parapet [m].
             roof: shape of the roof.
-            blind: edges whose walls have no openings.
+            blind: numbers of the edges built against a neighbour.
         """
         a, b, c, d, e = (round(float(v), 2) for v in (*area, wall_top))
         return Wing(a, b, c, d, e, round(float(top), 3), roof, frozenset(blind))
@@ -94,8 +94,12 @@ class Wing:
     ) -> Wing:
         """Returns a wing with a flat roof and a parapet.
 
-        The walls end `rim` below `top`, the height of the parapet's top [m].
-        The parapet is `parapet` high.
+        Args:
+            area: x0, y0, x1, y1 in the building's frame [m].
+            top: height of the parapet's top above the ground [m].
+            parapet: height of the parapet above the roof [m].
+            rim: distance from the parapet's top down to the top of the walls
+                [m].
         """
         return Wing.at(area, top - rim, top, Roof("flat", parapet=parapet))
 
@@ -136,12 +140,16 @@ class Wing:
         return massing.rectangle(self.x0, self.y0, self.x1, self.y1)
 
     def wall(self, edge: int) -> details.WallFrame:
-        """Returns the wall frame of an edge."""
+        """Returns the frame of the wall at an edge."""
         return details.WallFrame(self.outline, edge)
 
     @property
     def line(self) -> list[tuple[float, float]]:
-        """The roof line between the walls as (across, z), without eaves [m]."""
+        """The roof line as (across, z) points [m], without eaves.
+
+        `across` is the coordinate perpendicular to the ridge: y, or x if the
+        ridge runs along y.
+        """
         roof = self.roof
         a, b = (self.x0, self.x1) if roof.along_y else (self.y0, self.y1)
         z = self.wall_top + roof.thickness - _SEAT
@@ -162,7 +170,7 @@ class Wing:
         return (0, 2) if self.roof.along_y else (3, 1)
 
     def covers(self, x: float, y: float) -> bool:
-        """Returns whether a point on the ground lies within the walls."""
+        """Returns whether a place (x, y) lies within the walls of the wing."""
         return self.x0 < x < self.x1 and self.y0 < y < self.y1
 
 
@@ -172,10 +180,14 @@ def add_roof(
     attic: Attic | None = None,
     material: str = "walls",
 ) -> None:
-    """Adds the roof of a wing, and its gables in the material `material`.
+    """Adds the roof of a wing, and the walls of its gables.
 
-    `attic` is a function that returns the windows of a gable; None for no
-    windows.
+    Args:
+        out: the building under assembly, which gets the parts.
+        wing: the wing.
+        attic: function that returns the windows of a gable, such as
+            `attic_window` makes; None for no windows.
+        material: material of the gables.
     """
     roof, outline, line = wing.roof, wing.outline, wing.line
     is_free = [k not in wing.blind for k in range(4)]
@@ -249,7 +261,7 @@ def _fits(hole: walls.Patch, under: list[bays.Span]) -> bool:
 def attic_window(
     width: float, z0: float, z1: float, depth: float, count: int = 1
 ) -> Attic:
-    """Returns a function that returns the windows of a gable.
+    """Returns a function that places windows in a gable, for `add_roof`.
 
     The windows are side by side in the middle of the gable.
 
@@ -398,9 +410,15 @@ def add_dormers(
 def free_stretches(
     wing: Wing, edge: int, others: Iterable[Wing], z: float
 ) -> list[tuple[float, float]]:
-    """Returns the stretches of a wall that no other wing hides [m].
+    """Returns the stretches of a wing's wall that no other wing hides [m].
 
-    They are computed at the height `z` [m].
+    Each stretch is a pair: start and end along the wall. A blind wall has none.
+
+    Args:
+        wing: the wing.
+        edge: number of the wall.
+        others: the wings of the house.
+        z: height at which the wall is examined; lower wings hide nothing [m].
     """
     wall = wing.wall(edge)
     cuts = {0.0, wall.length}
@@ -425,7 +443,12 @@ def free_stretches(
 
 
 class Openings:
-    """Collects the windows and doors of a wing by edge; builds the wing."""
+    """Collects the windows and doors of one wing, and builds its walls.
+
+    The constructor takes the building under assembly, the wing, and all wings
+    of the house, which can hide parts of its walls. The edges of a wing are
+    numbered: 0 front, 1 right, 2 back, 3 left.
+    """
 
     def __init__(
         self, out: Assembly, wing: Wing, others: Sequence[Wing] = ()
@@ -462,7 +485,14 @@ class Openings:
                 ]
 
     def put(self, edge: int, x: float, width: float, bay: bays.Bay) -> None:
-        """Adds a bay around x [m]; it replaces the bays that it touches."""
+        """Adds a bay to a wall; it replaces the openings that it touches.
+
+        Args:
+            edge: number of the wall.
+            x: middle of the bay along the wall [m].
+            width: width of the bay [m].
+            bay: the bay.
+        """
         x0, x1 = x - width / 2, x + width / 2
         new = bay(x0, x1)
         if not new:
@@ -476,20 +506,20 @@ class Openings:
         ] + new
 
     def add(self, edge: int, reliefs: Iterable[walls.Relief]) -> None:
-        """Adds reliefs given in the wall's coordinates."""
+        """Adds reliefs, given in wall coordinates, to the wall `edge`."""
         self._reliefs[edge] += reliefs
 
     def clear(
         self, edge: int, x0: float, x1: float, z0: float, z1: float
     ) -> None:
-        """Removes the reliefs that touch a rectangle of a wall.
+        """Removes the openings that touch a rectangle of a wall.
 
         Args:
             edge: number of the wall.
             x0: start of the rectangle along the wall [m].
             x1: end of the rectangle along the wall [m].
-            z0: lower height of the rectangle [m].
-            z1: upper height of the rectangle [m].
+            z0: height of the rectangle's lower edge [m].
+            z1: height of the rectangle's upper edge [m].
         """
         self._reliefs[edge] = [
             r
@@ -498,9 +528,9 @@ class Openings:
         ]
 
     def layout(self, edge: int, length: float) -> list[walls.Relief]:
-        """Returns all reliefs of a wall, as a layout for `Facade`.
+        """Returns all reliefs of a wall, as the layout of a `Facade`.
 
-        Bands are interrupted at arches, which need flat wall around them.
+        Bands of the facade are interrupted at arches.
         """
         found: list[walls.Relief] = []
         for relief in self._reliefs[edge]:
@@ -515,9 +545,12 @@ class Openings:
         bands: Sequence[walls.Band] = (),
         material: str = "walls",
     ) -> None:
-        """Adds the walls, their foundation, and panes of the material `glass`.
+        """Adds the walls, their foundation and their panes to the building.
 
-        The argument `glass` contains the depths of the openings with panes [m].
+        Args:
+            glass: depths of the openings with panes [m].
+            bands: strips around the wing.
+            material: material of the walls; that of the panes is `glass`.
         """
         wing = self._wing
         bands, glass = tuple(bands), tuple(glass)
@@ -539,10 +572,15 @@ class Openings:
         material: str = "walls",
         attic: Attic | None = None,
     ) -> None:
-        """Adds the walls (see `add_walls`) and the roof on them.
+        """Adds the walls, their panes and the roof to the building.
 
-        `attic` is a function that returns the windows of a gable; None for no
-        windows.
+        Args:
+            glass: depths of the openings with panes [m].
+            bands: strips around the wing.
+            material: material of walls and gables; that of the panes is
+                `glass`.
+            attic: function that returns the windows of a gable, such as
+                `attic_window` makes; None for no windows.
         """
         self.add_walls(glass, bands, material)
         add_roof(self._out, self._wing, attic, material)
@@ -589,7 +627,7 @@ class Openings:
         lights: float = 0.0,
         material: str = "accent",
     ) -> None:
-        """Adds a door with its leaf, and side windows if wanted.
+        """Adds a door with its leaf and, if `lights` is set, side windows.
 
         Args:
             edge: number of the wall.
@@ -621,7 +659,14 @@ class Openings:
     def add_garage_door(
         self, edge: int, x: float, width: float, height: float = 2.15
     ) -> None:
-        """Adds a garage door with horizontal ribs, in the material `trim`."""
+        """Adds a garage door with horizontal ribs, in the material `trim`.
+
+        Args:
+            edge: number of the wall.
+            x: middle of the door along the wall [m].
+            width: width of the door [m].
+            height: height of the door [m].
+        """
         a, b = round(x - width / 2, 2), round(x + width / 2, 2)
         hole: list[walls.Relief] = [walls.Patch(a, b, 0.0, height, DOOR_M)]
         self.put(edge, x, width + 0.3, lambda x0, x1: hole)
@@ -635,7 +680,11 @@ class Openings:
             self._out.add_to("trim", self._wing.wall(edge).place(panel))
 
     def add_casings(self, edges: Sequence[int], style: str) -> None:
-        """Adds frames to the windows of some walls; see `details.casings`."""
+        """Adds frames, sills or shutters to the windows of some walls.
+
+        `edges` are the numbers of the walls, and `style` is `frame`, `sill` or
+        `shutters`.
+        """
         material = "accent" if style == "shutters" else "trim"
         for edge in edges:
             wall = self._wing.wall(edge)
@@ -702,13 +751,15 @@ GLASS_M, DOOR_M = 0.12, 0.2
 def sash(
     width: float, z: float, sill: float, head: float, bars: int = 0
 ) -> bays.Bay:
-    """Returns a bay with a window of one storey.
+    """Returns a bay with a window, given by heights above its floor.
+
+    The glass is 0.12 m behind the wall.
 
     Args:
         width: width of the window [m].
-        z: height of the storey's floor [m].
-        sill: height of the sill above the floor [m].
-        head: height of the top above the floor [m].
+        z: height of the floor [m].
+        sill: height of the bottom of the glass above the floor [m].
+        head: height of the top of the glass above the floor [m].
         bars: number of mullions.
     """
     low, high = round(z + sill, 2), round(z + head, 2)

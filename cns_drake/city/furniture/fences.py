@@ -15,10 +15,15 @@ _LONGEST = 8
 
 @dataclass(frozen=True)
 class RunKind:
-    """A kind of fence, from `fences.yaml`, with the size of its panels [m].
+    """A kind of fence, wall or hedge: one entry of `furniture/fences.yaml`.
 
-    `end_post`, if given, is a post after the last panel. Its four numbers are
-    its size in x, its least and its greatest y, and its height [m].
+    Attributes:
+        panel: length of a panel [m].
+        height: usual height [m].
+        colours: the colours, of which each fence has one.
+        end_post: post after the last panel: its size in x, its least y, its
+            greatest y, and its height [m]; None for no post.
+        semantic_class: a key of `cns_drake.scene.semantics.CLASS_IDS`.
     """
 
     panel: float
@@ -44,10 +49,13 @@ def run(
     length: float = 10.0,
     height: float | None = None,
 ) -> structures.Model:
-    """Returns a fence of several panels in a random colour.
+    """Returns a fence, wall or hedge of equal panels, in a random colour.
 
-    `name` is a key of `RUN_KINDS`. `length` and `height` are in [m]; by
-    default, the height is that of the kind of fence.
+    Args:
+        name: kind of fence, a key of `RUN_KINDS`.
+        rng: random generator for the colour.
+        length: length along x [m]; the panels are stretched to fit.
+        height: height [m]; by default the usual one of this kind.
 
     Raises:
         ValueError: the length or the height is not positive.

@@ -42,9 +42,9 @@ FORMS = {
 
 
 def car(rng: np.random.Generator, *, form: str) -> structures.Model:
-    """Returns a parked vehicle with random paint and scale.
+    """Returns a parked vehicle with random paint and a slightly random size.
 
-    `form` is a body type: a key of `FORMS`.
+    `form` is a body type, such as `van`: a key of `FORMS`.
     """
     size = rng.uniform(0.97, 1.03, 3)
     scale = structures.triple(round(float(s), 3) for s in size)

@@ -44,7 +44,7 @@ from cns_drake.roads.network import RoadNetwork, load_road_network
 
 
 class City(NamedTuple):
-    """A whole city: its structures, ground first, and kinds of parked cars.
+    """All structures of a city, ground first, and its kinds of parked cars.
 
     `cars` maps the name of a kind of car to its weight in random choices.
     """
@@ -86,7 +86,7 @@ class Streets(NamedTuple):
 
 
 def meshes_of(structures: Iterable[Structure]) -> dict[str, Mesh]:
-    """Returns name -> mesh of all meshes of structures.
+    """Returns all meshes of structures, as a mapping from name to mesh.
 
     Raises:
         ValueError: if two different meshes have the same name, or one has no
@@ -126,10 +126,11 @@ def make_city(world: Path) -> City:
 def lay_out(network: RoadNetwork, plan: CityPlan, source: str) -> City:
     """Makes a city from a road network and a plan.
 
-    Error messages name the `source` of the plan.
+    `source` is the file of the plan, named in error messages.
 
     Raises:
-        InputError: if the plan names something unknown or impossible.
+        InputError: if the plan names something unknown, or something in it has
+            no room.
     """
     streets = Streets(
         network.areas,
@@ -146,13 +147,13 @@ def lay_out(network: RoadNetwork, plan: CityPlan, source: str) -> City:
 
 
 def build_along(streets: Streets, plan: CityPlan, source: str) -> City:
-    """Makes a city along streets.
+    """Makes a city along given streets.
 
-    What needs most space, or fits in the fewest places, is placed first. Error
-    messages name the `source` of the plan.
+    `source` is the file of the plan, named in error messages.
 
     Raises:
-        InputError: if the plan names something unknown or impossible.
+        InputError: if the plan names something unknown, or something in it has
+            no room.
     """
     _check_names(plan, source)
     draft = Draft(streets.areas, streets.kerb_height, plan, source)

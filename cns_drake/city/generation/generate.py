@@ -39,12 +39,14 @@ _COLUMNS = ("name", "class", "x", "y", "tags")
 
 
 class Renaming(NamedTuple):
-    """What happened to the names in `stages.yaml` after a city was changed.
+    """How the names in `stages.yaml` must change after a change of the city.
 
-    `renamed` maps old names to new names, for structures that are still at the
-    same place. `lost` contains the names of structures that are no longer
-    there, even if another structure has the name now. `unclear` contains
-    patterns that now match different structures.
+    Attributes:
+        renamed: old name -> new name of each structure that is still at the
+            same place, but has another name now.
+        lost: names of structures that no longer exist at their place, even if
+            another structure has the name now.
+        unclear: patterns that match different structures than before.
     """
 
     renamed: dict[str, str]
@@ -66,11 +68,15 @@ class _Row(NamedTuple):
 def find_renaming(
     stages: Path, table: Path, structures: Sequence[Structure]
 ) -> Renaming:
-    """Returns the new names of the structures that `stages.yaml` names.
+    """Finds out how names in `stages.yaml` must change for the current city.
 
-    `table` is the `structures.csv` of the city for which `stages.yaml` was
-    written, and `structures` are those of the current city. Structures at the
-    same place count as the same structure.
+    Structures at the same place, before and now, count as the same structure.
+
+    Args:
+        stages: the file `stages.yaml`.
+        table: the file `structures.csv` of the city for which `stages` was
+            written.
+        structures: the structures of the current city.
 
     Raises:
         InputError: a file cannot be read.
@@ -258,12 +264,14 @@ def stage_sdf(
 ) -> str:
     """Returns the SDF of a world: all structures as visuals of one static link.
 
-    Drake parses a static scene fastest as one link with many visuals. The link
-    has no collision geometry, because nothing ever touches it. A visual is
-    named `<structure>/<part>`. Drake gives the geometry the same name, from
-    which the structure of a LiDAR return is found. `comment` is a line for
-    readers of the file, and `before` contains the SDF texts of further visuals,
-    which come first.
+    Drake parses a static scene fastest in this form. A visual is named
+    `<structure>/<part>`. There is no collision geometry.
+
+    Args:
+        world: name of the world.
+        structures: the structures.
+        comment: a line about the world for readers of the file.
+        before: SDF texts of further visuals, which come first.
     """
     lines = [
         '<?xml version="1.0"?>',
@@ -526,7 +534,10 @@ def differing_files(
     *,
     repair_stages: bool = False,
 ) -> list[Path]:
-    """Returns the files that would change if the city were generated again."""
+    """Returns the files that `generate_city` would change, without writing.
+
+    The arguments are the same as those of `generate_city`.
+    """
     world = Path(world)
     files = _rendered(world, progress, repair_stages)
     stale = _generated(world) - {world / name for name in files}

@@ -108,9 +108,14 @@ def _drive(network: RoadNetwork, stage: str, rng: np.random.Generator) -> dict:
 
 
 def starter_plan(areas: Areas, seed: int) -> dict:
-    """Returns a plan with a random character for each block between roads.
+    """Returns a plan with a kind of district for each block between roads.
 
-    It contains fields of `CityPlan`.
+    Districts such as an old town or offices are assigned at random. The result
+    has the fields of `cns_drake.city.plan.city_plan.CityPlan`.
+
+    Args:
+        areas: areas of the streets, in W [m].
+        seed: seed of the random choice.
     """
     folder = resources.files("cns_drake.city.generation")
     text = folder.joinpath("characters.yaml").read_text(encoding="utf-8")
@@ -152,7 +157,11 @@ def starter_plan(areas: Areas, seed: int) -> dict:
 
 
 def starter_stages(city: City) -> dict:
-    """Returns two stages; the first lacks buildings and trees in the east."""
+    """Returns two stages, of which the first lacks the east of the city.
+
+    The first stage lacks buildings and trees there. The result has the fields
+    of `cns_drake.city.plan.stages.Stages`.
+    """
     kinds = "building", "vegetation"
     standing = [s for s in city.structures if s.semantic_class in kinds]
     buildings = [s for s in standing if s.semantic_class == "building"]

@@ -65,7 +65,11 @@ class Mesh:
     def moved(
         self, translation: ArrayLike = (0.0, 0.0, 0.0), yaw: float = 0.0
     ) -> Mesh:
-        """Returns the mesh rotated about z by `yaw` [rad], then translated."""
+        """Returns the mesh rotated about the z axis, and then moved.
+
+        `yaw` is the angle of the rotation [rad], and `translation` (3,) the
+        shift [m].
+        """
         c, s = np.cos(yaw), np.sin(yaw)
         R = np.array([[c, -s, 0.0], [s, c, 0.0], [0.0, 0.0, 1.0]])
         return self.with_vertices(self.vertices @ R.T + np.asarray(translation))
@@ -95,7 +99,7 @@ class Mesh:
 
 
 def merge_meshes(*meshes: Mesh) -> Mesh:
-    """Returns one mesh with the faces of all given meshes."""
+    """Returns one mesh that contains the faces of all given meshes."""
     vertices, offset = [np.zeros((0, 3))], 0
     faces: list[tuple[int, ...]] = []
     for mesh in meshes:
@@ -106,7 +110,11 @@ def merge_meshes(*meshes: Mesh) -> Mesh:
 
 
 def box_mesh(size: ArrayLike, center: ArrayLike = (0.0, 0.0, 0.0)) -> Mesh:
-    """Returns an axis-aligned box of the given size about a centre [m]."""
+    """Returns an axis-aligned box, given by its size and centre [m].
+
+    `size` contains the lengths along x, y and z, and `center` (3,) the
+    position.
+    """
     half = np.asarray(size, dtype=float) / 2
     corners = np.array(
         [(x, y, z) for z in (-1, 1) for y in (-1, 1) for x in (-1, 1)]
@@ -120,7 +128,7 @@ FOLDER = Path(__file__).parents[1] / "object_meshes"
 
 
 def object_mesh(name: str) -> Mesh:
-    """Returns the shared object mesh with a given name.
+    """Returns a mesh of the folder `object_meshes`, by its name.
 
     Raises:
         FileNotFoundError: there is no such mesh.

@@ -175,10 +175,16 @@ def _is_between(p: _Point, q: _Point, c: _Point) -> bool:
 def cut_ears(
     ring: Sequence[_Point], fans: bool = False
 ) -> list[tuple[int, ...]]:
-    """Divides a ring into triangles, given as indices of the ring's corners.
+    """Divides a polygon into triangles, as indices of its corners.
 
-    The ring may touch itself. Unless `fans` is set, fans of thin triangles are
-    avoided.
+    Args:
+        ring: the corners, counter-clockwise, in whole numbers such as
+            millimetres. The ring may touch itself.
+        fans: whether many thin triangles may share one corner, as in a fan;
+            otherwise such fans are avoided.
+
+    Returns:
+        The indices of three corners of `ring` for each triangle.
 
     Raises:
         ValueError: the ring crosses itself, or runs clockwise.
@@ -287,7 +293,11 @@ def hull_of(xy: np.ndarray) -> BaseGeometry:
 
 
 def placed(shape: Shape, xy: Sequence[float], yaw: float) -> Shape:
-    """Returns a shape rotated about the origin by `yaw`, then moved by `xy`."""
+    """Returns a shape rotated about the origin and then moved.
+
+    `yaw` is the angle of the rotation [rad], and `xy` contains the shift along
+    x and y [m].
+    """
     c, s = math.cos(yaw), math.sin(yaw)
     return affine_transform(shape, [c, -s, s, c, *xy])
 
@@ -307,9 +317,10 @@ def polygons_of(geometry: BaseGeometry) -> list[Polygon]:
 
 
 def tiles(geometry: BaseGeometry, size: float) -> Iterator[MultiPolygon]:
-    """Yields the part of a geometry in each square of a grid in W.
+    """Yields the part of an area in each square of a grid in W.
 
-    `size` is the side of the squares [m].
+    `size` is the side of the squares [m]. Squares without any part are left
+    out.
     """
     _, squares = _squares(geometry, size)
     pieces = shapely.intersection(geometry, squares)
@@ -338,11 +349,14 @@ def _squares(
 def surface_mesh(
     geometry: BaseGeometry, height: HeightMap | float, spacing: float = 0.0
 ) -> Mesh:
-    """Returns a mesh over polygons in W, at one height or on a height map.
+    """Returns a horizontal or curved surface that covers polygons in W.
 
-    Heights are in [m]. With a positive `spacing`, the polygons are first
-    divided into squares of this size [m], so that the mesh can follow a height
-    map.
+    Args:
+        geometry: the polygons [m].
+        height: height of the surface [m], or a function that returns the
+            heights at arrays of x and y [m].
+        spacing: side of the squares into which the polygons are divided first,
+            so that the surface can follow `height` [m]; 0 for no division.
     """
     squares = np.zeros((0, 4, 2))
     pieces: list[BaseGeometry | None] = [geometry]
@@ -405,8 +419,13 @@ def wall_mesh(
 ) -> Mesh:
     """Returns vertical walls on the edges of polygons in W, facing inwards.
 
-    The walls reach from the heights `bottom` to the heights `top` [m]. With
-    `along`, only edges whose middle lies in this area get a wall.
+    Args:
+        geometry: the polygons [m].
+        bottom: height of the walls' foot [m], or a function that returns the
+            heights at arrays of x and y [m].
+        top: height of the walls' top, given in the same way.
+        along: only edges whose middle lies in this area get a wall; None for
+            all edges.
     """
     starts, ends = [], []
     for polygon in polygons_of(geometry):
@@ -468,19 +487,14 @@ def _are_planes(rings: np.ndarray, height: HeightMap | float) -> np.ndarray:
 
 
 class Occupancy:
-    """The occupied ground, as a growing set of polygons in W.
-
-    It is designed for a few thousand polygons: one vectorised comparison of
-    bounding boxes finds the candidates, and only the candidates are checked
-    exactly.
-    """
+    """The occupied ground: a growing set of polygons in W."""
 
     def __init__(self) -> None:
         self._geometries: list[BaseGeometry] = []
         self._bounds: np.ndarray = np.zeros((64, 4))
 
     def add(self, geometry: BaseGeometry) -> None:
-        """Marks the ground of a polygon as occupied."""
+        """Marks the area of a polygon in W as occupied."""
         count = len(self._geometries)
         if count == len(self._bounds):
             self._bounds = np.concatenate(
@@ -496,11 +510,16 @@ class Occupancy:
         clearance: float = 0.0,
         ignore: BaseGeometry | None = None,
     ) -> bool:
-        """Returns whether a polygon in W keeps clear of all occupied ground.
+        """Returns whether an area in W keeps clear of all occupied ground.
 
-        `clearance` is the least distance [m]; with 0, polygons may touch. The
-        occupied polygon `ignore` may be closer, but must not be overlapped.
+        Args:
+            geometry: the area.
+            clearance: least distance from occupied ground [m]; with 0, areas
+                may touch.
+            ignore: an occupied polygon that may be closer than `clearance`, but
+                must not be overlapped.
         """
+        # One comparison of all bounding boxes finds the few candidates.
         x0, y0, x1, y1 = geometry.bounds
         taken = self._bounds[: len(self._geometries)]
         near = np.flatnonzero(

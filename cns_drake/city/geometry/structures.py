@@ -15,7 +15,10 @@ from cns_drake.city.geometry.polygons import hull_of, placed
 
 @dataclass(frozen=True)
 class MeshShape:
-    """A mesh, given by its name, scaled about the origin of the mesh."""
+    """A mesh, scaled about its origin by factors along x, y and z.
+
+    `mesh` is the name of the mesh in `Model.meshes`.
+    """
 
     mesh: str
     scale: tuple[float, float, float] = (1.0, 1.0, 1.0)
@@ -23,14 +26,14 @@ class MeshShape:
 
 @dataclass(frozen=True)
 class BoxShape:
-    """A box centred on the part frame; `size` along x, y, z [m]."""
+    """A box centred on the origin of its part; `size` is along x, y, z [m]."""
 
     size: tuple[float, float, float]
 
 
 @dataclass(frozen=True)
 class CylinderShape:
-    """A cylinder centred on the part frame, its axis along z [m]."""
+    """A cylinder centred on the origin of its part, its axis along z [m]."""
 
     radius: float
     length: float
@@ -38,7 +41,7 @@ class CylinderShape:
 
 @dataclass(frozen=True)
 class SphereShape:
-    """A sphere centred on the part frame [m]."""
+    """A sphere centred on the origin of its part [m]."""
 
     radius: float
 
@@ -48,10 +51,14 @@ Shape = MeshShape | BoxShape | CylinderShape | SphereShape
 
 @dataclass(frozen=True)
 class Part:
-    """One visual of a structure, at xyz and rpy in its frame S [m, rad].
+    """One visual of a structure: a shape at a pose in the structure's frame S.
 
-    The part's name, e.g. `storey_03`, is unique within the structure. Without
-    `rgb`, the part has the colour of the structure's class.
+    Attributes:
+        name: name of the part, unique within the structure, e.g. `storey_03`.
+        shape: the shape.
+        xyz: position of the shape's origin in S [m].
+        rpy: roll, pitch and yaw of the shape in S, as in SDF [rad].
+        rgb: colour; by default that of the structure's semantic class.
     """
 
     name: str
@@ -63,9 +70,12 @@ class Part:
 
 @dataclass(frozen=True)
 class Model:
-    """The shape of a structure: its parts in S, and name -> mesh.
+    """The shape of a structure, in the structure's frame S.
 
-    `footprint` is the ground area that the model needs, in S [m].
+    Attributes:
+        parts: the parts.
+        meshes: name -> mesh of all meshes that the parts use.
+        footprint: ground area that the model needs [m].
     """
 
     parts: tuple[Part, ...]
@@ -85,11 +95,16 @@ class Model:
 
 @dataclass(frozen=True)
 class Structure:
-    """A named model, and the pose of its frame S in the world W [m, rad].
+    """A named object of a city: a model, and its pose in the world W.
 
-    The name is stable and unique in the city, e.g. `tower_017`. Tags are words
-    for use by the layout and the stages, such as the name of the block. The
-    semantic class is a key of `cns_drake.scene.semantics.CLASS_IDS`.
+    Attributes:
+        name: unique and stable name, e.g. `tower_017`.
+        semantic_class: a key of `cns_drake.scene.semantics.CLASS_IDS`.
+        model: the shape, in the structure's frame S.
+        xyz: position of S in W [m].
+        yaw: heading of S in W [rad].
+        tags: words that describe the structure, such as the name of its
+            district.
     """
 
     name: str
@@ -106,7 +121,10 @@ class Structure:
 
     @property
     def p_WFs(self) -> np.ndarray:
-        """The (N, 3) lowest points of the model (its feet), in W [m]."""
+        """Lowest points (N, 3) of the model, its feet, in W [m].
+
+        They are all vertices at most 0.05 m above the lowest one.
+        """
         model = self.model
         meshes = [part_mesh(part, model.meshes) for part in model.parts]
         p_SPs = np.concatenate([mesh.vertices for mesh in meshes])
@@ -140,10 +158,12 @@ _ROUND_SIDES = 12
 
 @dataclass(frozen=True)
 class Builder:
-    """Makes objects of one kind with `build(rng, **parameters) -> Model`.
+    """A kind of object, and the function that makes objects of this kind.
 
-    Every parameter has a default; most defaults are drawn at random from `rng`.
-    The same state of the random generator gives the same model.
+    `build(rng, **parameters)` returns a `Model`. Every parameter has a default;
+    most defaults are drawn at random from `rng`. The same state of `rng` gives
+    the same model. `semantic_class` is a key of
+    `cns_drake.scene.semantics.CLASS_IDS`.
     """
 
     semantic_class: str
@@ -157,14 +177,16 @@ def post(
     xy: tuple[float, float] = (0.0, 0.0),
     rgb: tuple[float, float, float] | None = None,
 ) -> Part:
-    """Returns an upright cylinder that begins below the ground.
+    """Returns an upright cylinder that stands on the ground.
+
+    It begins slightly below the ground.
 
     Args:
         name: name of the part.
         radius: radius of the cylinder [m].
         height: height of its top above the ground [m].
         xy: position of its axis in the structure's frame [m].
-        rgb: colour; by default the structure's.
+        rgb: colour; by default that of the structure's semantic class.
     """
     return Part(
         name,
@@ -181,14 +203,14 @@ def bar(
     radius: float,
     rgb: tuple[float, float, float] | None = None,
 ) -> Part:
-    """Returns a cylinder between two points.
+    """Returns a cylinder between two points, as a part of a structure.
 
     Args:
         name: name of the part.
         start: (3,) centre of one end in the structure's frame [m].
-        end: (3,) centre of the other end [m].
+        end: (3,) centre of the other end in the structure's frame [m].
         radius: radius of the cylinder [m].
-        rgb: colour; by default the structure's.
+        rgb: colour; by default that of the structure's semantic class.
     """
     start, end = np.asarray(start, float), np.asarray(end, float)
     along = end - start
@@ -211,14 +233,14 @@ def block(
     yaw: float = 0.0,
     rgb: tuple[float, float, float] | None = None,
 ) -> Part:
-    """Returns a box.
+    """Returns a box as a part of a structure.
 
     Args:
         name: name of the part.
         size: lengths along the box's own x, y and z [m].
         center: (3,) centre of the box in the structure's frame [m].
-        yaw: heading of the box [rad].
-        rgb: colour; by default the structure's.
+        yaw: heading of the box in the structure's frame [rad].
+        rgb: colour; by default that of the structure's semantic class.
     """
     return Part(
         name,
@@ -236,10 +258,11 @@ def triple(values: Iterable[float]) -> tuple[float, float, float]:
 
 
 def assemble(*parts: Part) -> Model:
-    """Returns a model of the given parts, with their meshes.
+    """Returns a model of the given parts.
 
-    The meshes are read from the shared `object_meshes`. The footprint is the
-    convex hull of all geometry below `HEADROOM`.
+    Their meshes are read from the folder `object_meshes`. The footprint is the
+    convex hull of everything below 2.4 m (`HEADROOM`), so that crowns and signs
+    above it leave the ground free.
     """
     shapes = [part.shape for part in parts]
     names = [shape.mesh for shape in shapes if isinstance(shape, MeshShape)]
@@ -250,7 +273,11 @@ def assemble(*parts: Part) -> Model:
 def ground_footprint(
     parts: Sequence[Part], meshes: Mapping[str, Mesh]
 ) -> Polygon:
-    """Returns the convex hull (x, y) in S of the parts below `HEADROOM`."""
+    """Returns the convex hull of all parts below `HEADROOM`, seen from above.
+
+    The hull is a polygon in the structure's frame S [m], slightly enlarged.
+    `HEADROOM` is 2.4 m.
+    """
     corners: list[np.ndarray] = [np.zeros((0, 2))]
     for part in parts:
         mesh = part_mesh(part, meshes)
@@ -273,9 +300,9 @@ def ground_footprint(
 
 
 def ground_triangles(structures: Iterable[Structure]) -> np.ndarray:
-    """Returns the triangles (M, 3, 3) of the ground, in W [m].
+    """Returns the triangles (M, 3, 3) of structures, in W [m].
 
-    The meshes of the structures must be given in W.
+    The meshes of the structures must be given in W, as those of the ground are.
     """
     meshes = [m for one in structures for m in one.model.meshes.values()]
     found = [mesh.vertices[mesh.triangles()] for mesh in meshes]
@@ -285,17 +312,21 @@ def ground_triangles(structures: Iterable[Structure]) -> np.ndarray:
 def part_triangles(
     part: Part, meshes: Mapping[str, Mesh]
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Returns the vertices (N, 3) of a part in S, and its triangles (M, 3).
+    """Returns the vertices (N, 3) [m] and the triangles (M, 3) of a part.
 
-    Round shapes become polyhedra that just contain the shapes, so that a
-    footprint made from these polyhedra is never too small.
+    The vertices are in the structure's frame S; triangles contain indices of
+    vertices. Cylinders and spheres become slightly larger prisms.
     """
     mesh = part_mesh(part, meshes)
     return mesh.vertices, mesh.triangles()
 
 
 def part_mesh(part: Part, meshes: Mapping[str, Mesh]) -> Mesh:
-    """Returns a part's mesh in S; round shapes are as in `part_triangles`."""
+    """Returns the mesh of a part, in the structure's frame S [m].
+
+    Cylinders and spheres become slightly larger prisms. `meshes` maps names to
+    meshes.
+    """
     shape = part.shape
     scale = np.ones(3)
     if isinstance(shape, MeshShape):
@@ -311,7 +342,10 @@ def part_mesh(part: Part, meshes: Mapping[str, Mesh]) -> Mesh:
 
 
 def rotation(rpy: tuple[float, float, float]) -> np.ndarray:
-    """Returns the rotation matrix Rz(yaw) Ry(pitch) Rx(roll), as in SDF."""
+    """Returns the rotation matrix Rz(yaw) Ry(pitch) Rx(roll), as in SDF.
+
+    `rpy` contains roll, pitch and yaw [rad].
+    """
     (cr, sr), (cp, sp), (cy, sy) = ((np.cos(a), np.sin(a)) for a in rpy)
     return np.array(
         [

@@ -11,9 +11,9 @@ def long_normals(triangles: np.ndarray) -> np.ndarray:
     """Returns the cross products (M, 3) of two edges of triangles (M, 3, 3).
 
     Each result is a normal of its triangle, with a length of twice the
-    triangle's area. For a few triangles, this function is faster than
-    `np.cross`.
+    triangle's area.
     """
+    # For a few triangles, this is faster than `np.cross`.
     u = triangles[:, 1] - triangles[:, 0]
     v = triangles[:, 2] - triangles[:, 0]
     normal = np.empty(u.shape)
@@ -25,7 +25,7 @@ def long_normals(triangles: np.ndarray) -> np.ndarray:
 def unit_normals(triangles: np.ndarray) -> np.ndarray:
     """Returns the unit normals (M, 3) of triangles (M, 3, 3).
 
-    They are zero for triangles without area.
+    The normal of a triangle without area is zero.
     """
     normal = long_normals(triangles)
     size = np.linalg.norm(normal, axis=1, keepdims=True)
@@ -38,18 +38,21 @@ def looks_up(triangles: np.ndarray) -> np.ndarray:
 
 
 def turned_up(triangles: np.ndarray) -> np.ndarray:
-    """Returns triangles (M, 3, 3) with all of them turned to face upwards."""
+    """Returns triangles (M, 3, 3), reversed where they face downwards."""
     is_down = unit_normals(triangles)[:, 2] < 0.0
     return np.where(is_down[:, None, None], triangles[:, ::-1], triangles)
 
 
 def from_above(triangles: np.ndarray) -> np.ndarray:
-    """Returns triangles (M, 3, 3) as polygons (M,), seen from above."""
+    """Returns the outlines (M,) of triangles (M, 3, 3), seen from above."""
     return np.asarray(shapely.polygons(triangles[:, :, :2]), object)
 
 
 def quartered(triangles: np.ndarray) -> np.ndarray:
-    """Returns each triangle divided into four at the middles of its sides."""
+    """Returns triangles (M, 3, 3), each divided into four: (4 M, 3, 3).
+
+    The new corners are the middles of the sides.
+    """
     a, b, c = np.moveaxis(triangles, 1, 0)
     ab, bc, ca = (a + b) / 2, (b + c) / 2, (c + a) / 2
     parts = ((a, ab, ca), (ab, b, bc), (ca, bc, c), (ab, bc, ca))
@@ -57,7 +60,11 @@ def quartered(triangles: np.ndarray) -> np.ndarray:
 
 
 class UpperSides:
-    """The upper sides of solids, with their height at any place."""
+    """The upper sides of solids, and their height at any place.
+
+    The constructor takes the triangles (M, 3, 3) of all surfaces [m], and keeps
+    those that face upwards.
+    """
 
     def __init__(self, triangles: np.ndarray):
         """Keeps those of solids' triangles (M, 3, 3) that face upwards [m]."""
@@ -66,9 +73,9 @@ class UpperSides:
         self._tree = shapely.STRtree(from_above(self._triangles))
 
     def heights(self, xy: np.ndarray) -> np.ndarray:
-        """Returns the height (N,) of the highest surface at (N, 2) places [m].
+        """Returns the height (N,) of the highest surface at places (N, 2) [m].
 
-        It is -inf where there is no surface.
+        The height is -inf at a place without a surface.
         """
         highest = np.full(len(xy), -np.inf)
         place, triangle = self._tree.query(shapely.points(xy), "intersects")

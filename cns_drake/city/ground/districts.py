@@ -14,10 +14,14 @@ from cns_drake.city.plan.city_plan import CityPlan, DistrictPlan, PatchPlan
 
 
 class District(NamedTuple):
-    """A district and its ground, in W [m].
+    """A district of a city, and the areas of its ground in W [m].
 
-    `grounds` maps each kind of ground to its area; together, these areas make
-    up `area`. Terraces are level patches.
+    Attributes:
+        plan: the entry of the district in the plan.
+        area: ground of the district.
+        grounds: kind of ground, such as `lawn` -> its area. Together, these
+            areas make up `area`.
+        terraces: patches that are level.
     """
 
     plan: DistrictPlan

@@ -44,7 +44,7 @@ class Pad(NamedTuple):
 class LevelGround:
     """The ground of a city whose streets all have the same height [m].
 
-    Inside the areas of `pads`, the ground has the heights of these pads.
+    `pads` is empty, because level ground needs no level areas of its own.
     """
 
     height: float
@@ -57,17 +57,17 @@ class LevelGround:
 
 
 class SlopingGround:
-    """The ground of a city with sloping streets, as a height over x and y.
+    """The ground of a city with sloping streets: its height at any x and y.
 
     Sidewalks follow their roads. Between the streets and level pads, the height
     is a harmonic field on a grid: each node has the mean height of its
     neighbours. Nodes on streets and pads have given heights. At the edge of the
     city, the field has no slope perpendicular to the edge.
 
-    Within the reach R of a street or pad, at the distance d, the height is the
-    mean of the field, with weight 1/R, and of the exact height of the street or
-    pad, with weight 1/d - 1/R (Shepard's interpolation). The ground thus meets
-    the edges of streets and pads without a step.
+    Next to a street or pad, up to a distance R, the ground changes gradually
+    from the height of the street or pad to that of the field (Shepard's
+    interpolation). At the distance d, the height of the street or pad has the
+    weight 1/d - 1/R, and that of the field 1/R.
     """
 
     is_level = False
@@ -199,8 +199,8 @@ def make_ground(
 
     Args:
         surface: heights of the roads.
-        kerb_height: height of sidewalks above the roads [m], as one number or
-            by place.
+        kerb_height: height of sidewalks above the roads [m]: one number, or a
+            function that returns the heights (N,) at places (N, 2).
         streets: area of carriageways, sidewalks and medians in W [m].
         bounds: x0, y0, x1, y1 of the city in W [m].
         pads: level areas outside the streets. Where two of them meet, the first
@@ -214,7 +214,12 @@ def make_ground(
 
 
 def aprons(buildings: Iterable[Structure], streets: BaseGeometry) -> list[Pad]:
-    """Returns level pads in W around buildings, at the floors' heights."""
+    """Returns the level ground below and around buildings, in W [m].
+
+    Each building has a pad at the height of its floor: its footprint, and a
+    strip around it. The strip keeps a distance from `streets`, the area of the
+    streets in W [m].
+    """
     kerbside = streets.buffer(_APRON)
     pads = []
     for building in buildings:

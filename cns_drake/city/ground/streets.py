@@ -58,9 +58,13 @@ _MEDIAN_RGB = (0.47, 0.55, 0.34)
 
 
 class Covering(NamedTuple):
-    """Ground of one kind, and the name and colour of its structure.
+    """A kind of ground, such as parking bays, and the area that it covers.
 
-    `area` is in W [m].
+    Attributes:
+        name: name of its structure.
+        semantic_class: a key of `cns_drake.scene.semantics.CLASS_IDS`.
+        area: the area in W [m].
+        rgb: colour.
     """
 
     name: str
@@ -69,7 +73,7 @@ class Covering(NamedTuple):
     rgb: tuple[float, float, float]
 
     def tiles(self) -> Iterator[tuple[str, MultiPolygon]]:
-        """Yields the name and the polygons of each tile of the area."""
+        """Yields the name and the polygons of each square tile of the area."""
         for k, piece in enumerate(tiles(self.area, TILE)):
             yield f"tile_{k:02d}", piece
 
@@ -138,10 +142,13 @@ def street_surfaces(
     Args:
         areas: the areas of the streets in W [m].
         surface: heights of the carriageway.
-        kerb: height of sidewalks and medians above the carriageway [m], as one
-            number or by place.
-        coverings: parts of the carriageway with a surface of their own.
-        kerbless: area in W without kerbs, where streets lead onto bridges.
+        kerb: height of sidewalks and medians above the carriageway [m]: one
+            number, or a function that returns the heights (N,) at places (N,
+            2).
+        coverings: parts of the carriageway with a surface of their own, such as
+            parking bays.
+        kerbless: area in W without kerbs, where streets lead onto bridges; None
+            for kerbs everywhere.
     """
     road, walk = _heights(surface, kerb)
     medians = snap(areas.medians)
@@ -165,7 +172,10 @@ def street_surfaces(
 
 
 def kerb_area(paved: BaseGeometry) -> MultiPolygon:
-    """Returns the area of the kerb stones along a carriageway, in W [m]."""
+    """Returns the area of the kerb stones along a carriageway, in W [m].
+
+    `paved` is the area of the carriageway.
+    """
     grown = paved.buffer(_KERB_WIDTH, join_style="mitre")
     return MultiPolygon(polygons_of(snap(grown.difference(paved))))
 
@@ -188,7 +198,7 @@ def _heights(
 
 
 def kerb_height(network: RoadNetwork) -> float:
-    """Returns the height of kerbs above the carriageway [m]."""
+    """Returns the height of the highest kerb above the carriageway [m]."""
     return max(road.kerb_height for road in network.roads.values())
 
 
@@ -297,7 +307,7 @@ _LEAST_LENGTH = 2 * _STOP_LINE[1] + 4.0
 
 
 def marking_structure(network: RoadNetwork) -> Structure:
-    """Returns the painted markings of all roads, one part per road."""
+    """Returns the painted markings of all roads, with one part per road."""
     pieces = {}
     for name, road in network.roads.items():
         strips = list(_lane_lines(road))

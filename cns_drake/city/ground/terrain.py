@@ -41,7 +41,10 @@ _WAVELENGTHS = (22.0, 60.0)
 
 
 class GroundShape:
-    """The height of the finished ground, inside and outside the streets."""
+    """The height of a city's finished ground, at any x and y in W [m].
+
+    It is the height of `base`, plus the swells on the lawns of districts.
+    """
 
     def __init__(
         self,
@@ -107,7 +110,8 @@ def ground_structures(
 ) -> list[Structure]:
     """Returns the structures of the ground of all districts.
 
-    `shape` defines all heights except that of the water, `water_level` [m].
+    `shape` gives the height of all ground except water. `water_level` is the
+    height of the water [m].
     """
     structures = []
     # Land within water is a bridge, below which there is water.
@@ -195,7 +199,7 @@ _WATER_RGB = (0.25, 0.38, 0.45)
 
 
 def water_area(district: District, streets: BaseGeometry) -> BaseGeometry:
-    """Returns all water of a district in W, also below bridges."""
+    """Returns the area of a district of water in W [m], also below bridges."""
     if district.plan.area is None:
         return district.area
     below = Polygon(district.plan.area).intersection(streets)
@@ -210,10 +214,16 @@ def bridge_structures(
 ) -> list[Structure]:
     """Returns the sides, undersides and piers of all bridges.
 
-    There is a bridge where a street crosses a district of water, and where such
-    a district has a patch of land. The street or the patch is the upper side of
-    the bridge. `shape` defines all heights except that of the water,
-    `water_level` [m].
+    There is a bridge wherever a street crosses a district of water, and
+    wherever such a district has a patch of land. The street or the patch is the
+    upper side of the bridge.
+
+    Args:
+        districts: all districts of the city.
+        streets: area of the streets in W [m].
+        shape: function that returns the heights of the ground at x and y in W
+            [m].
+        water_level: height of the water [m].
     """
     structures = []
     for district in districts:

@@ -46,13 +46,17 @@ _Point = list[float]
 
 
 def lowered(model: Model, height: float, name: str, seed: int) -> Model:
-    """Returns a building cut off at a height, with a flat roof.
+    """Returns a building cut off at a height, with a new flat roof.
 
-    The roof is at `height` above the building's own ground [m]. The parapet and
-    the roof equipment reach higher; `seed` is the seed of the equipment. The
-    names of new meshes begin with `name`. The model is returned unchanged if
-    less than a storey lies above `height`, or if its walls enclose no area at
-    this height.
+    The model is returned unchanged if less than a storey lies above `height`,
+    or if its walls enclose no area at this height.
+
+    Args:
+        model: the building.
+        height: height of the new roof above the building's ground [m]; the
+            parapet and the roof equipment reach higher.
+        name: beginning of the names of new meshes.
+        seed: seed of the random roof equipment.
     """
     if top_of(model) < height + _STOREY:
         return model
@@ -86,7 +90,7 @@ def lowered(model: Model, height: float, name: str, seed: int) -> Model:
 
 
 def top_of(model: Model) -> float:
-    """Returns the height of a building without its roof equipment [m]."""
+    """Returns the height of a building's top, without roof equipment [m]."""
     return max(
         float(part_mesh(part, model.meshes).vertices[:, 2].max())
         for part in model.parts
@@ -95,11 +99,18 @@ def top_of(model: Model) -> float:
 
 
 def cut_at(mesh: Mesh, height: float) -> tuple[Mesh, np.ndarray]:
-    """Returns the part of a mesh below a height [m], and the edges of the cut.
+    """Cuts a mesh at a height; returns its lower part and the edges of the cut.
 
-    The part is open at the cut. The mesh must have plane, convex faces. An edge
-    is the segment in which the cut meets a face; (N, 2, 2) are the start and
-    the end of each edge [m]. The back of the face is on the left of the edge.
+    The lower part is open at the cut.
+
+    Args:
+        mesh: a mesh with plane, convex faces.
+        height: height of the cut [m].
+
+    Returns:
+        The lower part, and start and end of the edges, (N, 2, 2) [m]. Each edge
+        is the line along which one face is cut; the back of the face is on the
+        left.
     """
     corners: list[_Point] = []
     faces: list[tuple[int, ...]] = []
@@ -155,11 +166,12 @@ def _clipped(
 
 
 def enclosed(edges: np.ndarray) -> MultiPolygon:
-    """Returns the area that cut walls enclose: left of edges (N, 2, 2) [m].
+    """Returns the area that cut walls enclose, with holes for courtyards [m].
 
-    The polygons have holes for courtyards, and coordinates in whole
-    millimetres. They include reveals, and gaps between walls and objects in
-    front of the walls.
+    `edges` (N, 2, 2) contains start and end of the edges of a cut, with the
+    area on their left, as from `cut_at`. Niches in the walls, and gaps between
+    walls and objects in front of them, count as enclosed. Coordinates are whole
+    millimetres.
     """
     edges = edges[np.ptp(edges, axis=1).max(axis=1) > 0.001]
     lines = shapely.linestrings(edges)

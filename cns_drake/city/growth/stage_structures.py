@@ -35,10 +35,9 @@ from cns_drake.city.plan.stages import LotUse, Stages
 
 
 def younger(model: Model, height: float) -> Model:
-    """Returns a plant scaled down to a height [m].
+    """Returns a plant scaled down to a height above z = 0 [m].
 
-    The plant stands on z = 0. A plant that is already lower is returned
-    unchanged.
+    A plant that is already lower is returned unchanged.
     """
     meshes = (part_mesh(part, model.meshes) for part in model.parts)
     top = max(mesh.vertices[:, 2].max() for mesh in meshes)
@@ -48,7 +47,7 @@ def younger(model: Model, height: float) -> Model:
 
 
 def scaled(model: Model, share: float) -> Model:
-    """Returns a plant scaled by the factor `share`."""
+    """Returns a plant scaled about its origin by the factor `share`."""
 
     def times(values: tuple[float, ...], digits: int) -> list[float]:
         return np.round(np.multiply(values, share), digits).tolist()
@@ -78,10 +77,17 @@ _MOST_SIDES = 12
 
 
 def building_site(model: Model, height: float, name: str, seed: int) -> Model:
-    """Returns the unfinished frame of a building, with its crane.
+    """Returns a building under construction: a frame and, with room, a crane.
 
-    The frame is `height` high [m]. Except for the jib of the crane, the model
-    stays within the building's footprint.
+    The model stays within the footprint of the building, except for the jib of
+    the crane.
+
+    Args:
+        model: the finished building.
+        height: height of the frame [m], limited to those of the archetype
+            `unfinished_tower`.
+        name: name of the building.
+        seed: seed of the random parameters.
 
     Raises:
         ValueError: the footprint has no room for a frame.
@@ -124,9 +130,9 @@ def _beside(part: Part, xy: tuple[float, float]) -> Part:
 def largest_rectangle(footprint: BaseGeometry) -> Polygon:
     """Returns a large axis-aligned rectangle that lies within a footprint.
 
-    If all edges of the footprint are axis-aligned, it is the largest possible
-    rectangle. Otherwise it is the largest rectangle whose sides pass through
-    corners of the footprint.
+    Its sides pass through corners of the footprint. Of these rectangles, it is
+    the largest one, unless the footprint has so many corners that only some of
+    them are tried. It is tiny if no such rectangle lies within the footprint.
     """
     corners = shapely.get_coordinates(footprint.simplify(0.05))
     xs, ys = (_spread(np.unique(np.round(c, 3))) for c in corners.T)
@@ -160,7 +166,11 @@ USES: tuple[LotUse, ...] = get_args(LotUse)
 
 
 def use_by_size(structure: Structure) -> LotUse:
-    """Returns the use of an empty lot that suits the lot's size."""
+    """Returns the use of an empty lot by default: it depends on the area.
+
+    `structure` is the building whose lot is empty. The use is a garden, a yard,
+    a market or, on the largest lots, a car park.
+    """
     area = structure.model.footprint.area
     if area > 900:
         return "car_park"
@@ -235,9 +245,10 @@ def _places(
 class GrowingCity:
     """A city in all of its stages.
 
-    Its structures are first the structures of the whole city, and then the
-    objects on lots that are not built on yet. The instance id of a structure is
-    its number in this order, counted from 1, and is the same in all stages.
+    The attribute `structures` lists the structures of the whole city, and then
+    the objects on lots whose buildings are absent in some stage. The instance
+    id of a structure is its number in this list, counted from 1, and is the
+    same in all stages.
     """
 
     def __init__(

@@ -31,7 +31,11 @@ _WORDS = {"car": "car", "truck": "truck", "traffic-sign": "sign"}
 
 
 def name_stem(object_name: str) -> str:
-    """Returns the stem of an object's name, such as `tree` for `lime_tree`."""
+    """Returns the everyday word for an object, with which its name begins.
+
+    For example, it is `tree` for `lime_tree`. `object_name` is a key of
+    `cns_drake.city.placement.objects.OBJECTS`.
+    """
     if object_name in SPECIES:
         return "tree"
     return _WORDS.get(OBJECTS[object_name].semantic_class, object_name)
@@ -45,17 +49,19 @@ _RANGE = 50
 
 
 class Draft:
-    """Collects structures, gives them names and keeps them apart.
+    """A city under construction: places structures, and keeps them apart.
 
     All areas and heights are in W [m].
 
     Attributes:
+        structures: the structures placed so far.
         streets: area of the streets, including sidewalks.
-        frontage: lines along which buildings stand.
+        frontage: area along whose outline buildings stand: the streets, and any
+            margins beside them.
         base: height of sidewalks and of the ground between them, before
             buildings and relief change this ground.
-        ground: upper sides of the finished ground; set once the buildings
-            stand.
+        ground: upper sides of the finished ground; None until all buildings are
+            placed.
         source: file of the plan, named in error messages.
     """
 
@@ -80,28 +86,30 @@ class Draft:
         self._lanes.add(areas.lane_area)
 
     def rng(self, *words: str | int) -> np.random.Generator:
-        """Returns the random generator of a task, whose name is `words`.
+        """Returns the random generator of a task, such as placing trees.
 
-        Every task has its own generator, so that a change in one district does
-        not change the random draws in other districts.
+        Each task has its own generator, so that a change in one district does
+        not change the random draws in other districts. `words` are the name of
+        the task.
         """
         key = "/".join(map(str, words)).encode()
         return np.random.default_rng([self.plan.seed, zlib.crc32(key)])
 
     def task(self, *words: str | int) -> np.random.Generator:
-        """Starts a task with the name `words`; returns its random generator.
+        """Starts a task: a new range of numbers for names, and a new generator.
 
-        See `rng` for the generator, and `open_range` for names in the task.
+        The result is the random generator, as from `rng`; for the range of
+        numbers, see `open_range`. `words` are the name of the task.
         """
         self.open_range()
         return self.rng(*words)
 
     def open_range(self) -> None:
-        """Starts a new range of numbers for the names of the next task.
+        """Lets the numbers in names go on after the next multiple of 50.
 
-        `stages.yaml` refers to structures by name. Thanks to the ranges, one
-        object more or less in a task does not rename the objects of later
-        tasks, just as house numbers begin anew in each street.
+        It is called before each task, such as placing a row of trees. One
+        structure more or less in a task then does not change the names of
+        structures in later tasks, to which `stages.yaml` refers.
         """
         for kind, count in self._counts.items():
             self._counts[kind] = -(-count // _RANGE) * _RANGE
@@ -119,9 +127,12 @@ class Draft:
     ) -> bool:
         """Returns whether an area in W is off the lanes and not occupied.
 
-        `clearance` is the least distance from occupied ground [m]; it does not
-        apply to lanes. The occupied area `ignore` may be closer, but must not
-        be overlapped.
+        Args:
+            area: the area.
+            clearance: least distance from occupied ground [m]; it does not
+                apply to lanes.
+            ignore: an occupied area that may be closer than `clearance`, but
+                must not be overlapped.
         """
         return self._lanes.is_free(area) and self._occupancy.is_free(
             area, clearance, ignore
@@ -132,7 +143,7 @@ class Draft:
         self._occupancy.add(area)
 
     def add_building(self, structure: Structure) -> None:
-        """Adds a building on ground that is already marked as occupied."""
+        """Adds a building; `take` must have marked its ground as occupied."""
         self.structures.append(structure)
         self._walls.add(structure.footprint_W)
 
@@ -149,17 +160,20 @@ class Draft:
         crown_part: float = 0.0,
         within: BaseGeometry | None = None,
     ) -> Structure | None:
-        """Places an object on the finished ground; returns None without room.
+        """Places an object on the finished ground, if there is room for it.
 
-        Even if there is no room for the object, its name is used up, so that
-        the names of later objects do not depend on whether it fits.
+        Returns the new structure, or None if there is no room or the ground is
+        too steep. Even then, a number is used up for the name, so that the
+        names of later objects do not depend on whether this one fits.
 
         Args:
-            name: key of `OBJECTS`.
+            name: kind of object, a key of `OBJECTS`.
             model: the object.
-            xy, yaw: position and heading in W [m, rad].
+            xy: position of the object in W [m].
+            yaw: heading of the object in W [rad].
             tags: tags of the structure.
-            kind: stem of the structure's name; by default that of the object.
+            kind: first part of the structure's name, such as `tree`; by default
+                the word that `name_stem` returns.
             clearance: least distance from all objects placed before [m].
             crown_part: share of the reach of a tree's crown that must be clear
                 of buildings, from 0 to 1.

@@ -63,10 +63,15 @@ class Station(NamedTuple):
 def lines_along(
     streets: BaseGeometry, within: BaseGeometry, distance: float
 ) -> list[LineString]:
-    """Returns the lines within an area, at a distance from the streets [m].
+    """Returns lines parallel to streets, as far as they lie in an area.
 
-    The lines are divided at corners into smooth pieces. The order of the pieces
-    is always the same, and the street is on the right of each piece.
+    Lines are split at corners. The street is on the right of each line. The
+    order of the lines is always the same.
+
+    Args:
+        streets: area of the streets in W [m].
+        within: the area in W [m].
+        distance: distance of the lines from the streets [m].
     """
     edge = streets.buffer(distance, quad_segs=_QUAD_SEGMENTS).boundary
     cut = shapely.set_precision(edge.intersection(within), 0.001)
@@ -84,7 +89,7 @@ def lines_along(
 
 
 def station_at(line: LineString, s: float) -> Station:
-    """Returns the place and heading at an arc length of a line [m]."""
+    """Returns the place and heading at the distance `s` along a line [m]."""
     before = line.interpolate(max(s - _SHORT, 0.0))
     after = line.interpolate(min(s + _SHORT, line.length))
     at = line.interpolate(s)
@@ -95,9 +100,15 @@ def station_at(line: LineString, s: float) -> Station:
 def lot_at(
     line: LineString, start: float, width: float, depth: float
 ) -> Lot | None:
-    """Returns the lot whose front begins at `start` along a line [m].
+    """Returns the lot whose front begins at a distance along a line.
 
-    The result is None if the line ends within the lot or bends too much.
+    The result is None if the line ends before the lot does, or bends too much.
+
+    Args:
+        line: line along a street, which is on its right [m].
+        start: distance along the line at which the front begins [m].
+        width: length of the front [m].
+        depth: depth of the lot, away from the street [m].
     """
     end = start + width
     if end > line.length + 1e-6:

@@ -1,4 +1,4 @@
-"""All kinds of small objects that a city can place, by name."""
+"""All kinds of small objects with which a city can be furnished, by name."""
 
 from collections.abc import Mapping
 

@@ -35,11 +35,15 @@ _HIGHEST_STEP = 0.3
 
 
 def furnish(draft: Draft, district: District) -> None:
-    """Places a district's objects, lines, parked cars and scattered plants.
+    """Places the objects, fences, parked cars and plants of a district.
+
+    These are the entries `objects`, `lines`, `parking` and `scatter` of the
+    district in the plan. Objects without room are left out, except those under
+    `objects`.
 
     Raises:
-        InputError: if there is no room for an object that the plan lists
-            singly.
+        InputError: if there is no room for an entry of `objects`, or its
+            parameters are wrong.
     """
     plan = district.plan
     draft.open_range()
@@ -145,11 +149,11 @@ def place_car(
     rng: Generator,
     tags: tuple[str, ...],
 ) -> None:
-    """Places a parked car if there is room for it.
+    """Places a parked car of a random kind, if there is room for it.
 
     Args:
         draft: the city so far, to which the car is added.
-        cars: name of a car -> its weight in the random choice.
+        cars: kind of car -> its weight in the random choice.
         xy: position of the car's centre in W [m].
         yaw: heading of the car [rad].
         rng: random generator for the choice of the car.

@@ -31,7 +31,7 @@ _SIGNS = ("sign_round", "sign_rectangular", "sign_triangular")
 
 
 def furnish_junctions(draft: Draft, network: RoadNetwork) -> None:
-    """Places traffic lights and then signs at all junctions."""
+    """Places traffic lights and signs where three or more roads meet."""
     for junction in network.junctions.values():
         rng = draft.task("junction", junction.name)
         for arm in junction.arms:
@@ -104,7 +104,7 @@ def furnish_sidewalks(
 ) -> None:
     """Places street lamps, trees and then furniture on all sidewalks.
 
-    `junctions` is the area of all junctions in W [m].
+    `junctions` is the area of all junctions in W [m], which is kept clear.
     """
     for task, distance in _FROM_KERB_OF.items():
         keep_off = junctions.buffer(_JUNCTION_CLEARANCE[task])
@@ -117,7 +117,7 @@ def furnish_sidewalks(
 
 
 def park_along_streets(draft: Draft, network: RoadNetwork) -> None:
-    """Parks cars in the parking bays along the roads."""
+    """Parks cars in the parking bays along the roads, where there is room."""
     for (name, side), bay in network.areas.parking_bays.items():
         road = network.roads[name]
         rng = draft.task("bays", name, side)
@@ -137,7 +137,10 @@ def park_along_streets(draft: Draft, network: RoadNetwork) -> None:
 
 
 def plant_medians(draft: Draft) -> None:
-    """Places plants and lamps on the medians of roads."""
+    """Places the `trees` of `medians` in the plan on the medians of roads.
+
+    Without `medians`, the `trees` of the city's `street` are placed.
+    """
     plan = draft.plan.medians or draft.plan.street
     for index, median in enumerate(draft.areas.medians.geoms):
         rng = draft.task("median", index)

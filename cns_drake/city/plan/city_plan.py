@@ -69,7 +69,7 @@ class BuildingPlan(_Model):
             building is turned by `yaw_deg`.
         yaw_deg: heading of the building [deg]. At 0 its front faces the
             direction -y.
-        height: height of the walls [m].
+        height: height of the parapet, ridge or spire [m].
         kind: first part of the building's name in the tables; by default the
             archetype.
     """
@@ -100,7 +100,8 @@ class RowPlan(_Model):
         width: smallest and largest width of a lot [m]. Each lot's width is
             drawn at random between them.
         depth: smallest and largest depth of a lot [m].
-        height: smallest and largest height of the walls [m].
+        height: smallest and largest height of a building's parapet, ridge or
+            spire [m].
         gap: smallest and largest gap between neighbouring buildings [m].
         fill: share of the lots that have a building.
         kind: first part of the buildings' names in the tables; by default the
@@ -317,8 +318,8 @@ class CityPlan(_Model):
             by name.
         street: objects on sidewalks, in front of districts without a `street`
             of their own.
-        medians: plants and lamps on the medians of roads. By default as
-            `street`.
+        medians: objects on the medians of roads; only the fields `trees` and
+            `tree_spacing` are used. By default as `street`.
         districts: districts of the city. If two overlap, the first in the list
             gets the ground.
     """

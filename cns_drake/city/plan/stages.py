@@ -92,7 +92,10 @@ class Stages(_Model):
         }
 
     def heights(self, stage: str) -> dict[str, float]:
-        """Returns name -> height [m] of the structures lower in a stage.
+        """Returns name -> height [m] of structures that still have to grow.
+
+        The heights are those in the stage `stage`. Structures that do not exist
+        there yet can be among them; see `absent`.
 
         Raises:
             KeyError: if there is no such stage.
@@ -106,7 +109,11 @@ class Stages(_Model):
         return heights
 
     def sites(self, stage: str) -> dict[str, float]:
-        """Returns name -> height [m] of the building sites in a stage."""
+        """Returns name -> height [m] of buildings under construction.
+
+        Raises:
+            KeyError: if there is no such stage.
+        """
         return {
             name: group.height
             for group in self.stages[stage].sites.values()
@@ -126,14 +133,18 @@ def load_stages(
 ) -> Stages:
     """Reads `stages.yaml`, and checks it against the city's structures.
 
-    `structures` contains the names of all structures. `text` replaces the
-    content of the file; by default the file is read. Patterns are replaced by
-    the names that they match.
+    In the result, each pattern is replaced by the names that it matches.
+
+    Args:
+        path: the file.
+        structures: names of all structures of the city.
+        text: text to read instead of the content of the file; None to read the
+            file.
 
     Raises:
-        InputError: if the file cannot be read, has a wrong key or type, its
-            stages are out of order, the last one lacks something, a name is
-            unknown or absent twice, or a pattern matches nothing.
+        InputError: if the file cannot be read or has a wrong key or type; if
+            the stages are out of order; if the last stage lacks anything; if a
+            name is unknown or absent twice; or if a pattern matches nothing.
     """
     content = read_yaml(path) if text is None else parse_yaml(text)
     stages = validated(Stages, content, path)

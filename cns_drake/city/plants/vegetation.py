@@ -19,9 +19,15 @@ from cns_drake.city.geometry import (
 
 @dataclass(frozen=True)
 class Species:
-    """A species of tree, with the range of heights of planted trees [m].
+    """A species of tree.
 
-    People can walk under `street` trees: their crowns start at 2.5 m or higher.
+    Attributes:
+        variants: number of its shapes, each with meshes of its own.
+        height_range: least and greatest height of a tree [m].
+        leaf_rgb: colour of the leaves.
+        bark_rgb: colour of the wood.
+        street: whether it can stand on a sidewalk: people can walk under its
+            crown, which begins at 2.5 m or higher.
     """
 
     variants: int
@@ -47,7 +53,10 @@ STREET_TREES = tuple(name for name, kind in SPECIES.items() if kind.street)
 
 
 def mesh_names(species: str, variant: int) -> tuple[str, str]:
-    """Returns the names of a variant's meshes: those of wood and of leaves."""
+    """Returns the names of two meshes of a tree: the wood and the crown.
+
+    `variant` is the number of the tree's shape, from 0.
+    """
     stem = f"{species}_{string.ascii_lowercase[variant]}"
     return f"{stem}_wood", f"{stem}_crown"
 
@@ -59,11 +68,15 @@ def tree(
     height: float | None = None,
     variant: int | None = None,
 ) -> Model:
-    """Returns one tree; parameters that are not given are drawn at random.
+    """Returns one tree; what is not given is drawn at random.
 
-    `height` is the height of the tree's top [m]. It must be within the species'
-    range, so that street trees have enough clearance below their crowns.
-    `variant` is the number of the mesh variant.
+    Args:
+        rng: random generator.
+        species: a key of `SPECIES`.
+        height: height of the tree's top [m]; it should be within the range of
+            the species, so that people can walk below the crowns of street
+            trees.
+        variant: number of the tree's shape, from 0.
     """
     kind = SPECIES[species]
     drawn_height = rng.uniform(*kind.height_range)

@@ -55,9 +55,17 @@ _LET_IN = 2.0
 
 @dataclass(frozen=True)
 class Bare:
-    """An imported building: its surfaces without details, and its style.
+    """An imported building, split into surfaces that details can be added to.
 
-    Walls, roof and all other surfaces are triangles (M, 3, 3) [m].
+    Attributes:
+        one: the building.
+        walls: triangles (M, 3, 3) of the walls [m].
+        roof: triangles (M, 3, 3) of the roof [m].
+        rest: triangles (M, 3, 3) of all other surfaces [m].
+        base: height of the lowest floor in W [m].
+        style: appearance of the building.
+        is_flat: whether the roof is flat.
+        rng: random generator for the details.
     """
 
     one: Imported
@@ -73,9 +81,15 @@ class Bare:
 def all_laid_bare(
     buildings: Sequence[Imported], ground: Ground, seed: int
 ) -> list[Bare]:
-    """Returns all buildings as `Bare`, split into walls, roof and the rest.
+    """Splits buildings into walls, roof and other surfaces.
 
-    Variants of a building have the same style.
+    A variant of a building, such as a lower one in an earlier stage, has the
+    style of the original.
+
+    Args:
+        buildings: the buildings.
+        ground: the ground on which they stand.
+        seed: seed of the random styles.
     """
     found = []
     styles: dict[str, Style] = {}
@@ -129,7 +143,7 @@ _BEFORE, _BELOW_TOP = 0.3, 0.3
 
 
 class DriveViews:
-    """Viewpoints on drives, from which visible walls are found."""
+    """Viewpoints along drives, to find out which walls are visible."""
 
     def __init__(
         self,
@@ -155,20 +169,21 @@ class DriveViews:
             TriangleMesh(self._scene, (solids - self._middle).astype("f4"))
 
     def are_near(self, limits: np.ndarray, distance: float) -> np.ndarray:
-        """Returns (N,) bool: whether boxes are within a distance of a drive.
+        """Returns (N,) bool: whether boxes are near a drive.
 
-        The distance is in [m]. `limits` (N, 2, 2) are the least and greatest x
-        and y of each box [m]. A box is treated as the circle around it.
+        `limits` (N, 2, 2) contains the least and the greatest x and y of each
+        box [m]. A box counts as near if the circle around it is at most
+        `distance` [m] from a viewpoint.
         """
         middles = limits.mean(axis=1)
         reach = np.linalg.norm(limits[:, 1] - middles, axis=1)
         return np.asarray(self._tree.query(middles)[0] <= reach + distance)
 
     def distances(self, panels: Sequence[Panel], most: float) -> np.ndarray:
-        """Returns (N,) distances from panels to drives that see them [m].
+        """Returns (N,) distances from walls to the drives that see them [m].
 
-        A distance is that to the nearest viewpoint that sees the panel. It is
-        infinite if no viewpoint within `most` [m] sees the panel.
+        The distance is that to the nearest viewpoint that sees the wall. It is
+        infinite if no viewpoint within `most` [m] sees it.
         """
         pairs = [self._looks(panel, most) for panel in panels]
         counts = [len(distance) for _, distance in pairs]
@@ -235,10 +250,13 @@ _NO_TRIANGLES = np.zeros((0, 3, 3))
 
 @dataclass(frozen=True)
 class DressedBuildings:
-    """Original building -> building with details, and counts of the details.
+    """The buildings of a city with details, and counts of the details.
 
-    `at_random` counts random details by kind. `by_file` counts buildings for
-    which the file contains an appearance, by its kind.
+    Attributes:
+        buildings: original building -> building with details.
+        at_random: kind of detail -> number of details drawn at random.
+        by_file: kind of appearance, such as a colour -> number of buildings
+            that have it from the file.
     """
 
     buildings: Mapping[Imported, Imported]
@@ -262,14 +280,14 @@ def dress_buildings(
     shops face streets.
 
     Args:
-        structures: the structures of the city, of which the buildings are
-            dressed.
+        structures: the structures of the city, of which the buildings get
+            details.
         drives: the drives, near which there is more detail.
         streets: the streets that doors and shops face.
         ground: the ground on which buildings stand.
         seed: seed of all random draws.
-        always: structures that exist in all stages and so hide what is behind
-            them; None for all structures.
+        always: structures that exist in all stages. Only these hide walls,
+            which then get no details. None for all structures.
         paving: triangles (M, 3, 3) of terrain, streets and sidewalks, on which
             doors stand [m].
     """
@@ -416,12 +434,16 @@ def _seen(
 
 @dataclass(frozen=True)
 class Dressing:
-    """A dressed city, and what was added to it.
+    """An imported city with added details, and what was added.
 
-    `origins` maps the names of changed or added structures to `dressed` or
-    `lot`; all other structures are as in the file. `facts` contains counts of
-    parts from the file and of random parts. `bottom` contains the ground with
-    class and colour if the file has no terrain.
+    Attributes:
+        city: the city with its details.
+        origins: name of a changed or added structure -> `dressed` for one with
+            added details, or `lot` for one that was drawn at random. All other
+            structures are as in the file.
+        facts: counts of details from the file and of random ones.
+        bottom: structures of the guessed ground; empty if the file has a
+            terrain.
     """
 
     city: StagedCity
@@ -439,8 +461,8 @@ def dress_city(
 ) -> Dressing:
     """Returns a city with details on its buildings and along its streets.
 
-    Small objects of the file that were counted as left out, but get a place
-    here, are removed from the faults of `city`.
+    Small objects of the file count as left out in `city.faults`; those that get
+    a place here are taken off this count.
 
     Args:
         staged: the structures of each stage.

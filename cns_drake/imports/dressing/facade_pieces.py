@@ -58,11 +58,16 @@ _ON_GROUND = 0.6
 
 
 class Opening(NamedTuple):
-    """A window or a door in a wall, in the coordinates of its panel [m].
+    """A window or a door in a wall, in the wall's panel coordinates [m].
 
-    `row` is the number of the storey, and `nth` the number of the bay, counted
-    from the nearer end of the wall. `kind` is `window`, `shop`, `door` or
-    `gate`.
+    Attributes:
+        row: number of the storey, from 0.
+        nth: number of the bay, counted from the nearer end of the wall, from 0.
+        x0: left end, seen from outside.
+        x1: right end.
+        z0: height of the lower edge.
+        z1: height of the upper edge.
+        kind: `window`, `shop`, `door` or `gate`.
     """
 
     row: int
@@ -82,8 +87,8 @@ class FacadePlan:
         panel: the wall.
         style: the style of the building.
         openings: the wall's windows and doors.
-        floor, ground: heights of the lowest floor, and of the ground in front,
-            in panel coordinates [m].
+        floor: height of the lowest floor above the panel's origin [m].
+        ground: height of the ground in front, above the panel's origin [m].
         to_drive: distance from the wall to the nearest drive [m].
         top_is_free: whether no building touches the wall's upper edge.
     """
@@ -102,22 +107,23 @@ class FacadePlan:
 
     @property
     def on_street(self) -> list[Opening]:
-        """Openings in the ground floor."""
+        """Openings of the ground floor; none if the wall begins higher."""
         on_ground = self.stands_on_ground
         return [o for o in self.openings if o.row == 0 and on_ground]
 
     def is_in_the_way(self, z: float, reach: float) -> bool:
-        """Returns whether a part at height z [m] would block a car on a drive.
+        """Returns whether a part on the wall would block a car on a drive.
 
-        The part protrudes from the wall by `reach` [m].
+        `z` is the height of the part above the panel's origin, and `reach` is
+        how far it protrudes from the wall [m].
         """
         is_low = z - self.ground < _TALLEST_CAR
         return is_low and self.to_drive < reach + _BESIDE
 
     def probes(self) -> np.ndarray:
-        """Returns points (N + 1, 3) in front of each opening and the top.
+        """Returns places (N + 1, 3) in front of N openings and the top [m].
 
-        A wall or opening is hidden if its point cannot be seen.
+        An opening, or the wall's top, is hidden if its place cannot be seen.
         """
         panel = self.panel
         at = [((o.x0 + o.x1) / 2, (o.z0 + o.z1) / 2) for o in self.openings]
@@ -126,11 +132,10 @@ class FacadePlan:
         return panel.place(x, z, _BEFORE)
 
     def threshold(self, door: Opening, paving: upper_sides.UpperSides) -> float:
-        """Returns the height of a door's threshold, in panel coordinates [m].
+        """Returns the height of a door's threshold in panel coordinates [m].
 
         The threshold is one step above the highest paving in front of the door
-        and in the door's recess. Paving far above or below the ground is
-        ignored.
+        and in its recess. Paving far above or below the ground is ignored.
         """
         depths = {"shop": _SHOP_DEPTH, "gate": _GATE_DEPTH}
         deep = depths.get(door.kind, self.style.depth + _DOOR_DEEPER)
@@ -147,7 +152,8 @@ class FacadePlan:
     def without(self, is_hidden: np.ndarray) -> FacadePlan:
         """Returns the plan without hidden openings.
 
-        `is_hidden` (N + 1,) says which of the points `probes` are hidden.
+        `is_hidden` (N + 1,) says which of the places that `probes` returns are
+        hidden: those of the openings, and that of the wall's top.
         """
         pairs = zip(self.openings, is_hidden[:-1], strict=True)
         return replace(
@@ -165,8 +171,8 @@ def plan_facade(
     Args:
         panel: the wall.
         style: the style of the building.
-        base: height of the lowest floor of the building [m].
-        ground: height of the ground in front of the panel [m].
+        base: height of the building's lowest floor in W [m].
+        ground: height of the ground in front of the wall in W [m].
         to_drive: distance from the wall to the nearest drive [m].
     """
     floor, ground = base - panel.origin[2], ground - panel.origin[2]
@@ -272,7 +278,16 @@ _EXACT, _LEAST_AREA = 1e-3, 1e-4
 def add_facade(
     out: Assembly, plan: FacadePlan, rng: np.random.Generator
 ) -> Counter[str]:
-    """Adds all parts of a wall to `out`; returns kind of part -> number."""
+    """Adds a wall and all its details to a building under assembly.
+
+    Args:
+        out: the building, which gets the parts.
+        plan: the plan of the wall.
+        rng: random generator for balconies and signs.
+
+    Returns:
+        Kind of detail, such as `windows` -> number of details.
+    """
     counts: Counter[str] = Counter()
     panel, style = plan.panel, plan.style
     has_balconies = style.balconies and bool(rng.random() < 0.6)
@@ -514,7 +529,10 @@ _RIDGE = 0.15
 
 
 def is_flat_roof(roof: np.ndarray) -> bool:
-    """Returns whether most of a roof's triangles (M, 3, 3) are level."""
+    """Returns whether most of the area of a roof is level.
+
+    `roof` contains the triangles (M, 3, 3) of the roof [m].
+    """
     above = np.abs(upper_sides.long_normals(roof)[:, 2])
     level = np.abs(upper_sides.unit_normals(roof)[:, 2]) > _LEVEL
     return bool(above[level].sum() >= _FLAT_PART * above.sum())
@@ -523,7 +541,14 @@ def is_flat_roof(roof: np.ndarray) -> bool:
 def add_roof_pieces(
     out: Assembly, roof: np.ndarray, style: Style, is_flat: bool
 ) -> None:
-    """Adds equipment or chimneys to a roof of triangles (M, 3, 3) [m]."""
+    """Adds equipment to a flat roof, or chimneys to a pitched one.
+
+    Args:
+        out: the building under assembly, which gets the parts.
+        roof: triangles (M, 3, 3) of the roof [m].
+        style: style of the building, whose use decides what is added.
+        is_flat: whether the roof is flat.
+    """
     items = _ITEMS.get(style.use, "").split()
     if is_flat and items and (found := _largest_level(roof)) is not None:
         area, z = found

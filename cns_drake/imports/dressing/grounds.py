@@ -1,4 +1,4 @@
-"""The ground of a dressed city: kerbs, sidewalks, streets, paving, marks."""
+"""Adds kerbs, sidewalks, streets and lane marks to an imported city."""
 
 from collections.abc import Iterator, Sequence
 from dataclasses import replace
@@ -52,7 +52,7 @@ _GRID = 0.001
 
 
 def is_dense(structures: Sequence[Imported]) -> bool:
-    """Returns whether buildings cover a large part of the city's area."""
+    """Returns whether buildings cover at least 12 % of the area around them."""
     outlines = [
         one.structure.model.footprint
         for one in structures
@@ -72,7 +72,7 @@ def paved(structure: Structure) -> Structure:
 
 
 def with_kerb(one: Imported) -> Imported:
-    """Returns a sidewalk with a vertical face along its whole edge."""
+    """Returns a sidewalk with a kerb: a vertical face along its whole edge."""
     structure = one.structure
     name = f"{structure.name}_kerb"
     edges = _outer_edges(turned_up(one.triangles))
@@ -112,7 +112,7 @@ def _outer_edges(triangles: np.ndarray) -> np.ndarray:
 def near_drives(
     structures: Sequence[Imported], drives: Sequence[WaypointDrive]
 ) -> list[Imported]:
-    """Returns the structures near drives."""
+    """Returns the structures that are at most 80 m from a drive."""
     paths = MultiLineString([drive.path for drive in drives])
     shapely.prepare(paths)
     outlines = [one.structure.model.footprint for one in structures]
@@ -127,10 +127,16 @@ def missing_sidewalks(
     streets: Sequence[Street],
     drives: Sequence[WaypointDrive],
 ) -> Iterator[Imported]:
-    """Yields sidewalks near drives that are missing in the file.
+    """Yields sidewalks for streets whose tags do not mention sidewalks.
 
-    They belong to streets whose tags do not mention sidewalks. The ground must
-    be level.
+    Only the larger streets within 80 m of a drive get them. The ground must be
+    level.
+
+    Args:
+        structures: structures of the city, which the sidewalks must not
+            overlap.
+        streets: the streets.
+        drives: the drives, at least one.
     """
     paths = MultiLineString([drive.path for drive in drives])
     near = [
@@ -281,10 +287,10 @@ _SQUARE = 50.0
 def paved_gaps(
     structures: Sequence[Imported], drives: Sequence[WaypointDrive]
 ) -> Iterator[Imported]:
-    """Yields sidewalks that fill narrow gaps beside sidewalks.
+    """Yields sidewalks that fill the gaps beside sidewalks near drives.
 
-    Such gaps lie between sidewalks, roads and buildings near drives, where the
-    imported file has no ground. The ground is level.
+    A gap is at most 3 m wide, such as between a sidewalk and a building. The
+    ground must be level.
     """
     near = near_drives(
         [one for one in structures if one.kind != "Tree"], drives
@@ -370,7 +376,7 @@ _WHITE: Rgb = (0.86, 0.86, 0.84)
 def lane_marks(
     streets: Sequence[Street], drives: Sequence[WaypointDrive]
 ) -> Iterator[Imported]:
-    """Yields the middle lines of the larger streets near drives.
+    """Yields dashed lines in the middle of the larger streets near drives.
 
     There must be at least one drive, and the ground must be level.
     """

@@ -48,10 +48,15 @@ FROM_EDGE = 0.6
 def beside_street(
     xy: np.ndarray, streets: Sequence[Street], courses: Sequence[LineString]
 ) -> tuple[np.ndarray, float]:
-    """Returns a place beside the carriageway, and the heading to the street.
+    """Returns a place beside the nearest street, and the heading to it [rad].
 
-    If `xy` (2,) [m] is on a carriageway, the result is a place next to it, and
-    otherwise `xy`. The heading is in [rad].
+    A place on a carriageway, or close to it, is moved to 0.6 m beside it. Any
+    other place stays.
+
+    Args:
+        xy: (2,) the place in W [m].
+        streets: the streets.
+        courses: middle line of each street [m].
     """
     point = Point(xy)
     distances = shapely.distance(courses, point)
@@ -74,10 +79,13 @@ def beside_street(
 def place_along(
     line: LineString, s: float, side: float, offset: float
 ) -> tuple[tuple[float, float], float]:
-    """Returns a place beside a line, and the heading of the object there.
+    """Returns a place beside a line, and the heading of the line there [rad].
 
-    The place is at the distance `s` along the line and `offset` beside it [m].
-    `side` is 1 for the right, and -1 for the left. The heading is in [rad].
+    Args:
+        line: the line in W [m].
+        s: distance along the line [m].
+        side: 1 for the right side, -1 for the left.
+        offset: distance from the line [m].
     """
     at = station_at(line, s)
     x = at.x + side * offset * float(np.sin(at.yaw))
@@ -92,9 +100,9 @@ _POST, _DISC, _BALL = "round_post", "round_disc", "round_ball"
 
 
 def without_curves(model: Model) -> Model:
-    """Returns a model with polyhedra instead of cylinders and spheres.
+    """Returns a model with polyhedra in place of cylinders and spheres.
 
-    The cross-sections of the polyhedra have the same areas.
+    A polyhedron has the same cross-section area as the shape that it replaces.
     """
     parts, meshes = [], dict(model.meshes)
     for part in model.parts:
@@ -137,12 +145,18 @@ _SOLID = ("building", "fence", "other-structure")
 
 @dataclass
 class StreetThings:
-    """The small objects along streets that were placed, and counts of them.
+    """The small objects that were placed along streets, and their counts.
 
-    `by_file` counts objects from the file, and `at_random` random objects.
-    `no_room` counts objects from the file that are left out, because they would
-    block a drive or stand in a wall or another object. `moved` contains trees
-    from the file that stood on a carriageway and were moved to its edge.
+    Attributes:
+        structures: the objects.
+        from_file: names of the structures that come from the file.
+        moved: original -> moved tree, for trees of the file that stood on a
+            carriageway.
+        sources: ids, in the file, of the objects that were placed.
+        by_file: kind of object -> number of objects from the file.
+        at_random: kind of object -> number of random objects.
+        no_room: number of objects of the file that are left out, because they
+            would block a drive or stand in a wall or another object.
     """
 
     structures: list[Imported] = field(default_factory=list)
@@ -155,7 +169,11 @@ class StreetThings:
 
 
 class StreetRoom:
-    """The free space for small objects: places objects where it is free."""
+    """Places small objects in a city where there is room for them.
+
+    `found` (a `StreetThings`) gets the objects, and `lamps` lists the positions
+    (x, y) of the street lamps among them [m].
+    """
 
     def __init__(
         self,
@@ -194,7 +212,7 @@ class StreetRoom:
         self.lamps: list[tuple[float, float]] = []
 
     def is_near(self, line: np.ndarray, distance: float) -> bool:
-        """Returns whether a line (N, 2) is near a drive."""
+        """Returns whether a line (N, 2) is within a distance of a drive [m]."""
         return bool(shapely.dwithin(LineString(line), self.paths, distance))
 
     def keep_tree(self, tree: Imported) -> None:
@@ -203,7 +221,11 @@ class StreetRoom:
         self._taken.add(Point(x, y).buffer(_TRUNK, 4))
 
     def has_tree_pit(self, xy: np.ndarray) -> bool:
-        """Returns whether a trunk at (2,) is off roads, walls and drives."""
+        """Returns whether a tree could stand at a place.
+
+        The trunk must be off roads, buildings and drives. `xy` (2,) is the
+        place in W [m].
+        """
         pit = Point(xy).buffer(_TRUNK, 2)
         around = shapely.get_coordinates(pit)
         return not (
@@ -220,16 +242,17 @@ class StreetRoom:
         yaw: float,
         rng: np.random.Generator,
     ) -> bool:
-        """Places an object if its place is free; returns whether it was.
+        """Places an object if there is room for it; returns whether there was.
 
         The object stands at the height of the lowest ground below it. Only cars
         are placed on carriageways.
 
         Args:
             name: name of the new structure.
-            kind: kind of object, a key of `OBJECTS`.
+            kind: kind of object, a key of
+                `cns_drake.city.placement.objects.OBJECTS`.
             xy: position of the object's centre in W [m].
-            yaw: heading of the object [rad].
+            yaw: heading of the object in W [rad].
             rng: random generator for the object's variant and colours.
         """
         builder = OBJECTS[kind]
@@ -299,10 +322,9 @@ _ROW_PITCH, _BAY, _AISLE = 6.2, (2.6, 5.0), 5.5
 
 
 def may_park_on(side: str, street: Street) -> bool:
-    """Returns whether cars may park on a side of a street.
+    """Returns whether the tags of a street allow parking on one of its sides.
 
-    `side` is `left` or `right`. For the tags, see
-
+    `side` is `left` or `right`. Tags:
     https://wiki.openstreetmap.org/wiki/Street_parking
     """
     if street.tags.get("highway", "") in _TABLES["streets without parked cars"]:
@@ -316,9 +338,13 @@ def may_park_on(side: str, street: Street) -> bool:
 
 
 class Row(NamedTuple):
-    """A street along which cars may park: name, middle line, half width [m].
+    """A street along which cars may park.
 
-    `may_park` says whether cars may park on the right, and on the left.
+    Attributes:
+        name: name of the street.
+        line: middle line of the street [m].
+        half: half the width of the carriageway [m].
+        may_park: whether cars may park on the right, and on the left.
     """
 
     name: str
@@ -330,7 +356,14 @@ class Row(NamedTuple):
 def park_along(
     placing: StreetRoom, row: Row, lines: BaseGeometry, rng: np.random.Generator
 ) -> None:
-    """Parks cars along both sides of a street, where they may park."""
+    """Parks cars at random on those sides of a street where they may park.
+
+    Args:
+        placing: places the cars.
+        row: the street.
+        lines: middle lines of all streets, near whose crossings no car parks.
+        rng: random generator for places and kinds of cars.
+    """
     line = row.line
     others = lines.difference(line.buffer(0.5))
     for side, is_allowed in zip((1.0, -1.0), row.may_park, strict=True):
@@ -353,7 +386,13 @@ def park_along(
 
 
 def fill_car_park(placing: StreetRoom, one: Imported, seed: int) -> None:
-    """Parks cars along the longer sides of a car park."""
+    """Parks cars at random along the longer sides of a car park.
+
+    Args:
+        placing: places the cars.
+        one: the car park.
+        seed: seed of the random draws.
+    """
     outline = MultiPoint(one.triangles.reshape(-1, 3)[:, :2])
     box = np.array(outline.minimum_rotated_rectangle.boundary.coords)
     if len(box) != 5 or not placing.is_near(box, ROWS_WITHIN):

@@ -37,14 +37,23 @@ _SMALL = 45.0  # [m^2]
 
 @dataclass(frozen=True)
 class Style:
-    """The details that a building gets; lengths are in [m].
+    """The style of a building; all lengths are in [m].
 
-    For windows, `pitch` is the distance between the centres of neighbours,
-    `sill` the height above the floor, and `depth` the depth of the recess.
-    `shops` says whether the ground floor may have shops on the street, and
-    `balconies` whether every other window has a balcony. A plinth or cornice
-    with height 0 does not exist. `by_tag` lists the fields whose values come
-    from the file.
+    Attributes:
+        use: use of the building, such as `flats`.
+        storey: height of a storey.
+        pitch: distance between the centres of neighbouring windows.
+        width: width of a window.
+        sill: height of a window's lower edge above the floor.
+        height: height of a window.
+        depth: depth of a window's recess.
+        wall, roof, glass, frame, trim, door, sign: colours of these parts.
+        shops: whether the ground floor may have shops on the street.
+        balconies: whether every other window may have a balcony.
+        plinth: height of the plinth; 0 for none.
+        cornice: height of the cornice; 0 for none.
+        by_tag: what comes from the file's tags, of `use`, `levels` (the number
+            of storeys), `wall` and `roof`.
     """
 
     use: str
@@ -73,8 +82,10 @@ def building_use(
 ) -> tuple[str, bool]:
     """Returns the use of a building, and whether its tags state the use.
 
-    Without such tags, the use follows from the area of the footprint [m^2] and
-    the height of the walls [m].
+    Args:
+        tags: tags of the building, as in OpenStreetMap.
+        area: area of the footprint [m^2]; it decides if the tags state no use.
+        height: height of the walls [m]; it decides if the tags state no use.
     """
     words = [tags.get(key, "") for key in _USE_KEYS]
     words += [key for key in ("shop", "office") if key in tags]
@@ -92,7 +103,10 @@ def building_use(
 
 
 def tagged_colour(tags: Mapping[str, str], part: str) -> Rgb | None:
-    """Returns the colour that tags state for a part, such as `building`."""
+    """Returns the colour that tags state for a part; None if they state none.
+
+    `part` is the beginning of the tags' keys, `building` or `roof`.
+    """
     for key in (f"{part}:colour", f"{part}:color"):
         text = tags.get(key, "").strip().lower()
         for name in (text, re.sub(r"[\s_-]", "", text)):

@@ -1,4 +1,4 @@
-"""Plane walls of imported buildings, found among a file's triangles."""
+"""Finds the plane walls of imported buildings among their triangles."""
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
@@ -36,11 +36,17 @@ _BENT, _PIECE_BENT = 0.05, 0.01
 class Panel:
     """A vertical wall, or a piece of one, as seen from outside.
 
-    Panel coordinates are x to the right and z upwards [m]. `origin` (3,) is the
-    point x = z = 0 in W, and `along` (2,) is a unit vector to the right.
-    `outline` is a polygon in x and z; None if the wall is a rectangle.
-    `triangles` (M, 3, 3) are the triangles in the file, and `building` is the
-    number of their building. `is_plane` is False for a wall that bends.
+    In panel coordinates, x runs to the right and z upwards [m].
+
+    Attributes:
+        building: number of the building.
+        origin: (3,) point x = z = 0 in W [m].
+        along: (2,) unit vector to the right.
+        length: length along x [m].
+        height: height along z [m].
+        outline: polygon in x and z; None if the wall is a rectangle.
+        triangles: (M, 3, 3) triangles of the wall in the file [m].
+        is_plane: whether the wall is plane; otherwise it bends.
     """
 
     building: int
@@ -59,14 +65,14 @@ class Panel:
 
     @property
     def frame(self) -> WallFrame:
-        """Frame of the wall, in which facade details are placed."""
+        """Frame of the wall, with which details of the facade are placed."""
         start = self.origin[:2]
         return WallFrame([start, start + self.length * self.along], 0)
 
     def place(
         self, x: ArrayLike, z: ArrayLike, out: ArrayLike = 0.0
     ) -> np.ndarray:
-        """Converts panel coordinates to points (..., 3) in the world [m].
+        """Converts panel coordinates to places (..., 3) in W [m].
 
         Args:
             x: distance along the panel from its origin [m].
@@ -93,12 +99,14 @@ def find_panels(
     walls: Sequence[np.ndarray],
     is_wanted: Callable[[np.ndarray], np.ndarray] | None = None,
 ) -> list[Panel]:
-    """Returns the panels of the walls of buildings.
+    """Returns the walls of buildings as panels; a bent wall as several.
 
-    `walls` contains for each building its vertical triangles (M, 3, 3), which
-    face outwards [m]. `is_wanted` selects walls: it takes the least and
-    greatest x and y of N walls, (N, 2, 2) [m], and returns (N,) bool. By
-    default all walls are selected.
+    Args:
+        walls: for each building, its vertical triangles (M, 3, 3), which face
+            outwards [m].
+        is_wanted: function that selects walls. It takes the least and the
+            greatest x and y of N walls, (N, 2, 2) [m], and returns (N,) bool.
+            None for all walls.
     """
     triangles = joined(walls)
     building = np.repeat(np.arange(len(walls)), [len(w) for w in walls])

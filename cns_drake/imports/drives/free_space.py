@@ -40,12 +40,15 @@ _LEAST_ROAD = 800.0
 
 @dataclass(frozen=True)
 class FreeSpace:
-    """The free space for a car, on a grid with the corner `low` (2,) [m].
+    """The free space for a car, on a grid of square cells.
 
-    `clearance` (rows along y, columns along x) is the distance from the centre
-    of each cell to the nearest obstacle [m], and 0 where a car must not drive.
-    `least` is the clearance that a path needs [m]. `walls` are the obstacles,
-    seen from above.
+    Attributes:
+        low: (2,) corner of the grid with the least x and y [m].
+        clearance: (R, C) distance from the centre of each cell to the nearest
+            obstacle [m]; 0 where a car must not drive. Rows are along y,
+            columns along x.
+        least: clearance that a path needs [m].
+        walls: search tree of the obstacles, seen from above.
     """
 
     low: np.ndarray
@@ -54,7 +57,7 @@ class FreeSpace:
     walls: STRtree
 
     def clearance_at(self, xy: np.ndarray) -> np.ndarray:
-        """Returns the distances (N,) to obstacles at places (N, 2) [m].
+        """Returns the distance (N,) from places (N, 2) to obstacles [m].
 
         A place outside of the grid gets the distance of the nearest cell.
         """
@@ -65,10 +68,10 @@ class FreeSpace:
         return self.clearance[row, column]
 
     def obstacle(self, path: np.ndarray) -> np.ndarray | None:
-        """Returns the first place (2,) of a path where a car does not fit.
+        """Returns the first place (2,) of a path where a car does not fit [m].
 
-        It is None if the car fits everywhere. The path is given by places (N,
-        2) that are close together [m].
+        The result is None if the car fits everywhere. `path` (N, 2) contains
+        places on the path that are close together [m].
         """
         narrow = self.clearance_at(path) < self.least - _SLACK
         hit = self.walls.query(shapely.points(path), "dwithin", _HALF_CAR)[0]
@@ -76,17 +79,20 @@ class FreeSpace:
         return path[narrow.argmax()] if narrow.any() else None
 
     def middle(self, row: np.ndarray, column: np.ndarray) -> np.ndarray:
-        """Returns the centres (N, 2) of cells, given by row and column [m]."""
+        """Returns the centres (N, 2) of cells [m], given by row and column.
+
+        `row` and `column` are (N,) indices of the grid.
+        """
         return self.low + CELL * (np.c_[column, row] + 0.5)
 
 
 def find_free_space(
     structures: Sequence[Imported], ground: Ground
 ) -> FreeSpace:
-    """Returns the space for a car that is free in all stages.
+    """Returns the space for a car that is free in all stages of a city.
 
     `structures` are those of all stages. If the city has roads, only space on
-    roads counts.
+    roads counts as free.
     """
     low, high = _window(structures)
     size = np.ceil((high - low) / CELL).astype(int) + 1

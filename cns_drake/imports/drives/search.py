@@ -1,9 +1,10 @@
 """Searches two drives through a city that share a part of their paths.
 
 The first drive is approximately the longest of all shortest paths. The second
-drive shares the middle part of the first drive; before and after it, an "arm"
-of its own leads elsewhere. A `WayGraph` defines the pieces that make up a path
-("way"): lanes of streets, or cells of free space.
+drive shares the middle part of the first drive, but begins and ends elsewhere:
+with two "arms" of its own. A path is a sequence of pieces, such as lanes of
+streets or cells of free space. A `WayGraph` says which piece can follow which;
+a sequence of its pieces is called a way.
 """
 
 from abc import ABC, abstractmethod
@@ -74,9 +75,12 @@ _MOST_REACHED = 400_000
 
 @dataclass(frozen=True)
 class WaypointDrive:
-    """A drive: its waypoints (N, 2) or (N, 3), and the path (M, 2) [m].
+    """A drive through an imported city.
 
-    `limit` is the lowest speed limit along the path [m/s]; None without one.
+    Attributes:
+        waypoints: (N, 2) or (N, 3) places through which the car drives [m].
+        path: (M, 2) closely spaced places on the path [m].
+        limit: lowest speed limit along the path [m/s]; None without one.
     """
 
     waypoints: np.ndarray
@@ -92,13 +96,18 @@ class WaypointDrive:
 def steerable_drive(
     waypoints: np.ndarray, room: Room | None = None, margin: float = _MARGIN
 ) -> WaypointDrive | Obstacle:
-    """Returns the drive along waypoints, or the place of an obstacle.
+    """Returns the drive along waypoints, or the place (2,) where it fails.
 
-    Waypoints are (N, 2) or (N, 3) [m]. `room` takes the path and returns the
-    place of an obstacle on it, or None; by default there are no obstacles. A
-    bend also counts as an obstacle if its radius is less than `margin` times
-    the car's smallest radius. If the path is too short for a drive, its middle
-    is returned as an obstacle.
+    A drive fails at an obstacle, at a bend that is too tight for the car, or in
+    its middle if it is too short.
+
+    Args:
+        waypoints: (N, 2) or (N, 3) places [m].
+        room: function that takes places (M, 2) along the path, and returns the
+            first one with an obstacle, or None; by default there are no
+            obstacles.
+        margin: least radius of a bend, as a multiple of the car's smallest
+            turning radius.
     """
     waypoints = np.round(waypoints, 3)
     xyz = np.zeros((len(waypoints), 3))
@@ -119,7 +128,10 @@ def steerable_drive(
 
 
 def evenly_spaced(line: np.ndarray, spacing: float) -> np.ndarray:
-    """Returns places (N, D) along a line (M, D), about `spacing` apart [m]."""
+    """Returns places (N, D) along a line (M, D), about `spacing` apart [m].
+
+    Ends of the line are kept.
+    """
     steps = np.linalg.norm(np.diff(line, axis=0), axis=1)
     along = np.concatenate([[0.0], np.cumsum(steps)])
     count = max(1, round(along[-1] / spacing))
@@ -128,9 +140,10 @@ def evenly_spaced(line: np.ndarray, spacing: float) -> np.ndarray:
 
 
 def driven_path(points: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Returns places (M, 2) of a path, and the radii (M,) there [m].
+    """Returns places (M, 2) along a path, and the radii (M,) of its bends [m].
 
-    The path is a spline with evenly spaced control points `points` (N, 2) [m].
+    The path is a spline; `points` (N, 2) are its evenly spaced control points
+    [m].
     """
     reach = _DEGREE // 2
     points = np.concatenate(
@@ -150,11 +163,15 @@ def driven_path(points: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
 
 
 class WayGraph(ABC):
-    """A graph whose nodes are N pieces of possible paths ("ways") of a car.
+    """A graph from whose N pieces the paths of a car can be built.
 
-    `lengths` (N,) contains the lengths of the pieces [m]. Edges lead from each
-    piece to the pieces that can follow it. `is_open` (N,) says which pieces a
-    car can drive along, as far as is known.
+    A piece is, for example, a lane from one junction to the next. A sequence of
+    pieces is called a way. An edge of the graph leads from a piece to each
+    piece that can follow it.
+
+    Attributes:
+        lengths: (N,) lengths of the pieces [m].
+        is_open: (N,) whether a car can drive along a piece, as far as is known.
     """
 
     def __init__(
@@ -178,42 +195,61 @@ class WayGraph(ABC):
 
     @abstractmethod
     def beside(self, pieces: np.ndarray, joint: int) -> np.ndarray:
-        """Returns (N,) bool: which pieces an arm must not use.
+        """Returns (N,) bool: pieces that an arm of the second drive must avoid.
 
-        An arm is the part of the second drive that it does not share with the
-        first. It must not use the pieces of drives (`pieces`), nor pieces close
-        to them. `joint` is the piece at which the arm begins.
+        An arm is the part of the second drive before it joins the first drive,
+        or after it leaves it. Pieces to avoid are the pieces of the drives so
+        far, and pieces close to them.
+
+        Args:
+            pieces: numbers of the pieces of the drives so far.
+            joint: piece at which the second drive joins or leaves the first
+                one; this piece is allowed.
         """
 
     @abstractmethod
     def is_simple(self, way: Sequence[int]) -> bool:
-        """Returns whether a way (sequence of pieces) visits no place twice."""
+        """Returns whether a way visits no place twice.
+
+        `way` is a sequence of piece numbers.
+        """
 
     @abstractmethod
     def drive(self, way: Sequence[int]) -> WaypointDrive | Obstacle:
-        """Returns the drive along a way, or the obstacle that prevents it."""
+        """Returns the drive along a way, or the place (2,) of an obstacle.
+
+        `way` is a sequence of piece numbers.
+        """
 
     @abstractmethod
     def blocked(self, way: Sequence[int], place: Obstacle) -> np.ndarray:
-        """Returns the pieces of a way that an obstacle at `place` blocks."""
+        """Returns the pieces of a way that an obstacle blocks.
+
+        `way` is a sequence of piece numbers, and `place` (2,) the place of the
+        obstacle [m].
+        """
 
     def along(self, way: Sequence[int]) -> np.ndarray:
         """Returns the distance (N,) along a way to each piece's end [m]."""
         return np.cumsum(self.lengths[list(way)])
 
     def length(self, way: Sequence[int]) -> float:
-        """Returns the length of a way [m]."""
+        """Returns the length of a way [m]; 0 if the way has no pieces."""
         return float(self.along(way)[-1]) if len(way) else 0.0
 
     def cut(self, way: list[int], longest: float) -> list[int]:
-        """Returns the beginning of a way, no longer than `longest` [m]."""
+        """Returns the first pieces of a way, no longer than `longest` [m].
+
+        At least one piece is returned.
+        """
         kept = int(np.searchsorted(self.along(way), longest, "right"))
         return way[: max(1, kept)]
 
     def links(self, closed: np.ndarray | None = None) -> csr_array:
-        """Returns the costs from piece to next piece, as a sparse matrix.
+        """Returns the costs from piece to next piece, as a matrix (N, N).
 
-        Pieces in the mask `closed` (N,) are left out.
+        Pieces that are not open, and those in the mask `closed` (N,), have no
+        edges.
         """
         is_open = self.is_open if closed is None else self.is_open & ~closed
         before, after, costs = self._links
@@ -226,7 +262,7 @@ class WayGraph(ABC):
 def find_drives(graph: WayGraph) -> list[WaypointDrive]:
     """Returns two drives that share a part, one drive, or none.
 
-    It returns fewer than two drives if no more are found.
+    There are fewer than two only if no more are found.
     """
     for _ in range(_MOST_TRIES):
         way = _longest(graph)
@@ -392,10 +428,14 @@ _ROUND, _SMOOTH_ASIDE = 7, 15
 class Lane:
     """A lane from one junction to the next.
 
-    `line` (N, 2) is the middle of the street, in driving direction [m]. The
-    lane lies at the distance `aside` to the right of this line [m]. The lane in
-    the opposite direction on the same piece of street has the same number
-    `way`.
+    Attributes:
+        line: (N, 2) middle of the street, in driving direction [m].
+        begin: node at which the lane begins.
+        end: node at which the lane ends.
+        aside: distance of the lane to the right of `line` [m]; to the left
+            where traffic keeps left.
+        way: number of the piece of street; the lane in the opposite direction
+            has the same number.
     """
 
     line: np.ndarray
@@ -410,7 +450,10 @@ class Lane:
 
 
 def make_lanes(streets: Sequence[Street]) -> list[Lane]:
-    """Returns the lanes of streets, cut where streets meet."""
+    """Returns the outermost lane of each street in each allowed direction.
+
+    Streets are cut where they meet.
+    """
     lanes: list[Lane] = []
     for way, (street, line, (begin, end)) in enumerate(cut_at_nodes(streets)):
         if street.forward:
@@ -423,7 +466,8 @@ def make_lanes(streets: Sequence[Street]) -> list[Lane]:
 def lane_links(lanes: Sequence[Lane]) -> tuple[np.ndarray, np.ndarray]:
     """Returns pairs of lanes of which the first leads into the second.
 
-    The result is the numbers of the first lanes, and of the second lanes.
+    The result is two arrays (L,): the numbers of the first lanes, and those of
+    the second lanes. Sharp turns are left out.
     """
     starts: defaultdict[int, list[int]] = defaultdict(list)
     for number, lane in enumerate(lanes):
@@ -449,7 +493,12 @@ def _leads_on(lane: Lane, after: Lane) -> bool:
 def lane_path(lanes: Sequence[Lane], spacing: float) -> np.ndarray:
     """Returns a line (N, 3) along lanes: x, y and lateral offset [m].
 
-    Each lane leads into the next. The points are about `spacing` apart [m].
+    x and y are in the middle of the street; the offset is the `aside` of the
+    lane.
+
+    Args:
+        lanes: lanes, of which each leads into the next.
+        spacing: approximate distance between points [m].
     """
     parts = []
     for lane in lanes:
@@ -461,7 +510,7 @@ def lane_path(lanes: Sequence[Lane], spacing: float) -> np.ndarray:
 
 
 class CellGraph(WayGraph):
-    """A graph of free cells, each linked to its eight neighbours."""
+    """A `WayGraph` of the cells of free space, each with eight neighbours."""
 
     def __init__(self, space: FreeSpace):
         self._space = space
@@ -514,11 +563,15 @@ def simplified_drive(
     space: FreeSpace,
     tolerances: Sequence[float] = _SIMPLIFICATIONS,
 ) -> WaypointDrive | Obstacle:
-    """Returns a drive with few waypoints, or the obstacle that prevents it.
+    """Returns a drive with few waypoints along a line, or where it fails.
 
-    The drive passes the places `xy` (N, 2), about 1 m apart, within a tolerance
-    [m]. The tolerances are tried one after the other until a drive fits into
-    the free space `space`.
+    The tolerances are tried one after the other, until a drive fits into the
+    free space. If none fits, the result is the place (2,) of an obstacle [m].
+
+    Args:
+        xy: (N, 2) places on the line, about 1 m apart [m].
+        space: the free space.
+        tolerances: distances by which the drive may deviate from the line [m].
     """
     found: WaypointDrive | Obstacle = xy[len(xy) // 2]
     for straightened, tolerance in product(_STRAIGHTENED, tolerances):
@@ -552,7 +605,7 @@ def _densified(corners: np.ndarray) -> np.ndarray:
 
 
 class StreetGraph(WayGraph):
-    """A graph of lanes of streets, from junction to junction.
+    """A `WayGraph` of the lanes of streets, from junction to junction.
 
     On one-way streets a car drives only in the allowed direction. On all other
     streets it drives in the outermost lane.

@@ -58,7 +58,11 @@ _END = 0.2
 
 
 def kerb_tapers(carriageway: BaseGeometry) -> list[Polygon]:
-    """Returns areas that fill steps in a carriageway's edge, as tapers [m]."""
+    """Returns areas that turn steps in a carriageway's edge into tapers [m].
+
+    `carriageway` is the area of the carriageway in W. The results lie outside
+    of it.
+    """
     found: list[Polygon] = []
     for polygon in polygons_of(carriageway):
         polygon = shapely.orient_polygons(polygon)
@@ -141,13 +145,18 @@ def _kerb(xy: np.ndarray, ahead: np.ndarray) -> np.ndarray:
 
 
 class ImportedStreets:
-    """Areas of lanes on the ground, by kind [m].
+    """The areas that the lanes on the ground cover, by kind, in W [m].
 
-    `areas` contains three areas: all lanes at road level, the lanes of class
-    road, and raised ground with a kerb. Where lanes overlap, road takes
-    precedence over parking, parking over other ground, and all of these over
-    sidewalks. Coverings are parts of the carriageway that are not road. Margins
-    are lanes without a use, which stay empty.
+    Where lanes overlap, road takes precedence over parking, parking over other
+    ground, and all of these over sidewalks.
+
+    Attributes:
+        areas: the carriageway (everything at road level), the lanes of class
+            road in it, sidewalks and medians.
+        junctions: the area of all junctions.
+        coverings: parts of the carriageway that are not road, such as parking
+            bays.
+        margins: lanes without a use, on which nothing is built.
     """
 
     def __init__(
@@ -212,7 +221,7 @@ class ImportedStreets:
 
 
 def lane_polygon(band: LaneBand) -> BaseGeometry:
-    """Returns the area of a lane [m]; it is empty for a lane without width."""
+    """Returns the area of a lane in W [m]; empty for a lane without width."""
     inner, outer = band.inner[:, :2], band.outer[:, :2]
     outline = Polygon(np.concatenate([inner, outer[::-1]]))
     if outline.is_valid:
@@ -284,7 +293,10 @@ def _multi(area: BaseGeometry) -> MultiPolygon:
 
 
 def bridge_decks(bands: Sequence[LaneBand]) -> Iterator[Structure]:
-    """Yields structures of bridges: upper sides by class, and undersides."""
+    """Yields the structures of bridges: their upper sides and undersides.
+
+    `bands` contains the lanes on bridges.
+    """
     of_road: dict[tuple[str, str], list[np.ndarray]] = defaultdict(list)
     for band in bands:
         # The sides of parts without a lane are closed as well.
@@ -312,7 +324,10 @@ def bridge_decks(bands: Sequence[LaneBand]) -> Iterator[Structure]:
 
 
 def bridge_ends(bands: Sequence[LaneBand]) -> BaseGeometry:
-    """Returns the areas around the ends of bridges [m]."""
+    """Returns narrow areas across the ends of bridges, in W [m].
+
+    `bands` contains the lanes on bridges.
+    """
     lines = [
         LineString([band.inner[k, :2], band.outer[k, :2]])
         for band in bands

@@ -39,7 +39,10 @@ _LEAST_HALF_WIDTH, _SHORTEST = 0.3, 5.0
 
 
 class BandGraph(search.WayGraph):
-    """A graph of lanes of road sections, linked in driving direction."""
+    """A `cns_drake.imports.drives.search.WayGraph` of OpenDRIVE lanes.
+
+    Each lane of a road section is a piece. Edges lead in driving direction.
+    """
 
     def __init__(self, bands: Sequence[LaneBand]):
         self.bands = [band for band in bands if _is_driven(band)]
@@ -118,8 +121,8 @@ class BandGraph(search.WayGraph):
 def find_lane_drives(bands: Sequence[LaneBand]) -> list[WaypointDrive]:
     """Returns two drives on lanes that share a part of their paths.
 
-    If fewer are found, it returns one drive or none. `bands` contains the lanes
-    of the whole network, including bridges.
+    There are fewer than two only if no more are found. `bands` contains the
+    lanes of the whole network, including bridges.
     """
     return search.find_drives(BandGraph(bands))
 
@@ -176,7 +179,11 @@ def _forwards(line: np.ndarray) -> np.ndarray:
 def lanes_for_traffic(
     bands: Sequence[LaneBand], kerbs: KerbHeights
 ) -> str | None:
-    """Returns the text of a lane file; None if there is no lane to drive on."""
+    """Returns the text of a lane file; None if there is no lane to drive on.
+
+    `bands` contains the lanes of the whole network, and `kerbs` the heights of
+    sidewalks above the road.
+    """
     graph = BandGraph(bands)
     lanes = [
         DirectedLane(

@@ -62,7 +62,7 @@ _ARRAYS = (
 
 
 def lane_class(kind: str) -> str | None:
-    """Returns the semantic class of a lane; None for the type `none`."""
+    """Returns the semantic class of a lane type; None for the type `none`."""
     classes: dict[str, str] = TYPES["lanes"]
     return None if kind == "none" else classes.get(kind, "road")
 
@@ -70,8 +70,9 @@ def lane_class(kind: str) -> str | None:
 def is_raised(kind: str, height: float) -> bool:
     """Returns whether a lane is above a kerb, and not at road level.
 
-    `height` is the height of the lane's inner edge above the road in the file
-    [m].
+    Args:
+        kind: type of the lane.
+        height: height of the lane's inner edge above the road in the file [m].
     """
     has_kerb = height >= _LEAST_KERB
     return kind in _RAISED or (
@@ -81,20 +82,23 @@ def is_raised(kind: str, height: float) -> bool:
 
 @dataclass(frozen=True)
 class LaneBand:
-    """A lane of a road section, sampled from end to end.
+    """A lane of a road section, sampled at N places from end to end.
 
     Attributes:
-        road, section, lane: the road, the number of the section in this road,
-            and the lane.
+        road: the road.
+        section: number of the section in this road.
+        lane: the lane.
         kind: type of the lane. It is "enclosed" for a lane of type none with
             other lanes farther outside, as on a road that is closed to traffic.
-        inner, outer: (N, 3) places on the lane's edges, in the order of the
-            road [m]. Where the width of the lane has a step, a place on one
-            edge is repeated. For a lane above a kerb, z is the height of the
-            road, not that of the lane.
+        inner: (N, 3) places on the edge nearer to the middle of the road [m].
+            Where the width of the lane has a step, a place on one edge is
+            repeated. For a lane above a kerb, z is the height of the road, not
+            that of the lane.
+        outer: (N, 3) places on the other edge, like `inner` [m].
         middle: (N, 3) places midway between the two edges [m].
-        heading, roll, grade: (N,) heading, roll and grade of the road at these
-            places [rad, rad, 1]. The roll is 0 for a level lane.
+        heading: (N,) heading of the road [rad].
+        roll: (N,) roll of the road [rad]; 0 for a level lane.
+        grade: (N,) grade of the road, rise per run.
         rise: (N, 2) heights of the lane's edges above the road [m]; NaN if
             unknown.
         s: (N,) distances along the road [m].
@@ -123,8 +127,9 @@ def lane_bands(road: ImportedRoad) -> Iterator[LaneBand]:
     """Yields all lanes of a road, section by section, from the middle outwards.
 
     Raises:
-        ValueError: the road has too many bends to be followed, or a lane leads
-            out of the world. The message names the road and the fault.
+        ValueError: the road bends so often that it would need too many places,
+            or a lane leads out of the world. The message names the road and the
+            fault.
     """
     for k, section in enumerate(road.sections):
         s, inside = _stations(road, section)
@@ -339,10 +344,10 @@ def _runs(is_bridge: np.ndarray) -> Iterator[tuple[slice, bool]]:
 class RoadHeights:
     """The height of imported carriageways, and of the ground near them.
 
-    Each place in the middle of a lane defines a plane, with the grade and roll
-    of its road. The height at any place is a weighted mean of the nearby planes
-    (Shepard's interpolation). It is exact on a single road, and has no step
-    where roads that overlap in a junction have different heights.
+    At a place on a single road, the height is exact. Where roads with different
+    heights overlap in a junction, it changes gradually from one to the other
+    (Shepard's interpolation between planes with the grade and roll of the
+    roads).
     """
 
     def __init__(self, bands: Sequence[LaneBand]):
@@ -387,7 +392,13 @@ class RoadHeights:
 
 
 class KerbHeights:
-    """The height of imported sidewalks above the road, by place."""
+    """The height of imported sidewalks above the road, by place.
+
+    The constructor takes the lanes on the ground, and the usual height of a
+    kerb [m], which applies where the file states none. An object is called with
+    places (N, 2) in W [m], and returns heights (N,) [m]. `differ` says whether
+    any kerb has another height than the usual one.
+    """
 
     def __init__(self, bands: Sequence[LaneBand], usual: float):
         """Takes the lanes on the ground, and the usual height of a kerb [m].

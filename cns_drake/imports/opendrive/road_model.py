@@ -38,7 +38,7 @@ def _integral(
 
 @dataclass(frozen=True)
 class Arc:
-    """An arc; a straight line if the curvature [1/m] is 0."""
+    """An arc in a road's course; a straight line if `curvature` is 0 [1/m]."""
 
     curvature: float
 
@@ -56,7 +56,7 @@ class Arc:
 
 
 class Spiral:
-    """A clothoid: its curvature changes linearly with the distance."""
+    """A clothoid in a road's course: its curvature changes linearly."""
 
     def __init__(self, start: float, end: float, length: float):
         """Takes the curvature at both ends [1/m], and the length [m]."""
@@ -91,7 +91,7 @@ class Spiral:
 
 
 class Cubic:
-    """A curve given by two cubic polynomials u(p) and v(p)."""
+    """A curve in a road's course, given by cubic polynomials u(p) and v(p)."""
 
     def __init__(
         self,
@@ -162,10 +162,15 @@ Shape = Arc | Spiral | Cubic
 
 @dataclass(frozen=True)
 class Piece:
-    """One element of a road's course in plan view, which begins at s [m].
+    """One element of a road's course in plan view.
 
-    x, y and heading are those of the element's first point in the world [m,
-    rad]. `shape` is expressed in the frame of this point.
+    Attributes:
+        s: distance along the road at which the element begins [m].
+        x: x of its first point in W [m].
+        y: y of its first point in W [m].
+        heading: heading at its first point in W [rad].
+        length: length of the element [m].
+        shape: the curve, in the frame of its first point.
     """
 
     s: float
@@ -176,7 +181,10 @@ class Piece:
     shape: Shape
 
     def evaluate(self, s: np.ndarray) -> np.ndarray:
-        """Returns (N, 3) x, y [m] and heading [rad] at distances (N,) [m]."""
+        """Returns x, y [m] and heading [rad] (N, 3) at distances (N,) [m].
+
+        The distances `s` are along the road, and the result is in W.
+        """
         u, v, turn = self.shape.evaluate(s - self.s).T
         c, sine = math.cos(self.heading), math.sin(self.heading)
         return np.stack(
@@ -210,9 +218,12 @@ class Cubics:
     ) -> np.ndarray:
         """Returns the values (N,), or the slopes, at distances (N,) [m].
 
-        `inside` (N,) selects the cubic piece for each distance. It is usually
-        equal to `s`. Where `s` is at a joint between two pieces, `inside` lies
-        slightly before or after the joint, within the wanted piece.
+        Args:
+            s: distances along the road [m].
+            inside: distances that select the cubic piece, usually equal to `s`.
+                Where `s` is at a joint between two pieces, `inside` lies
+                slightly before or after the joint, within the wanted piece.
+            is_slope: whether to return slopes.
         """
         if not self:
             return np.zeros(len(s))
@@ -227,9 +238,10 @@ class Cubics:
         return np.where(index < 0, 0.0, value)
 
     def bend(self, start: float, end: float) -> float:
-        """Returns the greatest second derivative between `start` and `end`.
+        """Returns the greatest absolute second derivative in a stretch.
 
-        Both distances must lie within one cubic piece.
+        `start` and `end` of the stretch, as distances along the road [m], must
+        lie within one cubic piece.
         """
         middle = (start + end) / 2.0
         index = int(np.searchsorted(self.starts, middle, side="right")) - 1
@@ -252,8 +264,8 @@ class MarkLine:
     Attributes:
         aside: distance from the border of the lane, positive to the left [m].
         start: distance from the start of the mark to the first dash [m].
-        dash, gap: lengths of a dash and of the gap after it; the line is
-            continuous if the gap is 0 [m].
+        dash: length of a dash [m].
+        gap: length of the gap after a dash [m]; 0 for a continuous line.
         width: width of the line [m].
     """
 
@@ -268,10 +280,13 @@ class MarkLine:
 class RoadMark:
     """A mark painted on the border of a lane.
 
-    The mark begins at the distance `start` along the road [m]. `kind` is a text
-    such as `solid broken`, and `colour` the colour in the file. Without
-    `lines`, the mark has the lines that are usual for its kind, each with the
-    width `width` [m].
+    Attributes:
+        start: distance along the road at which the mark begins [m].
+        kind: type of the mark, such as `solid broken`.
+        colour: colour in the file.
+        width: width of a line without a width of its own [m].
+        lines: the lines in the file; if empty, the mark has the lines that are
+            usual for its type.
     """
 
     start: float
@@ -283,16 +298,26 @@ class RoadMark:
 
 @dataclass(frozen=True)
 class Lane:
-    """A lane of a road section, of a type such as driving.
+    """A lane of a road section.
 
-    Numbers count from the middle of the road outwards, positive on the left. A
-    lane has either a width or a border, as functions of the distance along the
-    road; the border is the distance from the middle of the road to the lane's
-    outer edge. `inner_height` and `outer_height` are heights of the lane's
-    edges above the road, if the file has them, and `height` is the greatest
-    `inner_height` [m]. A lane with `is_level` is not banked even where the road
-    is. With `is_reversed`, traffic drives against the usual direction. Marks
-    are on the lane's outer border, one after the other.
+    A lane has either a width or a border, as functions of the distance along
+    the road.
+
+    Attributes:
+        number: number counted from the middle of the road outwards, positive on
+            the left.
+        kind: type of the lane, such as driving.
+        width: width [m].
+        border: distance from the middle of the road to the lane's outer edge
+            [m].
+        height: greatest `inner_height` [m].
+        marks: marks on the lane's outer border, one after the other.
+        inner_height: height of the inner edge above the road [m], if the file
+            states it.
+        outer_height: height of the outer edge above the road [m], if the file
+            states it.
+        is_level: whether the lane is not banked even where the road is.
+        is_reversed: whether traffic drives against the usual direction.
     """
 
     number: int
@@ -309,10 +334,14 @@ class Lane:
 
 @dataclass(frozen=True)
 class LaneSection:
-    """A stretch of road with the same lanes, from `start` to `end` [m].
+    """A stretch of road with the same lanes.
 
-    `lanes` maps lane number -> lane. It excludes the middle lane 0, which has
-    only marks.
+    Attributes:
+        start: distance along the road at which the stretch begins [m].
+        end: distance along the road at which the stretch ends [m].
+        lanes: lane number -> lane. It excludes the middle lane 0, which has
+            only marks.
+        middle_marks: marks of the middle lane 0.
     """
 
     start: float
@@ -356,16 +385,16 @@ class Thing(NamedTuple):
 
 @dataclass(frozen=True)
 class ImportedRoad:
-    """A road of a network.
+    """A road of an OpenDRIVE network.
 
     Attributes:
         name: unique name, made from the id: letters, digits, dots and dashes.
         junction: name of the junction to which the road belongs; None without
             one.
-        length: its length [m].
-        pieces: pieces of its course, one after the other.
-        elevation, superelevation: height [m] and roll [rad] of the reference
-            line.
+        length: length of the road [m].
+        pieces: pieces of the road's course, one after the other.
+        elevation: height of the reference line [m].
+        superelevation: roll of the reference line [rad].
         lane_offset: distance from the reference line to the middle of the
             lanes, positive to the left [m].
         sections: stretches with the same lanes, one after the other.
@@ -389,10 +418,12 @@ class ImportedRoad:
     spans: tuple[str, ...] = ()
 
     def reference(self, s: np.ndarray, inside: np.ndarray) -> np.ndarray:
-        """Returns (N, 5) x, y, z, heading and roll of the reference line.
+        """Returns x, y, z, heading and roll (N, 5) of the reference line.
 
-        `s` (N,) contains distances along the road [m], and `inside` (N,)
-        distances that select the pieces of the road; see `Cubics.at`.
+        Args:
+            s: (N,) distances along the road [m].
+            inside: (N,) distances that select the piece of the road, usually
+                equal to `s` (see `Cubics.at`).
         """
         starts = np.array([piece.s for piece in self.pieces])
         index = np.searchsorted(starts, inside, side="right") - 1
@@ -409,10 +440,13 @@ class ImportedRoad:
     def points(
         self, s: np.ndarray, inside: np.ndarray, t: np.ndarray
     ) -> np.ndarray:
-        """Returns places (N, 3) that lie t (N,) left of the reference line [m].
+        """Returns places (N, 3) beside the reference line, in W [m].
 
-        `s` (N,) contains distances along the road [m], and `inside` (N,)
-        distances that select the pieces of the road; see `Cubics.at`.
+        Args:
+            s: (N,) distances along the road [m].
+            inside: (N,) distances that select the piece of the road, usually
+                equal to `s` (see `Cubics.at`).
+            t: (N,) distances to the left of the reference line [m].
         """
         x, y, z, heading, roll = self.reference(s, inside).T
         across = t * np.cos(roll)
@@ -430,8 +464,10 @@ class ImportedRoad:
 class RoadMap:
     """All roads of an OpenDRIVE file, in the order of the file.
 
-    `reference_system` is the name of the reference system in the file. `origin`
-    is the origin of the world in coordinates of this system [m].
+    Attributes:
+        roads: the roads.
+        reference_system: name of the reference system in the file.
+        origin: origin of W in coordinates of this system [m].
     """
 
     roads: tuple[ImportedRoad, ...]

@@ -53,9 +53,14 @@ def read_marks(
 ) -> list[road_model.RoadMark]:
     """Returns the marks of a lane, in their order along the road.
 
-    `start` is where the lane's section begins along the road [m], and `road` is
-    the name of the road. Marks whose lines are not usable are counted in
-    `faults`.
+    Marks whose lines cannot be used get the usual lines of their type, and are
+    counted in `faults`.
+
+    Args:
+        lane: the lane in the file.
+        start: distance along the road at which the lane's section begins [m].
+        road: name of the road.
+        faults: counts the marks that were changed.
 
     Raises:
         ValueError: a text is not a number; the error names its line.
@@ -105,7 +110,11 @@ def _mark_lines(
 
 
 def count_dangling_links(top: Element, faults: ImportFaults) -> None:
-    """Counts links to objects that are not in the file, as faults."""
+    """Counts links to objects that are not in the file, as faults.
+
+    Objects are roads, lanes and junctions. `top` is the root element of the
+    file.
+    """
     roads = {one.attrib.get("id", ""): one for one in top.all("road")}
     junctions = {one.attrib.get("id", "") for one in top.all("junction")}
     for name, road in roads.items():
@@ -136,7 +145,7 @@ _KNOWN = parse_yaml(Path(__file__).with_name("unread.yaml").read_bytes())
 
 
 def count_unread(element: Element, faults: ImportFaults, name: str) -> None:
-    """Counts parts of an element that are not read but affect the roads.
+    """Counts parts of an element that affect the roads but are not read.
 
     `name` is the name of the road or junction that contains the element.
     """

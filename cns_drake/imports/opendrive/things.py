@@ -37,6 +37,9 @@ def read_things(
 ) -> Iterator[Thing]:
     """Yields the signals and objects beside a road.
 
+    `road` is the road in the file, and `name` its name. What is not read is
+    counted in `faults`.
+
     Raises:
         ValueError: a text is not a number; the error names its line.
     """
@@ -149,8 +152,10 @@ def thing_structures(
 ) -> Iterator[Structure]:
     """Yields structures of the signals and objects beside a road.
 
-    `lanes` is the area of all lanes; signs inside this area are left out. What
-    is left out is counted in `faults`.
+    Args:
+        road: the road.
+        lanes: area of all lanes in W [m]; signs inside this area are left out.
+        faults: counts what is left out.
     """
     for thing in road.things:
         if not 0.0 <= thing.s <= road.length + 1.0:

@@ -81,14 +81,22 @@ def moved_off_kerbs(
     reach: tuple[float, float],
     carriageway: BaseGeometry,
 ) -> np.ndarray:
-    """Returns how far to move lines off a kerb, (N,), positive to the left [m].
+    """Returns how far lines must move to leave a kerb, (N,) [m].
 
-    `border` contains places (N, 3) on the border of a lane, and `left` (N, 2)
-    unit vectors to its left. Where only one side of the border is carriageway,
-    lines are moved to this side; elsewhere the result is 0, except next to
-    such a place. `reach` is how far the lines extend to the
-    left and right of the border [m]. `carriageway` must be a prepared geometry
-    (Shapely).
+    A line on the border of a lane would partly lie on a kerb where only one
+    side of the border is carriageway. It moves to this side. Elsewhere it
+    stays, except right next to such a place.
+
+    Args:
+        border: (N, 3) places on the border of a lane [m].
+        left: (N, 2) unit vectors to the left of the border.
+        reach: how far the lines extend to the left and to the right of the
+            border [m].
+        carriageway: area of the carriageway in W, a prepared geometry
+            (Shapely).
+
+    Returns:
+        Distances, positive to the left.
     """
     xy = border[:, :2].copy()
     # A kerb may cross the border right at its end.
@@ -113,10 +121,15 @@ def as_triangles(quads: np.ndarray) -> np.ndarray:
 
 
 def on_carriageway(quads: np.ndarray, carriageway: BaseGeometry) -> np.ndarray:
-    """Returns the parts of quadrilaterals (K, 4, 3) on a carriageway [m].
+    """Returns the parts of quadrilaterals that lie on a carriageway [m].
 
-    The parts are triangles (M, 3, 3), cut as seen from above. `carriageway`
-    must be a prepared geometry (Shapely).
+    Args:
+        quads: (K, 4, 3) the quadrilaterals.
+        carriageway: area of the carriageway in W, a prepared geometry
+            (Shapely).
+
+    Returns:
+        Triangles (M, 3, 3), cut as seen from above.
     """
     outlines = np.asarray(shapely.polygons(quads[..., :2]))
     inside = shapely.contains_properly(carriageway, outlines)
@@ -155,7 +168,7 @@ def road_marks(
     heights: Callable[[np.ndarray], np.ndarray] | None = None,
     carriageway: BaseGeometry | None = None,
 ) -> Iterator[Structure]:
-    """Yields the marks of each road as a structure.
+    """Yields the painted road marks of each road as a structure.
 
     Args:
         prefix: beginning of the structures' names.
@@ -337,10 +350,18 @@ _SHOWN = (
 
 @dataclass(frozen=True)
 class Town:
-    """A town in all its stages, its drives, and counts of the import.
+    """A town built on an imported road network, in all its stages.
 
-    `streets` excludes bridges. There are at most two drives. `lanes` is the
-    text of the lane file; None if there are no lanes for traffic.
+    Attributes:
+        roads: the imported roads.
+        seed: seed of all random draws.
+        city: the whole town.
+        stages: how the town looked in each stage.
+        streets: areas of the streets, except bridges.
+        drives: the proposed drives, at most two.
+        lanes: text of the lane file; None if there are no lanes for traffic.
+        kinds: kind of structure -> number of structures.
+        faults: counts of repaired and omitted parts of the file.
     """
 
     roads: RoadMap
@@ -360,9 +381,13 @@ def build_town(
     progress: Callable[[str], None] = lambda line: None,
     dressed: bool = False,
 ) -> Town:
-    """Returns a town built along the roads of a file.
+    """Returns a town, built at random along the roads of an OpenDRIVE file.
 
-    Road marks of the file are painted only if the town is dressed.
+    Args:
+        source: the file.
+        seed: seed of all random draws.
+        progress: called with messages of one line on the progress.
+        dressed: whether to paint the road marks of the file.
 
     Raises:
         InputError: the file cannot be used.
@@ -554,10 +579,17 @@ def _kinds(
 def write_town(
     draft: Path, source: Path, town: Town, progress: Callable[[str], None]
 ) -> tuple[ImportReport, dict[str, tuple[int, int]]]:
-    """Writes all files of a town to a folder, which has the map's name.
+    """Writes all files of a town to a map folder.
+
+    Args:
+        draft: the folder, which has the map's name.
+        source: imported file, named in messages and comments.
+        town: the town.
+        progress: called with messages of one line on the progress.
 
     Returns:
-        What was imported, and stage -> its numbers of structures and triangles.
+        What was imported, and name of a stage -> numbers of its structures and
+        of its triangles.
 
     Raises:
         InputError: the town has more structures than there are instance ids.

@@ -65,7 +65,11 @@ _LARGEST = 20_000.0  # [m]
 
 
 def object_of(tags: reading.Tags) -> str | None:
-    """Returns the kind of small object that a node's tags describe, or None."""
+    """Returns the kind of small object that a node's tags describe.
+
+    The kind is a key of `cns_drake.city.placement.objects.OBJECTS`, or None for
+    a node without such an object.
+    """
     found = [
         name
         for key, value, name in TABLES["objects"]
@@ -84,7 +88,10 @@ def object_of(tags: reading.Tags) -> str | None:
 
 
 def make_things(features: reading.OsmFeatures, local: Local) -> Iterator[Thing]:
-    """Yields small objects: those at nodes, and the trees of tree rows."""
+    """Yields small objects: those at nodes, and the trees of tree rows.
+
+    `local` converts places of the file to metres in W.
+    """
     kinds = features.kinds
     for name, tags, place in features.nodes:
         kind = object_of(tags)
@@ -119,13 +126,19 @@ def _direction(tags: reading.Tags) -> float | None:
 def import_openstreetmap(
     path: Path, year_attribute: str | None, dressed: bool = False
 ) -> ForeignCity:
-    """Imports a city from a file; the origin is the centre of its buildings.
+    """Imports a city from an OpenStreetMap file.
 
-    Only with `dressed`, the result contains the sea, areas of ground by their
-    material, and buildings that were demolished at an unknown date. Also,
-    bridges at ground level then get parapets, and bridges over streets and
-    tunnels are left out. Without `dressed`, bridges and tunnels are streets on
-    the ground.
+    The origin of the map is the centre of its buildings. Bridges and tunnels
+    become streets on the ground.
+
+    Args:
+        path: the file.
+        year_attribute: tag with the year of construction; None for the usual
+            tags.
+        dressed: whether to read more: the sea, areas of ground by their
+            material, and buildings that were demolished at an unknown date.
+            Tunnels, and bridges over other ways, are then left out; bridges at
+            ground level get parapets.
 
     Raises:
         InputError: if the file cannot be read, has no building, or is larger
@@ -336,10 +349,11 @@ class _Block:
 def standing_buildings(
     areas: Iterable[OsmArea], faults: ImportFaults, with_gone: bool = False
 ) -> Iterator[OsmArea]:
-    """Yields buildings and building parts above ground that exist or existed.
+    """Yields buildings and building parts that stand, or once stood.
 
-    Buildings demolished at an unknown date are included only with `with_gone`.
-    Buildings that are left out are counted as faults.
+    Those below the ground and the like are left out, and counted as faults.
+    Buildings demolished at an unknown date are left out unless `with_gone` is
+    set.
     """
     for one in areas:
         absent = why_absent(one.tags)
@@ -369,7 +383,7 @@ def make_buildings(
         year_attribute: tag with the year of construction; None for the usual
             tags.
         faults: counts parts that were repaired or left out.
-        once: whether buildings that lie inside one another are joined.
+        once: whether a building inside another one is joined with it.
     """
     outlines: list[_Block] = []
     parts: list[_Block] = []

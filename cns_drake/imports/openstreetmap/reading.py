@@ -1,10 +1,8 @@
 """Reads the parts of an OpenStreetMap file that make up a city.
 
-The reader needs nodes before ways before relations, by ascending positive ids,
-and each only once. Files with another order are sorted first: Overpass writes
-nodes last, or the coordinates of nodes inside ways; editors give negative ids
-to new objects and mark deleted objects; files with a history contain every
-version of an object.
+Some files are sorted first, such as those of Overpass and of editors. The
+reader needs nodes before ways before relations, by ascending positive ids, and
+the newest version of each only.
 """
 
 from collections.abc import Iterable, Iterator, Mapping
@@ -34,7 +32,10 @@ _CHUNK = 1 << 24
 
 
 def number_in_file(number: int) -> int:
-    """Returns an object's id in the original file, given its sorted id."""
+    """Returns the id that an object has in the file before it was sorted.
+
+    Sorting replaces negative ids, which editors give to new objects.
+    """
     return _FIRST_NEW - number if number > _FIRST_NEW else number
 
 
@@ -52,10 +53,10 @@ class _Thing(NamedTuple):
 
 
 def sorted_file(path: Path, folder: Path, faults: ImportFaults) -> Path:
-    """Returns a file that the reader can read: `path` or a sorted copy.
+    """Returns a file in the order that the reader needs.
 
-    A copy is written to `folder`. Objects that are left out are counted in
-    `faults`.
+    The result is `path`, or a sorted copy in `folder` if `path` is in another
+    order. Objects that are left out of the copy are counted in `faults`.
 
     Raises:
         RuntimeError, ValueError: the file is not an OpenStreetMap file.
@@ -219,8 +220,10 @@ _KIND_KEYS, _GONE, _LIFECYCLE = (
 class Local:
     """Converts degrees to metres east and north of an origin.
 
-    It uses the Earth's radii of curvature at the origin, which is exact to 1 in
-    10,000 within 10 km.
+    The constructor takes the longitude and latitude of the origin [deg]. An
+    object is called with longitudes and latitudes (N, 2) [deg], and returns x
+    and y (N, 2) [m]. It uses the Earth's radii of curvature at the origin,
+    which is exact to 1 in 10,000 within 10 km.
     """
 
     def __init__(self, longitude: float, latitude: float):
@@ -239,7 +242,10 @@ class Local:
         return self.metres(offset)
 
     def metres(self, offset: np.ndarray) -> np.ndarray:
-        """Converts offsets (..., 2) from degrees to metres."""
+        """Converts differences of places (..., 2) from degrees to metres.
+
+        They are differences of longitude and latitude.
+        """
         return np.asarray(offset * self._metres)
 
     def polygon(self, polygon: Polygon) -> Polygon:
@@ -251,7 +257,14 @@ OsmNode = tuple[str, Tags, tuple[float, float]]
 
 
 class OsmWay(NamedTuple):
-    """A way: its id, tags, places (N, 2) [deg] and the ids of its nodes."""
+    """A way of an OpenStreetMap file, such as a street.
+
+    Attributes:
+        name: id of the way, such as `w123`.
+        tags: tags of the way.
+        line: (N, 2) longitude and latitude of its nodes [deg].
+        nodes: ids of its nodes.
+    """
 
     name: str
     tags: Tags
@@ -260,7 +273,13 @@ class OsmWay(NamedTuple):
 
 
 class OsmArea(NamedTuple):
-    """An area: its id, tags and polygons [deg]."""
+    """An area of an OpenStreetMap file, such as a building.
+
+    Attributes:
+        name: id of the area, such as `w123` or `r123`.
+        tags: tags of the area.
+        polygons: its polygons, in longitude and latitude [deg].
+    """
 
     name: str
     tags: Tags
@@ -269,20 +288,20 @@ class OsmArea(NamedTuple):
 
 @dataclass
 class OsmFeatures:
-    """The content of an OpenStreetMap file; places are in [deg].
+    """The content of an OpenStreetMap file.
 
-    Places are longitude and latitude.
+    Places are longitude and latitude [deg]. An id is a number with the prefix
+    `n` for a node, `w` for a way and `r` for a relation.
 
     Attributes:
         areas: closed ways and multipolygons.
         ways: ways; places that are not in the file are left out.
         trees: nodes that are trees.
-        crossings: the node id of each crossing, and its tags.
+        crossings: number and tags of each node that is a crossing.
         nodes: all other nodes with tags.
         outers: id of a way that is the outline of a building's multipolygon ->
             id of this multipolygon.
-        kinds: id -> kind, for all objects with tags. An id is a number with the
-            prefix `n` for a node, `w` for a way and `r` for a relation.
+        kinds: id -> kind, for all objects with tags.
         faults: counts of faulty parts.
     """
 
@@ -408,7 +427,10 @@ def _is_flat(outlines: Iterable[BaseGeometry]) -> bool:
 
 
 def thing_kind(tags: Tags) -> str:
-    """Returns the kind of an element, from the first known tag."""
+    """Returns the kind of an element in words, from the first known tag.
+
+    For example, it is `highway=residential`, or `other` without a known tag.
+    """
     for key in _KIND_KEYS:
         if has_tag(tags, key):
             return f"{key}={tags[key]}"
@@ -429,7 +451,7 @@ def has_tag(tags: Tags, name: str) -> bool:
 def is_building(tags: Tags) -> bool:
     """Returns whether tags describe a building or a part of a building.
 
-    A former building counts, too, if its tags contain the date of its end.
+    A former building counts, too, if its tags state when it was demolished.
     """
     return (
         has_tag(tags, "building")
@@ -439,5 +461,5 @@ def is_building(tags: Tags) -> bool:
 
 
 def was_building(tags: Tags) -> bool:
-    """Returns whether a tag marks a former building."""
+    """Returns whether tags mark a building that no longer exists."""
     return any(has_tag(tags, f"{stage}:building") for stage in _GONE)

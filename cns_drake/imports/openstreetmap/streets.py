@@ -51,11 +51,13 @@ _STRIPE, _STRIPE_LENGTH, _STRIPE_HEIGHT = 0.5, 3.0, 0.01
 
 @dataclass(frozen=True)
 class Bridges:
-    """Ids of the bridges and tunnels among the ways for cars and people.
+    """Bridges and tunnels among the ways for cars, people and trains.
 
-    `over_streets` contains bridges over a street or a railway, `level` all
-    other bridges, which are assumed to be at the height of the surrounding
-    ground, and `tunnels` all tunnels.
+    Attributes:
+        over_streets: ids of the bridges that cross another way.
+        level: ids of all other bridges, which are assumed to be at the height
+            of the surrounding ground.
+        tunnels: ids of the tunnels.
     """
 
     over_streets: AbstractSet[str] = frozenset()
@@ -68,7 +70,10 @@ class Bridges:
 
 
 def bridges_of(ways: Iterable[OsmWay], local: Local) -> Bridges:
-    """Returns which ways are bridges and tunnels."""
+    """Finds the bridges and the tunnels among the ways of a file.
+
+    `local` converts places of the file to metres.
+    """
     used = [
         way
         for way in ways
@@ -96,7 +101,14 @@ def bridges_of(ways: Iterable[OsmWay], local: Local) -> Bridges:
 
 
 class Look(NamedTuple):
-    """Kind, class, colour and height [m] of an area on the ground."""
+    """How an area on the ground is built and looks.
+
+    Attributes:
+        kind: kind of the area, such as Sidewalk.
+        semantic_class: a key of `cns_drake.scene.semantics.CLASS_IDS`.
+        rgb: colour; None for that of the class.
+        z: height of the upper side [m].
+    """
 
     kind: str
     semantic_class: str
@@ -114,8 +126,12 @@ def laid(
 ) -> Iterator[Imported]:
     """Yields one level surface that fills areas; nothing if they are empty.
 
-    `name` is the name of the surface. Its part after the first underscore is
-    the name of the element in the file, which is used in `faults`.
+    Args:
+        name: name of the surface: a word, an underscore, and the id of the
+            element in the file.
+        look: kind, class, colour and height of the surface.
+        areas: the areas in W [m].
+        faults: counts parts that were repaired or left out.
     """
     source = name.partition("_")[2]
     surface = [
@@ -135,7 +151,11 @@ def raised(
 ) -> Iterator[Imported]:
     """Yields one solid on the ground that fills areas; nothing if empty.
 
-    `source` contains the name of the element in the file, and the faults.
+    Args:
+        name: name of the solid.
+        look: kind, class, colour and height of the solid.
+        areas: the areas in W [m].
+        source: id of the element in the file, and the faults to add to.
     """
     solids = [
         np.concatenate(faces.extruded(polygon, 0.0, look.z, *source))
@@ -160,7 +180,7 @@ def _made(
 def parapets(
     ways: Iterable[OsmWay], bridges: Bridges, local: Local
 ) -> Iterator[Imported]:
-    """Yields low walls on both sides of bridges for cars at ground level."""
+    """Yields parapets on both sides of bridges for cars at ground level."""
     for name, tags, line, _ in ways:
         width = street_width(tags)
         if width is None or name not in bridges.level:
@@ -178,7 +198,10 @@ def parapets(
 def street_surfaces(
     features: reading.OsmFeatures, local: Local, bridges: Bridges
 ) -> Iterator[Imported]:
-    """Yields carriageways, sidewalks beside them, and paths."""
+    """Yields the carriageways, their sidewalks, and paths for people.
+
+    Tunnels and bridges over other ways are left out, and counted as faults.
+    """
     faults = features.faults
     for kind, ids in (
         ("bridge over a street or railway, left out", bridges.over_streets),
@@ -224,7 +247,14 @@ def _is_elsewhere(name: str, tags: reading.Tags, bridges: Bridges) -> bool:
 def drivable_streets(
     ways: Iterable[OsmWay], local: Local, bridges: Bridges
 ) -> list[Street]:
-    """Returns the streets for cars, with the nodes at which they meet."""
+    """Returns the streets on which cars may drive.
+
+    Args:
+        ways: ways of the file.
+        local: converts places of the file to metres.
+        bridges: the bridges and tunnels. Streets over other ways and in tunnels
+            are left out.
+    """
     streets = []
     for name, tags, line, nodes in ways:
         width = street_width(tags)
@@ -344,7 +374,11 @@ _BEYOND, _BESIDE = 3000.0, 0.1
 def ground_areas(
     features: reading.OsmFeatures, local: Local, dressed: bool
 ) -> Iterator[Imported]:
-    """Yields areas on the ground; if `dressed`, also areas by material."""
+    """Yields areas on the ground, such as lawns and water.
+
+    If `dressed`, there are more kinds, such as sports grounds, and areas have
+    the colours of their materials.
+    """
     for name, tags, polygons in features.areas:
         look = _look(tags) if dressed else _plain_look(tags)
         if look is None or has_tag(tags, "building"):
@@ -396,7 +430,7 @@ def _pitch(tags: reading.Tags) -> Look:
 
 
 def coasts_of(ways: Iterable[OsmWay]) -> list[OsmWay]:
-    """Returns the coastlines; land is on their left."""
+    """Returns the coastlines among ways; land is on their left."""
     return [way for way in ways if way.tags.get("natural") == "coastline"]
 
 
@@ -408,7 +442,11 @@ def sea(
 ) -> Iterator[Imported]:
     """Yields the sea, to the right of the coastlines; nothing without them.
 
-    `limits` (2, 2) are the least and the greatest x and y of the city [m].
+    Args:
+        coasts: the coastlines.
+        local: converts places of the file to metres.
+        limits: (2, 2) the least and the greatest x and y of the sea [m].
+        faults: counts parts that were repaired or left out.
     """
     if not coasts:
         return

@@ -108,13 +108,14 @@ def tag_value(
     """Returns the value of a tag; None if the tag has no valid one.
 
     Args:
-        tags: tags of a map element.
+        tags: tags of an element.
         key: key of the tag.
-        read: parses the text; returns None for a text that it cannot parse.
-        most, least: limits of a plausible value. Any other value is counted as
-            a fault.
-        where: name of the element, and the faults to add to; None if faults are
+        read: function that returns the value of a text; None if it cannot.
+        most: greatest plausible value. A greater one is counted as a fault, as
+            is a text that `read` cannot read.
+        where: id of the element, and the faults to add to; None if faults are
             not counted.
+        least: least plausible value. A smaller one is counted as a fault.
     """
     text = tags.get(key)
     if text is None:
@@ -132,9 +133,11 @@ def tag_value(
 def heights(
     tags: Mapping[str, str], where: tuple[str, ImportFaults] | None = None
 ) -> tuple[float, float, float]:
-    """Returns heights of a building: lowest point, highest point, roof [m].
+    """Returns three heights of a building, from its tags [m].
 
-    The lowest and highest points are measured from the ground.
+    They are the heights of the lowest and the highest point above the ground,
+    and the height of the roof alone. Heights without a tag are estimated, for
+    example from the number of levels.
     """
 
     def metres(key: str, least: float = 0.0) -> float | None:
@@ -172,7 +175,10 @@ def heights(
 
 
 def why_absent(tags: Mapping[str, str]) -> str | None:
-    """Returns why a building is left out; None if it is not left out."""
+    """Returns why a building is left out, such as `underground`, from its tags.
+
+    The result is None if the building is not left out.
+    """
     if not ("building" in tags or "building:part" in tags):
         return "demolished"
     kinds = [tags.get("building", ""), tags.get("building:part", "")]
@@ -209,7 +215,12 @@ def is_inside(tags: Mapping[str, str]) -> bool:
 def street_width(
     tags: Mapping[str, str], where: tuple[str, ImportFaults] | None = None
 ) -> float | None:
-    """Returns the width of a street for cars [m]; None for other ways."""
+    """Returns the width of a street's carriageway [m]; None for other ways.
+
+    Without a tag for the width, it follows from the number of lanes or the kind
+    of street. `where` contains the id of the street, and the faults to add to;
+    None if faults are not counted.
+    """
     kind = tags.get("highway", "").removesuffix("_link")
     usual: float | None = TABLES["streets"].get(kind)
     if usual is None:
@@ -225,9 +236,10 @@ def street_width(
 
 
 def driven_ways(tags: Mapping[str, str]) -> tuple[bool, bool]:
-    """Returns two bools: whether cars may drive along a street's line.
+    """Returns whether cars may drive along a street, and against it.
 
-    The first is for the direction of the line, the second against it.
+    The first result is for the direction of the street's line, the second for
+    the opposite direction.
     """
     if any(
         tags.get(key) in ("no", "private", "bus", "agricultural")
@@ -271,7 +283,10 @@ def is_marked(tags: Mapping[str, str]) -> bool:
 
 
 def path_width(tags: Mapping[str, str]) -> float | None:
-    """Returns the width of a path for people [m]; None for other ways."""
+    """Returns the width of a path for people [m]; None for other ways.
+
+    Without a tag for the width, it follows from the kind of path.
+    """
     usual: float | None = TABLES["paths"].get(tags.get("highway", ""))
     if usual is None:
         return None
@@ -279,7 +294,7 @@ def path_width(tags: Mapping[str, str]) -> float | None:
 
 
 def sidewalk_sides(tags: Mapping[str, str]) -> tuple[bool, bool]:
-    """Returns whether a street has a sidewalk on its left and right."""
+    """Returns whether a street has a sidewalk on its left, and on its right."""
 
     def has(side: str) -> bool:
         return tags.get("sidewalk") in ("both", side) or "yes" in (
@@ -291,7 +306,10 @@ def sidewalk_sides(tags: Mapping[str, str]) -> tuple[bool, bool]:
 
 
 def area_kind(tags: Mapping[str, str]) -> tuple[str, str] | None:
-    """Returns kind and class of an area on the ground; None for other areas."""
+    """Returns the kind and the semantic class of an area on the ground.
+
+    The result is None for tags of anything else.
+    """
     if tags.get("natural") == "water" or tags.get("waterway") in (
         "riverbank",
         "dock",
@@ -325,9 +343,13 @@ class LaneLayout(NamedTuple):
     def offset(self, is_forward: bool, number: int) -> float:
         """Returns the distance of a lane from the middle of the street [m].
 
-        `number` 0 is the innermost lane. The distance is positive to the right
-        in driving direction where traffic keeps right, and to the left where it
-        keeps left.
+        The distance is positive towards the side on which traffic keeps.
+
+        Args:
+            is_forward: whether the lane is in the direction of the street's
+                line.
+            number: number of the lane in this direction; 0 is the innermost
+                one.
         """
         same, other = self.forward, self.backward
         if not is_forward:
@@ -336,8 +358,9 @@ class LaneLayout(NamedTuple):
 
 
 def lane_layout(tags: Mapping[str, str], width: float) -> LaneLayout:
-    """Returns the lanes of a street; no lanes if vehicles cannot pass.
+    """Returns the lanes of a street, from its tags.
 
+    There are no lanes if cars may not use the street, or if it is too narrow.
     `width` is the width of the carriageway [m].
     """
     is_along, is_against = driven_ways(tags)
@@ -372,7 +395,11 @@ def lane_layout(tags: Mapping[str, str], width: float) -> LaneLayout:
 
 
 def speed_limit(tags: Mapping[str, str], is_forward: bool = True) -> float:
-    """Returns the speed limit along a street, or against its line [m/s]."""
+    """Returns the speed limit on a street [m/s].
+
+    Without a tag, it is the usual limit for the kind of street. `is_forward` is
+    the direction of travel: along the street's line, or against it.
+    """
     side = "forward" if is_forward else "backward"
     for key in (f"maxspeed:{side}", "maxspeed", "maxspeed:type"):
         found = _speed(tags.get(key, ""))

@@ -46,9 +46,11 @@ _Place = tuple[int, float]
 
 
 class StreetWalkways:
-    """Walkways: strips of sidewalks and paths, and crossings between them.
+    """The walkways of a city: sidewalks, paths, and crossings between them.
 
-    The name of a crossing is the id of its node on the street.
+    Attributes:
+        walkways: all walkways, those over crossings last.
+        crossings: node of a street -> the crossing there.
     """
 
     def __init__(
@@ -238,8 +240,12 @@ _ABOVE, _BELOW = 0.3, 3.5
 class Stretch:
     """A street between two junctions, with its lanes.
 
-    `line` (N, 2) is the middle of the street [m], with rounded corners and
-    evenly spaced points. `nodes` are those of its first and last point.
+    Attributes:
+        street: the street, which may extend beyond the junctions.
+        line: (N, 2) middle of the street, with rounded corners and evenly
+            spaced points [m].
+        nodes: node at the first point of `line`, and at the last one.
+        layout: numbers and width of the lanes.
     """
 
     street: Street
@@ -252,9 +258,10 @@ class Stretch:
         return float(np.linalg.norm(np.diff(self.line, axis=0), axis=1).sum())
 
     def heading(self, end: int) -> float:
-        """Returns the heading away from an end of the stretch [rad].
+        """Returns the direction of the stretch at one of its ends [rad].
 
-        `end` is 0 for the first point and -1 for the last.
+        It points away from this end, along the stretch. `end` is 0 for the
+        first point and -1 for the last.
         """
         line = self.line if end == 0 else self.line[::-1]
         reach = min(len(line) - 1, max(1, round(_ARM / SPACING)))
@@ -283,12 +290,14 @@ class _Lane:
 
 
 class StreetTraffic:
-    """The lanes of streets and their links, for traffic.
+    """The lanes of streets, and which lane leads into which.
 
-    Streets are cut at junctions into stretches. The lanes of the stretches come
-    first, and then the lanes through junctions. In a link, the second lane
-    follows the first. A lane can have a neighbour on its outer side, with the
-    same direction.
+    Attributes:
+        stretches: streets, cut where they meet.
+        lanes: lanes of the stretches, then those through junctions.
+        links: pairs of lanes, of which the second follows the first.
+        beside: lane -> its neighbour on the outer side, with the same
+            direction.
     """
 
     def __init__(
@@ -332,11 +341,15 @@ class StreetTraffic:
             self.lanes.append(DirectedLane(_level(line), limit, is_junction))
 
     def junctions(self) -> list[int]:
-        """Returns the nodes at which three or more streets meet."""
+        """Returns the nodes at which three or more ends of streets meet."""
         return [node for node, arms in self._arms.items() if len(arms) > 2]
 
     def setback(self, arm: _Arm) -> float:
-        """Returns how far before the end of a stretch its lanes end [m]."""
+        """Returns how far before the end of a stretch its lanes end [m].
+
+        `arm` is the number of the stretch, and 0 for its first end or -1 for
+        its last.
+        """
         stretch = self.stretches[arm[0]]
         wanted = [self._wanted_setback((arm[0], end)) for end in (0, -1)]
         room = max(stretch.length - _SHORTEST, 0.0)
@@ -511,8 +524,9 @@ def lanes_of_streets(
 ) -> str | None:
     """Returns the text of a lane file; None if there is no lane to drive on.
 
-    Traffic stays on streets near the drives. The lane file lists the objects,
-    such as parked cars, that were added beside the streets and stand in a lane.
+    The file contains the streets within 300 m of the drives. It also lists
+    objects, such as parked cars, that were added beside the streets and stand
+    in a lane.
 
     Args:
         streets: streets from the imported file.
