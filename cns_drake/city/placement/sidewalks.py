@@ -142,6 +142,8 @@ def plant_medians(draft: Draft) -> None:
     Without `medians`, the `trees` of the city's `street` are placed.
     """
     plan = draft.plan.medians or draft.plan.street
+    if not plan.trees:
+        return
     for index, median in enumerate(draft.areas.medians.geoms):
         rng = draft.task("median", index)
         line = _middle_line(median)

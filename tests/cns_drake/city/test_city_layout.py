@@ -199,6 +199,22 @@ def test_faults_are_named_in_one_line(lay_out_text, tmp_path, old, new, fault):
     assert "\n" not in message
 
 
+def test_a_median_needs_no_trees(tmp_path):
+    """Trees stand on a road's median only if the plan lists some."""
+    (tmp_path / "roads.yaml").write_text(
+        ROADS.replace("parking: 2.2", "median: 3.0")
+    )
+    roads = load_road_network(tmp_path / "roads.yaml")
+    path = tmp_path / "city.yaml"
+    numbers = []
+    for trees in ("trees: {lime_tree: 1}, ", ""):
+        path.write_text(PLAN.replace("trees: {lime_tree: 1}, ", trees))
+        city = lay_out(roads, load_plan(path), str(path))
+        numbers.append(sum(s.tags[0] == "median" for s in city.structures))
+    assert numbers[0] > 3
+    assert numbers[1] == 0
+
+
 def test_a_missing_plan_is_named(tmp_path):
     (tmp_path / "roads.yaml").write_text(ROADS)
     with pytest.raises(InputError, match=r"city\.yaml: No such file"):
