@@ -27,8 +27,8 @@ def decode(data: bytes | memoryview, message_type: str) -> Any:
     """Decodes serialised bytes to a message.
 
     Raises:
-        ValueError: the bytes are not such a message, or more than such a
-            message can have.
+        ValueError: the bytes are not a message of this type, or are longer than
+            any plausible message of this type.
     """
     if len(data) > _LONGEST.get(message_type, len(data)):
         raise ValueError(
@@ -49,7 +49,8 @@ def read_cloud_header(data: bytes | memoryview) -> tuple[int, str]:
     """Returns the stamp [ns] and frame of a PointCloud2, and nothing else.
 
     Raises:
-        ValueError: if it is cut off, or claims more than makes sense.
+        ValueError: if the message is cut off, or has an implausibly long frame
+            name or too many fields.
     """
     try:
         order = "<" if data[1] & 1 else ">"
@@ -75,7 +76,10 @@ def stamp_ns(header: Any) -> int:
 
 
 def odometry_row(message: Any) -> tuple:
-    """Returns a message as a record of `ODOMETRY_DTYPE`."""
+    """Returns a message nav_msgs/msg/Odometry as a record of `ODOMETRY_DTYPE`.
+
+    The dtype is `cns_drake.base.drives.drive.ODOMETRY_DTYPE`.
+    """
     pose, twist = message.pose.pose, message.twist.twist
     return (
         stamp_ns(message.header),
@@ -87,7 +91,10 @@ def odometry_row(message: Any) -> tuple:
 
 
 def imu_row(message: Any) -> tuple:
-    """Returns a message as a record of `IMU_DTYPE`."""
+    """Returns a message sensor_msgs/msg/Imu as a record of `IMU_DTYPE`.
+
+    The dtype is `cns_drake.base.drives.drive.IMU_DTYPE`.
+    """
     return (
         stamp_ns(message.header),
         xyzw(message.orientation),
@@ -107,7 +114,7 @@ def xyzw(q: Any) -> tuple[float, float, float, float]:
 
 
 class StaticTransforms:
-    """Constant poses of frames, each in its parent frame."""
+    """The tree of frames in /tf_static, with the pose of each in its parent."""
 
     def __init__(self, messages: Iterable[Any], where: str):
         """Reads the transforms of messages of type tf2_msgs/msg/TFMessage.
@@ -136,6 +143,10 @@ class StaticTransforms:
     def pose(self, base: str, frame: str) -> np.ndarray:
         """Returns the pose (4, 4) of a frame in one of its ancestors.
 
+        Args:
+            base: name of the ancestor.
+            frame: name of the frame.
+
         Raises:
             InputError: no transforms lead from the frame to the ancestor, or
                 one of them is not a rigid transform.
@@ -161,10 +172,11 @@ def checked_poses(
     Args:
         p: (..., 3) positions [m].
         quat_xyzw: (..., 4) quaternions.
+        where: file or topic, with which an error message begins.
 
     Raises:
-        InputError: a number is not finite, a position is too far away, or a
-            quaternion has no length.
+        InputError: a number is not finite, a position is too far away, or the
+            norm of a quaternion is zero.
     """
     if not (np.isfinite(p).all() and np.isfinite(quat_xyzw).all()):
         raise InputError(f"{where}: a pose is not finite")

@@ -52,7 +52,7 @@ class _Work:
 class TimeLeft:
     """Estimates the time left for jobs, from their costs and their progress.
 
-    All times `now` must come from the same clock [s].
+    The methods take the present time `now` [s], always of the same clock.
     """
 
     def __init__(self, costs: Mapping[str, float]):
@@ -61,13 +61,13 @@ class TimeLeft:
         self._most_running = 1
 
     def start(self, name: str, now: float) -> None:
-        """Notes that a job starts, perhaps not for the first time."""
+        """Records that a job starts, or is started again."""
         self._works[name] = _Work(self._works[name].cost, since=now)
         running = sum(w.since is not None for w in self._works.values())
         self._most_running = max(self._most_running, running)
 
     def progress(self, name: str, share: float, now: float) -> None:
-        """Notes the share of a job that is done, 0 to 1.
+        """Records which share of a job is done, 0 to 1.
 
         The time until the first call for a job counts as loading, and not as
         work.
@@ -79,7 +79,7 @@ class TimeLeft:
         work.taken, work.measured = now - work.since, share - work.first
 
     def end(self, name: str, now: float) -> None:
-        """Notes that a job has ended."""
+        """Records that a job has ended."""
         work = self._works[name]
         since = now if work.since is None else work.since
         work.done, work.since = 1.0, None
@@ -165,7 +165,7 @@ class JobProgress:
         return self._bars.get_renderable()
 
     def start(self, name: str) -> None:
-        """Shows that a job starts, perhaps not for the first time."""
+        """Shows that a job starts, or is started again."""
         self._left.start(name, time.monotonic())
         self._remove(name)
         self._tasks[name] = self._bars.add_task(name, total=None, note="")
@@ -191,7 +191,7 @@ class JobProgress:
         self.refresh()
 
     def end(self, name: str, fault: bool = False) -> None:
-        """Shows that a job has ended; if `fault`, with an error."""
+        """Shows that a job has ended; if `fault` is true, with an error."""
         self._left.end(name, time.monotonic())
         self._num_ended += 1
         self._remove(name)

@@ -18,7 +18,7 @@ _REPORT_INTERVAL = 0.5
 
 
 class Reporter:
-    """Reports the progress of a step; does nothing if nobody receives it."""
+    """Reports the progress and the notes of a step, by default to nobody."""
 
     def __init__(self, send: Callable[..., None] = lambda *message: None):
         """Takes the receiver of messages: a kind and its values."""
@@ -85,7 +85,11 @@ class Step(abc.ABC):
         """
 
     def made_of(self, inputs: Mapping[str, object]) -> dict[str, object]:
-        """Returns the step's inputs together with the digest of its code."""
+        """Returns the inputs, and the digest of the step's code as `code`.
+
+        A fingerprint of the result tells whether the step's files are up to
+        date; see `cns_drake.base.jobs.fingerprint`.
+        """
         return {**inputs, "code": code_digest(type(self).__module__)}
 
 
