@@ -156,7 +156,8 @@ class CalibratedReturns:
             scene: geometry on which rays are cast.
             materials: reflection properties of each geometry.
             pattern: the beams of a turn.
-            turn: the beams' directions and errors in this turn.
+            turn: the beams with the errors of the individual unit, from
+                `CalibratedReturns.turn`.
             p_WSset: (K, 3) positions of S in the world [m].
             R_WSset: (K, 3, 3) orientations of S in the world.
             times: (T,) firing times as fractions of the turn.
@@ -234,7 +235,11 @@ class CalibratedReturns:
         return report_echoes(light, receiver, key, turn.range_error, turn.gain)
 
     def turn(self, beams: Beams) -> CalibratedTurn:
-        """Returns the beams of a turn, with the individual unit's errors."""
+        """Returns the beams of a turn with the errors of the individual unit.
+
+        Args:
+            beams: the nominal beams, from `BeamPattern.beams`.
+        """
         laser = np.arange(int(beams.ring.max()) + 1)
         key = frame_key(self.unit_seed, f"unit/{self.sensor_name}", 0)
         sheet, head = self.sheet, self.sheet.head
