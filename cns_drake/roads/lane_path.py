@@ -64,11 +64,14 @@ class LanePath:
 
 
 def check_length(length: float, source: object) -> None:
-    """Checks the length of a path [m].
+    """Raises an error if a path is too short or too long for a drive.
+
+    Args:
+        length: length of the path [m].
+        source: text with which the error message begins.
 
     Raises:
-        InputError: beginning with `source`, if the path is too short or too
-            long.
+        InputError: the path is too short or too long.
     """
     if length < _MIN_LENGTH:
         raise InputError(
