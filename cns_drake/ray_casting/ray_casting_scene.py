@@ -100,7 +100,10 @@ class RayCastingScene:
             self._group_of[[index for index, *_ in group.members]] = row
 
     def serves(self, p_WS: np.ndarray) -> bool:
-        """Returns whether ranges are precise for a sensor at p_WS (3,) [m]."""
+        """Returns whether ranges are precise for a sensor at p_WS (3,) [m].
+
+        If not, make a new scene for the sensor's position.
+        """
         return serves(self._p_WO, self._groups, p_WS)
 
     def set_frame_poses(
