@@ -53,7 +53,11 @@ def draw_parts(
 ) -> None:
     """Draws parts of a city as one mesh per class, named `<path>/<class>`.
 
-    Without `rgba`, each part keeps its own colour.
+    Args:
+        meshcat: Meshcat's server.
+        path: path in Meshcat.
+        parts: the parts.
+        rgba: colour of all parts; None for their own colours.
     """
     by_class: dict[str, list[Part]] = {}
     for part in parts:
@@ -72,7 +76,13 @@ def draw_parts(
 def draw_body(
     meshcat: Meshcat, path: str, geometries: Iterable[PerceptionGeometry]
 ) -> None:
-    """Draws the geometry of one frame in its own colours."""
+    """Draws the geometry of one frame in its own colours.
+
+    Args:
+        meshcat: Meshcat's server.
+        path: path in Meshcat of the frame.
+        geometries: the geometries of the frame.
+    """
     by_color: dict[tuple, list[PerceptionGeometry]] = {}
     for geometry in geometries:
         rgb = geometry.rgb or _DEFAULT_RGB
@@ -94,7 +104,13 @@ def draw_marker(meshcat: Meshcat, path: str) -> None:
 def draw_route(
     meshcat: Meshcat, path: str, X_WBs: Sequence[RigidTransform]
 ) -> None:
-    """Draws a route as a flat ribbon, from red (start) to blue (end)."""
+    """Draws a route as a flat ribbon, from red (start) to blue (end).
+
+    Args:
+        meshcat: Meshcat's server.
+        path: path in Meshcat of the ribbon.
+        X_WBs: poses of the vehicle along the route.
+    """
     p_WBset = np.array([X_WB.translation() for X_WB in X_WBs])
     left_W = np.array([X_WB.rotation().matrix()[:, 1] for X_WB in X_WBs])
     step = np.linalg.norm(np.diff(p_WBset, axis=0), axis=1)
@@ -148,7 +164,10 @@ def draw_points(meshcat: Meshcat, path: str, p_WRset: np.ndarray) -> None:
 def set_view(meshcat: Meshcat, lower: np.ndarray, upper: np.ndarray) -> None:
     """Lights a scene as in daylight; sets a view from the south and above.
 
-    The view covers the coordinates from `lower` (3,) to `upper` (3,) [m].
+    Args:
+        meshcat: Meshcat's server with the scene.
+        lower, upper: (3,) least and greatest coordinates that the view shows
+            [m].
     """
     meshcat.SetProperty("/Grid", "visible", False)
     meshcat.SetProperty("/Axes", "visible", False)
