@@ -81,18 +81,19 @@ def read_records(
 ) -> list[tuple[int, dict[str, str]]]:
     """Returns the rows of a CSV file whose first line names the columns.
 
+    Args:
+        path: the file.
+        columns: names of the columns that the file must have. It may have more.
+
     Returns:
         For each row, its line number and a dictionary column -> cell. If an
         earlier version of this program wrote the file, renamed columns appear
         under their present names.
 
-    Args:
-        path: the file.
-        columns: names of the columns that the file must have. It may have more.
-
     Raises:
-        InputError: the file cannot be read as CSV (see `read_rows`), a column
-            is missing, or a row has more or fewer cells than there are columns.
+        InputError: the file cannot be read as CSV (see
+            `cns_drake.base.csv_files.read_rows`), a column is missing, or a row
+            has more or fewer cells than there are columns.
     """
     (_, names), *rows = read_rows(path) or [(1, [])]
     names = [

@@ -55,7 +55,12 @@ class InputError(Exception):
     exit_status = 2
 
     def __init__(self, message: object):
-        """Takes the message; see `one_line`."""
+        """Makes an error with a message of one line.
+
+        Args:
+            message: the message; line breaks and control characters are
+                replaced.
+        """
         super().__init__(one_line(message))
 
 
@@ -198,7 +203,12 @@ def nearest_field(
 
 
 def did_you_mean(given: object, names: Iterable[str]) -> str:
-    """Returns "; did you mean <name>?" for a similar name, or ""."""
+    """Returns a suggestion for a misspelt name: "; did you mean <name>?".
+
+    Args:
+        given: the misspelt name.
+        names: the known names. If none of them is similar, the result is "".
+    """
     near = _nearest(given, names)
     return f"; did you mean {near}?" if near else ""
 

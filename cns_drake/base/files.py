@@ -75,7 +75,7 @@ def draft_folder(folder: Path, *, replaces: bool = False) -> Iterator[Path]:
 
     The last part of its path is the same as in `folder`, because files written
     to it may contain this name; only the parent folder differs. On an exception
-    the temporary folder is removed. If `folder` exists and is not empty, it is
+    the temporary folder is removed. An existing `folder` that is not empty is
     replaced if `replaces` is true; otherwise it is an error.
 
     Raises:

@@ -79,8 +79,8 @@ def interrupts_wait() -> Iterator[Callable[[], None]]:
 
     Without the delay, KeyboardInterrupt can be raised while the arguments of a
     C++ function are being converted; the conversion then reports a wrong type
-    instead. Only the first interrupt is delayed: a second one takes effect at
-    once. Later ones are ignored, so that files can be closed.
+    instead. Only the first interrupt is delayed. A second one takes effect at
+    once, and further ones are ignored, so that files can be closed.
     """
     waiting: list[int] = []
     struck: list[int] = []

@@ -17,8 +17,8 @@ def to_jpeg(
     Args:
         picture: the picture.
         quality: quality of the JPEG, as Pillow defines it.
-        longest: greatest width and height [pixels]. A larger picture is itself
-            reduced to this size, in place. None for no limit.
+        longest: greatest width and height [pixels]. A larger picture is reduced
+            to this size, in place. None for no limit.
     """
     if longest is not None:
         picture.thumbnail((longest, longest))

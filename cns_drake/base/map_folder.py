@@ -69,7 +69,7 @@ class MapFolder:
         return found
 
     def stage(self, stage: str) -> Path:
-        """Returns the path of the SDF file of a stage, such as `01`."""
+        """Returns the path of a stage's SDF file (for example, `01`'s)."""
         return self.path / stage_name(stage)
 
     def stages(self) -> dict[str, Path]:
@@ -80,7 +80,7 @@ class MapFolder:
         }
 
     def drive(self, number: str) -> Path:
-        """Returns the path of the scenario file of a drive, such as `01`."""
+        """Returns the path of a drive's scenario file (for example, `01`'s)."""
         return self.path / f"sequence_{number}.yaml"
 
     def drives(self) -> list[Path]:

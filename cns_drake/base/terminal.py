@@ -251,6 +251,11 @@ def track(items: Iterable[Any], description: str, total: int) -> Iterator[Any]:
     """Yields items and shows progress on stderr.
 
     On a terminal the progress is a bar; elsewhere it is printed as lines.
+
+    Args:
+        items: the items.
+        description: text that is shown before the bar.
+        total: number of items.
     """
     # Slow to import, and not needed to print help.
     from cns_drake.base.progress_bars import count_progress, show_progress

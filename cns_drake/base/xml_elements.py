@@ -110,12 +110,13 @@ def read_elements(
     Namespace prefixes need not be declared.
 
     Args:
+        path: the file.
         root: required tag of the top element; None for any tag.
         encoding: encoding of the file; by default the one that it declares.
 
     Raises:
-        InputError: if it cannot be read, is no XML, has another root, holds
-            a document type, is nested too deep or has too many elements.
+        InputError: if it cannot be read, is no XML, has another root, holds a
+            document type, is nested too deep or has too many elements.
     """
     parser = expat.ParserCreate(encoding)
     depth = count = 0

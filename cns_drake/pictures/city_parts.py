@@ -41,9 +41,9 @@ class Part:
 class StageDifference:
     """The differences between two stages, as lists of parts of structures.
 
-    The two stages are "this stage" and "the other stage". Where a structure is
-    higher in one of them, its upper part is what lies above its top in the
-    other.
+    The two stages are "this stage" and "the other stage". If a structure is
+    higher in one stage, its "upper parts" are those above its height in the
+    other stage.
 
     Attributes:
         common: what exists in both stages, with the shape in this stage.

@@ -502,7 +502,7 @@ class MeshcatRecorder(LeafSystem):
             X_BSs: name of a LiDAR -> pose of its frame S on the body B.
             period: time between two frames [s].
             num_frames: number of frames that are recorded; all if None.
-            shown: stages whose differences the page shows.
+            shown: stages whose differences the page shows; None for none.
             scan_spacing: distance driven between two shown scans [m].
             cameras: name of a camera -> number of frames from one image to the
                 next.

@@ -93,7 +93,12 @@ def draw_body(
 
 
 def draw_marker(meshcat: Meshcat, path: str) -> None:
-    """Draws a large arrow that points down to the origin."""
+    """Draws a large arrow that points down to the origin of its path.
+
+    Args:
+        meshcat: Meshcat's server.
+        path: path in Meshcat of the arrow.
+    """
     meshcat.SetObject(
         path,
         MeshcatCone(height=_MARKER_HEIGHT, a=_MARKER_RADIUS, b=_MARKER_RADIUS),
@@ -148,9 +153,14 @@ def height_rgb(z: np.ndarray) -> np.ndarray:
 
 
 def draw_points(meshcat: Meshcat, path: str, p_WRset: np.ndarray) -> None:
-    """Draws points (N, 3) in W [m], coloured by height.
+    """Draws points, coloured by height.
 
     All points have the same size on the screen, whatever their distance.
+
+    Args:
+        meshcat: Meshcat's server.
+        path: path in Meshcat of the points.
+        p_WRset: (N, 3) points in W [m].
     """
     cloud = PointCloud(len(p_WRset), Fields(BaseField.kXYZs | BaseField.kRGBs))
     cloud.mutable_xyzs()[:] = _on_grid(p_WRset).T

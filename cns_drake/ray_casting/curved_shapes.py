@@ -66,7 +66,11 @@ class NearCurvedShapes:
     """Finds rays that start near curved shapes that never move."""
 
     def __init__(self, groups: Sequence[RayGroup]):
-        """Takes the curved shapes of groups; the groups must have poses."""
+        """Collects the curved shapes of groups.
+
+        Args:
+            groups: the groups, already placed (see `RayGroup.place`).
+        """
         rows: list[int] = []
         X_LGs, sizes = [], []
         for row, group in enumerate(groups):
@@ -170,7 +174,11 @@ class CapsuleAxes:
     """Casts rays along the axes of capsules, where Embree is not exact."""
 
     def __init__(self, groups: Sequence[RayGroup]):
-        """Takes groups; the groups must have poses."""
+        """Collects the capsules of groups.
+
+        Args:
+            groups: the groups, already placed (see `RayGroup.place`).
+        """
         found = [
             (row, index, X_LG, surface)
             for row, group in enumerate(groups)

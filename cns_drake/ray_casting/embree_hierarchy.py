@@ -77,8 +77,8 @@ def merge_first(group: RayGroup) -> Iterator[Primitives]:
     """Yields what the first hierarchy contains of a group.
 
     These are the group's triangles, and polyhedra around its curved shapes. If
-    the group can move, it contains the curved shapes themselves instead of
-    polyhedra. All rays are cast on the first hierarchy.
+    the group can move, the first hierarchy contains the curved shapes
+    themselves instead of polyhedra. All rays are cast on the first hierarchy.
     """
     members = _numbered(group)
     flat = [
@@ -266,7 +266,7 @@ class EmbreeHierarchy:
     an edge that two triangles share.
 
     Attributes:
-        rows: rows of the groups that have primitives in the hierarchy.
+        rows: indices of the groups that have primitives in the hierarchy.
     """
 
     def __init__(
@@ -278,8 +278,12 @@ class EmbreeHierarchy:
     ):
         """Builds the hierarchy.
 
-        `merge` returns the primitives of a group, possibly none. Scenes of
-        groups that are unchanged since a previous hierarchy are reused.
+        Args:
+            groups: the groups, already placed (see `RayGroup.place`).
+            merge: returns the primitives of a group, possibly none.
+            num_threads: number of threads that share the rays of a cast.
+            previous: hierarchy from which the scenes of unchanged groups are
+                reused; None to build all anew.
 
         Raises:
             MemoryError: Embree cannot build it.
@@ -474,7 +478,13 @@ class EmbreeScene:
         num_threads: int,
         previous: EmbreeScene | None = None,
     ):
-        """Builds the scene of groups; the groups must have poses.
+        """Builds the scene.
+
+        Args:
+            groups: the groups, already placed (see `RayGroup.place`).
+            num_threads: number of threads that share the rays of a cast.
+            previous: scene from which unchanged groups are reused; None to
+                build all anew.
 
         Raises:
             MemoryError: Embree cannot build it.

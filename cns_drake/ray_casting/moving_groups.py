@@ -17,8 +17,8 @@ class KnownPoses(NamedTuple):
     """Poses of M frames F in the world.
 
     Attributes:
-        rows: frame -> row of its pose. In a simulation, all KnownPoses share
-            this one object.
+        rows: frame -> row of its pose. All KnownPoses of a simulation share
+            this mapping.
         X_WFs: (M, 4, 4) poses.
     """
 
@@ -58,7 +58,7 @@ class Placed(NamedTuple):
 
     Attributes:
         rows: (P,) rows of the groups.
-        X_OLs: (P, 3, 4) poses; see `RayGroup.X_OL`.
+        X_OLs: (P, 3, 4) poses; see `cns_drake.ray_casting.ray_groups.RayGroup`.
         in_sight: (P,) bool, whether rays can meet each group.
         moves: (P,) bool, whether each group has a `motion`.
     """
@@ -95,7 +95,13 @@ class MovingGroups:
     """The groups of a scene that can move."""
 
     def __init__(self, groups: Sequence[RayGroup], p_WO: np.ndarray):
-        """Takes groups; the groups must have poses."""
+        """Finds the groups that can move.
+
+        Args:
+            groups: all groups of the scene, already placed (see
+                `RayGroup.place`).
+            p_WO: (3,) origin of the scene in the world [m].
+        """
         self._groups = groups
         self._p_WO = p_WO
         self._rows = np.array(

@@ -67,17 +67,20 @@ class RayCastingScene:
         previous: RayCastingScene | None = None,
         p_WS: np.ndarray | None = None,
     ):
-        """Builds the scene; hits give indices into the geometries.
+        """Builds the scene.
 
         Args:
-            geometries: the geometries that rays can hit.
+            geometries: the geometries that rays can hit. A hit contains the
+                index of its geometry in this sequence.
             anchored_frames: frames that never move.
             calc_X_WF: returns the pose of a frame.
             num_threads: threads that share the rays of a cast; hits do not
                 depend on it.
-            previous: a scene of similar geometry, which is replaced: frames
-                whose surfaces are still the same objects are not built anew.
-            p_WS: the position of the sensor [m].
+            previous: a scene of similar geometry, which is replaced: its parts
+                are reused where the surfaces are still the same objects. None
+                to build all anew.
+            p_WS: (3,) position of the sensor in the world [m]; None if it is
+                not known.
         """
         self._p_WO, self._groups = group_geometries(
             enumerate(geometries),

@@ -142,8 +142,8 @@ class RayGroup:
     def content(self) -> tuple:
         """Returns a key of the group's shapes and their poses in the group.
 
-        Groups with equal keys can share one Embree scene. The key is valid as
-        long as the surfaces of both groups exist in memory.
+        Groups with equal keys can share one Embree scene. A key is valid as
+        long as the surfaces of its group exist in memory.
         """
         shapes = tuple(
             (
@@ -165,7 +165,9 @@ def group_geometries(
     *,
     p_WS: np.ndarray | None = None,
 ) -> tuple[np.ndarray, list[RayGroup]]:
-    """Groups geometries that move together; returns the scene's origin, too.
+    """Divides geometries into groups that move rigidly, and chooses an origin.
+
+    Ranges are most precise near the origin of a scene.
 
     A large surface with many copies gets a group for each copy, and these
     groups share the surface.

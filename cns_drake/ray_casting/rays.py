@@ -95,7 +95,12 @@ class Hits(NamedTuple):
 
     @classmethod
     def misses(cls, num_rays: int, with_normals: bool) -> Hits:
-        """Returns hits that say that every ray missed."""
+        """Returns the hits of rays none of which hits anything.
+
+        Args:
+            num_rays: number of rays.
+            with_normals: whether the result has normals, which are zero.
+        """
         return cls(
             np.full(num_rays, np.inf, np.float32),
             np.full(num_rays, -1, np.int32),

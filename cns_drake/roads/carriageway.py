@@ -58,10 +58,10 @@ def corner_setback(
 ) -> float:
     """Returns the distance from a junction at which a road must end [m].
 
-    At this distance, the arc of the kerb at the corner between the road and its
-    neighbour ends. The edges of both roads meet at the distance (b + a
-    cos(angle)) / sin(angle) along the road, and the arc ends r / tan(angle / 2)
-    beyond this point. The result is at least r.
+    The kerb at the corner between the road and its neighbour is rounded by an
+    arc. The road ends where this arc begins. The edges of both roads meet at
+    the distance (b + a cos(angle)) / sin(angle) along the road, and the arc
+    begins r / tan(angle / 2) beyond this point. The result is at least r.
 
     Args:
         half_width: a, half the width of the road [m].
@@ -156,8 +156,8 @@ def make_areas(
     """Returns the areas of a road network, from its roads and junctions.
 
     Args:
-        roads: name -> road.
-        junction_areas: name -> area of each junction [m].
+        roads: name of each road -> the road.
+        junction_areas: name of each junction -> its area, seen from above [m].
     """
     lanes = {name: road_strip(road) for name, road in roads.items()}
     bays = {}

@@ -63,8 +63,8 @@ class RoadNetwork:
     """A road network: roads and junctions, with their lanes and areas.
 
     Attributes:
-        roads: name -> road.
-        junctions: name -> junction.
+        roads: name of each road -> the road.
+        junctions: name of each junction -> the junction.
     """
 
     def __init__(self, roads: dict[str, Road], junctions: dict[str, Junction]):

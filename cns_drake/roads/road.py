@@ -190,14 +190,15 @@ class Road:
 
         Args:
             name: name of the road.
-            entry: its fields in `roads.yaml`.
-            curve: its whole centreline.
-            setbacks: distances of its two ends from their junctions [m].
+            entry: the road's fields in `roads.yaml`.
+            curve: the whole centreline, from junction to junction.
+            setbacks: distances of the road's two ends from the positions of
+                their junctions [m].
             heights: heights of the two junctions [m].
 
         Raises:
-            ValueError: the setbacks leave nothing of the road, or its heights
-                are outside it or out of order.
+            ValueError: the setbacks leave nothing of the road, or the heights
+                in `entry` are outside the road or out of order.
         """
         self.name = name
         self.start = entry.start
@@ -309,7 +310,13 @@ class Road:
     def lane_centreline(
         self, direction: Direction, lane: int, spacing: float = 1.0
     ) -> np.ndarray:
-        """Returns the middle (N, 3) of a lane in driving direction [m]."""
+        """Returns the middle (N, 3) of a lane in driving direction [m].
+
+        Args:
+            direction: `forward` or `backward`.
+            lane: number of the lane, from 1 next to the middle of the road.
+            spacing: greatest distance between the points [m].
+        """
         points = self.evaluate(
             self.stations(spacing), self.lane_offset(direction, lane)
         )[:, :3]

@@ -188,7 +188,7 @@ def read_waypoints(path: Path) -> tuple[np.ndarray, list[int]]:
     """Reads waypoints from a file.
 
     Returns:
-        (N, 3) positions of the waypoints [m]; the number of each one's line.
+        (N, 3) positions of the waypoints [m]; the line number of each waypoint.
 
     Raises:
         InputError: the file cannot be read, or a line is not usable. The

@@ -33,10 +33,15 @@ class ModelFinder:
     """Finds the files to which URIs in a world refer."""
 
     def __init__(self, world: Path, model_paths: Iterable[Path] = ()):
-        """Takes the folders to search, in order of precedence.
+        """Determines the folders to search.
 
-        They are the given ones, those of the environment variables, the world's
-        folder, the one above it, and `models` in these two.
+        These are, in order of precedence: the given ones, those of the
+        environment variables, the world's folder, its parent folder, and the
+        folder `models` in both.
+
+        Args:
+            world: SDF file of the world.
+            model_paths: folders to search first.
         """
         folder = world.absolute().parent
         named = [

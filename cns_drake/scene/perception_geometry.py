@@ -156,7 +156,7 @@ class GeometryReader:
     """
 
     def __init__(self, role: Role):
-        """Takes the role, and reads nothing yet."""
+        """Makes a reader of the geometry with a role; nothing is read yet."""
         self._role = role
         self._known: dict[GeometryId, tuple[tuple, PerceptionGeometry]] = {}
 
@@ -302,7 +302,7 @@ def geometry_revision_port(scene_graph: SceneGraph) -> OutputPort:
     """Returns a port whose value changes when, and only when, geometry does.
 
     Geometry changes if it is added, removed, replaced, reshaped, renamed or
-    given another role. A pose is not geometry.
+    given another role. A new pose of a frame does not count.
 
     The first call adds the port to the SceneGraph, and must come before a
     Diagram is built from it.

@@ -42,14 +42,14 @@ class BodyShape(NamedTuple):
 
 
 class Limb(NamedTuple):
-    """A rigid part of a body, which swings about its y axis.
+    """A rigid part of a body, which swings about the y axis of its joint.
 
     Attributes:
         name: name of the limb.
         joint: position of the limb's joint in the frame of the body [m].
-        swing: amplitude of its swing at walking speed [rad], negative if it
-            first swings backwards.
-        shapes: the shapes of which it consists.
+        swing: amplitude of the limb's swing at walking speed [rad], negative if
+            it first swings backwards.
+        shapes: the shapes of which the limb consists.
     """
 
     name: str

@@ -88,7 +88,13 @@ class Crossing:
 def make_crossing(
     line: np.ndarray, width: float, marked: bool = True
 ) -> Crossing:
-    """Returns a crossing of a given width around a line (2, 3) [m]."""
+    """Returns a crossing for walkers.
+
+    Args:
+        line: (2, 3) ends of the crossing's middle line [m].
+        width: width of the crossing [m].
+        marked: whether vehicles give way to waiting walkers.
+    """
     course = LineString(line[:, :2])
     return Crossing(line, course.buffer(width / 2, cap_style="flat"), marked)
 
@@ -377,9 +383,15 @@ def length_of(points: np.ndarray) -> float:
 
 
 def distances_along(points: np.ndarray) -> np.ndarray:
-    """Returns the distances (N,) of points along their line from the first [m].
+    """Returns how far along a polyline each of its points is [m].
 
-    The points are (N, 2) or (N, 3) [m].
+    The first point is at 0.
+
+    Args:
+        points: (N, 2) or (N, 3) points [m].
+
+    Returns:
+        (N,) distances [m].
     """
     steps = np.linalg.norm(np.diff(points, axis=0), axis=1)
     return np.append(0.0, np.cumsum(steps))

@@ -567,7 +567,13 @@ def places_on(
 
 @compiled
 def speed_on(streets: Streets, piece: int, s: float) -> float:
-    """Returns the allowed speed at a distance `s` [m] along a piece [m/s]."""
+    """Returns the allowed speed on a piece of a lane graph [m/s].
+
+    Args:
+        streets: arrays of all pieces.
+        piece: number of the piece.
+        s: distance along the piece [m].
+    """
     row = streets.pieces[piece]
     k = min(max(int(s / row.step), 0), row.num_points - 1)
     return streets.speed[row.first + k]

@@ -76,7 +76,12 @@ class BodyStates(NamedTuple):
 
 
 def bodies_at(plan: TrafficPlan, t: float) -> BodyStates:
-    """Returns the states of all bodies at a time [s]."""
+    """Returns the states of all bodies at a time.
+
+    Args:
+        plan: the planned traffic.
+        t: time since the start of the drive [s].
+    """
     vehicles, vehicle_rates = plan.vehicles.at(t)
     walkers, walker_rates = plan.walkers.at(t)
     both = np.concatenate([vehicles[:, :4], walkers[:, :4]])
@@ -181,9 +186,14 @@ class TrafficMotion(LeafSystem):
         source_id: SourceId,
         turn: float,
     ):
-        """Takes a plan, and its vehicles and then its walkers as bodies.
+        """Declares the ports.
 
-        `turn` is the duration of a LiDAR's turn [s].
+        Args:
+            plan: planned motion.
+            bodies: the vehicles of the plan, and then its walkers.
+            source_id: geometry source of the bodies.
+            turn: time over which the output `body_spatial_velocities` is
+                averaged [s]: the duration of a LiDAR's turn.
         """
         super().__init__()
         self.source_id = source_id
@@ -312,10 +322,8 @@ def make_traffic(
 ) -> TrafficMotion:
     """Adds traffic to a SceneGraph; returns the system that moves it.
 
-    Traffic consists of vehicles and walkers.
-
-    The system is not yet part of a diagram; `cns_drake.add_traffic` adds it to
-    one.
+    Traffic consists of vehicles and walkers. The system is not yet part of a
+    diagram; `cns_drake.add_traffic` also adds it to one.
 
     Args:
         scene_graph: SceneGraph to which the geometry is added, under a source

@@ -171,8 +171,11 @@ class Follower:
     ):
         """Places a car at the beginning of its path.
 
-        The path and the bounds are those of a trajectory. The drive begins at
-        the step `start`.
+        Args:
+            graph: the lane graph.
+            trajectory: drive whose path and bounds of the speed the car keeps.
+            box: size of the car.
+            start: number of the time step at which the drive begins.
         """
         self._path, self._profile = trajectory.path, trajectory.speed_profile
         self._square = self._profile.speed**2
@@ -520,9 +523,9 @@ def plan_traffic(
         vehicles, walkers: requested numbers of vehicles and walkers.
         seed: seed of the random kinds, places and routes.
         duration: duration of the drive [s]. If the ego car follows other
-            vehicles, the longest time that the drive may take. ego: function
-            times -> positions and headings of the ego car. If the ego car
-            follows other vehicles, only its first position counts.
+            vehicles, the longest time that the drive may take.
+        ego: function times -> positions and headings of the ego car. If the ego
+            car follows other vehicles, only its first position counts.
         ego_box: size of the ego car.
         drive: path and speeds of the ego car if it follows other vehicles;
             otherwise None.

@@ -539,7 +539,15 @@ def find_prior(traffic: Traffic, i: int) -> tuple[float, float, float]:
 
 @compiled
 def rear_on_way(streets: Streets, car: Any) -> float:
-    """Returns the place of a vehicle's rear along its way in a junction [m]."""
+    """Returns the place of a vehicle's rear along its path in a junction [m].
+
+    The result is negative before the junction.
+
+    Args:
+        streets: arrays of all lanes.
+        car: the vehicle, a record of dtype `VEHICLE`, whose `held` is its path
+            through the junction.
+    """
     rear = car.s - car.length
     if car.path[CURRENT] == car.held:
         return rear

@@ -140,9 +140,13 @@ class Crowd:
         crossings: np.ndarray,
         rng: np.random.Generator,
     ):
-        """Places `count` walkers on walkways, except on crossings.
+        """Places walkers on walkways, except on crossings.
 
-        `crossings` (C,) are records `CROSSING`.
+        Args:
+            count: requested number of walkers.
+            walkways: the walkways.
+            crossings: (C,) records of dtype `CROSSING`.
+            rng: random generator for their places.
         """
         self._crossings = crossings
         self._paths = _make_paths(walkways)

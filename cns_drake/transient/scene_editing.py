@@ -64,9 +64,11 @@ class SceneEditing:
     """
 
     def __init__(self, world: World):
-        """Takes a world that is not yet part of a diagram.
+        """Begins to change a world.
 
-        Its SceneGraph will be changed.
+        Args:
+            world: the world, not yet part of a diagram; its SceneGraph is
+                changed.
         """
         self._world = world
         self._source = world.plant.get_source_id()
@@ -80,12 +82,24 @@ class SceneEditing:
         self._notes.append(f"transient: {text}")
 
     def blame(self, structure: str, cause: str) -> None:
-        """Records the cause of a change to a structure."""
+        """Records why a structure was changed.
+
+        Args:
+            structure: name of the structure.
+            cause: field of the scenario's section `transient` that asked for
+                the change.
+        """
         if cause not in self._causes[structure]:
             self._causes[structure].append(cause)
 
     def remove(self, thing: Structure, cause: str) -> None:
-        """Removes a structure, and records the cause."""
+        """Removes a structure, and records why.
+
+        Args:
+            thing: the structure.
+            cause: field of the scenario's section `transient` that asks for the
+                change.
+        """
         for part in thing.parts:
             self._remove_part(part)
         self.blame(thing.name, cause)
@@ -100,7 +114,8 @@ class SceneEditing:
             X_new: rigid transform in W that is applied to the structure's
                 points.
             name: new name of the structure, unique in the world.
-            cause: cause of the change.
+            cause: field of the scenario's section `transient` that asks for the
+                change.
         """
         for part in thing.parts:
             self._register(
@@ -140,7 +155,9 @@ class SceneEditing:
             name: name of the structure, unique in the world.
             semantic_class: class of the structure.
             model: a model of the city generator.
-            X_WS: pose of the structure S in W. cause: cause of the change.
+            X_WS: pose of the structure S in W.
+            cause: field of the scenario's section `transient` that asks for the
+                change.
         """
         for part in model.parts:
             self._register(
@@ -215,7 +232,8 @@ class SceneEditing:
             p_WVs: (N, 3) vertices in W [m].
             triangles: (M, 3) indices of vertices.
             look: colour and reflectivity of the structure.
-            cause: cause of the change.
+            cause: field of the scenario's section `transient` that asks for the
+                change.
         """
         middle = np.round(p_WVs.mean(axis=0))
         self._register(
@@ -358,7 +376,8 @@ class Surroundings:
         The choice depends on the seed, the cause and the names of the objects.
 
         Args:
-            cause: kind of change for which the objects are chosen.
+            cause: field of the scenario's section `transient` that asks for the
+                change.
             things: objects with a `name`.
             share: share of the objects, from 0 to 1.
         """

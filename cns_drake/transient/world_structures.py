@@ -174,7 +174,11 @@ class Obstacles:
     """Areas, seen from above, where new objects must not stand."""
 
     def __init__(self, areas: Iterable[tuple[str, BaseGeometry]]):
-        """Takes names and areas in W [m]."""
+        """Collects obstacles.
+
+        Args:
+            areas: name and area of each obstacle, seen from above [m].
+        """
         pairs = [(n, area) for n, area in areas if not area.is_empty]
         self._names = np.array([name for name, _ in pairs], object)
         self._areas = [area for _, area in pairs]
@@ -251,7 +255,12 @@ class GroundSurface:
     """
 
     def __init__(self, things: Mapping[str, Structure], near: BaseGeometry):
-        """Takes all structures, and the area in which the ground is known."""
+        """Collects the ground in an area.
+
+        Args:
+            things: name -> structure, for all structures of the world.
+            near: area in which the ground is known, seen from above [m].
+        """
         shapely.prepare(near)
         self.near = near
         corners = {of_road: [np.zeros((0, 3, 3))] for of_road in (False, True)}

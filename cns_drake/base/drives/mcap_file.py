@@ -168,10 +168,10 @@ class McapFile:
     """
 
     def __init__(self, path: Path):
-        """Reads the index.
+        """Opens a file and reads its index.
 
         Raises:
-            InputError: if there is no such file, or it is no complete MCAP
+            InputError: if there is no such file, or it is not a complete MCAP
                 file.
         """
         self.path = Path(path)

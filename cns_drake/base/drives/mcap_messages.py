@@ -24,10 +24,14 @@ _ENCAPSULATION_BYTES = 4
 
 
 def decode(data: bytes | memoryview, message_type: str) -> Any:
-    """Decodes serialised bytes to a message.
+    """Decodes a serialised message.
+
+    Args:
+        data: the message, serialised as CDR.
+        message_type: its type, such as `nav_msgs/msg/Odometry`.
 
     Raises:
-        ValueError: the bytes are not a message of this type, or are longer than
+        ValueError: the data are not a message of this type, or are longer than
             any plausible message of this type.
     """
     if len(data) > _LONGEST.get(message_type, len(data)):
@@ -117,7 +121,11 @@ class StaticTransforms:
     """The tree of frames in /tf_static, with the pose of each in its parent."""
 
     def __init__(self, messages: Iterable[Any], where: str):
-        """Reads the transforms of messages of type tf2_msgs/msg/TFMessage.
+        """Collects the transforms of messages of /tf_static.
+
+        Args:
+            messages: messages of type tf2_msgs/msg/TFMessage.
+            where: file or topic, with which an error message begins.
 
         Raises:
             InputError: two messages place one frame differently.

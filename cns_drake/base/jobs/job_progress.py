@@ -56,7 +56,11 @@ class TimeLeft:
     """
 
     def __init__(self, costs: Mapping[str, float]):
-        """Takes name -> expected time on one core [s]."""
+        """Makes an estimate for jobs, none of which has started.
+
+        Args:
+            costs: name of each job -> expected time on one core [s].
+        """
         self._works = {name: _Work(cost) for name, cost in costs.items()}
         self._most_running = 1
 
@@ -128,12 +132,13 @@ class JobProgress:
         console: Console | None = None,
         num_done: int = 0,
     ):
-        """Takes the jobs that are left.
+        """Makes a display for jobs.
 
         Args:
-            costs: name -> expected time on one core [s].
-            console: stderr by default.
-            num_done: how many more were done before.
+            costs: name of each job that is left -> expected time on one core
+                [s].
+            console: where the display is shown; stderr by default.
+            num_done: number of further jobs that were done before.
         """
         self._left = TimeLeft(costs)
         self._stack = contextlib.ExitStack()

@@ -18,10 +18,15 @@ _REPORT_INTERVAL = 0.5
 
 
 class Reporter:
-    """Reports the progress and the notes of a step, by default to nobody."""
+    """Reports the progress of a step, and notes for the user."""
 
     def __init__(self, send: Callable[..., None] = lambda *message: None):
-        """Takes the receiver of messages: a kind and its values."""
+        """Makes a reporter.
+
+        Args:
+            send: called with the kind of each message ("progress" or "note")
+                and the values of the message. By default nothing is sent.
+        """
         self._send = send
         self._reported: float | None = None
 
@@ -43,7 +48,13 @@ class Reporter:
     def track(
         self, items: Iterable, description: str, total: int
     ) -> Iterator[Any]:
-        """Yields the items of a loop, reporting its progress."""
+        """Yields the items of a loop, and reports its progress.
+
+        Args:
+            items: the items.
+            description: not used.
+            total: number of items.
+        """
         for done, item in enumerate(items):
             self.progress(done, total)
             yield item

@@ -280,8 +280,8 @@ def texture(name: str) -> tuple[bytes, float]:
     Returns:
         The PNG, gamma-encoded, and the brightness of a white pixel. The
         brightness of any pixel is its linear value, from 0 to 1, times this
-        factor. The mean brightness is 1, unless the look has `is_face`; its
-        factor is 1.
+        factor. The mean brightness is 1. If the look has `is_face`, however,
+        the factor is 1, and the mean brightness can have any value.
     """
     from PIL import Image
 

@@ -162,8 +162,8 @@ def add_described_imu(
         config: the description, a section of a scenario.
         builder: builder of the diagram.
         body: body that carries the IMU.
-        trajectory: motion of that body as a function of time. motion: system
-            with the kinematic output ports of the body's plant.
+        trajectory: motion of that body as a function of time.
+        motion: system with the kinematic output ports of the body's plant.
         scan_rate: scans per second; the rate of the IMU if the description has
             none.
         seed: seed of the IMU's errors.
@@ -208,7 +208,12 @@ class NoisyImu(LeafSystem):
     """
 
     def __init__(self, noise: ImuNoise, rate: float):
-        """Declares the ports."""
+        """Declares the ports.
+
+        Args:
+            noise: errors of the IMU.
+            rate: samples per second.
+        """
         super().__init__()
         self._errors = ImuErrors(noise, rate)
         self._rate = rate

@@ -84,7 +84,12 @@ class ImuErrors:
     """
 
     def __init__(self, noise: ImuNoise, rate: float):
-        """Prepares the errors."""
+        """Prepares the errors.
+
+        Args:
+            noise: parameters of the errors.
+            rate: samples per second.
+        """
         self._noise = noise
         pairs = (
             (noise.accelerometer_noise_density, noise.gyroscope_noise_density),

@@ -656,7 +656,8 @@ class SeenGeometry:
             p_WS: the position of the sensor in the world, (3,) [m].
 
         Raises:
-            InputError: a geometry cannot be read; see `GeometryReader.read`.
+            InputError: a geometry cannot be read; see
+                `cns_drake.scene.perception_geometry.GeometryReader.read`.
         """
         inspector = query_object.inspector()
 

@@ -215,7 +215,13 @@ class LimitedPattern(BeamPattern):
         azimuths_deg: tuple[float, float],
         elevations_deg: tuple[float, float],
     ):
-        """See `BeamPattern.within`."""
+        """Limits a pattern; the arguments are those of `BeamPattern.within`.
+
+        Args:
+            whole: the pattern.
+            azimuths_deg: first and last azimuth [deg].
+            elevations_deg: limits of the elevation [deg].
+        """
         self.min_range, self.max_range = whole.min_range, whole.max_range
         self.period, self.repeats = whole.period, whole.repeats
         self._whole = whole

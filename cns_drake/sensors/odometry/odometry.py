@@ -21,8 +21,8 @@ class Odometry:
     """The pose and velocity of a body at one time.
 
     Attributes:
-        X_WB: pose of the body B in the world W. V_WB_B: spatial velocity of B
-            in W, expressed in B [rad/s, m/s].
+        X_WB: pose of the body B in the world W.
+        V_WB_B: spatial velocity of B in W, expressed in B [rad/s, m/s].
 
     Example:
         from cns_drake import Odometry
@@ -53,7 +53,12 @@ class OdometrySensor(LeafSystem):
     """
 
     def __init__(self, body: RigidBody, X_PB: RigidTransform | None = None):
-        """Makes the sensor; by default, B is the body itself."""
+        """Makes the sensor.
+
+        Args:
+            body: P: a body of a plant.
+            X_PB: pose of the observed frame B in P; by default B is P.
+        """
         super().__init__()
         self._body = body.index()
         self._X_PB = X_PB

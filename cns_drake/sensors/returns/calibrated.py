@@ -331,15 +331,15 @@ class CalibratedTurn:
         range_error: np.ndarray,
         gain: np.ndarray,
     ):
-        """Takes the attributes, all in firing order.
+        """Makes the turn; all arrays are in firing order.
 
         Args:
             beams: beams of the pattern.
-            d_Sset: their directions.
-            reported: directions that the unit reports.
-            height: height of each laser above the origin [m].
-            range_error: range error of each laser [m].
-            gain: gain of each laser.
+            d_Sset: (N, 3) true unit directions of the beams.
+            reported: (N, 3) unit directions that the unit reports.
+            height: (N,) height of each beam's laser above the origin of S [m].
+            range_error: (N,) range error of each beam's laser [m].
+            gain: (N,) gain of each beam's laser.
         """
         self.range_error, self.gain = range_error, gain
         self.reported = reported

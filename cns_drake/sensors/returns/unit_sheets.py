@@ -32,12 +32,13 @@ class Response:
         least: echoes of less energy are not reported even at close range, where
             the unit turns its power down.
         gain: standard deviation of the gain over the lasers; the mean gain is
-            1. dim: makes dim lasers dimmer than a normal distribution of gains:
-            a gain more than one standard deviation below the mean is lowered by
-            `dim` times what it is below that. flicker: the shots of a laser are
-            alternately brighter and darker, by a fraction of the intensity that
-            is constant for the laser. `flicker` is the standard deviation of
-            this fraction over the lasers.
+            1.
+        dim: lowers the gains of dim lasers. If a gain is more than one standard
+            deviation below the mean, the part beyond one standard deviation is
+            multiplied by 1 + `dim`.
+        flicker: the shots of a laser are alternately brighter and darker, by a
+            fraction of the intensity that is constant for the laser. `flicker`
+            is the standard deviation of this fraction over the lasers.
         speckle: standard deviation of the intensity of single shots, as a
             fraction of the intensity.
     """
