@@ -100,12 +100,14 @@ def with_options(
 ) -> Callable[[Callable[..., None]], Callable[..., None]]:
     """Returns a decorator that adds a group of options to a command.
 
+    The decorated function has one parameter for the whole group. On the command
+    line, the parameter is replaced by the options of the group.
+
     Args:
-        keyword: name of the command's parameter that receives the options as
-            one value.
-        options: the options.
-        make: function that takes the options' values and returns this one
-            value.
+        keyword: name of that parameter.
+        options: name -> (type, default) of each option of the group.
+        make: function that is called with the options' values as keyword
+            arguments. What it returns is passed to the command as `keyword`.
     """
     added = [
         inspect.Parameter(

@@ -19,13 +19,14 @@ def compiled(function: _Function) -> _Function:
     """Compiles a function of arrays to machine code, on its first call.
 
     The machine code is kept between runs in the user's cache folder. If that
-    folder cannot be written, each process compiles anew. Numba notices a change
-    only in the file of the function itself. A compiled function may therefore
-    call only compiled functions of its own folder: a change in that folder
-    recompiles all of them. If several processes need the same function at once,
-    one of them compiles it and the others wait.
+    folder cannot be written, each process compiles anew. If several processes
+    need the same function at once, one of them compiles it and the others wait.
 
-    In such functions, assign array elements one at a time. If an array is
+    A compiled function may call only compiled functions of its own folder. If
+    any file in that folder changes, all of its functions are compiled again;
+    changes in other folders would go unnoticed.
+
+    In compiled functions, assign array elements one at a time. If an array is
     assigned to a slice of another, numba also compiles an error message about
     shapes, which takes seconds.
     """

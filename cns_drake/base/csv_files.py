@@ -40,8 +40,14 @@ def write_csv(
 ) -> None:
     """Writes a CSV file.
 
+    Args:
+        path: the file; an existing one is replaced.
+        header: names of the columns, written as the first line.
+        rows: cells of each further line, as for
+            `cns_drake.base.csv_files.csv_text`.
+
     Raises:
-        InputError: it cannot be written.
+        InputError: the file cannot be written.
     """
     write_text(path, csv_text(header, rows))
 
@@ -75,13 +81,19 @@ def read_records(
 ) -> list[tuple[int, dict[str, str]]]:
     """Returns the rows of a CSV file whose first line names the columns.
 
+    Args:
+        path: the file.
+        columns: names of the columns that the file must have. It may have more.
+
     Returns:
-        For each row, its line number and a dictionary column -> cell. A column
-        that had another name in earlier versions has its present name.
+        For each row, its line number and a dictionary column -> cell. If an
+        earlier version of this program wrote the file, renamed columns appear
+        under their present names.
 
     Raises:
-        InputError: the file cannot be read as CSV (see `read_rows`), a column
-            is missing, or a row has more or fewer cells than there are columns.
+        InputError: the file cannot be read as CSV (see
+            `cns_drake.base.csv_files.read_rows`), a column is missing, or a row
+            has more or fewer cells than there are columns.
     """
     (_, names), *rows = read_rows(path) or [(1, [])]
     names = [

@@ -1,9 +1,9 @@
-"""Elementary functions, matrix products: equal bits on every processor.
+"""Elementary functions and matrix products with equal bits on every processor.
 
 The last bits of NumPy's results depend on the vector instructions of the
-processor, and the last bits of matrix products on the order in which a library
-adds. The elementary functions here call the C library for each value, which
-takes about 0.1 us; the matrix product adds in a fixed order.
+processor, and the last bits of its matrix products on the order of summation.
+The elementary functions here call the C library for each value, which takes
+about 0.1 us; the matrix product adds in a fixed order.
 """
 
 import math

@@ -55,7 +55,12 @@ class InputError(Exception):
     exit_status = 2
 
     def __init__(self, message: object):
-        """Takes the message; see `one_line`."""
+        """Makes an error with a message of one line.
+
+        Args:
+            message: the message; line breaks and control characters are
+                replaced.
+        """
         super().__init__(one_line(message))
 
 
@@ -89,11 +94,11 @@ def errors_at(place: object, instead_of: str = "") -> Iterator[None]:
 
     Args:
         place: file, field or other place, in words.
-        instead_of: text at the beginning of the message that the place
-            replaces.
+        instead_of: text that is removed from the beginning of the message
+            before the place is added.
 
     Raises:
-        InputError: if the block raises it.
+        InputError: if the block raises InputError.
     """
     try:
         yield
@@ -121,6 +126,12 @@ def printable(text: str) -> str:
 def validated(model: type[_Model], values: object, source: object) -> _Model:
     """Returns the values of a file or argument as a validated model.
 
+    Args:
+        model: class of the model.
+        values: the values, usually a mapping field -> value.
+        source: name of the file or argument, with which an error message
+            begins.
+
     Raises:
         InputError: a field is missing, unknown or not usable.
     """
@@ -138,11 +149,16 @@ def describe_validation_error(
     error: ValidationError,
     model: type[BaseModel] | None = None,
 ) -> str:
-    """Returns one line about the most urgent fault that pydantic found.
+    """Returns one line about the most important fault that pydantic found.
 
-    An unknown field comes before all other faults and a missing field after
-    them, because the unknown field may be the missing one, misspelt. If the
-    model is given, the line suggests a name for the unknown field.
+    Unknown fields are reported first, and missing fields last: an unknown field
+    may be the missing one, misspelt.
+
+    Args:
+        source: name of the file or argument, with which the line begins.
+        error: what pydantic raised.
+        model: the model that was validated. If it is given, the line suggests a
+            name for an unknown field.
     """
     fault = min(error.errors(), key=_urgency)
     field = ".".join(str(part) for part in fault["loc"]) or "(top level)"
@@ -187,7 +203,12 @@ def nearest_field(
 
 
 def did_you_mean(given: object, names: Iterable[str]) -> str:
-    """Returns "; did you mean <name>?" for a similar name, or ""."""
+    """Returns a suggestion for a misspelt name: "; did you mean <name>?".
+
+    Args:
+        given: the misspelt name.
+        names: the known names. If none of them is similar, the result is "".
+    """
     near = _nearest(given, names)
     return f"; did you mean {near}?" if near else ""
 

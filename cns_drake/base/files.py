@@ -75,8 +75,8 @@ def draft_folder(folder: Path, *, replaces: bool = False) -> Iterator[Path]:
 
     The last part of its path is the same as in `folder`, because files written
     to it may contain this name; only the parent folder differs. On an exception
-    the temporary folder is removed. If `folder` exists and is not empty, it is
-    replaced, for which `replaces` must be true.
+    the temporary folder is removed. An existing `folder` that is not empty is
+    replaced if `replaces` is true; otherwise it is an error.
 
     Raises:
         InputError: if `folder` cannot be written, or is not empty and
@@ -119,10 +119,11 @@ def remove_folder(folder: Path) -> None:
 
 
 def check_new_folder(folder: Path) -> None:
-    """Raises an error if a folder, to be written, exists and is not empty.
+    """Raises an error if a folder that is to be made already contains files.
 
     Raises:
-        InputError: the folder contains files, or the path is not a folder.
+        InputError: the folder contains files, or the path exists and is not a
+            folder.
     """
     with user_errors(folder):
         if os.path.lexists(folder) and (
@@ -244,12 +245,15 @@ def _new_part(path: Path) -> Path:
 
 
 def open_plain(path: Path, flags: int) -> int:
-    """Opens a file for writing and returns its descriptor.
+    """Opens a file for writing, and returns its file descriptor.
 
-    The file is created if needed.
+    The file is created if it does not exist. Symbolic links are not followed,
+    since they may lead to another user's file. If the path is a pipe, the
+    function does not wait for a reader.
 
-    Links are not followed, since they may lead to another user's file. If the
-    path is a pipe, the function does not wait for a reader.
+    Args:
+        path: the file.
+        flags: further flags of `os.open`, such as `os.O_WRONLY`.
     """
     flags |= os.O_CREAT | os.O_NOFOLLOW | os.O_NONBLOCK
     return os.open(path, flags, 0o666)
@@ -346,7 +350,10 @@ def exclusive(path: Path, on_wait: Callable[[], None]) -> Iterator[None]:
 
 
 def remove_lock(path: Path) -> None:
-    """Removes the lock file of a killed process, unless it is in use."""
+    """Removes the lock file `<path>.lock` that a killed process left behind.
+
+    A lock that a running process holds stays.
+    """
     lock = path.with_name(f"{path.name}.lock")
     if lock.is_file():
         # A file that cannot be locked is in use, or is not one of our locks.

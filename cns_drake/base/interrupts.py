@@ -19,9 +19,11 @@ _Handler = Callable[[int, FrameType | None], object]
 def interrupt_on_termination(once: bool = False) -> None:
     """Makes SIGTERM raise KeyboardInterrupt, so that open files are closed.
 
-    By default a second SIGTERM interrupts the closing of files. If `once` is
-    set, it is ignored; only SIGKILL can then end a process that hangs.
-    Therefore set `once` only if a parent process can send SIGKILL.
+    Args:
+        once: whether further SIGTERM signals are ignored after the first. Then
+            only SIGKILL can end a process that hangs, so set `once` only if a
+            parent process can send SIGKILL. By default, a second SIGTERM also
+            raises KeyboardInterrupt, and so interrupts the closing of files.
     """
 
     def interrupt(signal_number: int, frame: FrameType | None) -> None:
@@ -73,12 +75,12 @@ def uninterrupted() -> Iterator[None]:
 
 @contextlib.contextmanager
 def interrupts_wait() -> Iterator[Callable[[], None]]:
-    """Delays interrupts until the next call of the yielded function.
+    """Delays interrupts until the block calls the yielded function.
 
     Without the delay, KeyboardInterrupt can be raised while the arguments of a
     C++ function are being converted; the conversion then reports a wrong type
-    instead. A second interrupt takes effect at once. Later ones are ignored, so
-    that files can be closed.
+    instead. Only the first interrupt is delayed. A second one takes effect at
+    once, and further ones are ignored, so that files can be closed.
     """
     waiting: list[int] = []
     struck: list[int] = []

@@ -12,7 +12,14 @@ if TYPE_CHECKING:
 def to_jpeg(
     picture: Image, quality: int = 75, longest: int | None = None
 ) -> bytes:
-    """Returns a picture as JPEG, with sides of at most `longest` pixels."""
+    """Returns a picture as JPEG.
+
+    Args:
+        picture: the picture.
+        quality: quality of the JPEG, as Pillow defines it.
+        longest: greatest width and height [pixels]. A larger picture is reduced
+            to this size, in place. None for no limit.
+    """
     if longest is not None:
         picture.thumbnail((longest, longest))
     stream = io.BytesIO()

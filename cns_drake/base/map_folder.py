@@ -16,7 +16,7 @@ MESH_FOLDER = "meshes"
 
 
 def stage_name(stage: str) -> str:
-    """Returns the name of the SDF file of a stage."""
+    """Returns the file name of a stage: `stage_01.sdf` for the stage `01`."""
     return f"stage_{stage}.sdf"
 
 
@@ -69,7 +69,7 @@ class MapFolder:
         return found
 
     def stage(self, stage: str) -> Path:
-        """Returns the SDF file of a stage."""
+        """Returns the path of a stage's SDF file (for example, `01`'s)."""
         return self.path / stage_name(stage)
 
     def stages(self) -> dict[str, Path]:
@@ -80,7 +80,7 @@ class MapFolder:
         }
 
     def drive(self, number: str) -> Path:
-        """Returns the scenario file of a drive."""
+        """Returns the path of a drive's scenario file (for example, `01`'s)."""
         return self.path / f"sequence_{number}.yaml"
 
     def drives(self) -> list[Path]:

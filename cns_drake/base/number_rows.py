@@ -17,8 +17,8 @@ def parse_rows(
 
     Args:
         lines: N rows.
-        dtype: dtype with fields, one per number of a row; or dtype of every
-            number.
+        dtype: a structured dtype with one field per number of a row, or the
+            dtype that all numbers have.
         separator: text between numbers; None for white space.
         first: how many rows of the file come before `lines`; used for the row
             numbers in error messages.

@@ -14,9 +14,13 @@ _ROOT = os.path.realpath(os.path.join(os.path.dirname(__file__), "../.."))
 
 
 def leave_out_folder(search_path: list[str]) -> None:
-    """Removes the current folder from `sys.path`.
+    """Removes the current folder from a search path for modules.
 
-    `python -m` puts it there. It stays if it holds this package.
+    `python -m` puts the current folder there. If it contains this package, it
+    is not removed.
+
+    Args:
+        search_path: `sys.path`, which is changed in place.
     """
     here = os.path.realpath(os.curdir)
     if here != _ROOT:

@@ -65,9 +65,12 @@ def from_xyz(coordinates: np.ndarray) -> np.ndarray:
 
 
 def store(points: np.ndarray, name: str, values: np.ndarray) -> None:
-    """Writes float64 values to a field of points, checking that they fit.
+    """Writes values to a field of points, after checking that they fit.
 
-    The values are (N,), or (N, K) for a field of K numbers.
+    Args:
+        points: (N,) structured array, changed in place.
+        name: name of the field.
+        values: (N,) float64 or, for a field of K numbers, (N, K).
 
     Raises:
         ValueError: if a number does not fit the field's type.

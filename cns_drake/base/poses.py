@@ -17,7 +17,7 @@ def make_pose(R: np.ndarray, p: np.ndarray) -> np.ndarray:
 
 
 def is_pose(X: np.ndarray) -> bool:
-    """Returns whether a matrix is one rigid pose, but for rounding."""
+    """Returns whether an array is one rigid pose (4, 4), up to rounding."""
     if X.shape != (4, 4) or not np.isfinite(X).all():
         return False
     R = X[:3, :3]

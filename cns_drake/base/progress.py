@@ -10,5 +10,9 @@ Track = Callable[[Iterable[Any], str, int], Iterable[Any]]
 
 
 def silent(items: Iterable[Any], description: str, total: int) -> Iterable[Any]:
-    """Returns `items`: a `Track` callback that shows no progress."""
+    """Returns `items` unchanged: a progress callback that shows nothing.
+
+    Use it where a function takes a callback like
+    `cns_drake.base.terminal.track`.
+    """
     return items

@@ -29,14 +29,15 @@ def fixed_column() -> Column:
 def show_bars(
     *columns: ProgressColumn, console: Console | None = None
 ) -> Iterator[Progress]:
-    """Shows progress bars, each one line.
+    """Shows progress bars while the `with` block runs, each on one line.
 
-    The field `note` of a task is shown behind its bar. Without a terminal no
-    bar is drawn: Rich would print it only once, at the end, next to a possible
-    error message.
+    The text in a task's field `note` is shown after its bar. Without a terminal
+    no bar is drawn: Rich would print it only once, at the end, next to a
+    possible error message.
 
     Args:
         columns: columns that are shown between bar and note.
+        console: where the bars are shown; stderr by default.
     """
     progress = Progress(
         TextColumn("{task.description}", table_column=fixed_column()),
@@ -95,8 +96,8 @@ def show_progress(
 ) -> contextlib.AbstractContextManager[Progress]:
     """Shows progress bars, each one line, with elapsed and remaining time.
 
-    `show_bars` describes the bars. Without a terminal, `count_progress` prints
-    lines instead.
+    See `cns_drake.base.progress_bars.show_bars`. Without a terminal, no bar is
+    drawn; `count_progress` then prints lines.
     """
     return show_bars(_Times(table_column=fixed_column()), console=console)
 
@@ -107,7 +108,13 @@ def count_progress(
     """Returns a callback `(done, total)` that shows the progress of a task.
 
     On a terminal the bar moves; elsewhere a line is printed every few seconds.
-    When all is done, the text `after` is shown; it names the work that follows.
+
+    Args:
+        progress: the progress bars.
+        task: the task, one of those of `progress`.
+        unit: what `done` and `total` count.
+        after: text that is shown when all is done, such as the work that
+            follows.
     """
     console = progress.console
     interval = 0.5 if console.is_terminal else LINE_INTERVAL

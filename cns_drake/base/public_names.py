@@ -10,10 +10,15 @@ from typing import Any
 def attach(
     package: str, file: str
 ) -> tuple[Callable[[str], Any], Callable[[], list[str]], list[str]]:
-    """Returns `__getattr__`, `__dir__` and `__all__` of a package.
+    """Returns the functions `__getattr__` and `__dir__` and the list `__all__`.
 
-    They follow the package's stub `__init__.pyi`, which lists the public names
-    and the modules that define them; type checkers read it as well.
+    A package that assigns them in its `__init__.py` imports each of its public
+    names when the name is first used. The stub `__init__.pyi` next to it lists
+    the public names and the modules that define them.
+
+    Args:
+        package: the package's `__name__`.
+        file: the package's `__file__`.
     """
     stub = Path(file).with_suffix(".pyi").read_text(encoding="utf-8")
     homes = {

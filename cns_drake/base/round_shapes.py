@@ -6,17 +6,19 @@ import numpy as np
 def revolved(
     radius: np.ndarray, z: np.ndarray, sides: int
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Returns the convex hull of circles about the z axis.
+    """Returns a convex polyhedron that approximates a solid of revolution.
 
-    The circles are approximated by polygons, and mirrored at z = 0.
+    It is the convex hull of regular polygons around the z axis, and of their
+    mirror images at z = 0.
 
     Args:
-        radius, z: (N,) radii and heights of the circles, z >= 0 [m].
-        sides: number of sides of each circle.
+        radius: (N,) circumradii of the polygons [m].
+        z: (N,) heights of the polygons, z >= 0 [m].
+        sides: number of sides of each polygon.
 
     Returns:
-        (V, 3) vertices [m]; (M, 3) int32 triangles, counter-clockwise seen
-        from outside.
+        (V, 3) vertices [m]; (M, 3) int32 triangles, counter-clockwise seen from
+        outside.
     """
     # Slow to import, and most scenes have no round shapes.
     from scipy.spatial import ConvexHull

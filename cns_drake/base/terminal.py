@@ -57,15 +57,19 @@ def make_program(
     renamed: Mapping[str, str] | None = None,
     groups: Mapping[str, Sequence[str]] | None = None,
 ) -> typer.Typer:
-    """Returns an empty program, to which commands are added.
+    """Returns an empty command-line program, to which commands are added.
 
     The program has the options `--version` and those for shell completion. It
     shows its help when called without arguments.
 
     Args:
-        renamed: old command -> command that replaces it, without the program's
-            name unless it belongs to another program. Calling an old command is
-            a usage error whose message names the new command.
+        name: name of the program, as it is typed.
+        summary: text at the beginning of the program's help.
+        epilog: text at the end of the program's help.
+        renamed: name of a former command -> the command that replaces it, such
+            as `simulate`, or `cns-eval scores` if another program has it.
+            Calling a former command is an error whose message names the new
+            one.
         groups: heading -> commands that the help lists under it; by default
             there is a single heading for all commands.
     """
@@ -247,6 +251,11 @@ def track(items: Iterable[Any], description: str, total: int) -> Iterator[Any]:
     """Yields items and shows progress on stderr.
 
     On a terminal the progress is a bar; elsewhere it is printed as lines.
+
+    Args:
+        items: the items.
+        description: text that is shown before the bar.
+        total: number of items.
     """
     # Slow to import, and not needed to print help.
     from cns_drake.base.progress_bars import count_progress, show_progress
@@ -265,8 +274,11 @@ def check_finite(values: Mapping[str, object]) -> None:
 
     Typer lets NaN pass any bound.
 
+    Args:
+        values: name of an option's parameter -> value, or tuple of values.
+
     Raises:
-        InputError: it names the option.
+        InputError: a value is infinite or NaN; the message names the option.
     """
     for name, value in values.items():
         for one in value if isinstance(value, tuple) else (value,):
@@ -293,7 +305,14 @@ def note(message: str) -> None:
 
 @contextlib.contextmanager
 def resumable() -> Iterator[None]:
-    """If the block is interrupted, notes that the same command resumes it."""
+    """Says, if the block is interrupted, that the work can be resumed.
+
+    The note says that what is finished is kept, and that the same command
+    continues from there.
+
+    Raises:
+        KeyboardInterrupt: if the block is interrupted.
+    """
     try:
         yield
     except KeyboardInterrupt as error:
@@ -323,7 +342,10 @@ def print_rows(rows: Iterable[tuple[str, str]]) -> None:
 
 
 def number(value: float | None) -> str:
-    """Returns a ratio as text with four decimals."""
+    """Returns a number as text with four decimals.
+
+    None and NaN become "undefined".
+    """
     if value is None or math.isnan(value):
         return "undefined"
     return f"{value:.4f}"

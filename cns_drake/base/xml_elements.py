@@ -31,18 +31,23 @@ class Element(ElementTree.Element):
     line = 0
 
     def all(self, *path: str) -> Iterator[Element]:
-        """Yields the elements at the end of a path of tags."""
+        """Yields all elements that a path of tags leads to from this element.
+
+        For example, `all("road", "link")` yields each `link` in each `road` in
+        this element.
+        """
         return cast(Iterator[Element], self.iterfind("/".join(path)))
 
     def first(self, *path: str) -> Element | None:
-        """Returns the first element at the end of a path of tags."""
+        """Returns the first element that a path of tags leads to, or None."""
         return next(self.all(*path), None)
 
     def value(self, name: str, default: str | None = None) -> str:
-        """Returns an attribute as text, or the default.
+        """Returns an attribute of the element as text, or the default.
 
         Raises:
-            ValueError: if it is too long, or missing without a default.
+            ValueError: if the text is too long, or the attribute is missing and
+                has no default.
         """
         value = self.attrib.get(name, default)
         if value is None or len(value) > _LONGEST_VALUE:
@@ -53,11 +58,11 @@ class Element(ElementTree.Element):
         return value
 
     def number(self, name: str, default: float | None = None) -> float:
-        """Returns an attribute as a number, or the default.
+        """Returns an attribute of the element as a number, or the default.
 
         Raises:
-            ValueError: if it is not a number, is implausibly large, or is
-                missing and has no default.
+            ValueError: if the text is not a number or the number is implausibly
+                large, or the attribute is missing and has no default.
         """
         if default is not None and name not in self.attrib:
             return default
@@ -105,12 +110,13 @@ def read_elements(
     Namespace prefixes need not be declared.
 
     Args:
+        path: the file.
         root: required tag of the top element; None for any tag.
         encoding: encoding of the file; by default the one that it declares.
 
     Raises:
-        InputError: if it cannot be read, is no XML, has another root, holds
-            a document type, is nested too deep or has too many elements.
+        InputError: if it cannot be read, is no XML, has another root, holds a
+            document type, is nested too deep or has too many elements.
     """
     parser = expat.ParserCreate(encoding)
     depth = count = 0

@@ -30,9 +30,13 @@ def read_yaml(path: Path) -> Any:
 def parse_yaml(text: str | bytes, loader: type = yaml.CSafeLoader) -> Any:
     """Returns the content of a YAML document.
 
-    The number of values to which aliases expand is limited: a few lines of
-    aliases could otherwise fill the memory, or contain themselves. A repeated
-    key is an error; YAML libraries would silently use the last value.
+    A document whose aliases expand to too many values is refused, since a few
+    lines of aliases could fill the memory. A repeated key is an error; YAML
+    libraries would silently use the last value.
+
+    Args:
+        text: the document.
+        loader: the loader of PyYAML that converts it.
 
     Returns:
         The content as Python values; None for an empty document.

@@ -22,7 +22,10 @@ _HEIGHT_TOLERANCE = 0.5
 class Part:
     """A part of a structure that has one colour.
 
-    The colour is sRGB, each value from 0 to 1; the surface is expressed in W.
+    Attributes:
+        semantic_class: class of the structure.
+        rgb: sRGB colour, each value from 0 to 1.
+        surface: the part's surface, expressed in W.
     """
 
     semantic_class: str
@@ -36,15 +39,19 @@ class Part:
 
 @dataclass(frozen=True)
 class StageDifference:
-    """The differences between two stages: "this stage" and "the other stage".
+    """The differences between two stages, as lists of parts of structures.
+
+    The two stages are "this stage" and "the other stage". If a structure is
+    higher in one stage, its "upper parts" are those above its height in the
+    other stage.
 
     Attributes:
-        common: parts of structures that exist in both stages.
-        additional: structures that exist only in this stage, and the upper
-            parts of structures that are lower in the other stage.
-        absent: structures that exist only in the other stage.
-        lower: for each structure that is lower in this stage, its upper parts
-            in the other stage.
+        common: what exists in both stages, with the shape in this stage.
+        additional: what exists only in this stage: whole structures, and upper
+            parts of structures that are higher in this stage.
+        absent: whole structures that exist only in the other stage.
+        lower: upper parts of structures that are higher in the other stage,
+            with the shape in the other stage.
     """
 
     common: list[Part] = field(default_factory=list)
@@ -54,7 +61,7 @@ class StageDifference:
 
 
 def read_parts(world: World) -> dict[str, list[Part]]:
-    """Returns structure -> its parts, for all structures that never move."""
+    """Returns name -> parts, for all structures of a world that never move."""
     plant = world.plant
     context = plant.CreateDefaultContext()
     geometries = read_perception_geometry(
@@ -86,11 +93,14 @@ def read_parts(world: World) -> dict[str, list[Part]]:
 def compare_parts(
     own: Mapping[str, Sequence[Part]], other: Mapping[str, Sequence[Part]]
 ) -> StageDifference:
-    """Returns the difference between two stages, structure by structure.
+    """Returns the difference between two stages.
 
-    `own` contains the parts of this stage, and `other` those of the other
-    stage. A structure that was moved, or has another shape of the same height,
-    counts as common to both stages.
+    A structure that was moved, or has another shape of the same height, counts
+    as common to both stages.
+
+    Args:
+        own: name of a structure -> its parts in this stage.
+        other: name of a structure -> its parts in the other stage.
     """
     difference = StageDifference()
     for name, parts in own.items():

@@ -76,22 +76,24 @@ _THINNING_SIZE = 0.5
 
 @dataclass(frozen=True)
 class DriveRecord:
-    """The record of a drive; most lists have one entry per frame.
+    """The record of a drive of F frames; most lists have one entry per frame.
 
     Attributes:
         period: time between frames [s].
         X_WBs: poses of the vehicle.
-        X_WFs: moving geometry frame F -> its poses.
-        scans: for each scan to show, its frame index and the positions (N, 3)
-            of its points in W [m].
+        X_WFs: geometry frame that moves -> its pose at each frame of the drive.
+        scans: the scans to show: index of the frame, and positions (N, 3) of
+            the points in W [m].
         speeds: forward speed of the vehicle [m/s].
         specific_forces_I: specific force in the IMU's frame I [m/s^2].
         angular_velocities_I: angular velocity w_WI_I [rad/s].
         num_points: number of points in each scan as measured.
-        limbs: leading frame F of an object -> frame -> its constant pose in F,
-            for F itself and all frames that move together with F.
+        limbs: for moving objects of several geometry frames: leading frame ->
+            (frame -> its constant pose in the leading frame), for all frames of
+            the object.
         names: leading frame -> name of the object in the page.
-        images: camera -> frame index and JPEG of each image to show.
+        images: name of a camera -> the images to show: index of the frame, and
+            JPEG.
     """
 
     period: float
@@ -113,10 +115,12 @@ class DriveRecord:
 class ShownStages:
     """The stages that the page of a drive shows.
 
-    If `other` is given, the page shows the difference between the stage of the
-    drive and this other stage. If the drive is in a stage of a map, `stage` is
-    the name of this stage, and `stages` are the names of all stages of the map,
-    the earliest first.
+    Attributes:
+        other: a stage with which the stage of the drive is compared; None to
+            show no differences.
+        other_name: name of this other stage.
+        stage: name of the stage of the drive; None if it belongs to no map.
+        stages: names of all stages of the map, the earliest first.
     """
 
     other: World | None = None
@@ -178,8 +182,11 @@ def make_panel(
 ) -> str:
     """Returns the HTML of the page's title, switches, legend and plots.
 
-    `changes` contains the kinds of change that the page shows: keys of
-    `CHANGE_RGB`, whose colours the legend explains.
+    Args:
+        title: title of the page.
+        drive: record of the drive.
+        changes: kinds of change that the page shows, keys of `CHANGE_RGB`.
+        shown: the stages.
     """
     # Only pages need templates, and the import takes a moment.
     from jinja2 import Environment, StrictUndefined
@@ -231,7 +238,7 @@ class Plot:
 
     Attributes:
         name: title of the plot.
-        unit: a key of `_LEAST_RANGE`.
+        unit: unit of the values: `km/h`, `m/s²` or `deg/s`.
         values: values to display as text, at evenly spaced times of the drive.
         points: the points of the curve, in the format of SVG.
         ticks: labels of the scale, and their positions from the top, as shares
@@ -246,7 +253,13 @@ class Plot:
 
     @classmethod
     def of(cls, name: str, unit: str, values: np.ndarray) -> Plot:
-        """Returns the plot of values (F,), one per frame."""
+        """Returns the plot of values that were measured at even times.
+
+        Args:
+            name: title of the plot.
+            unit: unit of the values.
+            values: (F,) values, one per frame of the drive.
+        """
         count = min(len(values), _MAX_SAMPLES)
         frames = np.linspace(0, len(values) - 1, count).round().astype(int)
         values = values[frames]
@@ -322,7 +335,10 @@ def motion_plots(drive: DriveRecord) -> list[Plot]:
 
 
 def moving_frames(world: World) -> tuple[FrameId, ...]:
-    """Returns the frames that may move and have visible geometry."""
+    """Returns the geometry frames of a world that may move.
+
+    Frames without geometry that a LiDAR can see are left out.
+    """
     inspector = world.scene_graph.model_inspector()
     frames = (
         inspector.GetFrameId(geometry_id)
@@ -486,7 +502,7 @@ class MeshcatRecorder(LeafSystem):
             X_BSs: name of a LiDAR -> pose of its frame S on the body B.
             period: time between two frames [s].
             num_frames: number of frames that are recorded; all if None.
-            shown: stages whose differences the page shows.
+            shown: stages whose differences the page shows; None for none.
             scan_spacing: distance driven between two shown scans [m].
             cameras: name of a camera -> number of frames from one image to the
                 next.
@@ -529,11 +545,14 @@ class MeshcatRecorder(LeafSystem):
         self.DeclareForcedPublishEvent(self._publish)
 
     def show_too(self, name: str, frames: Sequence[FrameId]) -> None:
-        """Adds a moving object, with a unique name, to the page.
+        """Adds a moving object to the page.
 
-        The first of the object's geometry frames is its leading frame. All
-        others keep the poses relative to it that they have at the start of the
-        drive.
+        Only the pose of the object's first frame is recorded. All other frames
+        keep the poses relative to it that they have at the start of the drive.
+
+        Args:
+            name: name of the object, unique in the page.
+            frames: geometry frames of the object.
         """
         leading = frames[0]
         self.drive.X_WFs[leading] = []

@@ -53,7 +53,11 @@ def draw_parts(
 ) -> None:
     """Draws parts of a city as one mesh per class, named `<path>/<class>`.
 
-    Without `rgba`, each part keeps its own colour.
+    Args:
+        meshcat: Meshcat's server.
+        path: path in Meshcat.
+        parts: the parts.
+        rgba: colour of all parts; None for their own colours.
     """
     by_class: dict[str, list[Part]] = {}
     for part in parts:
@@ -72,7 +76,13 @@ def draw_parts(
 def draw_body(
     meshcat: Meshcat, path: str, geometries: Iterable[PerceptionGeometry]
 ) -> None:
-    """Draws the geometry of one frame in its own colours."""
+    """Draws the geometry of one frame in its own colours.
+
+    Args:
+        meshcat: Meshcat's server.
+        path: path in Meshcat of the frame.
+        geometries: the geometries of the frame.
+    """
     by_color: dict[tuple, list[PerceptionGeometry]] = {}
     for geometry in geometries:
         rgb = geometry.rgb or _DEFAULT_RGB
@@ -83,7 +93,12 @@ def draw_body(
 
 
 def draw_marker(meshcat: Meshcat, path: str) -> None:
-    """Draws a large arrow that points down to the origin."""
+    """Draws a large arrow that points down to the origin of its path.
+
+    Args:
+        meshcat: Meshcat's server.
+        path: path in Meshcat of the arrow.
+    """
     meshcat.SetObject(
         path,
         MeshcatCone(height=_MARKER_HEIGHT, a=_MARKER_RADIUS, b=_MARKER_RADIUS),
@@ -94,7 +109,13 @@ def draw_marker(meshcat: Meshcat, path: str) -> None:
 def draw_route(
     meshcat: Meshcat, path: str, X_WBs: Sequence[RigidTransform]
 ) -> None:
-    """Draws a route as a flat ribbon, from red (start) to blue (end)."""
+    """Draws a route as a flat ribbon, from red (start) to blue (end).
+
+    Args:
+        meshcat: Meshcat's server.
+        path: path in Meshcat of the ribbon.
+        X_WBs: poses of the vehicle along the route.
+    """
     p_WBset = np.array([X_WB.translation() for X_WB in X_WBs])
     left_W = np.array([X_WB.rotation().matrix()[:, 1] for X_WB in X_WBs])
     step = np.linalg.norm(np.diff(p_WBset, axis=0), axis=1)
@@ -132,9 +153,14 @@ def height_rgb(z: np.ndarray) -> np.ndarray:
 
 
 def draw_points(meshcat: Meshcat, path: str, p_WRset: np.ndarray) -> None:
-    """Draws points (N, 3) in W [m], coloured by height.
+    """Draws points, coloured by height.
 
     All points have the same size on the screen, whatever their distance.
+
+    Args:
+        meshcat: Meshcat's server.
+        path: path in Meshcat of the points.
+        p_WRset: (N, 3) points in W [m].
     """
     cloud = PointCloud(len(p_WRset), Fields(BaseField.kXYZs | BaseField.kRGBs))
     cloud.mutable_xyzs()[:] = _on_grid(p_WRset).T
@@ -148,7 +174,10 @@ def draw_points(meshcat: Meshcat, path: str, p_WRset: np.ndarray) -> None:
 def set_view(meshcat: Meshcat, lower: np.ndarray, upper: np.ndarray) -> None:
     """Lights a scene as in daylight; sets a view from the south and above.
 
-    The view covers the coordinates from `lower` (3,) to `upper` (3,) [m].
+    Args:
+        meshcat: Meshcat's server with the scene.
+        lower, upper: (3,) least and greatest coordinates that the view shows
+            [m].
     """
     meshcat.SetProperty("/Grid", "visible", False)
     meshcat.SetProperty("/Axes", "visible", False)

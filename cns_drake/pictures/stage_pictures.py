@@ -52,9 +52,13 @@ def load_views(path: Path) -> dict[str, View]:
 def draw_stages(stages: dict[str, Path], view: View, path: Path) -> None:
     """Draws stages side by side as seen in a view, with a scan of each below.
 
-    `stages` maps titles to SDF files, from left to right. The LiDAR is below
-    the camera; its points are drawn as the camera sees them, coloured by
-    distance. The ending of `path` sets the format of the picture.
+    The LiDAR is below the camera; its points are drawn as the camera sees them,
+    coloured by distance.
+
+    Args:
+        stages: title -> SDF file of each stage, from left to right.
+        view: position and direction of the camera.
+        path: file of the picture; its ending determines the format.
 
     Raises:
         InputError: a world cannot be loaded, or the picture cannot be written.
@@ -82,11 +86,13 @@ def draw_stages(stages: dict[str, Path], view: View, path: Path) -> None:
 
 
 def draw_drives(scenarios: Mapping[str, Scenario], path: Path) -> None:
-    """Draws drives side by side, seen from above, with north up.
+    """Draws drives in two columns of panels, seen from above, with north up.
 
-    `scenarios` maps titles to drives. All panels show the same part of the
-    world, so that they can be compared. The ending of `path` sets the format of
-    the picture.
+    All panels show the same part of the world, so that they can be compared.
+
+    Args:
+        scenarios: title -> scenario of each drive.
+        path: file of the picture; its ending determines the format.
 
     Raises:
         InputError: a drive cannot be planned, a world cannot be loaded, or the

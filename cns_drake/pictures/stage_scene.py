@@ -63,10 +63,18 @@ class View(BaseModel):
     def project(
         self, p_WQset: np.ndarray, width: int, height: int
     ) -> tuple[np.ndarray, np.ndarray]:
-        """Returns pixels (M, 2) of the visible points, and their indices.
+        """Returns where points are in the picture of the camera.
 
-        The points (N, 3) are in W [m]; the indices are (M,). Width and height
-        of the picture are in pixels.
+        Points outside the picture are left out. Points behind an object are
+        not.
+
+        Args:
+            p_WQset: (N, 3) points in W [m].
+            width, height: size of the picture [pixels].
+
+        Returns:
+            (M, 2) positions in the picture, from its upper left corner
+            [pixels]; the indices (M,) of these points.
         """
         scale = height / 2 / np.tan(np.deg2rad(self.fov_y) / 2)
         p_C = (self.pose().inverse() @ p_WQset.T).T
@@ -78,7 +86,11 @@ class View(BaseModel):
 
 
 class StageScene:
-    """The geometry of a stage, for pictures; rays can be cast on `scene`."""
+    """The geometry of a stage, for pictures.
+
+    Attributes:
+        scene: the geometry, on which rays can be cast.
+    """
 
     def __init__(self, path: Path, without: Collection[str] = ()):
         """Loads an SDF world.
@@ -103,7 +115,14 @@ class StageScene:
         height: int,
         haze_length: float = HAZE_LENGTH,
     ) -> np.ndarray:
-        """Returns a rendered picture (height, width, 3) uint8 of a view."""
+        """Returns a rendered picture of a view, (height, width, 3) uint8.
+
+        Args:
+            view: position and direction of the camera.
+            width, height: size of the picture [pixels].
+            haze_length: distance at which haze has removed two thirds of the
+                contrast [m]; infinite for clear air.
+        """
         return render(
             self.scene,
             self._geometries,

@@ -63,10 +63,14 @@ def circumscribe(surface: CurvedSurface) -> TriangleSurface:
 
 
 class NearCurvedShapes:
-    """Finds rays that start near the curved shapes of fixed groups."""
+    """Finds rays that start near curved shapes that never move."""
 
     def __init__(self, groups: Sequence[RayGroup]):
-        """Takes the curved shapes of groups; the groups must have poses."""
+        """Collects the curved shapes of groups.
+
+        Args:
+            groups: the groups, already placed (see `RayGroup.place`).
+        """
         rows: list[int] = []
         X_LGs, sizes = [], []
         for row, group in enumerate(groups):
@@ -105,9 +109,13 @@ class NearCurvedShapes:
         )
 
     def contain(self, p_OSset: np.ndarray) -> np.ndarray:
-        """Returns which of K points lie in a polyhedron around a shape.
+        """Returns which points lie in a polyhedron around one of the shapes.
 
-        The points are (K, 3) [m] in O; the result is (K,) bool.
+        Args:
+            p_OSset: (K, 3) points in the scene's frame O [m].
+
+        Returns:
+            (K,) bool.
         """
         result = np.zeros(len(p_OSset), bool)
         _find_near(self._near, p_OSset, result)
@@ -163,10 +171,14 @@ def _find_near(near: _Sorted, p_OSset: np.ndarray, result: np.ndarray) -> None:
 
 
 class CapsuleAxes:
-    """Casts rays along the axes of the capsules of groups."""
+    """Casts rays along the axes of capsules, where Embree is not exact."""
 
     def __init__(self, groups: Sequence[RayGroup]):
-        """Takes groups; the groups must have poses."""
+        """Collects the capsules of groups.
+
+        Args:
+            groups: the groups, already placed (see `RayGroup.place`).
+        """
         found = [
             (row, index, X_LG, surface)
             for row, group in enumerate(groups)
@@ -189,14 +201,18 @@ class CapsuleAxes:
         )
 
     def place(self, placed: Placed) -> None:
-        """Moves the groups with capsules to their current poses."""
+        """Moves the capsules with their groups to the current poses."""
         self._X_OLs[placed.rows] = placed.X_OLs
         self._is_still[placed.rows] = placed.in_sight & ~placed.moves
 
     def cast(self, rays: Rays, hits: Hits) -> None:
-        """Corrects `hits` of rays that run along the axis of a capsule.
+        """Corrects the hits of rays that run along the axis of a capsule.
 
         Capsules that move during the turn are left out.
+
+        Args:
+            rays: N rays.
+            hits: their hits as Embree found them, changed in place.
         """
         capsules = np.flatnonzero(self._is_still[self._groups])
         if not (len(capsules) and len(rays.d_Sset)):

@@ -133,6 +133,10 @@ def native_packet(
 
     The number is that of the processor's vector units, such as 16 with AVX-512
     and 8 with AVX2. In a larger packet, Embree would cast the rays one by one.
+
+    Args:
+        embree: Embree's C interface.
+        device: address of an Embree device.
     """
     lanes = 4
     for more, supported in _NATIVE_PACKETS:

@@ -57,11 +57,14 @@ _MOST_PIECES = 1000
 
 
 class Primitives(NamedTuple):
-    """The data of one Embree geometry, and its type number in Embree.
+    """The data of one Embree geometry.
 
-    Each buffer is (slot, format, array). `owners` contains for each primitive,
-    (P,) int32, the number of its member in the group. `mask` is `SOLID`, or
-    `PROXY` for polyhedra around curved shapes.
+    Attributes:
+        kind: Embree's number for the type of geometry.
+        buffers: slot, format and array of each buffer.
+        owners: (P,) int32 for each primitive, the number of its member in the
+            group.
+        mask: `SOLID`, or `PROXY` for polyhedra around curved shapes.
     """
 
     kind: int
@@ -71,10 +74,11 @@ class Primitives(NamedTuple):
 
 
 def merge_first(group: RayGroup) -> Iterator[Primitives]:
-    """Yields the primitives of a group on which all rays are cast.
+    """Yields what the first hierarchy contains of a group.
 
     These are the group's triangles, and polyhedra around its curved shapes. If
-    the group can move, the curved shapes themselves replace the polyhedra.
+    the group can move, the first hierarchy contains the curved shapes
+    themselves instead of polyhedra. All rays are cast on the first hierarchy.
     """
     members = _numbered(group)
     flat = [
@@ -97,10 +101,10 @@ def merge_first(group: RayGroup) -> Iterator[Primitives]:
 
 
 def merge_second(group: RayGroup) -> Iterator[Primitives]:
-    """Yields the primitives on which only few rays are cast.
+    """Yields what the second hierarchy contains of a group.
 
-    These are the curved shapes of groups that cannot move. `merge_first` yields
-    polyhedra that contain them.
+    These are the curved shapes, if the group cannot move. Only rays that hit a
+    polyhedron of the first hierarchy, or start in one, are cast on the second.
     """
     if group.frame_id is None:
         yield from merge_curved(_numbered(group))
@@ -133,6 +137,9 @@ def merge_curved(members: Sequence[Member]) -> Iterator[Primitives]:
 
     Embree intersects spheres, cones, discs and rounded segments exactly (in
     single precision).
+
+    Args:
+        members: index, pose X_LG and surface of each geometry of the group.
     """
     cones: list[tuple[int, ArrayLike]] = []
     capsules: list[tuple[int, ArrayLike]] = []
@@ -256,8 +263,10 @@ class EmbreeHierarchy:
 
     Rays are cast in packets marked as coherent, which is fast for neighbouring
     beams of a LiDAR. Embree's robust mode is on, so that no ray passes through
-    an edge that two triangles share. `rows` contains the rows of the groups
-    whose primitives are in the hierarchy.
+    an edge that two triangles share.
+
+    Attributes:
+        rows: indices of the groups that have primitives in the hierarchy.
     """
 
     def __init__(
@@ -269,8 +278,12 @@ class EmbreeHierarchy:
     ):
         """Builds the hierarchy.
 
-        `merge` returns the primitives of a group, possibly none. Scenes of
-        groups that are unchanged since a previous hierarchy are reused.
+        Args:
+            groups: the groups, already placed (see `RayGroup.place`).
+            merge: returns the primitives of a group, possibly none.
+            num_threads: number of threads that share the rays of a cast.
+            previous: hierarchy from which the scenes of unchanged groups are
+                reused; None to build all anew.
 
         Raises:
             MemoryError: Embree cannot build it.
@@ -343,9 +356,9 @@ class EmbreeHierarchy:
         )
 
     def place(self, placed: Placed) -> None:
-        """Moves instances in sight to their poses, and disables all others.
+        """Moves the groups in sight to their poses, and disables all others.
 
-        Fewer instances are faster to build and to cast rays on.
+        Fewer groups are faster to build and to cast rays on.
         """
         lib = self._lib
         places = np.ascontiguousarray(placed.X_OLs, np.float32)
@@ -392,7 +405,14 @@ class EmbreeHierarchy:
         mask: int = ALL,
         with_normals: bool = False,
     ) -> Hits:
-        """Casts rays on the geometry; returns the hits."""
+        """Casts rays on the geometry; returns the hits.
+
+        Args:
+            rays: the rays.
+            mask: bits of the geometry that can be hit: `SOLID`, `PROXY` or
+                `ALL`.
+            with_normals: whether to find normals as well.
+        """
         num_rays = len(rays.d_Sset)
         hits = Hits.misses(num_rays, with_normals)
         # All threads take parts from one iterator, which yields each part once.
@@ -447,7 +467,10 @@ class EmbreeHierarchy:
 
 
 class EmbreeScene:
-    """Casts rays on groups of geometry with Embree; see `RayCastingScene`."""
+    """Casts rays on groups of geometry with Embree.
+
+    It is a part of `cns_drake.ray_casting.ray_casting_scene.RayCastingScene`.
+    """
 
     def __init__(
         self,
@@ -455,7 +478,13 @@ class EmbreeScene:
         num_threads: int,
         previous: EmbreeScene | None = None,
     ):
-        """Builds the scene of groups; the groups must have poses.
+        """Builds the scene.
+
+        Args:
+            groups: the groups, already placed (see `RayGroup.place`).
+            num_threads: number of threads that share the rays of a cast.
+            previous: scene from which unchanged groups are reused; None to
+                build all anew.
 
         Raises:
             MemoryError: Embree cannot build it.

@@ -14,9 +14,12 @@ from cns_drake.scene import surfaces
 
 
 class KnownPoses(NamedTuple):
-    """Poses X_WF (M, 4, 4) of M frames F, and `rows`: frame -> row.
+    """Poses of M frames F in the world.
 
-    All KnownPoses of a simulation share one object `rows`.
+    Attributes:
+        rows: frame -> row of its pose. All KnownPoses of a simulation share
+            this mapping.
+        X_WFs: (M, 4, 4) poses.
     """
 
     rows: Mapping[FrameId, int]
@@ -30,7 +33,13 @@ class KnownPoses(NamedTuple):
     def find(
         self, frame: FrameId, calc_X_WF: Callable[[FrameId], RigidTransform]
     ) -> RigidTransform:
-        """Returns the stored pose of a frame; computes it if not stored."""
+        """Returns the pose of a frame.
+
+        Args:
+            frame: the frame F.
+            calc_X_WF: function that returns the pose of a frame that is not
+                stored.
+        """
         row = self.rows.get(frame)
         if row is None:
             return calc_X_WF(frame)
@@ -49,7 +58,7 @@ class Placed(NamedTuple):
 
     Attributes:
         rows: (P,) rows of the groups.
-        X_OLs: (P, 3, 4) poses; see `RayGroup.X_OL`.
+        X_OLs: (P, 3, 4) poses; see `cns_drake.ray_casting.ray_groups.RayGroup`.
         in_sight: (P,) bool, whether rays can meet each group.
         moves: (P,) bool, whether each group has a `motion`.
     """
@@ -61,7 +70,7 @@ class Placed(NamedTuple):
 
     @classmethod
     def of(cls, groups: Sequence[RayGroup], rows: Sequence[int]) -> Placed:
-        """Returns groups with their current poses."""
+        """Returns the current poses of the groups with the given rows."""
         chosen = [groups[row] for row in rows]
         return cls(
             np.array(rows, int),
@@ -83,10 +92,16 @@ NOTHING_PLACED = Placed.of((), ())
 
 
 class MovingGroups:
-    """The groups of a scene whose frames are not anchored."""
+    """The groups of a scene that can move."""
 
     def __init__(self, groups: Sequence[RayGroup], p_WO: np.ndarray):
-        """Takes groups; the groups must have poses."""
+        """Finds the groups that can move.
+
+        Args:
+            groups: all groups of the scene, already placed (see
+                `RayGroup.place`).
+            p_WO: (3,) origin of the scene in the world [m].
+        """
         self._groups = groups
         self._p_WO = p_WO
         self._rows = np.array(
@@ -121,10 +136,15 @@ class MovingGroups:
     ) -> Placed:
         """Updates the poses, motions and visibility of moving groups.
 
-        Sets `X_OL`, `motion` and `in_sight` of each group, except of groups
-        whose frames have not moved. Groups outside the ball `seen` are marked
-        as out of sight and keep their old poses. Poses are taken from `known`,
-        where it has them, instead of calling `calc_X_WF`.
+        Groups outside the ball `seen` are marked as out of sight and keep their
+        old poses.
+
+        Args:
+            calc_X_WF: function that returns the pose of a frame in the world.
+            motions: motions of frames that move during the turn.
+            known: poses that are used, where they exist, instead of calling
+                `calc_X_WF`.
+            seen: ball in the world that contains all rays.
 
         Returns:
             The groups whose poses were updated.

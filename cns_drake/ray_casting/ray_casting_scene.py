@@ -67,17 +67,20 @@ class RayCastingScene:
         previous: RayCastingScene | None = None,
         p_WS: np.ndarray | None = None,
     ):
-        """Builds the scene; hits give indices into the geometries.
+        """Builds the scene.
 
         Args:
-            geometries: the geometries that rays can hit.
+            geometries: the geometries that rays can hit. A hit contains the
+                index of its geometry in this sequence.
             anchored_frames: frames that never move.
             calc_X_WF: returns the pose of a frame.
             num_threads: threads that share the rays of a cast; hits do not
                 depend on it.
-            previous: a scene of similar geometry, which is replaced: frames
-                whose surfaces are still the same objects are not built anew.
-            p_WS: the position of the sensor [m].
+            previous: a scene of similar geometry, which is replaced: its parts
+                are reused where the surfaces are still the same objects. None
+                to build all anew.
+            p_WS: (3,) position of the sensor in the world [m]; None if it is
+                not known.
         """
         self._p_WO, self._groups = group_geometries(
             enumerate(geometries),
@@ -100,7 +103,10 @@ class RayCastingScene:
             self._group_of[[index for index, *_ in group.members]] = row
 
     def serves(self, p_WS: np.ndarray) -> bool:
-        """Returns whether ranges are precise for a sensor at p_WS (3,) [m]."""
+        """Returns whether ranges are precise for a sensor at p_WS (3,) [m].
+
+        If not, make a new scene for the sensor's position.
+        """
         return serves(self._p_WO, self._groups, p_WS)
 
     def set_frame_poses(

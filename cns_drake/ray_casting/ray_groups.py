@@ -63,10 +63,14 @@ class Motion(NamedTuple):
         return steps
 
     def at(self, times: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Returns the motion of F at (N,) fractions of the turn, from 0 to 1.
+        """Returns the motion of F at given times of the turn.
+
+        Args:
+            times: (N,) fractions of the turn, from 0 to 1.
 
         Returns:
-            (N, 3, 3) rotations, and (N, 3) displacements of F's origin.
+            (N, 3, 3) rotations, and (N, 3) displacements of F's origin [m],
+            relative to the given pose of F.
         """
         t = self.duration * np.asarray(times, float)[:, None] + self.start
         return turns(t * self.w), t * self.v
@@ -106,7 +110,12 @@ class RayGroup:
     def place(
         self, p_WO: np.ndarray, calc_X_WF: Callable[[FrameId], RigidTransform]
     ) -> None:
-        """Sets `X_OL` from the pose of the group's frame."""
+        """Sets `X_OL` from the pose of the group's frame.
+
+        Args:
+            p_WO: (3,) origin of the scene's frame O in the world [m].
+            calc_X_WF: function that returns the pose of a frame in the world.
+        """
         X_WL = self.X_FL
         if self.frame_id is not None:
             X_WL = calc_X_WF(self.frame_id).GetAsMatrix4() @ X_WL
@@ -114,7 +123,11 @@ class RayGroup:
         self.X_OL[:, 3] -= p_WO
 
     def X_OL_at(self, times: np.ndarray) -> np.ndarray:
-        """Returns `X_OL` (N, 3, 4) at fractions of the turn."""
+        """Returns `X_OL` at several times of the turn, (N, 3, 4).
+
+        Args:
+            times: (N,) fractions of the turn, from 0 to 1.
+        """
         if self.motion is None:
             return np.broadcast_to(self.X_OL, (len(times), 3, 4))
         R_OL0, way_F = self.motion.at(times)
@@ -127,9 +140,10 @@ class RayGroup:
         return X_OL
 
     def content(self) -> tuple:
-        """Returns a key that is equal for two groups only if their shapes are.
+        """Returns a key of the group's shapes and their poses in the group.
 
-        The key is valid as long as the surfaces of both groups exist in memory.
+        Groups with equal keys can share one Embree scene. A key is valid as
+        long as the surfaces of its group exist in memory.
         """
         shapes = tuple(
             (
@@ -151,14 +165,23 @@ def group_geometries(
     *,
     p_WS: np.ndarray | None = None,
 ) -> tuple[np.ndarray, list[RayGroup]]:
-    """Groups geometries; returns the scene's origin p_WO and the groups.
+    """Divides geometries into groups that move rigidly, and chooses an origin.
 
-    Each geometry comes with its index. Geometry that never moves is in the
-    first group (if there is any); half spaces are the last groups. A large
-    surface with many copies gets a group for each copy, and these groups share
-    the surface. O is the middle of the geometry that never moves. If the sensor
-    at p_WS is far from that middle, O is the centre of that cell of a coarse
-    grid of cubes in which the sensor lies.
+    Ranges are most precise near the origin of a scene.
+
+    A large surface with many copies gets a group for each copy, and these
+    groups share the surface.
+
+    Args:
+        geometries: pairs of an index and a geometry.
+        anchored_frames: frames that never move.
+        calc_X_WF: function that returns the pose of a frame in the world.
+        p_WS: (3,) position of the sensor [m]; None if it is not known.
+
+    Returns:
+        p_WO, (3,) [m]: the middle of the geometry that never moves or, if the
+        sensor is far from there, a point near the sensor. The groups: first the
+        geometry that never moves (if there is any), last the half spaces.
     """
     geometries = list(geometries)
     shared = _find_shared(geometries)
@@ -226,7 +249,13 @@ def group_geometries(
 def serves(
     p_WO: np.ndarray, groups: Sequence[RayGroup], p_WS: np.ndarray
 ) -> bool:
-    """Returns whether a scene about O is precise for a sensor at p_WS."""
+    """Returns whether ranges are precise for a sensor at a position.
+
+    Args:
+        p_WO: (3,) origin of the scene [m].
+        groups: groups of the scene.
+        p_WS: (3,) position of the sensor [m].
+    """
     has_world = any(group.is_merged_world for group in groups)
     cube = _CUBE if has_world else _MOVING_CUBE
     return bool((np.abs(p_WS - p_WO) <= cube / 2.0).all())

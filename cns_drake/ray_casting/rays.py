@@ -59,11 +59,14 @@ class Rays(NamedTuple):
 
 @compiled
 def rotate(R_FSset: np.ndarray, d_Sset: np.ndarray) -> np.ndarray:
-    """Returns directions (N, 3), given in S, as expressed in a frame F.
+    """Returns directions, given in a frame S, as expressed in a frame F.
 
-    Direction i is rotated by orientation i mod L of the (L, 3, 3) orientations.
-    Products are added in a fixed order, because the results of a matrix library
-    depend on the processor.
+    Direction i is rotated by orientation i mod L. Products are added in a fixed
+    order, because the results of a matrix library depend on the processor.
+
+    Args:
+        R_FSset: (L, 3, 3) orientations of S in F.
+        d_Sset: (N, 3) directions in S.
     """
     d_Fset, turn = np.empty((len(d_Sset), 3)), -1
     for ray in range(len(d_Sset)):
@@ -92,7 +95,12 @@ class Hits(NamedTuple):
 
     @classmethod
     def misses(cls, num_rays: int, with_normals: bool) -> Hits:
-        """Returns hits for rays that all missed."""
+        """Returns the hits of rays none of which hits anything.
+
+        Args:
+            num_rays: number of rays.
+            with_normals: whether the result has normals, which are zero.
+        """
         return cls(
             np.full(num_rays, np.inf, np.float32),
             np.full(num_rays, -1, np.int32),

@@ -32,7 +32,7 @@ _BAY_CLEARANCE = 3.0
 
 @dataclass(frozen=True)
 class Areas:
-    """The areas of streets in the world [m].
+    """The areas of all streets of a road network, seen from above [m].
 
     Attributes:
         carriageway: the area between the kerbs, where vehicles drive or park.
@@ -58,11 +58,16 @@ def corner_setback(
 ) -> float:
     """Returns the distance from a junction at which a road must end [m].
 
-    At this distance, the rounded kerb (radius r) between the road and a
-    neighbouring road touches the road's edge. The edges of both roads meet at
-    the distance (b + a cos(angle)) / sin(angle) along the road, where a and b
-    are half the widths of the road and its neighbour. The arc of the kerb
-    begins r / tan(angle / 2) beyond this point.
+    The kerb at the corner between the road and its neighbour is rounded by an
+    arc. The road ends where this arc begins. The edges of both roads meet at
+    the distance (b + a cos(angle)) / sin(angle) along the road, and the arc
+    begins r / tan(angle / 2) beyond this point. The result is at least r.
+
+    Args:
+        half_width: a, half the width of the road [m].
+        other_half_width: b, half the width of the neighbouring road [m].
+        angle: angle between both roads [rad].
+        kerb_radius: r, radius of the kerb at the corner [m].
     """
     # Roads on top of one another never separate.
     if angle < 1e-6:
@@ -148,7 +153,12 @@ def _stub(road: Road, arm: Arm) -> LineString:
 def make_areas(
     roads: Mapping[str, Road], junction_areas: Mapping[str, BaseGeometry]
 ) -> Areas:
-    """Returns the areas of a road network, from its roads and junctions."""
+    """Returns the areas of a road network, from its roads and junctions.
+
+    Args:
+        roads: name of each road -> the road.
+        junction_areas: name of each junction -> its area, seen from above [m].
+    """
     lanes = {name: road_strip(road) for name, road in roads.items()}
     bays = {}
     for name, road in roads.items():

@@ -41,9 +41,11 @@ class Centreline:
     """A polyline whose corners are rounded by arcs."""
 
     def __init__(self, points: ArrayLike, radii: ArrayLike) -> None:
-        """Rounds the inner corners of N points (N, 2) by arcs.
+        """Rounds the corners of a polyline by arcs.
 
-        `radii` has the N - 2 radii of the arcs [m].
+        Args:
+            points: (N, 2) points of the polyline [m].
+            radii: (N - 2,) radii of the arcs at its inner corners [m].
 
         Raises:
             ValueError: the arc of a corner does not fit between its neighbours,

@@ -64,11 +64,14 @@ class LanePath:
 
 
 def check_length(length: float, source: object) -> None:
-    """Checks the length of a path [m].
+    """Raises an error if a path is too short or too long for a drive.
+
+    Args:
+        length: length of the path [m].
+        source: text with which the error message begins.
 
     Raises:
-        InputError: beginning with `source`, if the path is too short or too
-            long.
+        InputError: the path is too short or too long.
     """
     if length < _MIN_LENGTH:
         raise InputError(
@@ -99,7 +102,7 @@ def sample_lane_path(
             length of the polyline [m].
         source: text with which error messages begin.
         beside: (N, 2) distances to the neighbouring lanes on the left and right
-            of each corner [m]; see `LanePath`.
+            of each corner [m]; see `cns_drake.roads.lane_path.LanePath`.
 
     Raises:
         InputError: the polyline is too short or too long for a drive.

@@ -44,7 +44,12 @@ _CROSSING_TOLERANCE = 1.0
 class Connection:
     """A path through a junction from one lane to another.
 
-    The points (N, 3) of the path include the ends of both lanes [m].
+    Attributes:
+        junction: name of the junction.
+        incoming: the lane that leads to the junction.
+        outgoing: the lane that comes from the junction.
+        turn: direction of the path: left, right or straight on.
+        points: (N, 3) points of the path, ends of both lanes included [m].
     """
 
     junction: str
@@ -55,7 +60,12 @@ class Connection:
 
 
 class RoadNetwork:
-    """A road network: roads and junctions by name, their lanes and areas."""
+    """A road network: roads and junctions, with their lanes and areas.
+
+    Attributes:
+        roads: name of each road -> the road.
+        junctions: name of each junction -> the junction.
+    """
 
     def __init__(self, roads: dict[str, Road], junctions: dict[str, Junction]):
         self.roads = roads
@@ -77,7 +87,8 @@ class RoadNetwork:
     ) -> Connection:
         """Returns the path through a junction from one lane to another.
 
-        The path need not be legal. Its points are about `spacing` apart [m].
+        The path need not be legal; see `RoadNetwork.is_legal`. Its points are
+        about `spacing` apart [m].
 
         Raises:
             ValueError: a lane does not exist, the lanes do not meet in a

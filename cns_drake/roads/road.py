@@ -154,7 +154,14 @@ DIRECTIONS: tuple[Direction, Direction] = ("forward", "backward")
 
 
 class LaneRef(NamedTuple):
-    """Identifies a lane of a road; lane 1 is next to the middle of the road."""
+    """Identifies a lane of a road network.
+
+    Attributes:
+        road: name of the road.
+        direction: driving direction of the lane: `forward` along the road's
+            centreline, or `backward` against it.
+        lane: number of the lane, from 1 next to the middle of the road.
+    """
 
     road: str
     direction: Direction
@@ -183,14 +190,15 @@ class Road:
 
         Args:
             name: name of the road.
-            entry: its fields in `roads.yaml`.
-            curve: its whole centreline.
-            setbacks: distances of its two ends from their junctions [m].
+            entry: the road's fields in `roads.yaml`.
+            curve: the whole centreline, from junction to junction.
+            setbacks: distances of the road's two ends from the positions of
+                their junctions [m].
             heights: heights of the two junctions [m].
 
         Raises:
-            ValueError: the setbacks leave nothing of the road, or its heights
-                are outside it or out of order.
+            ValueError: the setbacks leave nothing of the road, or the heights
+                in `entry` are outside the road or out of order.
         """
         self.name = name
         self.start = entry.start
@@ -243,11 +251,15 @@ class Road:
     def evaluate(
         self, stations: ArrayLike, offset: ArrayLike = 0.0
     ) -> np.ndarray:
-        """Returns (N, 4): x, y, z [m] and heading of `forward` [rad].
+        """Returns x, y, z [m] and heading of `forward` [rad] along a road.
 
-        `stations` are (N,) arc lengths along the whole centreline [m]. `offset`
-        is the distance from the centreline, positive to the left, one for all
-        stations or (N,) [m].
+        Args:
+            stations: (N,) arc lengths along the whole centreline [m].
+            offset: distance from the centreline, positive to the left, one for
+                all stations or (N,) [m].
+
+        Returns:
+            (N, 4).
         """
         stations = np.asarray(stations, dtype=float)
         x, y, heading = self._curve.evaluate(stations).T
@@ -276,7 +288,10 @@ class Road:
         return self.evaluate(self.stations(spacing))[:, :3]
 
     def lane_offset(self, direction: Direction, lane: int) -> float:
-        """Returns the offset of a lane's middle to the left of `forward` [m].
+        """Returns how far a lane's middle is to the left of the centreline [m].
+
+        Left is as seen in the direction `forward`; lanes on the right have
+        negative offsets.
 
         Raises:
             ValueError: the road has no such lane.
@@ -295,7 +310,13 @@ class Road:
     def lane_centreline(
         self, direction: Direction, lane: int, spacing: float = 1.0
     ) -> np.ndarray:
-        """Returns the middle (N, 3) of a lane in driving direction [m]."""
+        """Returns the middle (N, 3) of a lane in driving direction [m].
+
+        Args:
+            direction: `forward` or `backward`.
+            lane: number of the lane, from 1 next to the middle of the road.
+            spacing: greatest distance between the points [m].
+        """
         points = self.evaluate(
             self.stations(spacing), self.lane_offset(direction, lane)
         )[:, :3]
@@ -320,9 +341,13 @@ class Road:
 class Arm:
     """One end of a road at a junction.
 
-    `heading` points away from the junction [rad]. `half_width` is half the
-    width of the carriageway, and `setback` the distance from the junction's
-    position to the end of the road [m].
+    Attributes:
+        road: name of the road.
+        end: which end of the road is at the junction.
+        heading: direction of the road, away from the junction [rad].
+        half_width: half the width of the carriageway [m].
+        setback: distance from the junction's position to the end of the road
+            [m].
     """
 
     road: str
@@ -334,7 +359,15 @@ class Arm:
 
 @dataclass(frozen=True)
 class Junction:
-    """A junction of roads; its arms are in counter-clockwise order."""
+    """A junction of roads.
+
+    Attributes:
+        name: name of the junction.
+        position: x and y of the point where the centrelines meet [m].
+        height: height z of the junction [m].
+        kerb_radius: radius of the kerb round each corner [m].
+        arms: the ends of its roads, in counter-clockwise order.
+    """
 
     name: str
     position: tuple[float, float]

@@ -41,20 +41,23 @@ def loop_corners(
     aside_in: float,
     aside_out: float,
 ) -> np.ndarray:
-    """Returns the corners of a loop to the left, in which a car turns round.
+    """Returns the corners of a line along which a car turns round to the left.
 
-    If the corners are rounded with the loop's radius, the path is smooth. The
-    car first swings out to the right of the line on which it arrives. It then
-    turns left around the centre, by more than 90 degrees. At the end, it comes
-    from the right of the line on which it leaves, and joins that line. The
-    bends at both ends have the loop's radius, too.
+    If all corners are rounded with the same radius, the path is smooth. The car
+    first swings out to the right of the line on which it arrives. It then turns
+    left around the centre, by more than 90 degrees. At the end, it comes from
+    the right of the line on which it leaves, and joins that line.
 
     Args:
-        centre: centre of the loop [m].
-        heading_in, heading_out: directions of the two lines [rad].
-        radius: radius of the loop [m].
+        centre: (2,) centre of the loop [m].
+        heading_in, heading_out: directions of the lines on which the car
+            arrives and leaves [rad].
+        radius: radius of the loop, and of the bends at both ends [m].
         aside_in, aside_out: distance of the centre to the left of each line, at
             most the radius [m].
+
+    Returns:
+        (N, 2) corners [m].
     """
     swing_in = math.acos(min(1.0, (radius + aside_in) / (2 * radius)))
     swing_out = math.acos(min(1.0, (radius + aside_out) / (2 * radius)))
@@ -83,10 +86,12 @@ def loop_corners(
 
 
 class Loop(NamedTuple):
-    """A car's U-turn, which begins at a distance along its lane [m].
+    """A car's U-turn into the opposite lane.
 
-    The points (N, 2) lead from this distance to the opposite place in the other
-    lane [m].
+    Attributes:
+        begin: distance along the lane at which the loop begins [m].
+        points: (N, 2) points of the loop, from there to the opposite place in
+            the other lane [m].
     """
 
     begin: float
@@ -101,9 +106,11 @@ def find_loop(
     """Returns the first loop that fits into an area.
 
     Args:
-        lanes_at: distance travelled [m] -> x, y and heading of the car, and the
-            distance to the opposite lane on its left [m].
-        centres: (N,) possible distances travelled to the loop's centre [m].
+        lanes_at: function that takes a distance along the lane [m], and returns
+            the pose there: x, y [m] and heading [rad], (3,); and the distance
+            to the opposite lane on the left [m].
+        centres: (N,) distances along the lane at which the loop's centre may be
+            [m], tried in order.
         area: the area in which the whole car must stay.
 
     Raises:
@@ -174,7 +181,7 @@ def swept_area(points: ArrayLike) -> BaseGeometry:
 
 
 def directions(points: np.ndarray) -> np.ndarray:
-    """Returns unit vectors (N, 2) ahead at the points (N, 2) of a path."""
+    """Returns the unit tangents (N, 2) of a path, at its points (N, 2)."""
     along = np.gradient(points, axis=0)
     along /= np.sqrt(along[:, :1] ** 2 + along[:, 1:] ** 2)
     return along
@@ -192,7 +199,8 @@ def outlines(
     Args:
         places: (..., 2) positions of the cars' frames [m].
         ahead: (..., 2) unit vectors in the direction of the cars.
-        rear, front: x coordinates of the cars' ends in their frames [m].
+        rear, front: distances from the frames' origins to the rear and front
+            ends of the cars, both positive [m].
         half_width: half the width of the cars [m].
     """
     left = np.stack([-ahead[..., 1], ahead[..., 0]], axis=-1)

@@ -185,10 +185,14 @@ def _loop(place: np.ndarray, heading: float, turn: float) -> np.ndarray:
 
 
 def read_waypoints(path: Path) -> tuple[np.ndarray, list[int]]:
-    """Reads waypoints (N, 3) from a file; returns them and line numbers.
+    """Reads waypoints from a file.
+
+    Returns:
+        (N, 3) positions of the waypoints [m]; the line number of each waypoint.
 
     Raises:
-        InputError: naming file, line and fault.
+        InputError: the file cannot be read, or a line is not usable. The
+            message names file, line and fault.
     """
     points, lines = [], []
     columns = None

@@ -12,11 +12,16 @@ from cns_drake.base.version import installed_versions
 def find_bus(
     builder: DiagramBuilder, lcm_buses: LcmBuses, caller: str, bus: str
 ) -> Any:
-    """Returns the LCM interface of a bus; replaces `LcmBuses.Find`.
+    """Returns the LCM interface of a bus, like Drake's `LcmBuses.Find`.
 
-    In Python with Drake 1.58, `Find` returns an unusable system: any use of
-    this system crashes the process. This function takes the system from the
-    builder instead.
+    In Python with Drake 1.58, any use of what `LcmBuses.Find` returns crashes
+    the process.
+
+    Args:
+        builder: builder of the diagram with the interface.
+        lcm_buses: the available buses.
+        caller: text with which an error message begins.
+        bus: name of the bus.
 
     Raises:
         RuntimeError: there is no such bus; the message names the caller.
@@ -31,8 +36,9 @@ def find_bus(
 def takes_screen_colours() -> bool:
     """Returns whether Drake's renderer reads vertex colours as sRGB.
 
-    Up to Drake 1.53 the renderer reads them as linear colours. If Drake was not
-    installed as a Python package, its version is assumed to be newer.
+    Up to Drake 1.53, it reads them as linear colours. If the version of Drake
+    is unknown, because Drake was not installed as a Python package, the result
+    is True.
     """
     version = installed_versions(["drake"]).get("drake", "1.54")
     return tuple(map(int, re.findall(r"\d+", version)[:2])) >= (1, 54)

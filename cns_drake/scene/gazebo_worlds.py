@@ -33,10 +33,15 @@ class ModelFinder:
     """Finds the files to which URIs in a world refer."""
 
     def __init__(self, world: Path, model_paths: Iterable[Path] = ()):
-        """Takes the folders to search, in order of precedence.
+        """Determines the folders to search.
 
-        They are the given ones, those of the environment variables, the world's
-        folder, the one above it, and `models` in these two.
+        These are, in order of precedence: the given ones, those of the
+        environment variables, the world's folder, its parent folder, and the
+        folder `models` in both.
+
+        Args:
+            world: SDF file of the world.
+            model_paths: folders to search first.
         """
         folder = world.absolute().parent
         named = [
@@ -52,8 +57,10 @@ class ModelFinder:
     def find(self, uri: str, folder: Path) -> Path | None:
         """Returns the file or folder of a URI; None if it does not exist.
 
-        The URI is `model://<name>/...`, an absolute path, or a path relative to
-        `folder`.
+        Args:
+            uri: `model://<name>/...`, an absolute path, or a relative path.
+            folder: folder of the file that contains the URI, from which
+                relative paths start.
         """
         rest = uri
         for scheme in _SCHEMES:
@@ -187,7 +194,12 @@ _EVERY_FLAG = 0xFFFFFFFF
 
 
 def is_gazebo_world(path: Path, root: Element) -> bool:
-    """Returns whether a world or model has elements that Drake cannot read."""
+    """Returns whether a world or model has elements that Drake cannot read.
+
+    Args:
+        path: the SDF file.
+        root: its root element.
+    """
     if root.find("world") is None and root.find("model") is None:
         return False
     return (
@@ -207,13 +219,19 @@ def is_gazebo_world(path: Path, root: Element) -> bool:
 def simplify_world(
     path: Path, root: Element, model_paths: Iterable[Path] = ()
 ) -> tuple[str, tuple[str, ...]]:
-    """Returns a world with only static models and their visuals, as SDF.
+    """Reduces a world or model to static models with visuals.
 
-    The second result is notes for the user on what was left out.
+    Args:
+        path: the SDF file.
+        root: its root element.
+        model_paths: folders in which `model://` is searched first.
+
+    Returns:
+        The new world as SDF text; notes for the user on what was left out.
 
     Raises:
-        InputError: a model that was found cannot be read, or something would be
-            at a wrong place.
+        InputError: a model that was found cannot be read, or the place of a
+            model or visual cannot be determined.
     """
     simplifier = _Simplifier(path, model_paths)
     worlds = root.findall("world")

@@ -31,8 +31,10 @@ class Labels(NamedTuple):
 def number_structures(names: Sequence[str]) -> Labels:
     """Returns labels for structures whose classes are unknown.
 
-    `names` contains the structure's name for each geometry. Instance ids count
-    from 1, in alphabetical order of the names.
+    Instance ids count from 1, in alphabetical order of the names.
+
+    Args:
+        names: for each of G geometries, the name of its structure.
 
     Raises:
         InputError: there are more structures than instance ids.

@@ -59,7 +59,9 @@ _JSON = 0x4E4F534A
 
 
 def unread_parts(path: Path) -> tuple[str, ...]:
-    """Returns one line for each kind of content that is ignored in a mesh file.
+    """Returns notes on the content of a mesh file that is ignored, if any.
+
+    There is one note for each kind of content.
 
     Raises:
         ValueError: the shapes in the file would be misread.
@@ -76,9 +78,9 @@ def unread_parts(path: Path) -> tuple[str, ...]:
 
 
 def check_gltf(path: Path) -> tuple[str, ...]:
-    """Returns one line for each kind of content of a glTF file that is ignored.
+    """Returns notes on the content of a glTF file that is ignored, if any.
 
-    The file is text or binary.
+    There is one note for each kind of content. The file is text or binary.
 
     Raises:
         ValueError: the file is not glTF, or its shapes would be misread; the
@@ -242,7 +244,7 @@ _SMALL_BYTES = 1 << 18
 
 
 class MeshFiles:
-    """Reads mesh files; each is read only once for all geometries with it.
+    """Reads mesh files, each only once.
 
     All geometries with the same mesh at the same scale share one surface.
     """
@@ -334,7 +336,10 @@ class MeshFiles:
 
 
 def mesh_shape_key(shape: Mesh | Convex) -> tuple:
-    """Returns a key that is equal only for equal meshes or convex hulls."""
+    """Returns a dictionary key for a mesh or convex hull.
+
+    Two keys are equal only if the shapes are equal.
+    """
     return type(shape), _source_key(shape.source()), tuple(shape.scale3())
 
 

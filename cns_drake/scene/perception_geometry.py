@@ -107,10 +107,14 @@ def read_perception_geometry(
 ) -> tuple[PerceptionGeometry, ...]:
     """Returns every geometry with `Role.kPerception` on selected frames.
 
-    `keep_frame` selects the frames; by default all.
+    Args:
+        inspector: inspector of the SceneGraph.
+        keep_frame: returns whether geometry on a frame is wanted; by default
+            all frames are.
 
     Raises:
-        InputError: a geometry cannot be read; see `GeometryReader.read`.
+        InputError: a geometry cannot be read; see
+            `cns_drake.scene.perception_geometry.GeometryReader.read`.
     """
     reader = GeometryReader(Role.kPerception)
     hidden = {
@@ -128,7 +132,11 @@ def merge_surfaces(
 ) -> TriangleSurface:
     """Returns the triangles of many geometries as one surface in a frame T.
 
-    `calc_X_TF` returns the pose of a frame in T. Curved shapes are tessellated.
+    Curved shapes are tessellated.
+
+    Args:
+        geometries: the geometries.
+        calc_X_TF: function that returns the pose of a frame F in T.
     """
     members = [
         (
@@ -148,7 +156,7 @@ class GeometryReader:
     """
 
     def __init__(self, role: Role):
-        """Takes the role, and reads nothing yet."""
+        """Makes a reader of the geometry with a role; nothing is read yet."""
         self._role = role
         self._known: dict[GeometryId, tuple[tuple, PerceptionGeometry]] = {}
 
@@ -160,8 +168,12 @@ class GeometryReader:
         """Returns every geometry of the role that is not hidden.
 
         The order is that of `GetAllGeometryIds`, which Drake documents as
-        stable, so the result depends only on the SceneGraph. A geometry that
-        has not changed since the last call is the same object.
+        stable, so the result depends only on the SceneGraph. For a geometry
+        that has not changed since the last call, the same object is returned.
+
+        Args:
+            inspector: inspector of the SceneGraph.
+            hidden: geometries to leave out.
 
         Raises:
             InputError: a geometry is deformable, a mesh file is missing or
@@ -289,15 +301,11 @@ _revisions = itertools.count(1)
 def geometry_revision_port(scene_graph: SceneGraph) -> OutputPort:
     """Returns a port whose value changes when, and only when, geometry does.
 
-    Two other ways to notice changes have drawbacks: SceneGraph's own
-    `geometry_version` only covers perception geometry that a render engine has
-    accepted, and comparing all geometries takes longer than a scan.
+    Geometry changes if it is added, removed, replaced, reshaped, renamed or
+    given another role. A new pose of a frame does not count.
 
-    A Context holds the geometry as a parameter, which Drake's cache tracks. The
-    port depends only on this parameter. Its value is therefore computed again
-    whenever geometry was added, removed, replaced, reshaped, renamed or given
-    another role. The first call adds the port to the SceneGraph, and must come
-    before a Diagram is built from it.
+    The first call adds the port to the SceneGraph, and must come before a
+    Diagram is built from it.
 
     Returns:
         An abstract port with an int as its value. Within this process, two

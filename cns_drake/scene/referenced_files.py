@@ -45,9 +45,9 @@ class FileWatch:
         return status
 
     def changed(self) -> str | None:
-        """Returns a file that has changed since `take_down` was called for it.
+        """Returns the path of a file that has changed; None if none has.
 
-        It is None if no file has changed.
+        Only files count whose status was recorded by `FileWatch.take_down`.
         """
         for path, state in self._states.items():
             if _state(_status(path)) != state:
@@ -72,6 +72,10 @@ def referenced_files(
     model: Path, watch: FileWatch
 ) -> dict[str, tuple[str, int]]:
     """Returns the files to which a model refers, directly or indirectly.
+
+    Args:
+        model: SDF or URDF file of the model.
+        watch: records the status of the model and of all files found.
 
     Returns:
         Name -> path of the file and its size [bytes]. The name is the path

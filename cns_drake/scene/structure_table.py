@@ -26,8 +26,8 @@ class StructureEntry:
         semantic_class: a key of `CLASS_IDS`.
         reflectivity: reflectivity of the structure's surfaces near 900 nm, from
             0 to 1; None if it follows from class and colours.
-        causes: the switches of a scenario's `transient` that changed the
-            structure relative to the stage's file.
+        causes: fields of the scenario's section `transient` that changed the
+            structure; empty if it is as in the stage's file.
     """
 
     instance: int
@@ -44,9 +44,9 @@ class StructureEntry:
 class StructureTable:
     """Structures by name, with instance ids and classes.
 
-    Structures that the table does not name get the free ids, in alphabetical
-    order, and the class `unlabeled`. Structures can thus be distinguished even
-    in a world without a table.
+    Structures of a world that are missing in the table get the free ids, in
+    alphabetical order, and the class `unlabeled`. Structures can thus be
+    distinguished even in a world without a table.
     """
 
     def __init__(self, entries: Iterable[StructureEntry]):
@@ -84,7 +84,11 @@ class StructureTable:
         return StructureTable(entries)
 
     def labels(self, names: Sequence[str]) -> Labels:
-        """Returns labels of geometries, given the names of their structures."""
+        """Returns labels and instance ids of geometries.
+
+        Args:
+            names: for each of G geometries, the name of its structure.
+        """
         table = self.completed(names)
         entries = [table[name] for name in names]
         columns = (

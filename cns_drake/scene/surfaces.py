@@ -29,7 +29,11 @@ class TriangleSurface:
 
 @dataclass(frozen=True)
 class EllipsoidSurface:
-    """An ellipsoid (or sphere) centred on G, with its axes along those of G."""
+    """An ellipsoid (or sphere) centred on G, with its axes along those of G.
+
+    Attributes:
+        semi_axes: half lengths along x, y and z [m].
+    """
 
     semi_axes: tuple[float, float, float]
 
@@ -40,7 +44,12 @@ class EllipsoidSurface:
 
 @dataclass(frozen=True)
 class CylinderSurface:
-    """A closed cylinder centred on G, its axis along z of G."""
+    """A closed cylinder centred on G, its axis along z of G.
+
+    Attributes:
+        radius: its radius [m].
+        length: its length [m].
+    """
 
     radius: float
     length: float
@@ -48,7 +57,12 @@ class CylinderSurface:
 
 @dataclass(frozen=True)
 class CapsuleSurface:
-    """A capsule centred on G; `length` excludes its two half spheres."""
+    """A capsule centred on G, its axis along z of G.
+
+    Attributes:
+        radius: radius of the cylinder and of the two half spheres [m].
+        length: length of the cylinder, without the half spheres [m].
+    """
 
     radius: float
     length: float
@@ -83,11 +97,12 @@ def merge_triangles(
 ) -> tuple[TriangleSurface, np.ndarray]:
     """Returns the triangles of many geometries in one frame T.
 
-    Each member consists of an index, a pose X_TG and a surface.
+    Args:
+        members: an index, the pose X_TG and the surface of each geometry.
 
     Returns:
-        The surface in T, and for each triangle, (M,) int32, the index given
-        with its member.
+        The surface in T; for each of its M triangles, the index that was given
+        with its geometry, (M,) int32.
     """
     vertices: list[np.ndarray] = [np.zeros((0, 3))]
     triangles: list[np.ndarray] = [np.zeros((0, 3), np.int32)]

@@ -18,14 +18,19 @@ def sensor_pose(mount: Mount) -> RigidTransform:
 def body_and_pose(
     place: RigidBody | Frame, X_PS: RigidTransform
 ) -> tuple[RigidBody, RigidTransform]:
-    """Returns the body B that carries a frame P, and a sensor's pose X_BS.
+    """Returns the body that carries a sensor, and the sensor's pose on it.
 
-    P is a body of a finalized plant, or a frame that is fixed on such a body.
-    X_PS is the pose of the sensor S in P.
+    Args:
+        place: the carrier P: a body of a finalized plant, or a frame that is
+            fixed on such a body.
+        X_PS: pose of the sensor S in P.
+
+    Returns:
+        The body B that P is, or that P is fixed on; the pose X_BS.
 
     Raises:
         RuntimeError: the plant is not finalized.
-        TypeError: P is of another type.
+        TypeError: `place` is of another type.
     """
     if not isinstance(place, RigidBody | Frame):
         cure = ""
@@ -51,9 +56,13 @@ def connect_motion(
 ) -> None:
     """Connects a system's inputs to the motion of the bodies of a plant.
 
-    `motion` has the kinematic output ports of a MultibodyPlant, such as
-    `body_poses`; by default it is the plant of `body`. `inputs` maps the name
-    of an output port of `motion` to the input port that is connected to it.
+    Args:
+        builder: builder of a diagram with all these systems.
+        motion: system with the kinematic output ports of a MultibodyPlant, such
+            as `body_poses`; None for the plant of `body`.
+        body: a body of the plant.
+        inputs: name of an output port of `motion` -> the input port that is
+            connected to it.
     """
     source = body.GetParentPlant() if motion is None else motion
     for name, port in inputs.items():

@@ -113,10 +113,24 @@ class LidarConfig:
 class ImuConfig:
     """An IMU, as YAML describes it to Drake.
 
-    The fields are the same as those of the IMU in a scenario, plus `name`,
-    `X_PB`, `seed` and `lcm_bus`, which are as in `LidarConfig`. The rate is
-    that of the field `rate`, or else that in the file `kalibr`, or else 20
-    messages a second.
+    Attributes:
+        name: name of the systems; the channel is `DRAKE_IMU_<name>`.
+        X_PB: pose of the sensor B in a frame P of the plant. The field
+            `base_frame` of this pose names P; by default P is the world frame.
+        rate: samples per second; by default the rate in the file `kalibr`, or
+            else 20.
+        kalibr: path of a file in Kalibr's format with the noise densities; by
+            default there is no noise.
+        accelerometer_turn_on_bias: standard deviation of the constant bias of
+            each axis of the accelerometer [m/s^2].
+        gyroscope_turn_on_bias: standard deviation of the constant bias of each
+            axis of the gyroscope [rad/s].
+        accelerometer_range: largest specific force that an axis can measure
+            [m/s^2]; by default no limit.
+        gyroscope_range: largest angular velocity that an axis can measure
+            [rad/s]; by default no limit.
+        seed: seed of the errors.
+        lcm_bus: name of the bus on which the samples are published.
 
     Example:
         from cns_drake import ImuConfig
@@ -140,8 +154,13 @@ class ImuConfig:
 class OdometryConfig:
     """Exact odometry of a frame, as YAML describes it to Drake.
 
-    The fields `name`, `X_PB` and `lcm_bus` are as in `LidarConfig`. The default
-    rate is 20 messages a second.
+    Attributes:
+        name: name of the system; the channel is `DRAKE_ODOMETRY_<name>`.
+        X_PB: pose of the observed frame B in a frame P of the plant. The field
+            `base_frame` of this pose names P; by default P is the world frame.
+        rate: messages per second; by default 20.
+        seed: not used, since the odometry is exact.
+        lcm_bus: name of the bus on which the odometry is published.
 
     Example:
         from cns_drake import OdometryConfig

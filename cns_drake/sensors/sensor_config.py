@@ -61,10 +61,13 @@ class Section(BaseModel):
 
 
 def field_off_by_default(default: Any, **constraints: Any) -> Any:
-    """Defines a field that is written only if it differs from its default.
+    """Defines a field that is written to a file only if it is not the default.
 
-    A new field of this kind does not change the text of scenarios that do not
-    use it.
+    Thus a new field does not change the text of scenarios that do not use it.
+
+    Args:
+        default: default value of the field.
+        constraints: further arguments of pydantic's `Field`, such as `ge`.
     """
     return Field(
         default=default,
@@ -88,15 +91,15 @@ class Mount(Section):
 class SensorConfig(Mount, abc.ABC):
     """A sensor that publishes one message at a time on one topic.
 
-    For your own kind of sensor, derive a class from this one. A sensor in a
-    field of a scenario is added to the Diagram and recorded; its frame has the
-    name of the field.
+    For your own kind of sensor, derive a class from this one. If a subclass of
+    `Scenario` has a field of this class, the sensor is added to the Diagram and
+    recorded. The name of the field is the name of the sensor and of its frame.
 
     Attributes:
         xyz: position in base_link [m].
         rpy_deg: roll, pitch, yaw in base_link [deg].
-        rate: messages per second, at least the rate of the fastest LiDAR and
-            at most 1000; by default one message per scan.
+        rate: messages per second, at least the rate of the fastest LiDAR and at
+            most 1000; by default one message per scan.
     """
 
     xyz: Triple = (0.0, 0.0, 0.0)
@@ -104,7 +107,7 @@ class SensorConfig(Mount, abc.ABC):
 
     @abc.abstractmethod
     def topic(self, name: str) -> Topic:
-        """Returns the topic of the sensor `name`: `/<name>/...`."""
+        """Returns the topic of the sensor with this name: `/<name>/...`."""
 
     @abc.abstractmethod
     def add(
@@ -117,17 +120,26 @@ class SensorConfig(Mount, abc.ABC):
         name: str,
         seed: int,
     ) -> OutputPort:
-        """Adds the sensor to a Diagram; returns the port to record.
+        """Adds the sensor to a Diagram; returns the output port to record.
 
         Args:
+            builder: builder of the Diagram.
             scene_graph: SceneGraph with the geometry that the sensor may see.
             body: the vehicle B, of a finalized plant.
             motion: system with the kinematic output ports of that plant.
+            name: name of the sensor.
+            seed: seed of the drive, for the sensor's random numbers.
         """
 
     @abc.abstractmethod
     def make_message(self, value: Any, frame_id: str, stamp_ns: int) -> Any:
-        """Converts a value of the recorded port to a ROS 2 message."""
+        """Converts a value of the recorded port to a ROS 2 message.
+
+        Args:
+            value: value of the output port that `SensorConfig.add` returned.
+            frame_id: name of the sensor's frame.
+            stamp_ns: time of the value [ns].
+        """
 
 
 def check_rate(

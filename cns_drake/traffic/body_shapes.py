@@ -26,7 +26,14 @@ _METAL: Rgb = (0.3, 0.31, 0.33)
 
 
 class BodyShape(NamedTuple):
-    """One shape of a body and its colour, in the frame L of its limb."""
+    """One shape of a limb, with its pose and colour.
+
+    Attributes:
+        name: name of the shape.
+        shape: Drake's shape S.
+        X_LS: pose of the shape in the frame L of its limb.
+        rgb: colour, from 0 to 1.
+    """
 
     name: str
     shape: Shape
@@ -35,11 +42,14 @@ class BodyShape(NamedTuple):
 
 
 class Limb(NamedTuple):
-    """A rigid part of a body, which swings about its y axis.
+    """A rigid part of a body, which swings about the y axis of its joint.
 
-    `origin` is the position of the limb's joint in the body's frame [m].
-    `swing` is the amplitude of its swing at walking speed [rad], negative if it
-    first swings backwards.
+    Attributes:
+        name: name of the limb.
+        joint: position of the limb's joint in the frame of the body [m].
+        swing: amplitude of the limb's swing at walking speed [rad], negative if
+            it first swings backwards.
+        shapes: the shapes of which the limb consists.
     """
 
     name: str
@@ -75,10 +85,14 @@ def _round(
 def vehicle_limbs(
     kind: VehicleKind, rng: np.random.Generator
 ) -> tuple[Limb, ...]:
-    """Returns the shapes of a vehicle, as its only limb.
+    """Returns the shapes of a vehicle, as a tuple with one limb.
 
-    The frame of the limb is on the ground below the middle of the vehicle's
-    box.
+    A vehicle has no moving parts. The frame of the limb is on the ground below
+    the middle of the vehicle's box.
+
+    Args:
+        kind: kind of the vehicle.
+        rng: random generator for its colour and variant.
     """
     paint = PAINTS[int(rng.integers(len(PAINTS)))]
     if kind.name in ("bicycle", "motorcycle"):

@@ -57,7 +57,8 @@ class TracedObject:
     Attributes:
         name: id of the object.
         type_name: type of the object; "" if the trace has none.
-        steps: (M,) numbers of the times at which the object exists, ascending.
+        steps: (M,) numbers of the time steps at which the object exists,
+            ascending.
         xy: (M, 2) position of a vehicle's front, or of a person's middle [m].
         yaw: (M,) heading, from x towards y [rad].
         slope: (M,) slope of the road, positive upwards [rad].
@@ -225,10 +226,10 @@ def play_trace(
     ego: EgoPath,
     ego_box: EgoBox,
 ) -> TrafficPlan:
-    """Returns the traffic in a SUMO trace, which starts with the drive.
+    """Returns the traffic of a SUMO trace that begins with the drive.
 
-    SUMO's simulation does not contain the ego car. Road users that would
-    collide with the ego car are left out.
+    Road users that would collide with the ego car are left out, because SUMO's
+    simulation did not contain the ego car.
 
     Args:
         trace: the trace that SUMO wrote.
@@ -334,12 +335,17 @@ class Heights:
     def along(
         self, xy: np.ndarray, z: np.ndarray, yaw: np.ndarray | None
     ) -> np.ndarray:
-        """Returns the heights (M,) of a road user along places (M, 2) [m].
+        """Returns the heights (M,) of one road user at successive places [m].
 
-        Where two roads cross at different heights, the heights `z` in the trace
-        decide on which of them the road user is. If the trace has no heights
-        (NaN), it is the road on which the road user arrived, or else the road
-        with a lane in the direction `yaw` [rad].
+        Where two roads cross at different heights, the road user is on the road
+        whose height is nearest to the height in the trace. Without heights in
+        the trace, it is on the road on which it arrived, or else on a road with
+        a lane in its direction.
+
+        Args:
+            xy: (M, 2) places [m].
+            z: (M,) heights in the trace [m]; NaN without heights.
+            yaw: (M,) headings [rad]; None if the direction does not count.
         """
         found = self.at(xy)
         count = min(_CANDIDATES, len(self._z))

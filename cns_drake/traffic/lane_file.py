@@ -66,8 +66,11 @@ class _File(_Model):
 class LaneFile(NamedTuple):
     """The content of a lane file: lanes and walkways for traffic.
 
-    `in_the_way` names structures, such as parked cars, that stand where
-    vehicles drive. A drive with traffic leaves out these structures.
+    Attributes:
+        graph: the lanes and crossings.
+        walkways: the walkways.
+        in_the_way: names of structures, such as parked cars, that stand where
+            vehicles drive. A drive with traffic leaves out these structures.
     """
 
     graph: LaneGraph
@@ -82,7 +85,7 @@ def lane_text(
 ) -> str:
     """Returns the text of a lane file with the given content.
 
-    `LaneFile` describes the content.
+    The arguments are the fields of `cns_drake.traffic.lane_file.LaneFile`.
     """
     content: dict[str, Any] = {
         "lanes": [

@@ -88,7 +88,13 @@ class Crossing:
 def make_crossing(
     line: np.ndarray, width: float, marked: bool = True
 ) -> Crossing:
-    """Returns a crossing of a given width around a line (2, 3) [m]."""
+    """Returns a crossing for walkers.
+
+    Args:
+        line: (2, 3) ends of the crossing's middle line [m].
+        width: width of the crossing [m].
+        marked: whether vehicles give way to waiting walkers.
+    """
     course = LineString(line[:, :2])
     return Crossing(line, course.buffer(width / 2, cap_style="flat"), marked)
 
@@ -135,10 +141,15 @@ class Walkway:
 def kept_clear(
     walkways: Sequence[Walkway], things: Sequence[BaseGeometry]
 ) -> list[Walkway]:
-    """Returns the walkways, led around objects or ending in front of them.
+    """Leads walkways around objects, or ends them in front of objects.
 
-    `things` contains the outlines of the objects as seen from above [m].
-    Crossings without a walkway at each end are left out.
+    Args:
+        walkways: the walkways.
+        things: outlines of the objects as seen from above [m].
+
+    Returns:
+        The walkways with the free part of their width, cut where nobody can
+        pass. Crossings without a walkway at each end are left out.
     """
     tree, found = shapely.STRtree(things), []
     node = 1 + max((max(way.start, way.end) for way in walkways), default=0)
@@ -220,7 +231,13 @@ def _lengthened(points: np.ndarray, count: int) -> np.ndarray:
 
 @dataclass(frozen=True)
 class LaneGraph:
-    """The pieces of vehicles' paths, and the walkers' crossings over them."""
+    """The lanes and paths through junctions of a map, and its crossings.
+
+    Attributes:
+        pieces: parts of lanes and paths through junctions. Their numbers are
+            indices into this tuple.
+        crossings: places where walkers cross the lanes.
+    """
 
     pieces: tuple[Piece, ...]
     crossings: tuple[Crossing, ...] = ()
@@ -238,14 +255,18 @@ def with_unmarked_crossings(
 ) -> tuple[LaneGraph, list[Walkway]]:
     """Adds crossings without marks, where walkers may cross narrow streets.
 
-    Each of these crossings is as near to the middle of a lane as possible.
-    There must be a walkway on both sides of the street, and none of the objects
-    `things`, seen from above, in between. A walkway has at most one such
-    crossing.
+    A crossing is added as near as possible to the middle of a lane, if there is
+    a walkway on both sides of the street and no object in between. Each walkway
+    has at most one such crossing.
+
+    Args:
+        graph: the lanes.
+        walkways: the walkways.
+        things: outlines of objects as seen from above [m].
 
     Returns:
-        The graph with the additional crossings, and the walkways, which are cut
-        at these crossings, together with new walkways over the crossings.
+        The graph with the additional crossings. The walkways, cut where these
+        crossings begin and end, and new walkways over the crossings.
     """
     sides = [k for k, way in enumerate(walkways) if way.crossing < 0]
     lines = [LineString(walkways[k].points[:, :2]) for k in sides]
@@ -362,7 +383,16 @@ def length_of(points: np.ndarray) -> float:
 
 
 def distances_along(points: np.ndarray) -> np.ndarray:
-    """Returns the distances (N,) of points (N, 2 or 3) along their line [m]."""
+    """Returns how far along a polyline each of its points is [m].
+
+    The first point is at 0.
+
+    Args:
+        points: (N, 2) or (N, 3) points [m].
+
+    Returns:
+        (N,) distances [m].
+    """
     steps = np.linalg.norm(np.diff(points, axis=0), axis=1)
     return np.append(0.0, np.cumsum(steps))
 
@@ -371,7 +401,8 @@ def without_dead_ends(pieces: Sequence[Piece]) -> list[Piece]:
     """Returns the pieces from which a vehicle never reaches a dead end.
 
     Three kinds of pieces are removed: lanes that lead nowhere, pieces that lead
-    only to such lanes, and lanes to which no piece leads.
+    only to such lanes, and lanes to which no piece leads. The remaining pieces
+    are numbered again.
     """
     alive = set(range(len(pieces)))
     while True:

@@ -18,10 +18,13 @@ _MOST_SHORT, _MOST_WAYS = 8, 12
 
 
 class DirectedLane(NamedTuple):
-    """A lane in one direction, given by points (N, 3) along its middle [m].
+    """A lane of a map, in its driving direction.
 
-    `limit` is the speed limit of the lane [m/s]. `connects` says whether the
-    lane is in a junction, where it connects two lanes.
+    Attributes:
+        points: (N, 3) points along its middle [m].
+        limit: speed limit [m/s].
+        connects: whether the lane is in a junction, where it connects two
+            lanes.
     """
 
     points: np.ndarray
@@ -36,10 +39,14 @@ def join_lanes(
 ) -> LaneGraph:
     """Returns the lane graph of a map's lanes, cut into pieces for traffic.
 
-    In each link, the second lane follows the first. `right_of` maps the number
-    of a lane to the number of the next lane on its right with the same
-    direction; without it, vehicles do not change lanes. The graph has no
-    signals and no crossings. It is empty if all lanes lead to dead ends.
+    The graph has no signals and no crossings. It is empty if all lanes lead to
+    dead ends.
+
+    Args:
+        lanes: the lanes, numbered from 0.
+        links: pairs of lane numbers; the second lane follows the first.
+        right_of: number of a lane -> number of the next lane on its right with
+            the same direction. None if vehicles do not change lanes.
     """
     merged, after, beside = _merge(lanes, links, right_of or {})
     points = [resampled(lane.points) for lane in merged]

@@ -9,11 +9,13 @@ from cns_drake.base.compiled import compiled
 
 @compiled
 def boxes_overlap(a: Any, b: Any, half_a: Any, half_b: Any) -> bool:
-    """Returns whether two rectangles overlap.
+    """Returns whether two rectangles a and b overlap.
 
-    They overlap if their projections on the axes of both rectangles overlap. A
-    rectangle is given by x, y of its centre [m] and its heading [rad], (3,),
-    and by half its length and half its width, (2,) [m].
+    They overlap if their projections on the axes of both rectangles overlap.
+
+    Args:
+        a, b: x and y of each centre [m], and heading [rad], (3,).
+        half_a, half_b: half of each length and width [m], (2,).
     """
     dx, dy = b[0] - a[0], b[1] - a[1]
     square = (half_a[0] + half_b[0]) ** 2 + (half_a[1] + half_b[1]) ** 2
@@ -40,11 +42,13 @@ def boxes_overlap(a: Any, b: Any, half_a: Any, half_b: Any) -> bool:
 def find_overlaps(
     poses: np.ndarray, half: np.ndarray, found: np.ndarray
 ) -> None:
-    """Marks in `found` (N, N) which pairs of bodies overlap at any time.
+    """Finds the pairs of bodies that overlap at any of several times.
 
-    `poses` (K, N, 3) contains x, y [m] and heading [rad] of N bodies at K
-    times; NaN while a body is absent. `half` (N, 2) contains half lengths and
-    half widths [m].
+    Args:
+        poses: (K, N, 3) x, y [m] and heading [rad] of N bodies at K times; NaN
+            while a body is absent.
+        half: (N, 2) half of each body's length and width [m].
+        found: (N, N) bool; set to True for each pair that overlaps.
     """
     reach = np.sqrt(half[:, 0] ** 2 + half[:, 1] ** 2)
     for k in range(len(poses)):

@@ -2,10 +2,10 @@
 
 A vehicle may enter its path ("way") through a junction under three conditions:
 vehicles on conflicting ways will have passed when it gets there; there is room
-for it behind the way; and its signal is green or, without a signal, it has
-stopped at the line. If a vehicle with the right of way is slower than expected,
-later vehicles wait for it on their ways. Earlier vehicles never wait for later
-ones, so no vehicle waits forever.
+for it in the lane after the junction; and its signal is green or, without a
+signal, it has stopped at the line. If a vehicle with the right of way is slower
+than expected, later vehicles wait for it on their ways. Earlier vehicles never
+wait for later ones, so no vehicle waits forever.
 """
 
 from typing import Any
@@ -78,8 +78,11 @@ _WALKERS_GAP = 6.0
 def grant_ways(traffic: Traffic, k: int) -> None:
     """Permits vehicles to enter junctions, in the order of their arrival.
 
-    Walkers are permitted to enter crossings by the same rule. `k` is the number
-    of the current time step.
+    Walkers are permitted to enter crossings by the same rule.
+
+    Args:
+        traffic: vehicles and crossings, changed in place.
+        k: number of the current time step.
     """
     streets, cars, crossings = traffic.streets, traffic.cars, traffic.crossings
     t, pieces, num_cars = k * STEP, streets.pieces, len(cars)

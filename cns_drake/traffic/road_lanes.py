@@ -45,7 +45,11 @@ _SHORTEST = 1.0
 
 
 def make_lane_graph(network: RoadNetwork) -> LaneGraph:
-    """Returns the lanes of a network, cut at their stop lines."""
+    """Returns the lane graph of a road network.
+
+    Lanes end at stop lines. Short lanes are part of the paths through
+    junctions.
+    """
     trims = {
         (road.name, end): _stop_line(network, road, end)
         for road in network.roads.values()
@@ -219,7 +223,11 @@ def _station(road: Road, end: End) -> float:
 
 
 def make_walkways(network: RoadNetwork, graph: LaneGraph) -> list[Walkway]:
-    """Returns the walkways of a network, with the crossings of its lanes."""
+    """Returns the walkways of a road network.
+
+    They lead along the sidewalks, around the corners of junctions, and over the
+    crossings of `graph`.
+    """
     nodes: dict[tuple[str, End, int], int] = {}
     for road in network.roads.values():
         if _is_walked(road):

@@ -51,10 +51,13 @@ class Signals(NamedTuple):
 
 
 def make_signals(graph: LaneGraph, begin: np.ndarray) -> Signals:
-    """Returns the program of all traffic lights.
+    """Returns the signal program of all traffic lights.
 
-    `begin` (P + C, P + C) contains the places at which paths through junctions
-    begin to meet crossings; see `find_conflicts`.
+    Args:
+        graph: lane graph with P pieces and C crossings.
+        begin: (P + C, P + C) distances along paths through junctions at which
+            they begin to meet crossings [m]; see
+            `cns_drake.traffic.streets.find_conflicts`.
     """
     pieces = graph.pieces
     flow = _flows(graph)
@@ -103,9 +106,15 @@ def make_signals(graph: LaneGraph, begin: np.ndarray) -> Signals:
 
 
 def way_shares(graph: LaneGraph, lane: int) -> np.ndarray:
-    """Returns the share of drivers that takes each path after a lane.
+    """Returns how drivers divide among the paths that follow a lane.
 
-    These are the paths through the junction to which the lane leads.
+    Args:
+        graph: the lane graph.
+        lane: number of the lane, which leads to a junction.
+
+    Returns:
+        Share of the drivers on each path in `graph.pieces[lane].after`; the sum
+        is 1.
     """
     after = graph.pieces[lane].after
     likes = []
@@ -223,14 +232,16 @@ class Streets(NamedTuple):
     """P pieces and C crossings of a lane graph, and the ego car at K times.
 
     Attributes:
-        pieces: (P,) records `PIECE`.
+        pieces: (P,) records of dtype `PIECE`.
         points: (M, 3) points of all pieces [m].
         speed: (M,) allowed speed at each point, reduced in bends [m/s].
-        after: numbers of the pieces that follow each piece.
+        after: numbers of the pieces that follow a piece, for all pieces in
+            turn; `pieces` says which rows belong to a piece.
         liked: for each entry of `after`, the cumulative share of drivers that
             take this piece or an earlier entry.
         signals: program of all signals.
-        begin, clear, joint: (2, P + C, P + C) see `find_conflicts`.
+        begin, clear, joint: (2, P + C, P + C) see
+            `cns_drake.traffic.streets.find_conflicts`.
         over: (P, C) place on a crossing's line where a path through a junction
             leads over the crossing [m]; NaN if it does not.
         until: (K, P + C) float32 time until the ego car reaches the piece or
@@ -258,9 +269,12 @@ class Streets(NamedTuple):
 
 
 class EgoBox(NamedTuple):
-    """The ego car's box on the ground; `rear` and `front` are x in its frame.
+    """The rectangle on the ground that the ego car covers, in the car's frame.
 
-    All lengths are in [m].
+    Attributes:
+        rear: x of the rear end [m], negative.
+        front: x of the front end [m].
+        half_width: half of the width [m].
     """
 
     rear: float
@@ -275,8 +289,9 @@ class EgoBox(NamedTuple):
     def middles(self, xy: np.ndarray, yaw: np.ndarray) -> np.ndarray:
         """Returns x, y [m] and yaw [rad] of the box's centre, (N, 3).
 
-        The car's frame is at places `xy` (N, 2) [m] with headings `yaw` (N,)
-        [rad].
+        Args:
+            xy: (N, 2) positions of the car's frame [m].
+            yaw: (N,) headings of the car [rad].
         """
         ahead = np.column_stack([cos(yaw), sin(yaw)])
         middle = (self.rear + self.front) / 2
@@ -285,8 +300,9 @@ class EgoBox(NamedTuple):
     def corners(self, xy: np.ndarray, yaw: np.ndarray) -> np.ndarray:
         """Returns the corners (N, 4, 2) of the box [m].
 
-        The car's frame is at places `xy` (N, 2) [m] with headings `yaw` (N,)
-        [rad].
+        Args:
+            xy: (N, 2) positions of the car's frame [m].
+            yaw: (N,) headings of the car [rad].
         """
         ahead = np.column_stack([cos(yaw), sin(yaw)])
         return outlines(xy, ahead, -self.rear, self.front, self.half_width)
@@ -368,22 +384,24 @@ def _speeds(piece: Piece) -> np.ndarray:
 def find_conflicts(
     graph: LaneGraph,
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Returns where pieces and crossings exclude each other.
+    """Returns where paths of vehicles, and crossings, are in conflict.
 
-    Two different paths through a junction ("ways") exclude each other if the
-    areas that vehicles sweep on them meet. Lanes exclude only crossings without
-    marks. The results are pairs of matrices, whose rows and columns are the
-    pieces and then the crossings. The first matrix of a pair is for two small
-    vehicles; in the second, at least one vehicle is large.
+    Two different paths through a junction ("ways") are in conflict if the areas
+    that vehicles sweep on them meet. Lanes are in conflict only with crossings
+    without marks.
+
+    Args:
+        graph: lane graph with P pieces and C crossings.
 
     Returns:
-        Three arrays (2, P + C, P + C), whose entries are for a row a and a
-        column b. The first is the distance of a vehicle's front along a at
-        which its area begins to meet that of b [m]; inf if they never meet. The
-        second is the distance of a vehicle's rear along a from which on b is
-        free again [m]; 0 if they never meet, or if a is a crossing. The third
-        is `SPLIT` or `MERGE` where two ways meet only at their beginning or
-        end, in a lane that they share.
+        Three arrays (2, P + C, P + C). The first index is 0 for two small
+        vehicles and 1 if at least one is large; the second index a and the
+        third index b number the pieces and then the crossings. The first array
+        is the distance of a vehicle's front along a at which it begins to meet
+        the area of b [m]; inf if they never meet. The second is the distance of
+        a vehicle's rear along a from which on b is free again [m]; 0 if they
+        never meet, or if a is a crossing. The third is `SPLIT` or `MERGE` where
+        two ways meet only at their beginning or end, in a lane that they share.
     """
     small_axles = (-1.6, 1.75)
     num_pieces = len(graph.pieces)
@@ -439,10 +457,14 @@ def swept_hulls(
 ) -> tuple[np.ndarray, np.ndarray]:
     """Returns the areas that a vehicle sweeps on a piece, step by step.
 
-    `size` is the vehicle's length and width; `axles` are x of its rear and
-    front axle from its middle [m]. The result is N + 1 distances of the front
-    bumper along the piece [m], and the N areas swept from each distance to the
-    next.
+    Args:
+        piece: the piece.
+        size: length and width of the vehicle [m].
+        axles: x of the rear and the front axle from the vehicle's middle [m].
+
+    Returns:
+        N + 1 distances of the front bumper along the piece [m]; the N areas
+        swept from each distance to the next.
     """
     line = piece.points[:, :2]
     along = distances_along(line)
@@ -521,9 +543,17 @@ def _find_ego(
 def places_on(
     streets: Streets, pieces: np.ndarray, s: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Returns x, y and z (...) at distances (...) along pieces (...) [m].
+    """Returns x, y and z of places that are given by a piece and a distance.
 
     Beyond its ends, a piece goes straight on.
+
+    Args:
+        streets: arrays of all pieces.
+        pieces: (...) numbers of the pieces.
+        s: (...) distances along the pieces [m].
+
+    Returns:
+        Three arrays (...) [m].
     """
     rows = streets.pieces[pieces]
     at = s / rows["step"]
@@ -537,7 +567,13 @@ def places_on(
 
 @compiled
 def speed_on(streets: Streets, piece: int, s: float) -> float:
-    """Returns the allowed speed at a distance along a piece [m/s]."""
+    """Returns the allowed speed on a piece of a lane graph [m/s].
+
+    Args:
+        streets: arrays of all pieces.
+        piece: number of the piece.
+        s: distance along the piece [m].
+    """
     row = streets.pieces[piece]
     k = min(max(int(s / row.step), 0), row.num_points - 1)
     return streets.speed[row.first + k]

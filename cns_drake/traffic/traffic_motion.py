@@ -63,7 +63,7 @@ class BodyStates(NamedTuple):
 
     @property
     def quat_xyzw(self) -> np.ndarray:
-        """The orientations (N, 4) of the bodies as unit quaternions."""
+        """The orientations (N, 4) of the bodies as quaternions (x, y, z, w)."""
         (cy, sy), (cp, sp) = (
             (cos(a / 2), sin(a / 2)) for a in (self.yaw, self.pitch)
         )
@@ -76,7 +76,12 @@ class BodyStates(NamedTuple):
 
 
 def bodies_at(plan: TrafficPlan, t: float) -> BodyStates:
-    """Returns the states of all bodies at a time [s]."""
+    """Returns the states of all bodies at a time.
+
+    Args:
+        plan: the planned traffic.
+        t: time since the start of the drive [s].
+    """
     vehicles, vehicle_rates = plan.vehicles.at(t)
     walkers, walker_rates = plan.walkers.at(t)
     both = np.concatenate([vehicles[:, :4], walkers[:, :4]])
@@ -111,9 +116,9 @@ class LimbTable:
         self._swing = np.array([limb.swing for limb in limbs])
 
     def poses(self, states: BodyStates) -> np.ndarray:
-        """Returns the poses X_WL (M, 4, 4) of all limbs.
+        """Returns the poses X_WL (M, 4, 4) of all limbs in the world.
 
-        Limbs turn about y, then about z.
+        Limbs of bodies that do not exist are far below the ground.
         """
         body, p = self.body, self._joint.T
         # A forward swing is a rotation about -y.
@@ -135,7 +140,15 @@ class LimbTable:
 
 
 class TrafficBody(NamedTuple):
-    """A vehicle or a walker, with a frame for each of its rigid limbs."""
+    """A vehicle or a walker that is registered with a SceneGraph.
+
+    Attributes:
+        instance: instance id.
+        name: name of the structure.
+        semantic_class: class of the structure.
+        limbs: rigid parts of the body.
+        frames: frame of each limb.
+    """
 
     instance: int
     name: str
@@ -173,9 +186,14 @@ class TrafficMotion(LeafSystem):
         source_id: SourceId,
         turn: float,
     ):
-        """Takes a plan, and its vehicles and then its walkers as bodies.
+        """Declares the ports.
 
-        `turn` is the duration of a LiDAR's turn [s].
+        Args:
+            plan: planned motion.
+            bodies: the vehicles of the plan, and then its walkers.
+            source_id: geometry source of the bodies.
+            turn: time over which the output `body_spatial_velocities` is
+                averaged [s]: the duration of a LiDAR's turn.
         """
         super().__init__()
         self.source_id = source_id
@@ -269,7 +287,9 @@ class TrafficMotion(LeafSystem):
 def traffic_structures(plan: TrafficPlan, first: int = 1) -> StructureTable:
     """Returns a table with name, instance id and class of all planned bodies.
 
-    The first id is `first`.
+    Args:
+        plan: the planned traffic.
+        first: instance id of the first body; the others follow.
 
     Raises:
         InputError: there are not enough ids.
@@ -300,9 +320,10 @@ def make_traffic(
     turn: float = 0.05,
     name: str = "traffic",
 ) -> TrafficMotion:
-    """Adds vehicles and walkers to a SceneGraph; returns a system for them.
+    """Adds traffic to a SceneGraph; returns the system that moves it.
 
-    The system moves the vehicles and walkers. It is not yet part of a diagram.
+    Traffic consists of vehicles and walkers. The system is not yet part of a
+    diagram; `cns_drake.add_traffic` also adds it to one.
 
     Args:
         scene_graph: SceneGraph to which the geometry is added, under a source
@@ -311,7 +332,8 @@ def make_traffic(
         seed: seed of colours and sizes.
         structures: table with an instance id for each body; by default
             `traffic_structures` of the plan.
-        turn: duration of a LiDAR's turn with motion distortion [s].
+        turn: time over which the output `body_spatial_velocities` is averaged
+            [s]: the duration of a turn of a LiDAR with motion distortion.
         name: name of the geometry source.
     """
     if structures is None:
@@ -344,9 +366,16 @@ def add_traffic(
 ) -> TrafficMotion:
     """Adds moving vehicles and walkers to a diagram.
 
-    Returns the system that moves them. `options` are further arguments of
-    `make_traffic`. The system has the name of the geometry source. Its port
-    `geometry_pose` is connected to the SceneGraph.
+    Args:
+        builder: builder of a diagram with `scene_graph`.
+        scene_graph: SceneGraph to which the geometry is added.
+        plan: the planned traffic.
+        name: name of the system and of the geometry source.
+        options: further arguments of
+            `cns_drake.traffic.traffic_motion.make_traffic`.
+
+    Returns:
+        The system that moves the bodies, connected to the SceneGraph.
 
     Example:
         from cns_drake import add_traffic

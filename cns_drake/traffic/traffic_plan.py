@@ -72,9 +72,15 @@ class _Run(NamedTuple):
 
 
 def find_runs(graph: LaneGraph, points: np.ndarray) -> list[_Run]:
-    """Returns the pieces that fit a car's path best, in driving order.
+    """Divides a car's path among the lanes and junction paths that it follows.
 
-    The path leads through points (N, 2), `_STEP` apart [m].
+    Args:
+        graph: the lane graph.
+        points: (N, 2) points of the car's path, 1 m apart.
+
+    Returns:
+        The parts of the path in driving order, each with the number of its
+        piece, or -1 where the path is on no lane.
     """
     lines = [shapely.LineString(piece.points[:, :2]) for piece in graph.pieces]
     tree = shapely.STRtree(lines)
@@ -153,9 +159,11 @@ class Follower:
     """The ego car in a simulation of traffic, which follows other vehicles.
 
     The car follows its path by the Intelligent Driver Model, asks for the right
-    of way like other vehicles, and keeps the speed limits of its drive. `u`
-    contains its distances along the path at all steps so far [m]. It has
-    arrived when it stands at the end of the path.
+    of way like other vehicles, and keeps the speed limits of its drive.
+
+    Attributes:
+        u: distances along the path at all time steps so far [m].
+        arrived: whether the car stands at the end of the path.
     """
 
     def __init__(
@@ -163,8 +171,11 @@ class Follower:
     ):
         """Places a car at the beginning of its path.
 
-        The path and the bounds are those of a trajectory. The drive begins at
-        the step `start`.
+        Args:
+            graph: the lane graph.
+            trajectory: drive whose path and bounds of the speed the car keeps.
+            box: size of the car.
+            start: number of the time step at which the drive begins.
         """
         self._path, self._profile = trajectory.path, trajectory.speed_profile
         self._square = self._profile.speed**2
@@ -182,7 +193,7 @@ class Follower:
         self.arrived = False
 
     def record(self, streets: Streets) -> np.ndarray:
-        """Returns the car at its start as a record `VEHICLE`, (1,)."""
+        """Returns the car at its start as a record of dtype `VEHICLE`, (1,)."""
         car = np.zeros(1, motion.VEHICLE)
         bound = _PART_OF_BOUND * self._profile.acceleration
         for name, value in (
@@ -202,7 +213,12 @@ class Follower:
         return car
 
     def step(self, traffic: Traffic, k: int) -> None:
-        """Moves the car in the k-th step; it is the last of the vehicles."""
+        """Moves the car by one time step.
+
+        Args:
+            traffic: the traffic, in which the car is the last of the vehicles.
+            k: number of the time step.
+        """
         car, u = traffic.cars[-1], self.u[-1]
         if k < self._leaves or self.arrived:
             self.u.append(u)
@@ -304,16 +320,20 @@ class Follower:
         path[CURRENT + 1 + (not is_way)] = streets.after[first]
 
     def poses(self, steps: np.ndarray) -> np.ndarray:
-        """Returns x, y [m] and yaw [rad], (N, 3), of the box's centre.
+        """Returns x, y [m] and yaw [rad] of the car box's centre, (N, 3).
 
-        `steps` (N,) contains the numbers of the time steps.
+        Args:
+            steps: (N,) numbers of time steps; they may be fractions.
         """
         u = np.interp(steps, np.arange(len(self.u)), self.u)
         jet = self._path.evaluate(u)
         return self._box.middles(jet.p[:, :2], jet.yaw)
 
     def positions(self) -> np.ndarray:
-        """Returns distances along the path at each `KNOT_PERIOD` [m]."""
+        """Returns the distances along the path at even times of the drive [m].
+
+        The times are `KNOT_PERIOD` apart and begin with the drive.
+        """
         every = round(KNOT_PERIOD / STEP)
         u = np.array(self.u[self._start :: every])
         return u[: np.count_nonzero(u < self._path.end) + REACH + 1]
@@ -428,7 +448,7 @@ class Tracks:
         )
 
     def select(self, chosen: np.ndarray) -> Tracks:
-        """Returns the tracks of some bodies."""
+        """Returns the tracks of some bodies, given their indices."""
         present = None if self.present is None else self.present[:, chosen]
         return Tracks(self.dt, self.values[:, chosen], present)
 
@@ -444,8 +464,9 @@ class TrafficPlan:
         walkers: x, y, z on the ground [m], yaw and phase of the gait [rad].
         left_out: number of requested bodies that are left out because they
             would collide.
-        positions: distances of the ego car along its path at each `KNOT_PERIOD`
-            [m], if the ego car follows other vehicles; otherwise None.
+        positions: distances of the ego car along its path at times
+            `KNOT_PERIOD` apart [m]; None if the ego car does not follow other
+            vehicles.
         notes: notes for the user.
     """
 
@@ -499,12 +520,12 @@ def plan_traffic(
     Args:
         graph: lanes and crossings.
         walkways: sidewalks on which walkers walk, and crossings.
-        vehicles, walkers: requested numbers.
+        vehicles, walkers: requested numbers of vehicles and walkers.
         seed: seed of the random kinds, places and routes.
-        duration: duration of the drive [s]; the greatest possible one if the
-            ego car follows other vehicles.
-        ego: motion of the ego car; its first place only, if the ego car follows
-            other vehicles.
+        duration: duration of the drive [s]. If the ego car follows other
+            vehicles, the longest time that the drive may take.
+        ego: function times -> positions and headings of the ego car. If the ego
+            car follows other vehicles, only its first position counts.
         ego_box: size of the ego car.
         drive: path and speeds of the ego car if it follows other vehicles;
             otherwise None.
@@ -557,7 +578,7 @@ def _try(
 
 
 class Trial:
-    """One simulation of a plan; records which bodies must be left out."""
+    """One simulation of traffic, which finds bodies that would collide."""
 
     def __init__(self, task: _Task, rng: np.random.Generator):
         """Places vehicles and walkers for the first time."""
@@ -599,7 +620,7 @@ class Trial:
         self._overlaps = np.zeros((len(self._half_sizes),) * 2, bool)
 
     def run(self, steps: range) -> None:
-        """Moves all bodies by the given time steps; notes which overlap."""
+        """Moves all bodies by the given time steps, and records overlaps."""
         traffic, crowd = self._traffic, self._crowd
         cars = traffic.cars
         past_cars = np.empty((len(steps), len(self._kinds)), cars.dtype)
@@ -637,9 +658,13 @@ class Trial:
         self._num_steps = steps.stop
 
     def is_over(self, num_steps: int) -> bool:
-        """Returns whether the ego car arrived some time ago.
+        """Returns whether the simulation can end before its last time step.
 
-        `num_steps` is the number of time steps simulated so far.
+        This is so if the ego car follows other vehicles, and arrived at least
+        20 time steps ago.
+
+        Args:
+            num_steps: number of time steps simulated so far.
         """
         if self._follower is None:
             return False
@@ -663,7 +688,7 @@ class Trial:
         return wanted - len(vehicles) - len(walkers)
 
     def plan(self) -> TrafficPlan:
-        """Returns the plan, once the last step was simulated."""
+        """Returns the plan that results from all time steps so far."""
         vehicles_at = self._vehicles[: self._num_steps]
         walkers_at = self._walkers[: self._num_steps]
         yaw = vehicles_at[:, :, 3]
@@ -708,11 +733,13 @@ def _at_half_steps(values: np.ndarray) -> np.ndarray:
 
 
 def whom_to_leave_out(overlaps: np.ndarray, kept: int) -> list[int]:
-    """Returns the bodies to remove until none overlap.
+    """Returns the bodies to remove until none overlap, as sorted indices.
 
-    Bodies with the most overlaps are removed first. `overlaps` (N, N) is
-    symmetric and says which bodies overlap. The first `kept` bodies are never
-    removed.
+    Bodies with the most overlaps are removed first.
+
+    Args:
+        overlaps: (N, N) bool, symmetric: which bodies overlap.
+        kept: the first `kept` bodies are never removed.
     """
     overlaps = overlaps.copy()
     out: list[int] = []
@@ -742,7 +769,7 @@ def plan_queues(
         graph: lanes and crossings.
         seed: seed of kinds and gaps.
         duration: duration of the drive [s].
-        ego: motion of the ego car.
+        ego: function times -> positions and headings of the ego car.
         ego_box: size of the ego car.
     """
     rng = np.random.default_rng(seed)

@@ -61,6 +61,14 @@ SMALL_SIZE = (5.6, 2.26)
 
 
 def draw_kinds(count: int, rng: np.random.Generator) -> np.ndarray:
-    """Returns a random mix of vehicles, as (count,) indices into `KINDS`."""
+    """Draws a random mix of vehicles.
+
+    Args:
+        count: number of vehicles.
+        rng: the random generator.
+
+    Returns:
+        (count,) indices into `cns_drake.traffic.vehicle_kinds.KINDS`.
+    """
     shares = np.array([kind.share for kind in KINDS])
     return rng.choice(len(KINDS), size=count, p=shares / shares.sum())

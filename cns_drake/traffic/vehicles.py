@@ -129,11 +129,15 @@ CROSSING = np.dtype(
 class Traffic(NamedTuple):
     """Vehicles and crossings while they are simulated.
 
-    `cars` (N,) contains records `VEHICLE`, and `crossings` (C,) records
-    `CROSSING`. Each piece has a list of the vehicles on it: `head` (P,) is the
-    number of its first entry (-1 for none), and `entries` contains the entries
-    of all lists; see `find_occupants`. `seed` is the seed of the random
-    directions at junctions.
+    Attributes:
+        streets: arrays of the P pieces of lanes and junction paths.
+        cars: (N,) records of dtype `VEHICLE`.
+        crossings: (C,) records of dtype `CROSSING`.
+        seed: seed of the random directions at junctions.
+        head: (P,) number of the first entry in the list of vehicles on each
+            piece; -1 for an empty list.
+        entries: the entries of all these lists; each contains the number of the
+            next entry. `find_occupants` fills the lists.
     """
 
     streets: Streets
@@ -147,7 +151,14 @@ class Traffic(NamedTuple):
 def begin_traffic(
     streets: Streets, cars: np.ndarray, crossings: np.ndarray, seed: int
 ) -> Traffic:
-    """Returns the traffic at the start of a simulation."""
+    """Returns the traffic at the start of a simulation.
+
+    Args:
+        streets: arrays of all lanes.
+        cars: (N,) records of dtype `VEHICLE`.
+        crossings: (C,) records of dtype `CROSSING`.
+        seed: seed of the random directions at junctions.
+    """
     num_pieces = len(streets.pieces)
     entries = np.zeros(_MOST_ENTRIES * len(cars) + num_pieces, _ENTRY)
     head = np.full(num_pieces, -1)
@@ -155,9 +166,9 @@ def begin_traffic(
 
 
 def make_crossings(graph: LaneGraph) -> np.ndarray:
-    """Returns the crossings of a graph as records `CROSSING` (C,).
+    """Returns the crossings of a lane graph, (C,) of dtype `CROSSING`.
 
-    No walkers are on them.
+    No walkers are on them yet.
     """
     crossings = np.zeros(len(graph.crossings), CROSSING)
     crossings["waits"] = np.inf
@@ -184,11 +195,16 @@ def room_for_vehicles(graph: LaneGraph) -> int:
 def place_vehicles(
     kinds: Sequence[VehicleKind], streets: Streets, rng: np.random.Generator
 ) -> tuple[np.ndarray, list[int]]:
-    """Places N vehicles in lanes, away from the first place of the ego car.
+    """Places vehicles in lanes at random, away from the ego car's first place.
+
+    Args:
+        kinds: kind of each vehicle.
+        streets: arrays of all lanes, with the ego car.
+        rng: the random generator.
 
     Returns:
-        Records `VEHICLE` of the vehicles for which a place was found, and their
-        indices in `kinds`.
+        Records of dtype `VEHICLE` of those vehicles for which a place was
+        found; the index in `kinds` of each of them.
     """
     free = np.flatnonzero(~streets.pieces["is_way"])
     lengths = streets.pieces["length"]
@@ -238,10 +254,14 @@ def place_vehicles(
 
 
 def vehicle_poses(streets: Streets, cars: np.ndarray) -> np.ndarray:
-    """Returns the poses (..., 5) of vehicles, given as records `VEHICLE`.
+    """Returns the poses (..., 5) of vehicles.
 
     A pose consists of x, y, z of the centre of the box's base on the ground
     [m], yaw and pitch [rad].
+
+    Args:
+        streets: arrays of all lanes.
+        cars: (...) records of dtype `VEHICLE`.
     """
     half = 0.5 * cars["length"]
     front = _places(streets, cars, half - cars["front_axle"])
@@ -290,10 +310,14 @@ def _places(
 
 @compiled
 def find_occupants(traffic: Traffic, k: int) -> None:
-    """Makes the list of vehicles on each piece, at the k-th time step.
+    """Makes the list of the vehicles on each piece, in place.
 
-    The first entries of the lists are in `traffic.head`. A vehicle is in the
-    list of each piece on which it stands.
+    A vehicle is in the list of each piece on which it stands. The ego car is in
+    the lists, too.
+
+    Args:
+        traffic: the traffic, whose `head` and `entries` are set.
+        k: number of the time step.
     """
     streets, cars = traffic.streets, traffic.cars
     pieces = streets.pieces
@@ -352,8 +376,13 @@ def find_ahead(
 ) -> tuple[float, float]:
     """Returns the gap to the next vehicle ahead [m], and its speed [m/s].
 
-    Only vehicles on the same piece count. The result is for the vehicle with
-    the number `who`, whose front bumper is at `s` along the piece [m].
+    Only vehicles on the same piece count. Without one, the gap is inf.
+
+    Args:
+        traffic: the traffic.
+        piece: number of the piece.
+        s: distance of the front bumper along the piece [m].
+        who: number of the vehicle for which the gap is computed.
     """
     gap, speed = np.inf, 0.0
     at = traffic.head[piece]
@@ -370,8 +399,11 @@ def find_ahead(
 def free_acceleration(car: Any, v0: float) -> float:
     """Returns a vehicle's acceleration on a free road [m/s^2].
 
-    Above the desired speed v0 [m/s], the vehicle brakes no harder than is
-    comfortable.
+    Above the desired speed, the vehicle brakes no harder than is comfortable.
+
+    Args:
+        car: the vehicle, a record of dtype `VEHICLE`.
+        v0: its desired speed [m/s].
     """
     if v0 < 0.01:
         return -car.b
@@ -382,9 +414,15 @@ def free_acceleration(car: Any, v0: float) -> float:
 def interaction(car: Any, gap: float, approach: float) -> float:
     """Returns by how much a vehicle ahead reduces the acceleration [m/s^2].
 
-    This is a (s* / gap)^2 with s* = s0 + max(0, v T + v dv / (2 sqrt(a b))).
-    The gap is from bumper to bumper [m]. dv (`approach`) is the vehicle's speed
-    minus the speed of the vehicle ahead [m/s].
+    This is a (s* / gap)^2 of the Intelligent Driver Model, with the desired gap
+    s* = s0 + max(0, v T + v dv / (2 sqrt(a b))).
+
+    Args:
+        car: the vehicle, a record of dtype `VEHICLE`: its speed v, headway T,
+            acceleration a and deceleration b.
+        gap: gap from bumper to bumper [m].
+        approach: dv, the vehicle's speed minus the speed of the vehicle ahead
+            [m/s].
     """
     wanted = STANDSTILL_GAP + max(
         0.0,
@@ -397,8 +435,11 @@ def interaction(car: Any, gap: float, approach: float) -> float:
 def is_walked(traffic: Traffic, c: int, way: int, is_large: bool) -> bool:
     """Returns whether walkers on a crossing have yet to cross a vehicle's path.
 
-    `c` is the number of the crossing, and `way` that of the path through the
-    junction. `is_large` says whether the vehicle is large.
+    Args:
+        traffic: the traffic.
+        c: number of the crossing.
+        way: number of the path through the junction, or lane, of the vehicle.
+        is_large: whether the vehicle is large.
     """
     one, place = traffic.crossings[c], traffic.streets.over[way, c]
     passed = _PASSED[int(is_large)]
@@ -409,14 +450,17 @@ def is_walked(traffic: Traffic, c: int, way: int, is_large: bool) -> bool:
 
 @compiled
 def lane_over(streets: Streets, car: Any, c: int) -> tuple[int, float, float]:
-    """Returns where a vehicle's lane meets the c-th crossing.
+    """Returns where a lane on a vehicle's path meets an unmarked crossing.
 
-    This concerns crossings without marks, which lead over lanes.
+    Args:
+        streets: arrays of all lanes.
+        car: the vehicle, a record of dtype `VEHICLE`.
+        c: number of the crossing.
 
     Returns:
-        The lane on the vehicle's path that meets the crossing, -1 for none; and
+        Number of the first lane on the vehicle's path that meets the crossing;
         the distances to the places where the vehicle enters and leaves the
-        crossing [m], inf for none.
+        crossing [m]. Without such a lane, they are -1, inf and inf.
     """
     begin, number = -car.s, len(streets.pieces) + c
     for column in range(CURRENT, NUM_PIECES):
@@ -434,14 +478,14 @@ def lane_over(streets: Streets, car: Any, c: int) -> tuple[int, float, float]:
 
 @compiled
 def find_prior(traffic: Traffic, i: int) -> tuple[float, float, float]:
-    """Returns what the i-th vehicle must wait for on its way in a junction.
+    """Returns what the i-th vehicle must stop for, and whom it must follow.
 
     The vehicle stops before a crossing that walkers use, in junctions and in
-    lanes. It also stops where its way (the path through the junction) meets the
-    way of a vehicle that was permitted to enter earlier and has not yet passed
-    this place. If the two vehicles leave or enter the same lane, it follows the
-    earlier vehicle instead. Vehicles therefore wait only for vehicles with a
-    lower `order`, and the first vehicle never waits: no vehicle waits forever.
+    lanes. It also stops where its path through the junction meets the path of a
+    vehicle that was permitted to enter earlier and has not yet passed this
+    place. If both vehicles come from the same lane, or leave for the same lane,
+    it follows the earlier vehicle instead. Vehicles wait only for vehicles that
+    were permitted earlier, so no vehicle waits forever.
 
     Returns:
         The distance to the place where the vehicle must stop [m], inf for none;
@@ -495,7 +539,15 @@ def find_prior(traffic: Traffic, i: int) -> tuple[float, float, float]:
 
 @compiled
 def rear_on_way(streets: Streets, car: Any) -> float:
-    """Returns the place of a vehicle's rear along its way in a junction [m]."""
+    """Returns the place of a vehicle's rear along its path in a junction [m].
+
+    The result is negative before the junction.
+
+    Args:
+        streets: arrays of all lanes.
+        car: the vehicle, a record of dtype `VEHICLE`, whose `held` is its path
+            through the junction.
+    """
     rear = car.s - car.length
     if car.path[CURRENT] == car.held:
         return rear
@@ -678,11 +730,10 @@ def advance(traffic: Traffic, accelerations: np.ndarray) -> None:
 
 @compiled
 def choose_way(traffic: Traffic, i: int) -> None:
-    """Chooses at random the direction of the i-th vehicle at a junction.
+    """Chooses at random where the i-th vehicle goes at the next junction.
 
-    Of two directions that are drawn, the one that leads to the emptier lane is
+    Two directions are drawn, and the one that leads to the emptier lane is
     chosen, so that no street stays empty while vehicles queue in other streets.
-    The vehicle is still in a lane.
     """
     streets, cars = traffic.streets, traffic.cars
     car = cars[i]

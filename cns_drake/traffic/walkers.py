@@ -95,7 +95,7 @@ class Paths(NamedTuple):
     """W walkways in both directions, as arrays.
 
     Attributes:
-        paths: (2 W,) records `_PATH`.
+        paths: (2 W,) records of the walkways, once in each direction.
         points: (M, 3) points in walking direction [m].
         tangents: (M, 2) unit vectors from each point to the next. The vector of
             a path's last point is that of the point before.
@@ -128,8 +128,9 @@ def gait_rate(speed: np.ndarray) -> np.ndarray:
 class Crowd:
     """All walkers during the planning of their motion.
 
-    `walkers` (N,) contains records of walkers: fewer than requested if there is
-    not enough room.
+    Attributes:
+        walkers: (N,) records of the walkers; fewer than requested if there is
+            not enough room.
     """
 
     def __init__(
@@ -139,9 +140,13 @@ class Crowd:
         crossings: np.ndarray,
         rng: np.random.Generator,
     ):
-        """Places `count` walkers on walkways, except on crossings.
+        """Places walkers on walkways, except on crossings.
 
-        `crossings` (C,) are records `CROSSING`.
+        Args:
+            count: requested number of walkers.
+            walkways: the walkways.
+            crossings: (C,) records of dtype `CROSSING`.
+            rng: random generator for their places.
         """
         self._crossings = crossings
         self._paths = _make_paths(walkways)
@@ -154,9 +159,11 @@ class Crowd:
         self.walkers = _place_walkers(count, walkways, rng)
 
     def step(self, t: float, seed: int) -> None:
-        """Moves all walkers by one time step, which begins at the time `t` [s].
+        """Moves all walkers by one time step.
 
-        `seed` is the seed of their random next paths.
+        Args:
+            t: time at which the step begins [s].
+            seed: seed of the random choice of their next walkways.
         """
         crossings, walkers = self._crossings, self.walkers
         opened = crossings["opened"]
@@ -288,10 +295,14 @@ class Crowd:
         return path ^ 1 if other // 2 == path // 2 else other
 
     def poses(self, walkers: np.ndarray) -> np.ndarray:
-        """Returns the poses (..., 5) of records of walkers (...).
+        """Returns the poses (..., 5) of walkers.
 
         A pose consists of x, y, z on the ground [m], yaw and phase of the gait
-        [rad]. The records can be those of several times.
+        [rad].
+
+        Args:
+            walkers: (...) records of walkers, which can be those of several
+                times.
         """
         paths, points, *_ = self._paths
         path = paths[walkers["path"]]

@@ -87,10 +87,11 @@ class Bay:
         self.reach = np.repeat([lengths.max() / 2, lengths.min() / 2], 2)
 
     def box(self, beyond: np.ndarray | float = 0.0) -> Polygon:
-        """Returns the bay, enlarged on each side, as seen from above [m].
+        """Returns the rectangle of the bay as seen from above, enlarged [m].
 
-        `beyond` contains the lengths by which the bay is enlarged at the front,
-        back, left and right [m], or one length for all sides.
+        Args:
+            beyond: lengths by which the bay is enlarged at the front, back,
+                left and right, (4,), or one length for all sides [m].
         """
         front, back, left, right = self.reach + beyond
         c, s = math.cos(self.yaw), math.sin(self.yaw)
@@ -102,7 +103,13 @@ class Bay:
         )
 
     def grow(self, car: Structure, cars: Obstacles, others: Obstacles) -> None:
-        """Enlarges the bay up to other objects and halfway to other cars."""
+        """Enlarges the bay up to other objects, and halfway to other cars.
+
+        Args:
+            car: the car in the bay.
+            cars: areas of all parked cars.
+            others: areas of all other objects.
+        """
         own = (car.name,)
         box = self.box()
         growth = np.zeros(4)
@@ -121,10 +128,14 @@ class Bay:
     def place(
         self, half_size: np.ndarray, rng: np.random.Generator
     ) -> tuple[np.ndarray, float] | None:
-        """Returns a random middle (2,) and yaw of a car in the bay [m, rad].
+        """Returns a random place for a car in the bay.
 
-        `half_size` (2,) is half the length and half the width of the car [m].
-        The result is None if the car is too big.
+        Args:
+            half_size: (2,) half the length and half the width of the car [m].
+            rng: the random generator.
+
+        Returns:
+            The middle (2,) [m] and yaw [rad] of the car; None if it is too big.
         """
         skew = float(rng.uniform(-_SKEW, _SKEW))
         across, turned = rng.uniform(size=2), rng.uniform() < 0.5
@@ -141,7 +152,7 @@ class Bay:
 
 
 def make_bays(around: Surroundings) -> dict[str, Bay]:
-    """Returns name of the car -> its bay, for all parked cars."""
+    """Returns name -> bay, for all parked cars near a drive."""
     cars = {car.name: car for car in around.of_classes(_PARKED)}
     bays = {name: Bay(car) for name, car in cars.items()}
     if not bays:
@@ -163,9 +174,13 @@ def make_bays(around: Surroundings) -> dict[str, Bay]:
 
 
 def change_parked_cars(around: Surroundings, share: float) -> None:
-    """Changes a share (from 0 to 1) of the parked cars.
+    """Changes some of the parked cars.
 
     A changed car is removed, moved in its bay, or replaced by another car.
+
+    Args:
+        around: surroundings of the drive, which are changed.
+        share: share of the cars that are changed, from 0 to 1.
     """
     editing, bays = around.editing, make_bays(around)
     if not bays:
@@ -267,9 +282,12 @@ _WAVES = (9.0, 3.7)
 def lay_snow(around: Surroundings, ground: GroundSurface, depth: float) -> None:
     """Covers surfaces with snow, except roads, plants and thin objects.
 
-    The snow is `depth` [m] deep and raises `ground`, which is the ground before
-    all other changes. Roads are cleared, and get banks of snow along their
-    kerbs.
+    Roads are cleared, and get banks of snow along their kerbs.
+
+    Args:
+        around: surroundings of the drive, which are changed.
+        ground: the ground as it was before any other change.
+        depth: depth of the snow [m].
     """
     editing = around.editing
     for thing in around.things.values():

@@ -51,6 +51,10 @@ def put_up_scaffolds(around: Surroundings, share: float) -> None:
     """Puts up scaffolds in front of a share of the buildings along a drive.
 
     A building without free space in front of it gets no scaffold.
+
+    Args:
+        around: surroundings of the drive, which are changed.
+        share: share of the buildings, from 0 to 1.
     """
     fronts = [
         thing
@@ -115,7 +119,10 @@ def _front(
 def scaffold(length: float, height: float, rng: np.random.Generator) -> Model:
     """Returns a scaffold along x: uprights, ledgers, decks, sometimes a net.
 
-    `length` and `height` are in [m].
+    Args:
+        length: length of the scaffold [m].
+        height: height of the facade [m].
+        rng: random generator for its variant.
     """
     lifts = max(int(height / _LIFT), 1)
     bays = max(round(length / _BAY), 1)
@@ -308,6 +315,10 @@ def put_up_works(around: Surroundings, share: float) -> None:
     """Puts up roadworks along a share of the kerbs near a drive.
 
     Kerbs without free space next to them get no roadworks.
+
+    Args:
+        around: surroundings of the drive, which are changed.
+        share: share of the kerbs, from 0 to 1.
     """
     stretches = _stretches(around, "works", _WORKS_CELL, _LENGTHS[0])
     solid, every = (
@@ -426,6 +437,10 @@ def fill_roadsides(around: Surroundings, share: float) -> None:
 
     Except for parked cars, the objects and their places are the same for every
     seed.
+
+    Args:
+        around: surroundings of the drive, which are changed.
+        share: share of the free places, from 0 to 1.
     """
     stretches = _stretches(around, "roadsides", _CELL, _SHORTEST)
     standing = around.obstacles(ignored=GROUND_CLASSES)

@@ -46,8 +46,10 @@ Named = TypeVar("Named", bound=_Named)
 class Look(NamedTuple):
     """Colour and reflectivity of new surfaces.
 
-    `rgb` is the diffuse colour. The reflectivity is from 0 to 1, near 900 nm;
-    if it is None, it follows from the class and the colour.
+    Attributes:
+        rgb: diffuse colour, from 0 to 1.
+        reflectivity: reflectivity near 900 nm, from 0 to 1; None if it follows
+            from the class and the colour.
     """
 
     rgb: tuple[float, float, float]
@@ -57,13 +59,16 @@ class Look(NamedTuple):
 class SceneEditing:
     """Removes structures from a loaded world, changes them and adds new ones.
 
-    The `cause` of a change is the name of the scenario's switch that made it.
+    In all methods, `cause` is the field of the scenario's section `transient`
+    that asks for the change, such as `snow`.
     """
 
     def __init__(self, world: World):
-        """Takes a world that is not yet part of a diagram.
+        """Begins to change a world.
 
-        Its SceneGraph will be changed.
+        Args:
+            world: the world, not yet part of a diagram; its SceneGraph is
+                changed.
         """
         self._world = world
         self._source = world.plant.get_source_id()
@@ -77,12 +82,24 @@ class SceneEditing:
         self._notes.append(f"transient: {text}")
 
     def blame(self, structure: str, cause: str) -> None:
-        """Records the cause of a change to a structure."""
+        """Records why a structure was changed.
+
+        Args:
+            structure: name of the structure.
+            cause: field of the scenario's section `transient` that asked for
+                the change.
+        """
         if cause not in self._causes[structure]:
             self._causes[structure].append(cause)
 
     def remove(self, thing: Structure, cause: str) -> None:
-        """Removes a structure, and records the cause."""
+        """Removes a structure, and records why.
+
+        Args:
+            thing: the structure.
+            cause: field of the scenario's section `transient` that asks for the
+                change.
+        """
         for part in thing.parts:
             self._remove_part(part)
         self.blame(thing.name, cause)
@@ -90,7 +107,16 @@ class SceneEditing:
     def move(
         self, thing: Structure, X_new: RigidTransform, name: str, cause: str
     ) -> None:
-        """Transforms a structure's points by X_new in W, and renames it."""
+        """Moves a structure and renames it.
+
+        Args:
+            thing: the structure.
+            X_new: rigid transform in W that is applied to the structure's
+                points.
+            name: new name of the structure, unique in the world.
+            cause: field of the scenario's section `transient` that asks for the
+                change.
+        """
         for part in thing.parts:
             self._register(
                 f"{name}/{part.name}",
@@ -129,8 +155,9 @@ class SceneEditing:
             name: name of the structure, unique in the world.
             semantic_class: class of the structure.
             model: a model of the city generator.
-            X_WS: pose of the structure.
-            cause: name of the switch that adds the structure.
+            X_WS: pose of the structure S in W.
+            cause: field of the scenario's section `transient` that asks for the
+                change.
         """
         for part in model.parts:
             self._register(
@@ -179,7 +206,7 @@ class SceneEditing:
         Args:
             part: the existing part.
             name: name of the new part.
-            p_WVs: (N, 3) vertices [m].
+            p_WVs: (N, 3) vertices in W [m].
             triangles: (M, 3) indices of vertices.
             look: colour and reflectivity of the new part.
         """
@@ -202,10 +229,11 @@ class SceneEditing:
         Args:
             name: name of the structure, unique in the world.
             semantic_class: class of the structure.
-            p_WVs: (N, 3) vertices [m].
+            p_WVs: (N, 3) vertices in W [m].
             triangles: (M, 3) indices of vertices.
             look: colour and reflectivity of the structure.
-            cause: name of the switch that adds the structure.
+            cause: field of the scenario's section `transient` that asks for the
+                change.
         """
         middle = np.round(p_WVs.mean(axis=0))
         self._register(
@@ -291,9 +319,12 @@ class SceneEditing:
 class Surroundings:
     """The surroundings of a drive, to which changes are made.
 
-    `things` are the structures before the changes, by name. `drive` is the path
-    of the vehicle, and `kept_free` the area that must stay free of new objects,
-    both seen from above [m].
+    Attributes:
+        editing: makes the changes in the world.
+        things: name -> structure, as they are before the changes.
+        drive: path of the vehicle, seen from above [m].
+        kept_free: area that must stay free of new objects, seen from above [m].
+        seed: seed of all random choices.
     """
 
     editing: SceneEditing
@@ -319,8 +350,12 @@ class Surroundings:
     ) -> Obstacles:
         """Returns the areas where new objects must not stand.
 
-        These are the area `kept_free` and the footprints of structures: of all
-        classes except `ignored` or, if `ignored` is None, only of `classes`.
+        These are the area `kept_free` and the footprints of some structures.
+
+        Args:
+            ignored: classes whose structures are no obstacles; all others are.
+            classes: classes whose structures are obstacles, if `ignored` is
+                None.
         """
         feet = (
             (thing.name, thing.footprint)
@@ -339,6 +374,12 @@ class Surroundings:
         """Yields a random share of objects, each with its own random generator.
 
         The choice depends on the seed, the cause and the names of the objects.
+
+        Args:
+            cause: field of the scenario's section `transient` that asks for the
+                change.
+            things: objects with a `name`.
+            share: share of the objects, from 0 to 1.
         """
         for thing in things:
             rng = draws(self.seed, cause, thing.name)

@@ -45,7 +45,12 @@ _BOX = np.array(
 
 @dataclass(frozen=True)
 class StructurePart:
-    """One geometry of a structure that a LiDAR can see, and its pose in W."""
+    """One geometry of a structure that a LiDAR can see.
+
+    Attributes:
+        geometry: the geometry G.
+        X_WG: its pose in W.
+    """
 
     geometry: PerceptionGeometry
     X_WG: RigidTransform
@@ -79,7 +84,14 @@ class StructurePart:
 
 @dataclass(frozen=True)
 class Structure:
-    """A structure in a loaded world; its class is a key of `CLASS_IDS`."""
+    """A structure in a loaded world.
+
+    Attributes:
+        name: name of the structure.
+        semantic_class: its class, a key of
+            `cns_drake.scene.semantics.CLASS_IDS`.
+        parts: its geometries.
+    """
 
     name: str
     semantic_class: str
@@ -120,10 +132,14 @@ def _hull(p_WPs: np.ndarray) -> BaseGeometry:
 def read_structures(
     world: World, wanted: Callable[[str], bool] = lambda name: True
 ) -> dict[str, Structure]:
-    """Returns the static structures of a world by name, sorted by name.
+    """Returns name -> structure, for the static structures of a world.
 
-    The world must not be part of a diagram yet. `wanted` selects structures by
-    name.
+    The names are sorted.
+
+    Args:
+        world: the world, not yet part of a diagram.
+        wanted: returns whether the structure with a name is wanted; by default
+            all are.
 
     Raises:
         InputError: a mesh cannot be read.
@@ -158,7 +174,11 @@ class Obstacles:
     """Areas, seen from above, where new objects must not stand."""
 
     def __init__(self, areas: Iterable[tuple[str, BaseGeometry]]):
-        """Takes names and areas in W [m]."""
+        """Collects obstacles.
+
+        Args:
+            areas: name and area of each obstacle, seen from above [m].
+        """
         pairs = [(n, area) for n, area in areas if not area.is_empty]
         self._names = np.array([name for name, _ in pairs], object)
         self._areas = [area for _, area in pairs]
@@ -169,7 +189,9 @@ class Obstacles:
     ) -> bool:
         """Returns whether an area touches no obstacle.
 
-        Obstacles with the names `ignored` do not count.
+        Args:
+            area: the area, seen from above [m].
+            ignored: names of obstacles that do not count.
         """
         return not self._met(area, ignored)
 
@@ -178,9 +200,13 @@ class Obstacles:
     ) -> float:
         """Returns the distance from an area to the nearest obstacle [m].
 
-        Only the parts of obstacles inside the area `within` count, and
-        obstacles with the names `ignored` do not. The distance is inf if there
-        is no obstacle.
+        The distance is inf if there is no obstacle.
+
+        Args:
+            area: the area, seen from above [m].
+            within: area of search. Parts of obstacles outside of it do not
+                count.
+            ignored: names of obstacles that do not count.
         """
         return min(
             (
@@ -212,8 +238,9 @@ _LEAST_AREA = 4.0
 class Kerb(NamedTuple):
     """A stretch of the edge of the carriageway.
 
-    `points` (N, 2) lie along the edge, in W [m]; at each of them, a unit vector
-    in `outwards` (N, 2) points away from the road.
+    Attributes:
+        points: (N, 2) points along the edge, in W [m].
+        outwards: (N, 2) unit vectors at the points, away from the road.
     """
 
     points: np.ndarray
@@ -221,10 +248,19 @@ class Kerb(NamedTuple):
 
 
 class GroundSurface:
-    """The ground near a drive: in the area `near`, given in W [m]."""
+    """The ground near a drive.
+
+    Attributes:
+        near: area in which the ground is known, seen from above [m].
+    """
 
     def __init__(self, things: Mapping[str, Structure], near: BaseGeometry):
-        """Takes all structures, and the area in which the ground is known."""
+        """Collects the ground in an area.
+
+        Args:
+            things: name -> structure, for all structures of the world.
+            near: area in which the ground is known, seen from above [m].
+        """
         shapely.prepare(near)
         self.near = near
         corners = {of_road: [np.zeros((0, 3, 3))] for of_road in (False, True)}
@@ -253,11 +289,12 @@ class GroundSurface:
     def heights(
         self, xy: np.ndarray, *, of_road: bool | None = None
     ) -> np.ndarray:
-        """Returns the heights (N,) of the ground at places (N, 2) [m].
+        """Returns the heights (N,) of the ground [m]; NaN where there is none.
 
-        `of_road` selects the ground: True for carriageways only, False for all
-        other ground, and None for the higher of the two. The height is NaN
-        where there is no such ground.
+        Args:
+            xy: (N, 2) places in W [m].
+            of_road: True for carriageways only, False for all other ground, and
+                None for the higher of both.
         """
         kinds = (False, True) if of_road is None else (of_road,)
         found = np.max([self._sides[k].heights(xy) for k in kinds], axis=0)
@@ -275,8 +312,10 @@ class GroundSurface:
     def rise(self, old: np.ndarray, new: np.ndarray) -> float:
         """Returns how much higher the ground is at `new` than at `old` [m].
 
-        `new` and `old` are places (2,) in W [m]. The result is 0 if there is no
-        ground at one of them.
+        The result is 0 if there is no ground at one of these places.
+
+        Args:
+            old, new: (2,) places in W [m].
         """
         z = self.heights(np.array([old, new]))
         return float(z[1] - z[0]) if np.isfinite(z).all() else 0.0
@@ -319,7 +358,10 @@ def _runs(xy: np.ndarray, inside: np.ndarray) -> Iterator[Kerb]:
 
 
 def triangle_corners(part: StructurePart) -> np.ndarray:
-    """Returns the corners (M, 3, 3) of a part's triangles in W [m]."""
+    """Returns the corners (M, 3, 3) of a part's triangles in W [m].
+
+    A part with a curved surface has no triangles.
+    """
     surface = part.geometry.surface
     if not isinstance(surface, surfaces.TriangleSurface):
         return np.zeros((0, 3, 3))
@@ -327,10 +369,15 @@ def triangle_corners(part: StructurePart) -> np.ndarray:
 
 
 def draws(seed: int, cause: str, name: str) -> np.random.Generator:
-    """Returns the random generator of a structure for one kind of change.
+    """Returns the random generator for one kind of change of one structure.
 
-    `cause` is the name of the switch. The random numbers do not depend on other
-    structures or other causes.
+    The random numbers do not depend on other structures or other kinds of
+    change.
+
+    Args:
+        seed: seed of the changes.
+        cause: field of the section `transient` that asks for the change.
+        name: name of the structure.
     """
     digest = hashlib.sha256(f"{seed}/{cause}/{name}".encode()).digest()
     return np.random.default_rng(int.from_bytes(digest[:16], "little"))

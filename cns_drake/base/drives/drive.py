@@ -66,14 +66,17 @@ class ImuSamples(NamedTuple):
 
 
 def driven_way(scenario: Mapping | None) -> dict | None:
-    """Returns those fields of a scenario that determine the driven path.
+    """Returns the fields of a scenario that determine the vehicle's path.
 
-    Two drives for which these fields are equal differ at most in their
-    surroundings and their sensors.
+    Two drives for which these fields are equal follow the same path. They may
+    differ in their surroundings and their sensors.
+
+    Args:
+        scenario: the fields of a scenario; None if a drive has no scenario.
 
     Returns:
-        Field -> value, without fields that are empty or zero; None if the
-        scenario does not determine the path.
+        Field -> value, without fields that are empty or zero. None if there is
+        no scenario, or if it has neither a route nor waypoints.
     """
     if scenario is None or not any(scenario.get(name) for name in _PATHS):
         return None
@@ -159,12 +162,22 @@ class Drive(abc.ABC):
 
     @property
     def odometry(self) -> np.ndarray | None:
-        """Motion of the vehicle, (M,) of `ODOMETRY_DTYPE`, or None."""
+        """Poses and velocities of the vehicle; None if not recorded.
+
+        An array (M,) of dtype `cns_drake.base.drives.drive.ODOMETRY_DTYPE`:
+        position [m] and orientation of the vehicle B in the world W, and its
+        velocities, expressed in B [m/s, rad/s].
+        """
         return None
 
     @property
     def imu(self) -> np.ndarray | None:
-        """Samples of the IMU, (M,) of `IMU_DTYPE`, or None."""
+        """Samples of the IMU I; None if not recorded.
+
+        An array (M,) of dtype `cns_drake.base.drives.drive.IMU_DTYPE`:
+        orientation R_WI, and angular velocity [rad/s] and specific force
+        [m/s^2], both expressed in I.
+        """
         return None
 
     @property
@@ -182,7 +195,7 @@ class Drive(abc.ABC):
 
     @property
     def datum(self) -> str | None:
-        """Name of the survey grid in which W lies, or None.
+        """Name of the survey grid in which the world frame W lies, or None.
 
         If two drives have the same survey grid, their world frames differ only
         by the positioning error of the drives, about ten metres.
@@ -196,19 +209,19 @@ class Drive(abc.ABC):
 
     @property
     def scenario(self) -> Mapping | None:
-        """The scenario of a simulated drive, if recorded.
+        """The scenario of a simulated drive; None if not recorded.
 
-        This class uses its keys `map` and `stage`, and the keys that
-        `driven_way` returns.
+        A mapping field -> value with the fields of the scenario file.
         """
         return None
 
     @property
     def lidar_section(self) -> Mapping:
-        """Settings of this LiDAR from the scenario; empty if there are none.
+        """Settings of the drive's LiDAR from the scenario; empty without any.
 
-        If the name of the drive ends in `_<lidar>`, they are the settings of
-        this LiDAR, and otherwise those of the scenario's first LiDAR.
+        A scenario may have several LiDARs. If the name of the drive ends in
+        `_<lidar>`, the settings of that LiDAR are returned, otherwise those of
+        the first one.
         """
         lidars = (self.scenario or {}).get("lidars")
         if not isinstance(lidars, dict) or not lidars:
@@ -229,19 +242,24 @@ class Drive(abc.ABC):
 
     @property
     def instances(self) -> Mapping[int, Mapping] | None:
-        """Instance id -> structure (`name`, `class`, `label`); may be None.
+        """Instance id -> structure; None if not recorded.
 
-        It is None if not recorded. The points of the scans carry the same
-        instance ids and labels.
+        A structure is a mapping with the keys `name`, `class` and `label`. The
+        points of the scans carry the same instance ids and labels.
         """
         return None
 
 
 def index_instances(table: Any, source: str) -> dict[int, Mapping]:
-    """Converts a structure table from JSON to instance id -> structure.
+    """Converts the structure table of a recording to instance id -> structure.
+
+    Args:
+        table: parsed JSON: a list of structures, each a mapping with the key
+            `instance` and other properties.
+        source: name of the file, with which an error message begins.
 
     Raises:
-        InputError: if it is no such table.
+        InputError: if the JSON is no such table.
     """
     try:
         return {entry["instance"]: entry for entry in table}
@@ -255,7 +273,9 @@ def index_instances(table: Any, source: str) -> dict[int, Mapping]:
 class PlacedDrive:
     """Name, world frame and map of a drive, without its scans.
 
-    `scenario` contains only the field `map`.
+    It stands for a drive where only these are compared, for example in
+    `cns_drake.base.drives.drive.check_same_world`. Of the scenario, only the
+    field `map` is kept.
     """
 
     name: str
@@ -264,7 +284,7 @@ class PlacedDrive:
 
     @classmethod
     def of(cls, drive: Drive) -> PlacedDrive:
-        """Returns the name, world frame and map of a drive."""
+        """Returns a `PlacedDrive` with a drive's name, world frame and map."""
         scenario = drive.scenario
         if scenario is not None:
             scenario = {k: v for k, v in scenario.items() if k == "map"}

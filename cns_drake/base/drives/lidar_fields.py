@@ -4,7 +4,14 @@ from typing import NamedTuple
 
 
 class LidarField(NamedTuple):
-    """Rings and vertical field of view of a LiDAR."""
+    """Number of rings and vertical field of view of a LiDAR.
+
+    Attributes:
+        rings: number of rings (channels).
+        lowest_deg: elevation of the lowest ring [deg]; negative below the
+            horizon.
+        highest_deg: elevation of the highest ring [deg].
+    """
 
     rings: int
     lowest_deg: float
@@ -38,5 +45,10 @@ _FIELDS = {
 
 
 def lidar_field(unit: object) -> LidarField | None:
-    """Returns rings and field of view of a LiDAR model; None if unknown."""
+    """Returns rings and field of view of a LiDAR model; None if it is unknown.
+
+    Args:
+        unit: name of a preset or model in lower case, such as `os1-64` or
+            `vlp-16`.
+    """
     return _FIELDS.get(unit) if isinstance(unit, str) else None

@@ -41,11 +41,11 @@ class McapDrive(Drive):
     images.
 
     Scan i is the i-th point cloud of the LiDAR by log time. Its pose is that of
-    the `/odometry` message with exactly the same stamp, composed with the
-    sensor's place on the vehicle from `/tf_static`; nothing is interpolated.
-    Scans without a pose or labels at the start and end of the recording are
-    left out, with a note. The last poses or labels are missing, for example, in
-    a repaired recording that was cut off.
+    the `/odometry` message with exactly the same stamp, composed with the pose
+    of the LiDAR on the vehicle from `/tf_static`. Poses are not interpolated.
+    At the start and end of the recording, scans without a pose or labels are
+    left out, and a note says so. This happens, for example, if the recording
+    was cut off and repaired.
 
     Contradictions raise an error: two poses for one stamp, two mounts of a
     sensor, or a frame that changes during the drive.
@@ -151,7 +151,8 @@ class McapDrive(Drive):
     def distortion_note(self) -> str | None:
         """Note that the scans contain motion distortion; None if they do not.
 
-        It is None as well for recordings of real LiDARs, which do not say so.
+        It is also None for recordings of real LiDARs, which do not state
+        whether their scans are distorted.
         """
         if not self.lidar_section.get("motion_distortion"):
             return None
@@ -171,7 +172,11 @@ class McapDrive(Drive):
 
     @property
     def inputs(self) -> Any:
-        """Digests of the files behind a simulated drive, if recorded."""
+        """SHA-256 digests of the files that a simulated drive was made from.
+
+        They are the value of `inputs_sha256` in the attachment
+        `provenance.json`; None if that was not recorded.
+        """
         found = self._json("provenance.json")
         return found.get("inputs_sha256") if isinstance(found, dict) else None
 
@@ -360,12 +365,12 @@ class McapDrive(Drive):
 
     @cached_property
     def X_BS(self) -> np.ndarray:
-        """Pose of the LiDAR on the vehicle B, (4, 4), from /tf_static."""
+        """Pose of the LiDAR S on the vehicle B, (4, 4), from /tf_static."""
         return self._mount(self._first(self._lidar_topic))
 
     @cached_property
     def X_BI(self) -> np.ndarray | None:
-        """Pose of the IMU on the vehicle B, (4, 4); None without an IMU."""
+        """Pose of the IMU I on the vehicle B, (4, 4); None without an IMU."""
         if _IMU_TOPIC not in self._message_types:
             return None
         return self._mount(self._first(_IMU_TOPIC))

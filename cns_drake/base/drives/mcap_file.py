@@ -160,18 +160,18 @@ class _Contents:
 class McapFile:
     """An MCAP file, open for reading single messages.
 
-    The file is opened for each access only; two uncompressed chunks (of
-    1 MiB as a rule) are kept, since messages are mostly read in order.
+    The file is opened for each access only. The last two chunks that were read
+    stay in memory uncompressed, since messages are mostly read in order.
 
     If a topic has several channels, for example because several nodes publish
     on it, their messages are read as one stream.
     """
 
     def __init__(self, path: Path):
-        """Reads the index.
+        """Opens a file and reads its index.
 
         Raises:
-            InputError: if there is no such file, or it is no complete MCAP
+            InputError: if there is no such file, or it is not a complete MCAP
                 file.
         """
         self.path = Path(path)
@@ -194,7 +194,7 @@ class McapFile:
     def topics(self) -> dict[str, list[str]]:
         """Topic -> sorted message types and encodings, `<type> in <encoding>`.
 
-        In an intact recording each topic has exactly one of them.
+        In an intact recording each topic has exactly one such entry.
         """
         return {
             topic: sorted({self._kind(channel) for channel in channels})
@@ -205,7 +205,8 @@ class McapFile:
         """Returns the places of a topic's messages in the file, sorted by time.
 
         Returns:
-            (N,) of `LOCATION`.
+            (N,) of dtype `cns_drake.base.drives.mcap_file.LOCATION`: chunk,
+            offset in the chunk, log time [ns] and channel of each message.
 
         Raises:
             InputError: if the index cannot be read.
@@ -215,7 +216,10 @@ class McapFile:
         return self._locations[topic]
 
     def step_back_ns(self, topic: str) -> int:
-        """Returns by how much a topic's log times go back at most [ns].
+        """Returns the largest decrease of the log time between messages [ns].
+
+        The messages are those of one topic, in the order in which they were
+        written. The result is 0 if the log times never decrease.
 
         Raises:
             InputError: if the index cannot be read.
@@ -237,10 +241,10 @@ class McapFile:
         """Yields many messages in file order, unpacking each chunk once.
 
         Args:
-            locations: (N,) of `LOCATION`.
+            locations: (N,) rows of `McapFile.locate`, in any order.
 
         Yields:
-            A position in `locations`, and the serialised message there.
+            The index of a message in `locations`, and the serialised message.
 
         Raises:
             InputError: if a chunk is damaged.

@@ -24,11 +24,15 @@ _ENCAPSULATION_BYTES = 4
 
 
 def decode(data: bytes | memoryview, message_type: str) -> Any:
-    """Decodes serialised bytes to a message.
+    """Decodes a serialised message.
+
+    Args:
+        data: the message, serialised as CDR.
+        message_type: its type, such as `nav_msgs/msg/Odometry`.
 
     Raises:
-        ValueError: the bytes are not such a message, or more than such a
-            message can have.
+        ValueError: the data are not a message of this type, or are longer than
+            any plausible message of this type.
     """
     if len(data) > _LONGEST.get(message_type, len(data)):
         raise ValueError(
@@ -49,7 +53,8 @@ def read_cloud_header(data: bytes | memoryview) -> tuple[int, str]:
     """Returns the stamp [ns] and frame of a PointCloud2, and nothing else.
 
     Raises:
-        ValueError: if it is cut off, or claims more than makes sense.
+        ValueError: if the message is cut off, or has an implausibly long frame
+            name or too many fields.
     """
     try:
         order = "<" if data[1] & 1 else ">"
@@ -75,7 +80,10 @@ def stamp_ns(header: Any) -> int:
 
 
 def odometry_row(message: Any) -> tuple:
-    """Returns a message as a record of `ODOMETRY_DTYPE`."""
+    """Returns a message nav_msgs/msg/Odometry as a record of `ODOMETRY_DTYPE`.
+
+    The dtype is `cns_drake.base.drives.drive.ODOMETRY_DTYPE`.
+    """
     pose, twist = message.pose.pose, message.twist.twist
     return (
         stamp_ns(message.header),
@@ -87,7 +95,10 @@ def odometry_row(message: Any) -> tuple:
 
 
 def imu_row(message: Any) -> tuple:
-    """Returns a message as a record of `IMU_DTYPE`."""
+    """Returns a message sensor_msgs/msg/Imu as a record of `IMU_DTYPE`.
+
+    The dtype is `cns_drake.base.drives.drive.IMU_DTYPE`.
+    """
     return (
         stamp_ns(message.header),
         xyzw(message.orientation),
@@ -107,10 +118,14 @@ def xyzw(q: Any) -> tuple[float, float, float, float]:
 
 
 class StaticTransforms:
-    """Constant poses of frames, each in its parent frame."""
+    """The tree of frames in /tf_static, with the pose of each in its parent."""
 
     def __init__(self, messages: Iterable[Any], where: str):
-        """Reads the transforms of messages of type tf2_msgs/msg/TFMessage.
+        """Collects the transforms of messages of /tf_static.
+
+        Args:
+            messages: messages of type tf2_msgs/msg/TFMessage.
+            where: file or topic, with which an error message begins.
 
         Raises:
             InputError: two messages place one frame differently.
@@ -135,6 +150,10 @@ class StaticTransforms:
 
     def pose(self, base: str, frame: str) -> np.ndarray:
         """Returns the pose (4, 4) of a frame in one of its ancestors.
+
+        Args:
+            base: name of the ancestor.
+            frame: name of the frame.
 
         Raises:
             InputError: no transforms lead from the frame to the ancestor, or
@@ -161,10 +180,11 @@ def checked_poses(
     Args:
         p: (..., 3) positions [m].
         quat_xyzw: (..., 4) quaternions.
+        where: file or topic, with which an error message begins.
 
     Raises:
-        InputError: a number is not finite, a position is too far away, or a
-            quaternion has no length.
+        InputError: a number is not finite, a position is too far away, or the
+            norm of a quaternion is zero.
     """
     if not (np.isfinite(p).all() and np.isfinite(quat_xyzw).all()):
         raise InputError(f"{where}: a pose is not finite")

@@ -151,7 +151,12 @@ _READERS = {
 
 @dataclass(frozen=True)
 class Fault:
-    """Why the bytes of a file from an offset onwards cannot be read."""
+    """A part of a file that cannot be read.
+
+    Attributes:
+        offset: where the part begins in the file [bytes].
+        text: why the part cannot be read.
+    """
 
     offset: int
     text: str

@@ -249,12 +249,12 @@ def from_layout(
             calibrated. Calibrated intensities keep their range of 0 to 255.
 
     Returns:
-        (N,) points, in which all fields of the given layout stay, too; `points`
-        itself if nothing changes. In `velodyne`, `time` [s] becomes `t` [ns].
-        In `autoware`, `time_stamp` and `channel` become `t` and `ring`, and
+        (N,) points; `points` itself if nothing changes. Fields that `cns` does
+        not have are kept. In `velodyne`, `time` [s] becomes `t` [ns]. In
+        `autoware`, `time_stamp` and `channel` become `t` and `ring`, and
         intensities are scaled to 0 to 1 unless they are calibrated. A
-        floating-point `t` becomes whole nanoseconds, unless its unit is not
-        certain.
+        floating-point `t` in seconds or nanoseconds becomes whole nanoseconds;
+        it stays as it is if its values fit neither unit.
 
     Raises:
         ValueError: the numbers of labels and points differ.

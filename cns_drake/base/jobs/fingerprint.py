@@ -59,7 +59,8 @@ def script_digest(path: Path) -> str:
     """Returns a digest of a Python file and of everything it imports.
 
     It covers imported files in the same folder, imported modules of this
-    project, and the versions of libraries; see `code_digest`.
+    project, and the versions of libraries; see
+    `cns_drake.base.jobs.fingerprint.code_digest`.
 
     Raises:
         InputError: if a file cannot be read.

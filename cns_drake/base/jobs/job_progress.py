@@ -52,22 +52,26 @@ class _Work:
 class TimeLeft:
     """Estimates the time left for jobs, from their costs and their progress.
 
-    All times `now` must come from the same clock [s].
+    The methods take the present time `now` [s], always of the same clock.
     """
 
     def __init__(self, costs: Mapping[str, float]):
-        """Takes name -> expected time on one core [s]."""
+        """Makes an estimate for jobs, none of which has started.
+
+        Args:
+            costs: name of each job -> expected time on one core [s].
+        """
         self._works = {name: _Work(cost) for name, cost in costs.items()}
         self._most_running = 1
 
     def start(self, name: str, now: float) -> None:
-        """Notes that a job starts, perhaps not for the first time."""
+        """Records that a job starts, or is started again."""
         self._works[name] = _Work(self._works[name].cost, since=now)
         running = sum(w.since is not None for w in self._works.values())
         self._most_running = max(self._most_running, running)
 
     def progress(self, name: str, share: float, now: float) -> None:
-        """Notes the share of a job that is done, 0 to 1.
+        """Records which share of a job is done, 0 to 1.
 
         The time until the first call for a job counts as loading, and not as
         work.
@@ -79,7 +83,7 @@ class TimeLeft:
         work.taken, work.measured = now - work.since, share - work.first
 
     def end(self, name: str, now: float) -> None:
-        """Notes that a job has ended."""
+        """Records that a job has ended."""
         work = self._works[name]
         since = now if work.since is None else work.since
         work.done, work.since = 1.0, None
@@ -128,12 +132,13 @@ class JobProgress:
         console: Console | None = None,
         num_done: int = 0,
     ):
-        """Takes the jobs that are left.
+        """Makes a display for jobs.
 
         Args:
-            costs: name -> expected time on one core [s].
-            console: stderr by default.
-            num_done: how many more were done before.
+            costs: name of each job that is left -> expected time on one core
+                [s].
+            console: where the display is shown; stderr by default.
+            num_done: number of further jobs that were done before.
         """
         self._left = TimeLeft(costs)
         self._stack = contextlib.ExitStack()
@@ -165,7 +170,7 @@ class JobProgress:
         return self._bars.get_renderable()
 
     def start(self, name: str) -> None:
-        """Shows that a job starts, perhaps not for the first time."""
+        """Shows that a job starts, or is started again."""
         self._left.start(name, time.monotonic())
         self._remove(name)
         self._tasks[name] = self._bars.add_task(name, total=None, note="")
@@ -191,7 +196,7 @@ class JobProgress:
         self.refresh()
 
     def end(self, name: str, fault: bool = False) -> None:
-        """Shows that a job has ended; if `fault`, with an error."""
+        """Shows that a job has ended; if `fault` is true, with an error."""
         self._left.end(name, time.monotonic())
         self._num_ended += 1
         self._remove(name)

@@ -83,8 +83,9 @@ def run_process(
     """Runs a job in a process of its own and waits for its end.
 
     Args:
-        job: a pickled `Step`.
-        on_message: called with each message of the job; see `Reporter`.
+        job: a pickled `cns_drake.base.jobs.step.Step`.
+        on_message: called with each message of the job, as the `send` of a
+            `cns_drake.base.jobs.step.Reporter`.
         is_wanted: called again and again; when it returns False, the process is
             ended.
 

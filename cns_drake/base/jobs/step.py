@@ -18,10 +18,15 @@ _REPORT_INTERVAL = 0.5
 
 
 class Reporter:
-    """Reports the progress of a step; does nothing if nobody receives it."""
+    """Reports the progress of a step, and notes for the user."""
 
     def __init__(self, send: Callable[..., None] = lambda *message: None):
-        """Takes the receiver of messages: a kind and its values."""
+        """Makes a reporter.
+
+        Args:
+            send: called with the kind of each message ("progress" or "note")
+                and the values of the message. By default nothing is sent.
+        """
         self._send = send
         self._reported: float | None = None
 
@@ -43,7 +48,13 @@ class Reporter:
     def track(
         self, items: Iterable, description: str, total: int
     ) -> Iterator[Any]:
-        """Yields the items of a loop, reporting its progress."""
+        """Yields the items of a loop, and reports its progress.
+
+        Args:
+            items: the items.
+            description: not used.
+            total: number of items.
+        """
         for done, item in enumerate(items):
             self.progress(done, total)
             yield item
@@ -85,7 +96,11 @@ class Step(abc.ABC):
         """
 
     def made_of(self, inputs: Mapping[str, object]) -> dict[str, object]:
-        """Returns the step's inputs together with the digest of its code."""
+        """Returns the inputs, and the digest of the step's code as `code`.
+
+        A fingerprint of the result tells whether the step's files are up to
+        date; see `cns_drake.base.jobs.fingerprint`.
+        """
         return {**inputs, "code": code_digest(type(self).__module__)}
 
 

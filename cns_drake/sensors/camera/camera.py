@@ -47,7 +47,10 @@ _OPTICAL = RigidTransform(
 
 
 def optical_pose(config: CameraSection) -> RigidTransform:
-    """Returns the pose X_BC of a camera's optical frame in base_link."""
+    """Returns the pose X_BC of a camera's optical frame C in base_link (B).
+
+    The axes of C are those of an image: x right, y down, z forward.
+    """
     return RigidTransform(RollPitchYaw(config.rpy), config.xyz) @ _OPTICAL
 
 
@@ -62,12 +65,14 @@ def add_cameras(
     Args:
         builder: builder of a diagram with the scene.
         scene: scene that the cameras see.
-        base: the vehicle's frame in the SceneGraph that `scene` copies.
-        cameras: name -> description.
+        base: the vehicle's frame in the original SceneGraph, of which `scene`
+            is a copy.
+        cameras: name of each camera -> its description.
 
     Returns:
-        Name of an input port of the recorder -> output port of a camera that is
-        to be connected to it, and a description of how its images are recorded.
+        Name of a stream of images, such as `front_depth` -> the output port
+        that supplies the images, and a description of how they are recorded.
+        Connect the output port to the recorder's input port of the same name.
     """
     found = {}
     # Drake warns that 16-bit depth images end at 65 m; no such images are

@@ -98,7 +98,7 @@ _Member = tuple[RigidTransform, tuple[float, float, float], TriangleSurface]
 
 
 class CameraScene(LeafSystem):
-    """Copies a SceneGraph into others for rendering, and moves their frames.
+    """A copy of a SceneGraph's geometry for rendering, whose frames can move.
 
     .. pydrake_system::
 
@@ -109,12 +109,14 @@ class CameraScene(LeafSystem):
         - geometry_pose
 
     The input `frame_poses` is abstract, of type `KnownPoses`: the poses of the
-    frames that move.
+    frames that move. The output supplies these poses to the copy.
 
     Attributes:
-        scene_graphs: SceneGraphs that the cameras see: `colours`, and `classes`
-            if labels are recorded.
-        frames: frame in the copied SceneGraph -> frame in `scene_graphs`.
+        scene_graphs: the copies, as kind -> SceneGraph. The kind `colours` is
+            for colour images; the kind `classes` is there if depth or label
+            images are recorded.
+        frames: id of a moving frame in the original -> id of its copy, which is
+            the same in all `scene_graphs`.
     """
 
     def __init__(
@@ -229,7 +231,9 @@ class CameraScene(LeafSystem):
     def connect(self, builder: DiagramBuilder, poses: object) -> None:
         """Adds this system and its SceneGraphs to a diagram.
 
-        `poses` is the output port that supplies `frame_poses`.
+        Args:
+            builder: builder of the diagram.
+            poses: output port that supplies the input `frame_poses`.
         """
         builder.AddNamedSystem("camera_scene", self)
         builder.Connect(poses, self.GetInputPort("frame_poses"))

@@ -238,10 +238,13 @@ def look_of(
     rgb: tuple[float, float, float],
     corners: int,
 ) -> str:
-    """Returns the name of the `Look` of a geometry.
+    """Returns the name of the `Look` of a geometry, a key of `LOOKS`.
 
-    The look depends on the geometry's name, class, colour and number of
-    vertices.
+    Args:
+        name: name of the geometry.
+        semantic_class: class of its structure.
+        rgb: its colour, from 0 to 1.
+        corners: number of its vertices.
     """
     red, green, blue = rgb
     part = name.rpartition("/")[2]
@@ -269,11 +272,16 @@ def look_of(
 
 @functools.cache
 def texture(name: str) -> tuple[bytes, float]:
-    """Returns a look's texture as PNG, and the brightness that white means.
+    """Returns the texture of a look as PNG, and a factor for its brightness.
 
-    The PNG is gamma-encoded. Unless the look has `is_face`, its pixels, decoded
-    to linear values from 0 to 1 and multiplied by the brightness of white, have
-    the mean 1.
+    Args:
+        name: a key of `LOOKS`.
+
+    Returns:
+        The PNG, gamma-encoded, and the brightness of a white pixel. The
+        brightness of any pixel is its linear value, from 0 to 1, times this
+        factor. The mean brightness is 1. If the look has `is_face`, however,
+        the factor is 1, and the mean brightness can have any value.
     """
     from PIL import Image
 
@@ -319,10 +327,16 @@ def sky(d_W: np.ndarray) -> np.ndarray:
 
 
 def texture_places(corners: np.ndarray, normals: np.ndarray) -> np.ndarray:
-    """Returns texture coordinates (N, 3, 2) [m] of the corners of N triangles.
+    """Returns the texture coordinates of the corners of N triangles.
 
-    The corners are (N, 3, 3) [m], and the unit normals of the triangles (N, 3).
     On walls, the rows of a texture are horizontal.
+
+    Args:
+        corners: (N, 3, 3) corners of the triangles [m].
+        normals: (N, 3) unit normals of the triangles.
+
+    Returns:
+        (N, 3, 2) texture coordinates [m].
     """
     across = np.round(np.stack([-normals[:, 1], normals[:, 0]], axis=1), 3)
     length = np.linalg.norm(across, axis=1, keepdims=True)
@@ -336,11 +350,16 @@ def texture_places(corners: np.ndarray, normals: np.ndarray) -> np.ndarray:
 def face_places(
     corners: np.ndarray, normals: np.ndarray, owners: np.ndarray
 ) -> np.ndarray:
-    """Returns texture coordinates (N, 3, 2) that cover each geometry once.
+    """Returns texture coordinates with which one texture covers each geometry.
 
-    The coordinates run from 0 to 1 over the face of a geometry. `owners` (N,)
-    contains the index of each triangle's geometry; corners (N, 3, 3) and
-    normals (N, 3) are as in `texture_places`.
+    Args:
+        corners: (N, 3, 3) corners of the triangles of all geometries [m].
+        normals: (N, 3) unit normals of the triangles.
+        owners: (N,) index of each triangle's geometry.
+
+    Returns:
+        (N, 3, 2) texture coordinates of the corners, which run from 0 to 1 over
+        each geometry.
     """
     low = np.full((owners.max() + 1, 3), np.inf)
     high = -low

@@ -58,7 +58,7 @@ class ImuSection(Mount):
         return self == ImuSection(xyz=self.xyz, rpy_deg=self.rpy_deg)
 
     def sample_rate(self, scan_rate: int) -> int:
-        """Returns the samples per second.
+        """Returns the number of samples per second.
 
         This is `rate` if given, or else the rate in Kalibr's file, or else the
         scan rate.
@@ -97,9 +97,13 @@ class ImuSection(Mount):
     def describe_kalibr(self, scan_rate: int) -> dict | None:
         """Returns the fields of a Kalibr file for the simulated IMU.
 
+        Args:
+            scan_rate: scans per second, which is the sample rate of the IMU if
+                neither `rate` nor Kalibr's file states one.
+
         Returns:
-            Field -> value, with the simulated sample rate; None if `kalibr`
-            names no file.
+            Field -> value, with the simulated sample rate as `update_rate`;
+            None if `kalibr` names no file.
 
         Raises:
             InputError: the file cannot be used.
@@ -119,11 +123,12 @@ class KalibrImu(Section):
     """The fields of Kalibr's `imu.yaml`.
 
     Attributes:
-        accelerometer_noise_density: white noise [m/s^2/sqrt(Hz)].
-        accelerometer_random_walk: walk of the bias [m/s^3/sqrt(Hz)].
-        gyroscope_noise_density: white noise [rad/s/sqrt(Hz)].
-        gyroscope_random_walk: walk of the bias [rad/s^2/sqrt(Hz)].
-        rostopic: topic of its messages; not used.
+        accelerometer_noise_density: density of the white noise
+            [m/s^2/sqrt(Hz)].
+        accelerometer_random_walk: random walk of the bias [m/s^3/sqrt(Hz)].
+        gyroscope_noise_density: density of the white noise [rad/s/sqrt(Hz)].
+        gyroscope_random_walk: random walk of the bias [rad/s^2/sqrt(Hz)].
+        rostopic: topic of the IMU's messages; not used.
         update_rate: samples per second.
     """
 

@@ -93,15 +93,15 @@ def add_imu(
 
     Args:
         builder: builder of a diagram with the plant, or with `motion`.
-        body: P: the body of a finalized plant that carries the IMU, or a frame
-            that is fixed on this body.
+        body: the carrier P of the IMU: a body of a finalized plant, or a frame
+            that is fixed on such a body.
         X_PI: pose of the IMU in P.
-        rate: samples per second; by default one per frame (scan) of a recorder.
+        rate: samples per second; None for one per frame (scan) of a recorder.
         noise: errors of the IMU, which need a rate; by default none.
         motion: system with the poses, velocities and accelerations of the
             plant's bodies; by default the plant.
-        name: the systems are named `<name>_accelerometer`,
-            `<name>_gyroscope` and `<name>_noise`.
+        name: the systems are named `<name>_accelerometer`, `<name>_gyroscope`
+            and `<name>_noise`.
 
     Raises:
         RuntimeError: the plant is not finalized.
@@ -159,18 +159,19 @@ def add_described_imu(
     """Adds an IMU to a diagram, given its description in a scenario.
 
     Args:
-        config: the description.
+        config: the description, a section of a scenario.
         builder: builder of the diagram.
         body: body that carries the IMU.
-        trajectory: motion of that body.
-        motion: the system that moves it.
+        trajectory: motion of that body as a function of time.
+        motion: system with the kinematic output ports of the body's plant.
         scan_rate: scans per second; the rate of the IMU if the description has
             none.
-        seed: seed of its errors.
+        seed: seed of the IMU's errors.
 
     Returns:
-        Name -> output port: `specific_force` and `angular_velocity`, and also
-        `imu_samples` if the IMU is not ideal or has a rate.
+        Name -> output port: `specific_force` [m/s^2] and `angular_velocity`
+        [rad/s], both in the frame of the IMU. If the IMU has errors, or a rate
+        of its own, there is also `imu_samples`, of type `ImuSamples`.
 
     Raises:
         InputError: Kalibr's file cannot be used.
@@ -189,7 +190,7 @@ def add_described_imu(
 
 
 class NoisyImu(LeafSystem):
-    """Adds noise to specific force and angular velocity.
+    """Adds the errors of an IMU to exact specific force and angular velocity.
 
     .. pydrake_system::
 
@@ -203,11 +204,16 @@ class NoisyImu(LeafSystem):
 
     All ports are vectors of size 3, expressed in the IMU's frame [m/s^2,
     rad/s]. Sample k is at time k / rate. Between two samples, the error of the
-    earlier sample holds.
+    earlier one is added.
     """
 
     def __init__(self, noise: ImuNoise, rate: float):
-        """Declares the ports."""
+        """Declares the ports.
+
+        Args:
+            noise: errors of the IMU.
+            rate: samples per second.
+        """
         super().__init__()
         self._errors = ImuErrors(noise, rate)
         self._rate = rate
@@ -234,9 +240,9 @@ class NoisyImu(LeafSystem):
 class VehicleImu(LeafSystem):
     """Measures like an ideal accelerometer and gyroscope on a vehicle.
 
-    Up to rounding, the values are those of Drake's sensors on a
-    `VehicleMotion`. This system takes a fifteenth of their time, because it
-    handles only one frame and computes many samples at once.
+    Up to rounding, the values are those of Drake's `Accelerometer` and
+    `Gyroscope`. This system is much faster, because it computes many samples at
+    once from a known trajectory.
 
     .. pydrake_system::
 
@@ -248,7 +254,7 @@ class VehicleImu(LeafSystem):
 
     `specific_force` [m/s^2] and `angular_velocity` w_WI [rad/s] are vectors of
     size 3, expressed in the IMU's frame I. Between two samples, the error of
-    the earlier sample holds. `samples` is abstract, of type `ImuSamples`: the
+    the earlier one is added. `samples` is abstract, of type `ImuSamples`: the
     last 256 samples up to the time of the context. All outputs depend only on
     time.
     """

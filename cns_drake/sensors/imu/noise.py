@@ -76,16 +76,20 @@ class ImuNoise:
 
 
 class ImuErrors:
-    """The errors in an IMU's samples.
+    """The errors of an IMU, which can be computed for any sample at any time.
 
-    The error of a sample depends only on its number, not on earlier calls. The
-    random walk is a Brownian motion with given values at time zero and far
-    away; values in between are drawn by halving intervals (Levy's
-    construction), so that a sample can be computed without the earlier samples.
+    The error of a sample depends only on its number, and not on which samples
+    were computed before. For this, the random walk of the bias is drawn by
+    halving intervals (Levy's construction of Brownian motion).
     """
 
     def __init__(self, noise: ImuNoise, rate: float):
-        """Prepares the errors."""
+        """Prepares the errors.
+
+        Args:
+            noise: parameters of the errors.
+            rate: samples per second.
+        """
         self._noise = noise
         pairs = (
             (noise.accelerometer_noise_density, noise.gyroscope_noise_density),
@@ -103,14 +107,23 @@ class ImuErrors:
     def measure(self, first: int, exact: np.ndarray) -> np.ndarray:
         """Returns exact samples with the errors of the IMU added.
 
-        `first` is the number of the first sample; sample 0 is at time zero. The
-        (N, 6) values are specific force [m/s^2] and angular velocity [rad/s].
+        Args:
+            first: number of the first sample; sample 0 is at time zero.
+            exact: (N, 6) specific force [m/s^2] and angular velocity [rad/s] of
+                consecutive samples.
+
+        Returns:
+            (N, 6) in the same order, limited to the ranges of the sensors.
         """
         measured = exact + self._of_samples(first, len(exact))
         return np.minimum(np.maximum(measured, -self._range), self._range)
 
     def at(self, sample: int) -> np.ndarray:
-        """Returns the errors of one sample, (6,), in the order of `measure`."""
+        """Returns the errors of one sample, (6,).
+
+        They are those of the specific force [m/s^2] and then of the angular
+        velocity [rad/s].
+        """
         return self._of_samples(sample, 1)[0]
 
     def _of_samples(self, first: int, count: int) -> np.ndarray:
@@ -125,7 +138,10 @@ class ImuErrors:
         return np.concatenate(parts)
 
     def of_block(self, number: int) -> np.ndarray:
-        """Returns the (1024, 6) errors from sample 1024 * number onwards."""
+        """Returns the (1024, 6) errors from sample 1024 * number onwards.
+
+        The columns are specific force [m/s^2] and angular velocity [rad/s].
+        """
         errors = np.tile(self._turn_on, (_BLOCK, 1))
         if self._walk.any():
             errors += self._walk * self._walk_in_block(number)

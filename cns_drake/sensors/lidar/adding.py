@@ -58,11 +58,11 @@ def add_lidar(
     Args:
         builder: builder of a diagram with `scene_graph`.
         scene_graph: the SceneGraph to scan.
-        body: P: a body, or a frame that is fixed on a body, of a finalized
-            plant that is registered with `scene_graph`; or a FrameId that any
-            other source has registered there. A frame on a body keeps the pose
-            from its model, even if a Context changes it, as for Drake's
-            cameras.
+        body: the carrier P: a body of a finalized plant that is registered with
+            `scene_graph`, a frame that is fixed on such a body, or a FrameId
+            that any other source has registered there. A frame on a body keeps
+            the pose from its model, even if a Context changes it, as for
+            Drake's cameras.
         X_PS: pose of the sensor S in P.
         pattern: beams of the LiDAR, or the name of a preset. With a name, the
             LiDAR turns at the rate of its data sheet, and coordinates are not
@@ -86,8 +86,8 @@ def add_lidar(
         options: further arguments of `Lidar`, such as `causal`.
 
     Returns:
-        The system, with the ports `scan`, `point_cloud_S`, `point_cloud_W`
-        and `X_WS`, and the methods `EvalGeometryIds`, `EvalInstances` and
+        The system, with the ports `scan`, `point_cloud_S`, `point_cloud_W` and
+        `X_WS`, and the methods `EvalGeometryIds`, `EvalInstances` and
         `CastRays` of a Context.
 
     Raises:
@@ -231,12 +231,12 @@ def add_described_lidar(
     """Adds a LiDAR to a diagram, given its description in a scenario.
 
     Args:
-        config: the description.
+        config: the description, a section of a scenario.
         builder: builder of a diagram with `scene_graph`.
         scene_graph: the SceneGraph to scan.
-        body: P: the body that carries the LiDAR, or a frame that is fixed on
-            it.
-        X_PS: pose of the sensor in P.
+        body: the carrier P: a body of a finalized plant, or a frame that is
+            fixed on such a body.
+        X_PS: pose of the sensor S in P.
         name: name of the system.
         seed: seed of noise and returns.
         weather: weather of calibrated returns.

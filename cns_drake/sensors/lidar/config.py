@@ -172,9 +172,12 @@ def make_pattern(
 ) -> UnitPattern:
     """Returns the beam pattern of a LiDAR.
 
-    A turn takes `period` [s] if it is given, or else the period that follows
-    from the rate. With calibrated returns, the elevations are those of a real
-    unit, where they are known.
+    With calibrated returns, the elevations are those measured for a real unit,
+    if they are known for this preset.
+
+    Args:
+        config: description of the LiDAR.
+        period: duration of a turn [s]; by default 1 / `config.rate`.
     """
     pattern = make_beam_pattern(
         config.preset,
@@ -192,11 +195,12 @@ def make_pattern(
 
 
 def describe_unit(config: LidarSection) -> dict[str, Any]:
-    """Returns what a user of a calibrated unit would know about it.
+    """Returns what the data sheet and serial number tell a LiDAR's user.
 
-    This is the preset, the unit seed and the nominal elevations. The true
-    angles of the lasers differ from the nominal angles by the errors of the
-    individual unit.
+    Returns:
+        The keys are `preset`, `unit_seed`, and `elevations_deg`: the nominal
+        elevations of the lasers [deg], empty for a preset without rings. The
+        true angles differ from them by the errors of the individual unit.
     """
     nominal = getattr(make_pattern(config), "elevations_rad", ())
     return {
@@ -209,7 +213,14 @@ def describe_unit(config: LidarSection) -> dict[str, Any]:
 def make_returns(
     config: LidarSection, weather: WeatherConfig, name: str, seed: int
 ) -> CalibratedReturns | None:
-    """Returns the model of calibrated returns; None for ideal ones."""
+    """Returns the model of calibrated returns; None for ideal returns.
+
+    Args:
+        config: description of the LiDAR.
+        weather: weather of the drive.
+        name: name of the LiDAR; other names give other random numbers.
+        seed: seed of the random numbers.
+    """
     if config.returns == "ideal":
         return None
     # Slow to import, and not needed to describe a scenario.

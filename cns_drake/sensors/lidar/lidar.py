@@ -51,10 +51,10 @@ _WITH_GREY = Fields(BaseField.kXYZs | BaseField.kRGBs)
 
 
 class Structures(Protocol):
-    """A table that supplies labels and instance ids of geometries."""
+    """A table from which a LiDAR takes the labels and ids of what it hits."""
 
     def labels(self, names: Sequence[str]) -> Labels:
-        """Returns labels of geometries, by the names of their structures."""
+        """Returns the labels and instance ids of structures, by their names."""
 
 
 class RayHits(NamedTuple):
@@ -114,12 +114,13 @@ class Lidar(LeafSystem):
     transforms it to the world. During the turn, all other moving geometry stays
     where it is at the time of the output.
 
-    With `moving_bodies`, P and all other bodies of a plant move during the
-    turn, with the velocities that they have at the time of the output. The port
-    `body_spatial_velocities` supplies these velocities as a MultibodyPlant
-    does: a list of V_WB over the plant's bodies, expressed in the world. Each
-    beam is cast at its own firing time, with S and the geometry at their poses
-    of that time, and its point is expressed in S at that time.
+    If the LiDAR was made with the argument `moving_bodies`, P and all other
+    bodies of a plant move during the turn, with the velocities that they have
+    at the time of the output. The port `body_spatial_velocities` supplies these
+    velocities as a MultibodyPlant does: a list of V_WB over the plant's bodies,
+    expressed in the world. Each beam is cast at its own firing time, with S and
+    the geometry at their poses of that time, and its point is expressed in S at
+    that time.
 
     The field `instance` of a point is the number of the structure that was hit.
     A structure is a model, or all geometries whose names are equal up to the
@@ -611,8 +612,8 @@ class SeenGeometry:
     geometry cannot be shared.
 
     Attributes:
-        scene: scene on which rays are cast; None before the first update. Its
-            geometry indices are indices into `built`.
+        scene: scene on which rays are cast; None before the first update. A hit
+            on geometry i of the scene is a hit on `built[i]`.
         built: the geometries in the scene.
         label: (num_geometries,) uint16 class of each geometry.
         moving_label: (num_geometries,) uint16 class of each geometry while it
@@ -655,7 +656,8 @@ class SeenGeometry:
             p_WS: the position of the sensor in the world, (3,) [m].
 
         Raises:
-            InputError: a geometry cannot be read; see `GeometryReader.read`.
+            InputError: a geometry cannot be read; see
+                `cns_drake.scene.perception_geometry.GeometryReader.read`.
         """
         inspector = query_object.inspector()
 
@@ -673,9 +675,10 @@ class SeenGeometry:
         self._revision = revision
 
     def labels(self, moving: np.ndarray) -> np.ndarray:
-        """Returns the class of each geometry, given the moving structures.
+        """Returns the present class of each geometry, (num_geometries,) uint16.
 
-        `moving` contains the instance ids of the structures that are moving.
+        Args:
+            moving: instance ids of the structures that are moving.
         """
         moves = np.zeros(MAX_INSTANCE + 1, bool)
         moves[moving] = True
@@ -815,13 +818,10 @@ def assemble_points(
 ) -> None:
     """Fills a scan: one point of `POINT_DTYPE` for each of N returns.
 
-    It is compiled, because NumPy would take a fifth of a frame's computing time
-    for it.
-
     Args:
-        scan: (N,) points, filled here.
-        table: beams of the pattern.
-        returns: the returns of the beams.
+        scan: (N,) points, whose fields are set.
+        table: properties of the beams.
+        returns: beam, range and intensity of each return.
         met: (N,) int32 index of the hit geometry in `label` and `instance`;
             negative for returns from rain, snow or fog.
         label, instance: uint16 class and instance id of each geometry.

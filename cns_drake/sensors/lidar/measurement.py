@@ -25,7 +25,10 @@ _RANGE_NOISE, _DROPOUT = range(2)
 
 
 class Echoes(str, Enum):
-    """Which echoes of a beam a unit reports."""
+    """Which echoes of a beam a LiDAR reports.
+
+    `DUAL` stands for the strongest and the last echo.
+    """
 
     FIRST = "first"
     STRONGEST = "strongest"
@@ -34,12 +37,12 @@ class Echoes(str, Enum):
 
 
 class Returns(NamedTuple):
-    """The returns of N beams, in firing order.
+    """The N returns of a scan, in the order in which their beams fired.
 
     Attributes:
-        beams: (N,) int index of each beam.
+        beams: (N,) int index of the beam of each return.
         ranges: (N,) float32 measured ranges [m].
-        intensity: (N,) float32, of at most 1.
+        intensity: (N,) float32, at most 1.
     """
 
     beams: np.ndarray
@@ -130,7 +133,7 @@ class MeasurementModel:
                 along each beam in firing order [m], inf if there is none.
             min_range: least measured range of a return [m].
             max_range: greatest measured range of a return [m].
-            frame: number of the frame.
+            frame: number of the frame, on which the random numbers depend.
         """
         ranges = true_ranges
         num_beams = len(true_ranges)

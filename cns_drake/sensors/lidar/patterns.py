@@ -100,10 +100,10 @@ class Beams:
 
     @cached_property
     def cast_columns(self) -> np.ndarray | None:
-        """(N,) column of each beam, in packet order; None if unneeded.
+        """(N,) column of each beam, in packet order; None in the regular case.
 
-        It is None if the columns of the beams in packet order are simply 0, 1,
-        ..., C - 1, again and again.
+        The case is regular if the columns in packet order are 0, 1, ..., C - 1,
+        again and again.
         """
         columns = self.column[self.packet_order]
         turns, rest = divmod(len(columns), max(len(self.column_t_ns), 1))
@@ -116,9 +116,11 @@ class Beams:
 def make_beams(d_Sset: np.ndarray, ring: np.ndarray, t_ns: np.ndarray) -> Beams:
     """Returns beams with arbitrary directions, in firing order.
 
-    `d_Sset` contains (N, 3) unit directions, `ring` (N,) numbers of lasers and
-    `t_ns` (N,) firing times since the start of the turn [ns], which must not
-    decrease.
+    Args:
+        d_Sset: (N, 3) unit directions, expressed in the sensor frame S.
+        ring: (N,) number of each beam's laser.
+        t_ns: (N,) firing times since the start of the turn [ns], not
+            decreasing.
     """
     elevation = np.arcsin(np.clip(d_Sset[:, 2], -1.0, 1.0))
     azimuth = np.arctan2(d_Sset[:, 1], d_Sset[:, 0])
@@ -213,7 +215,13 @@ class LimitedPattern(BeamPattern):
         azimuths_deg: tuple[float, float],
         elevations_deg: tuple[float, float],
     ):
-        """See `BeamPattern.within`."""
+        """Limits a pattern; the arguments are those of `BeamPattern.within`.
+
+        Args:
+            whole: the pattern.
+            azimuths_deg: first and last azimuth [deg].
+            elevations_deg: limits of the elevation [deg].
+        """
         self.min_range, self.max_range = whole.min_range, whole.max_range
         self.period, self.repeats = whole.period, whole.repeats
         self._whole = whole

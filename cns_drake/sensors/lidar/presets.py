@@ -1,4 +1,7 @@
-"""Beam patterns of commercial LiDARs by their data sheets: presets.yaml."""
+"""Presets: the beam patterns of commercial LiDARs, by their data sheets.
+
+The numbers are in the file `presets.yaml` next to this module.
+"""
 
 from __future__ import annotations
 
@@ -18,7 +21,12 @@ UnitPattern: TypeAlias = (
 
 
 class LidarPreset(NamedTuple):
-    """The beams of a commercial LiDAR, and the source of the numbers."""
+    """The beam pattern of a commercial LiDAR.
+
+    Attributes:
+        pattern: the pattern.
+        source: data sheet from which the numbers come.
+    """
 
     pattern: UnitPattern
     source: str
@@ -27,7 +35,13 @@ class LidarPreset(NamedTuple):
     def of(
         cls, *, source: str, ranges: tuple[float, float], **fields: Any
     ) -> LidarPreset:
-        """Makes a preset from its fields in presets.yaml."""
+        """Makes a preset from its entry in `presets.yaml`.
+
+        Args:
+            source: data sheet from which the numbers come.
+            ranges: nearest and farthest measured range [m].
+            fields: the other fields of the entry.
+        """
         fields["min_range"], fields["max_range"] = ranges
         if "pattern" in fields:
             kind = getattr(patterns, fields.pop("pattern"))

@@ -21,9 +21,8 @@ class Odometry:
     """The pose and velocity of a body at one time.
 
     Attributes:
-        X_WB: its pose in the world.
-        V_WB_B: its spatial velocity in the world, expressed in the body
-            [rad/s, m/s].
+        X_WB: pose of the body B in the world W.
+        V_WB_B: spatial velocity of B in W, expressed in B [rad/s, m/s].
 
     Example:
         from cns_drake import Odometry
@@ -54,7 +53,12 @@ class OdometrySensor(LeafSystem):
     """
 
     def __init__(self, body: RigidBody, X_PB: RigidTransform | None = None):
-        """Makes the sensor; by default, B is the body itself."""
+        """Makes the sensor.
+
+        Args:
+            body: P: a body of a plant.
+            X_PB: pose of the observed frame B in P; by default B is P.
+        """
         super().__init__()
         self._body = body.index()
         self._X_PB = X_PB
@@ -114,8 +118,8 @@ def add_odometry(
 
     Args:
         builder: builder of a diagram with the plant, or with `motion`.
-        body: P: a body of a finalized plant, or a frame that is fixed on a
-            body.
+        body: the carrier P: a body of a finalized plant, or a frame that is
+            fixed on such a body.
         X_PB: pose of the observed frame B in P; by default B is P.
         motion: source of body poses and velocities; by default the plant.
         name: name of the system.

@@ -156,7 +156,8 @@ class CalibratedReturns:
             scene: geometry on which rays are cast.
             materials: reflection properties of each geometry.
             pattern: the beams of a turn.
-            turn: the beams' directions and errors in this turn.
+            turn: the beams with the errors of the individual unit, from
+                `CalibratedReturns.turn`.
             p_WSset: (K, 3) positions of S in the world [m].
             R_WSset: (K, 3, 3) orientations of S in the world.
             times: (T,) firing times as fractions of the turn.
@@ -234,7 +235,11 @@ class CalibratedReturns:
         return report_echoes(light, receiver, key, turn.range_error, turn.gain)
 
     def turn(self, beams: Beams) -> CalibratedTurn:
-        """Returns the beams of a turn, with the individual unit's errors."""
+        """Returns the beams of a turn with the errors of the individual unit.
+
+        Args:
+            beams: the nominal beams, from `BeamPattern.beams`.
+        """
         laser = np.arange(int(beams.ring.max()) + 1)
         key = frame_key(self.unit_seed, f"unit/{self.sensor_name}", 0)
         sheet, head = self.sheet, self.sheet.head
@@ -326,15 +331,15 @@ class CalibratedTurn:
         range_error: np.ndarray,
         gain: np.ndarray,
     ):
-        """Takes the attributes, all in firing order.
+        """Makes the turn; all arrays are in firing order.
 
         Args:
             beams: beams of the pattern.
-            d_Sset: their directions.
-            reported: directions that the unit reports.
-            height: height of each laser above the origin [m].
-            range_error: range error of each laser [m].
-            gain: gain of each laser.
+            d_Sset: (N, 3) true unit directions of the beams.
+            reported: (N, 3) unit directions that the unit reports.
+            height: (N,) height of each beam's laser above the origin of S [m].
+            range_error: (N,) range error of each beam's laser [m].
+            gain: (N,) gain of each beam's laser.
         """
         self.range_error, self.gain = range_error, gain
         self.reported = reported

@@ -40,8 +40,14 @@ _FULL_INTENSITY = 255.0
 class Receiver(NamedTuple):
     """The receiver of a unit, in a given weather.
 
-    The extinction of the air is in [1/m], the limits of reported ranges are in
-    [m]. `scattering` is None in clear air.
+    Attributes:
+        sheet: data sheet of the unit.
+        budget: link budget: the strength of an echo by distance.
+        extinction: extinction coefficient of the air [1/m].
+        min_range: least reported range [m].
+        max_range: greatest reported range [m].
+        choice: which echoes of a beam are reported.
+        scattering: echoes of rain, snow and fog; None in clear air.
     """
 
     sheet: UnitSheet
@@ -101,9 +107,10 @@ def report_echoes(
     and the standard deviation of its distance.
 
     Args:
-        light: the light that came back.
+        light: the light that came back from surfaces.
         receiver: receiver of the unit.
-        key: key of the random numbers; see `frame_key`.
+        key: key of the random numbers; see
+            `cns_drake.sensors.returns.random_numbers.frame_key`.
         range_error: (N,) range error of each beam's laser [m].
         gain: (N,) gain of each beam's laser.
     """

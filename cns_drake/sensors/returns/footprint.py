@@ -48,11 +48,16 @@ class Sides(NamedTuple):
 def find_sides(shots: Shots, orders: np.ndarray, hits: BeamHits) -> Sides:
     """Returns extra rays to cast where neighbouring beams hit an edge.
 
-    Beams are neighbours if they are consecutive in one of the two `orders`, (2,
-    N). There is no edge between two neighbours if the point that one beam hits
-    lies in the plane that the other beam hits, or if the two planes intersect
+    There is no edge between two neighbours if the point that one beam hits lies
+    in the plane that the other beam hits, or if the two planes intersect
     between the beams. Otherwise there is an edge, either within one of the two
-    beams or in the gap between them. `hits` are the hits of the beams' axes.
+    beams or in the gap between them.
+
+    Args:
+        shots: the N beams.
+        orders: (2, N) two orders of the beams. Beams that are consecutive in
+            one of them are neighbours.
+        hits: hits of the N beams' axes.
     """
     farthest = _NEIGHBOURS * shots.divergence
     edges = [_find_edges(order, hits, farthest) for order in orders]
@@ -161,6 +166,11 @@ def meet_sides(sides: Sides, side_hits: BeamHits, hits: BeamHits) -> np.ndarray:
     surfaces at an edge. If such a ray hit the surface that the axis of its own
     beam hits, its hit is removed. If a ray passed the nearer surface, it gets a
     hit on the plane of the farther surface.
+
+    Args:
+        sides: the additional rays.
+        side_hits: hits of the additional rays; completed in place.
+        hits: hits of the N beams' axes.
 
     Returns:
         (N,) fraction of each beam's light that its axis represents; its

@@ -19,14 +19,19 @@ _Table = TypeVar("_Table", bound=Any)
 
 
 def select(table: _Table, rows: np.ndarray) -> _Table:
-    """Returns the rows of a table, given their numbers or a mask."""
+    """Returns some rows of a table, which is a named tuple of arrays.
+
+    Args:
+        table: named tuple of arrays with N rows each.
+        rows: indices of the rows, or a mask (N,).
+    """
     if rows.dtype == bool:
         rows = np.flatnonzero(rows)
     return table._make(values.take(rows, axis=0) for values in table)
 
 
 def join(tables: Sequence[_Table]) -> _Table:
-    """Concatenates the rows of several tables."""
+    """Concatenates the rows of tables, which are named tuples of arrays."""
     return tables[0]._make(map(np.concatenate, zip(*tables, strict=True)))
 
 
@@ -53,7 +58,12 @@ class BeamHits(NamedTuple):
 
     @classmethod
     def of(cls, d_Wset: np.ndarray, hits: RayHits) -> BeamHits:
-        """Returns the hits of rays whose cast found normals as well."""
+        """Returns the hits of N rays, with the cosines of their incidence.
+
+        Args:
+            d_Wset: (N, 3) unit directions of the rays in the world.
+            hits: result of casting the rays, with normals.
+        """
         cosine = -(hits.normals_W * d_Wset).sum(axis=1)
         return cls(
             d_Wset,
@@ -69,7 +79,8 @@ class Shots(NamedTuple):
     """The N beams of a turn, in the order in which they are cast.
 
     Attributes:
-        key: key of the frame's random numbers; see `frame_key`.
+        key: key of the frame's random numbers; see
+            `cns_drake.sensors.returns.random_numbers.frame_key`.
         beam: (N,) number of each beam in firing order.
         p_WSset: (K, 3) positions of the lasers in the world [m]; beam i starts
             at position i mod K.
@@ -138,7 +149,18 @@ def reflect(
 def reflected(
     share: float, geometry: int, cosine: float, materials: Materials
 ) -> float:
-    """Returns the energy that one surface reflects; see `reflect`."""
+    """Returns the light that a surface reflects along one ray.
+
+    Args:
+        share: light of the ray, as a fraction of the beam's light.
+        geometry: index of the geometry that the ray hits.
+        cosine: cosine of the angle of incidence.
+        materials: materials of the geometries.
+
+    Returns:
+        `share` times the reflectivity, times a factor for the angle of
+        incidence that depends on the kind of material.
+    """
     energy = share * materials.reflectivity[geometry]
     if materials.kind[geometry] == BEADS:
         return energy
@@ -179,7 +201,7 @@ def texture(
     normal_matrices: np.ndarray,
     p_WLset: np.ndarray,
 ) -> Light:
-    """Returns light whose energy and distance vary with surface texture.
+    """Varies the energy and distance of light as the texture of surfaces does.
 
     Each spot of a surface has an albedo and a height above the mean surface.
     Both are hashes of the spot's position in the surface's own frame, so that
@@ -188,14 +210,14 @@ def texture(
     cells are not parallel to walls or floors.
 
     Args:
-        light: light from surfaces without texture.
+        light: the light that smooth, uniform surfaces would return.
         row: (B,) row of each beam in `d_Wset`.
         p_WSset: (K, 3) positions of the sensor in the world [m]; the ray in row
             i of `d_Wset` starts at position i mod K.
         d_Wset: (B, 3) unit directions of the rays in the world.
         materials: materials of the geometries.
-        group_of, normal_matrices, p_WLset: see
-            `RayCastingScene.surface_frames`.
+        group_of, normal_matrices, p_WLset: frame of each geometry, as
+            `RayCastingScene.surface_frames` returns it.
     """
     energy, distance = light.energy.copy(), light.distance.copy()
     # As names of their own, fields are fast.
@@ -267,7 +289,10 @@ def _wave(turns: float) -> float:
 
 @compiled
 def cell_number(a: float, b: float, c: float) -> float:
-    """Returns a random number from -1 to 1 for the unit cell with (a, b, c)."""
+    """Returns a random number from -1 to 1 that depends on a cell of a grid.
+
+    All points (a, b, c) with the same integer parts give the same number.
+    """
     z = (
         np.uint64(np.int64(np.floor(a))) * np.uint64(0x9E3779B97F4A7C15)
         ^ np.uint64(np.int64(np.floor(b))) * np.uint64(0xC2B2AE3D27D4EB4F)

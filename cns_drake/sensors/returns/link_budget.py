@@ -36,10 +36,14 @@ HOPELESS_SNR = 0.9
 
 @dataclass(frozen=True)
 class SheetRow:
-    """A row of a data sheet: range [m] and probability of detection there.
+    """A row of a data sheet: how well a target is detected at a range.
 
-    The row holds for a Lambertian target that faces the unit, with a
-    reflectivity from 0 to 1.
+    The target is Lambertian and faces the unit.
+
+    Attributes:
+        reflectivity: reflectivity of the target, 0 to 1.
+        range: range of the target [m].
+        probability: probability that the target is detected.
     """
 
     reflectivity: float
@@ -82,8 +86,12 @@ def fit_link_budget(
 ) -> LinkBudget:
     """Returns the link budget that fits one or two data sheet rows exactly.
 
-    If there are two rows, their ranges must differ. The other arguments are
-    fields of `LinkBudget`.
+    Args:
+        rows: the rows; two rows must have different ranges.
+        range_noise: standard deviation of a range at an SNR of 1 [m].
+        range_floor: least standard deviation of a range, at any SNR [m].
+        range_bias: standard deviation of the range error that is constant for
+            each laser; a part of `range_floor` [m].
     """
     # log(snr r^2 / e) = log(S) - 2 alpha_0 r at each row.
     logs = [math.log(row.snr * row.range**2 / row.reflectivity) for row in rows]
@@ -100,10 +108,13 @@ def fit_link_budget(
 def target_snr(
     budget: LinkBudget, extinction: float, energy: _Value, distance: _Value
 ) -> _Value:
-    """Returns the SNR of targets at positive distances [m].
+    """Returns the signal-to-noise ratio (SNR) of the echoes of targets.
 
-    `extinction` is that of the weather [1/m]; `energy` is reflectivity times
-    cosine of incidence.
+    Args:
+        budget: link budget of the unit.
+        extinction: extinction coefficient of the weather [1/m].
+        energy: reflectivity of each target times the cosine of incidence.
+        distance: distance of each target, positive [m].
     """
     loss = 2.0 * (extinction + budget.own_extinction) * distance
     return budget.scale * energy * np.exp(-loss) / (distance * distance)
@@ -123,12 +134,11 @@ def detection_probability(snr: ArrayLike) -> np.ndarray:
 
 @compiled
 def range_deviation(budget: LinkBudget, snr: np.ndarray) -> np.ndarray:
-    """Returns the standard deviation of a laser's ranges [m].
+    """Returns the standard deviation of ranges from shot to shot [m].
 
     The total deviation is inversely proportional to the root of the SNR (Wagner
     et al., 2006), down to a limit set by the unit's clock and the shape of its
-    pulses. The result is the part that differs from shot to shot: the error
-    that is constant for each laser is subtracted from the total.
+    pulses. The error that is constant for each laser is subtracted from it.
     """
     whole = np.maximum(budget.range_noise / np.sqrt(snr), budget.range_floor)
     return np.sqrt(whole**2 - budget.range_bias**2)
@@ -136,9 +146,10 @@ def range_deviation(budget: LinkBudget, snr: np.ndarray) -> np.ndarray:
 
 @compiled
 def echo_energy(budget: LinkBudget, snr: _Value, distance: _Value) -> _Value:
-    """Returns the energy that the unit infers from SNR and distance.
+    """Returns the energy that the unit infers from SNR and distance [m].
 
-    The unit assumes clear air. The distance is in [m].
+    Energy is the reflectivity of a target times the cosine of incidence. The
+    unit assumes clear air.
     """
     gain = np.exp(2.0 * budget.own_extinction * distance)
     return snr * distance * distance * gain / budget.scale

@@ -52,7 +52,7 @@ _CLUMP, _TWIG, _CLUMPS = 0.5, 0.1, 0.6
 
 
 class Ways(NamedTuple):
-    """N rays that are still travelling, beyond their first hits.
+    """N rays that continue beyond a hit, through leaves or from a pane.
 
     Attributes:
         beam: (N,) number of each ray's beam.
@@ -182,8 +182,15 @@ def follow(
 ) -> list[Light]:
     """Follows rays through panes and leaves; returns the light that comes back.
 
-    `met` contains the hits of the rays `ways` on panes and leaves. `scale` is
-    that of a `LinkBudget`; it decides which light is too faint to follow.
+    Args:
+        shots: the beams.
+        ways: the rays.
+        met: hits of these rays on panes and leaves.
+        scale: `scale` of the `LinkBudget`, which determines what light is too
+            faint to be followed.
+
+    Returns:
+        The light that comes back, in several parts.
     """
     found: list[Light] = []
     for step in range(_MOST_STEPS):

@@ -17,7 +17,11 @@ _UNIT = 2.0**-53
 
 
 def frame_key(seed: int, sensor_name: str, frame: int) -> np.uint64:
-    """Returns the key of a sensor's random numbers in one frame."""
+    """Returns the key of a sensor's random numbers in one frame.
+
+    `cns_drake.sensors.returns.random_numbers.uniform` and `normal` take this
+    key.
+    """
     # A spawn key holds no negative numbers; frames before time zero do exist.
     spawn_key = (2 * abs(frame) + (frame < 0), *sensor_name.encode())
     seeds = np.random.SeedSequence(seed, spawn_key=spawn_key)
@@ -28,11 +32,16 @@ def frame_key(seed: int, sensor_name: str, frame: int) -> np.uint64:
 def uniform(
     key: np.uint64, beam: np.ndarray, draw: int | np.ndarray
 ) -> np.ndarray:
-    """Returns random numbers that are uniform over [0, 1), from a key.
+    """Returns random numbers that are uniform over [0, 1).
 
-    The key comes from `frame_key`. The numbers come from the generator
-    SplitMix64 (Steele, Lea and Flood, OOPSLA 2014), addressed by `beam` (0 or
-    greater) and `draw` (from 0 to `DRAWS_PER_BEAM` - 1).
+    Equal arguments give equal numbers. The generator is SplitMix64 (Steele, Lea
+    and Flood, OOPSLA 2014).
+
+    Args:
+        key: key of a frame, from `frame_key`.
+        beam: (N,) beams, 0 or greater.
+        draw: number of the draw, one or (N,), from 0 to `DRAWS_PER_BEAM` - 1.
+            Different draws of a beam are independent.
     """
     number = (beam * DRAWS_PER_BEAM + (draw + 1)).astype(np.uint64)
     z = key + number * _GOLDEN
@@ -46,7 +55,10 @@ def uniform(
 def normal(
     key: np.uint64, beam: np.ndarray, draw: int | np.ndarray
 ) -> np.ndarray:
-    """Returns standard normal random numbers; arguments as in `uniform`.
+    """Returns standard normal random numbers.
+
+    The arguments are those of
+    `cns_drake.sensors.returns.random_numbers.uniform`.
 
     They are the normal quantiles of uniform numbers, computed with PPND7, the
     short form of AS 241 (Wichura, Applied Statistics 37, 1988), which is exact

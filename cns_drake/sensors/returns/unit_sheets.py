@@ -31,12 +31,14 @@ class Response:
         floor: intensities below this are reported as 0, whatever the gain.
         least: echoes of less energy are not reported even at close range, where
             the unit turns its power down.
-        gain: standard deviation of a laser's gain.
-        dim: additional slope for gains more than one standard deviation below
-            the mean, so that they are lower than in a normal distribution.
-        flicker: standard deviation over lasers of the fraction of intensity by
-            which a laser's shots are alternately brighter and darker. Each
-            laser has a fixed fraction.
+        gain: standard deviation of the gain over the lasers; the mean gain is
+            1.
+        dim: lowers the gains of dim lasers. If a gain is more than one standard
+            deviation below the mean, the part beyond one standard deviation is
+            multiplied by 1 + `dim`.
+        flicker: the shots of a laser are alternately brighter and darker, by a
+            fraction of the intensity that is constant for the laser. `flicker`
+            is the standard deviation of this fraction over the lasers.
         speckle: standard deviation of the intensity of single shots, as a
             fraction of the intensity.
     """
@@ -53,10 +55,10 @@ class Response:
 
     @cached_property
     def table(self) -> np.ndarray:
-        """Intensities of diffuse targets at even steps of sqrt(energy).
+        """Intensities of diffuse targets at 4097 energies.
 
-        The table is interpolated, because computing the logarithms of all
-        points would take half of a frame's computing time.
+        The square roots of the energies are evenly spaced from 0 to 1.
+        Intensities in between are interpolated.
         """
         root = np.linspace(0.0, 1.0, 4097)
         energy = np.maximum(root, 1e-6) ** 2
@@ -69,8 +71,8 @@ class Head:
 
     Attributes:
         blocks: for each block of lasers, from the top: its lowest elevation
-            [deg], its height above the origin [m], and its range errors
-            relative to those in the data sheet.
+            [deg], its height above the origin [m], and a factor by which its
+            range errors are multiplied.
         alternate: range offset [m]. Every second laser, starting with the
             first, measures this much too far and the other lasers this much too
             near. The offset is part of the lasers' range errors.
@@ -89,7 +91,7 @@ class Head:
 
 @dataclass(frozen=True)
 class UnitSheet:
-    """The data sheet of a unit.
+    """The data sheet of a LiDAR model (unit).
 
     Attributes:
         rows: ranges at stated reflectivities, at most two.
@@ -104,9 +106,9 @@ class UnitSheet:
         source: where the numbers come from.
         angle_error_deg: standard deviation of a laser's elevation and azimuth
             [deg].
-        own_part: fraction of `range_floor` that is an error that stays
-            constant for a laser. The other fraction varies from shot to shot;
-            the squares of both fractions add up to 1.
+        own_part: fraction of `range_floor` that is an error that stays constant
+            for a laser. The other fraction varies from shot to shot; the
+            squares of both fractions add up to 1.
         response: how the unit converts energy to intensity.
         head: positions of the lasers.
     """

@@ -98,9 +98,13 @@ class Weather:
     def drops(self, diameters_mm: np.ndarray) -> list[tuple[np.ndarray, float]]:
         """Returns size distribution and reflectivity of raindrops and flakes.
 
-        The list contains a pair for rain if it rains, and then a pair for snow
-        if it snows. The distribution is N(D) [1/(m3 mm)] at the given
-        diameters.
+        Args:
+            diameters_mm: (D,) diameters of drops, or of melted flakes [mm].
+
+        Returns:
+            A pair for rain if it rains, and then a pair for snow if it snows:
+            the numbers N(D) at these diameters [1/(m3 mm)], and the
+            reflectivity of a drop or flake.
         """
         kinds = []
         if self.rain > 0.0:
