@@ -264,10 +264,11 @@ class _Writing:
         return meshes[Path(place).stem].to_obj().encode()
 
     def table(self, new: Mapping[str, Structure]) -> None:
-        """Writes the structure table: today's structures, then new ones.
+        """Writes the structure table of all stages.
 
-        Therefore, a longer history gives the structures of a shorter one the
-        same instance ids.
+        Today's structures come first, then those of later years in the order in
+        which they are built, and last those of the past. More years after today
+        thus do not change the instance ids of structures built before.
         """
         world = self._world
         rows: list[Mapping[str, object]] = [*world.rows.values()]

@@ -25,7 +25,7 @@ class ImportFaults:
         self._examples: dict[str, str] = {}
 
     def add(self, kind: str, example: str, number: int = 1) -> None:
-        """Counts faults of one kind.
+        """Adds `number` faults of one kind to the counts.
 
         `kind` describes the fault and its remedy in words. `example` is the
         name of an object that has the fault.

@@ -296,7 +296,10 @@ def fresh_versions() -> list[Version]:
 def draw_fresh_cities(
     maps: Sequence[str], numbers: Sequence[int], output: Path, cluster: Cluster
 ) -> list[Path]:
-    """Draws fresh versions of shipped maps; returns their map folders.
+    """Generates fresh versions of shipped maps; returns their map folders.
+
+    A fresh version has the streets of the map, in some cases rotated, but other
+    buildings, plants and objects.
 
     Args:
         maps: names of the maps; all maps if empty.
@@ -305,7 +308,7 @@ def draw_fresh_cities(
         cluster: runs the jobs.
 
     Raises:
-        InputError: a version is unknown or could not be drawn.
+        InputError: a version is unknown or could not be generated.
     """
     versions = fresh_versions()
     for what, given, known in (

@@ -286,7 +286,7 @@ class Fit:
 
 
 def judge(surface: Surface, scan: np.ndarray, X_WS: np.ndarray) -> Fit:
-    """Returns how well a scan fits a map at a given pose.
+    """Returns how well a scan fits a map at a given pose, see `Fit`.
 
     Args:
         surface: surface of the map.

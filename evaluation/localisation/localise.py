@@ -161,8 +161,8 @@ class OneScan(FileDrive):
     def scan(self, index: int) -> np.ndarray:
         """Returns the whole cloud, including points at the origin.
 
-        In the scan of a LiDAR, such points mark beams without a return; in a
-        map they are measured.
+        In scans of a LiDAR, a point at the origin marks a beam without a return
+        and is left out. Any other cloud can have a real point there.
         """
         return self._read(self._files[index], 0)
 

@@ -115,7 +115,10 @@ def height_image(
     height_step: float,
     num_layers: int,
 ) -> HeightImage:
-    """Returns an image of the heights at which each cell has points.
+    """Returns an image of a cloud, seen along the normal of a plane.
+
+    Each cell of the image contains the layers of height in which it has points,
+    and the mean position of its points.
 
     The grid of the cells starts at the first occupied row and column. Memory
     grows with the area that the points cover.
@@ -123,12 +126,14 @@ def height_image(
     Args:
         points: (N, 3) points [m].
         center: (3,) a point of the plane [m].
-        axes: (3, 3) directions of the image, one a row.
+        axes: (3, 3) directions of rows and columns and the normal, as
+            `image_axes` returns them.
         resolution: length of a cell [m].
-        height_range: limits of the heights above the plane [m].
+        height_range: limits of the heights above the plane [m]; other points
+            are left out.
         height_step: thickness of the layers of height [m].
-        num_layers: number of layers; points above them count only for the
-            means.
+        num_layers: number of layers. Points above the highest layer only count
+            for the mean positions.
     """
     # Rows, columns and heights of the points between the limits.
     near = np.empty((len(points), 3))

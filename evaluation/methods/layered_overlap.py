@@ -145,13 +145,15 @@ class LayeredDatabase:
 class LayeredOverlap(Method[LayeredScan, LayeredDatabase]):
     """Layered overlap, in four searches from coarse to fine.
 
-    The first three searches find the pose at which most bits coincide. They
-    rank places by how many standard deviations this number of bits lies above
-    chance. The last search improves that pose by hill climbing, cell by cell.
+    The first three searches compare coarse maps. For each place, they find the
+    pose with the most common filled cells. They rank the places by how many
+    standard deviations the number of common cells lies above chance. The last
+    search improves the poses of the best places by hill climbing on fine maps.
 
-    The score is a weighted count of the query's cells that coincide with a cell
-    of the place or its neighbour. It is divided by the geometric mean of the
-    two scans' weighted numbers of cells.
+    The score is the weighted number of common cells on the fine maps, divided
+    by the geometric mean of the two scans' weighted numbers of filled cells.
+    On these maps, a filled cell of the query is common if the place has a
+    filled cell at the same position or an adjacent one, in the same layer.
 
     Of several poses with equal counts, the first one is used. All counts are
     integers, so that scores are the same on every processor.

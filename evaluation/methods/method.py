@@ -294,7 +294,8 @@ def register(name: str) -> Callable[[_MethodClass], _MethodClass]:
     """Returns a decorator that registers a Method under a name.
 
     Raises:
-        ValueError: if another method has that name, or it cannot be printed.
+        ValueError: if another method has that name, or the name is empty or has
+            unprintable characters.
 
     Example:
         from evaluation import Method, register

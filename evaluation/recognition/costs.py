@@ -52,12 +52,11 @@ def measure_cost(
 
     Args:
         method: method to measure.
-        clouds: clouds to describe, two or more; the time of the first is not
+        clouds: C clouds to describe, C >= 2; the time of the first is not
             counted, since it includes loading and compiling.
-        scans_per_place: number of merged scans.
+        scans_per_place: number of scans that are merged into each cloud.
         database: described drive with places.
-        query: described drive with queries, of which as many are measured as
-            there are clouds.
+        query: described drive with queries; C of them are measured.
         gate_radius: radius of a match for the gate [m]; None without a gate.
     """
     describing = [cpu_ms(method.describe, cloud) for cloud in clouds]

@@ -40,16 +40,17 @@ class PairEvidence:
             shows; NaN without a match.
         hidden: (Q,) share of the query's scan that is hidden from the right
             place's sensor; NaN without a match.
-        changed: (Q,) share of the upright points of both scans, the query's and
-            its right place's, that show a change: the other scan has no point
-            on their structure, although it is not hidden from that scan's
-            sensor. NaN without a match, or if a recording does not name its
-            structures.
+        changed: (Q,) share of upright points that show a change, among all
+            upright points of the query and its right place. A point shows a
+            change if it is not hidden from the sensor of the other scan, but
+            that scan has no point on the same structure. NaN without a match,
+            or if a recording does not name its structures.
         changed_classes: for each query, the class of structures with most of
             the points counted in `changed`; "" if there are none.
-        right_fits: (Q,) share of the upright points of the query and its right
-            place that coincide at the best alignment of the two scans; NaN if
-            `fits` is NaN for every method.
+        right_fits: (Q,) share of upright points that coincide when the scans of
+            the query and its right place are aligned: the share of the query's
+            points or of the place's, whichever is less. NaN if `fits` is NaN
+            for every method.
         fits: method -> (Q,) the same share for the query and its wrong best
             place; NaN if the best place is right, or less than two radii away.
         unchanged: (Q,) `overlaps` of the control, which is the same comparison

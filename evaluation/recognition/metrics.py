@@ -282,10 +282,11 @@ def own_samples(
 def paired_samples(
     outcomes: QueryOutcomes, other: QueryOutcomes
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Returns metrics of bootstrap samples that are paired with others.
+    """Returns metrics of bootstrap samples that draw the blocks of another.
 
-    The samples draw the same blocks as `own_samples(other)`, so that the two
-    results can be compared sample by sample.
+    Sample k draws the same blocks of queries as sample k of
+    `own_samples(other)`. The metrics of the two can thus be subtracted, sample
+    by sample.
 
     Args:
         outcomes: outcomes of Q queries.
@@ -365,13 +366,12 @@ def mean_auc_difference(
 ) -> Difference:
     """Returns the mean AUC difference of two methods, with its p-value.
 
-    The mean is over one or more sets of queries (mode all). The bootstrap draws
-    the same blocks for both methods. The p-value is that of a t test with n - 1
-    degrees of freedom for n blocks; its standard error is the bootstrap's
-    standard deviation, corrected for n. Unlike the share of bootstrap samples
-    beyond zero, such a p-value can be smaller than 1 over the number of
-    samples. Sets of queries are independent, so that their variances and
-    degrees of freedom add up.
+    The mean is over one or more sets of queries (mode all). The p-value is that
+    of a t test. For a set with n blocks, the test has n - 1 degrees of freedom.
+    The standard error is the standard deviation over bootstrap samples, which
+    draw the same blocks for both methods, times the root of n / (n - 1). Sets
+    of queries are independent, so that their variances and degrees of freedom
+    add up.
 
     Args:
         pairs: outcomes of both methods on each set.

@@ -139,9 +139,10 @@ def pose_metrics(
 
 
 def pose_success(errors: PoseErrors, outcomes: QueryOutcomes) -> float:
-    """Returns the share of poses within 2 m and 5 deg of the truth.
+    """Returns the share of the queries with a match whose pose is right.
 
-    It is a share of the queries with a match, see `PoseMetrics.success`.
+    A pose is right within 2 m and 5 deg of the truth; see
+    `PoseMetrics.success`.
     """
     # A method that finds no place localises no query.
     known = ~np.isnan(errors.translation)

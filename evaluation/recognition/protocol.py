@@ -151,6 +151,9 @@ class RetrievalProtocol:
     def query_poses(self, X_WS: np.ndarray, frames: np.ndarray) -> np.ndarray:
         """Returns the poses (Q, 4, 4) of the queries' sensors in the world.
 
+        They differ from the recorded poses if the protocol turns or tilts
+        queries.
+
         Args:
             X_WS: (Q, 4, 4) poses of the recorded sensor in the world.
             frames: (Q,) frame number of each query.

@@ -143,9 +143,10 @@ class Reference:
         return next(modes, "all")
 
     def values(self, result: PlaceRecognition, mode: Mode) -> Published | None:
-        """Returns the published numbers, if they were counted in this mode.
+        """Returns the published numbers to compare with a result, if any.
 
-        Returns None for numbers that were measured by another protocol.
+        The result is None if the source has no such numbers, counted the
+        queries in another mode, or used another protocol than `result`.
         """
         if not self._ran(result):
             return None

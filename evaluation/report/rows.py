@@ -247,9 +247,9 @@ def percent(share: float) -> str:
 
 
 def interval_text(kept: Row) -> str:
-    """Returns the interval of a share as text in per cent, such as `(81–90)`.
+    """Returns the 95 % interval of a row's value in per cent, as `(81–90)`.
 
-    The text is empty if the interval is unknown.
+    The value must be a share. The text is empty if the interval is unknown.
     """
     if math.isnan(kept.low):
         return ""
@@ -287,10 +287,10 @@ def survival_numbers(survivals: Sequence[Survival]) -> tables.Table:
 
 
 def survival_table(survivals: Sequence[Survival]) -> tables.Table:
-    """Returns a table of the share of its AUC that each method keeps.
+    """Returns a table, for print, of how much of its AUC each method keeps.
 
-    The table is for print; the share is that of the result with change in the
-    result without change.
+    The share that a method keeps is its AUC with change, divided by its AUC
+    without change.
     """
     return tables.Table.of(
         survivals,

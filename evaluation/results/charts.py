@@ -113,9 +113,10 @@ class _Chart:
 
     @property
     def panes(self) -> dict[str, list[Row]]:
-        """Title of each panel -> its rows; one panel per map.
+        """Title of each panel -> its rows.
 
-        If the chart is over maps, there is one panel for all.
+        There is one panel per map. If the chart itself compares maps (`over` is
+        `map`), it has a single panel without a title.
         """
         found: dict[str, list[Row]] = {}
         for row in self.rows:

@@ -248,12 +248,13 @@ def keyed(
 
 
 def protocol_columns(path: str) -> Columns[Any]:
-    """Returns table columns for the options of a protocol, for `Table.of`.
+    """Returns columns of `Table.of` that show the protocol of each item.
 
-    The last column is the name of the protocol.
+    There is a column for each option of the protocol, and a last one for its
+    name.
 
     Args:
-        path: attribute of an item that contains the protocol, such as
+        path: attribute of an item that contains its protocol, such as
             `result.protocol`.
     """
     columns = keyed(
@@ -274,13 +275,14 @@ def _rows(values: Sequence[object]) -> list[tuple[object, ...]]:
 def ranked(
     values: Sequence[float | None], printed: Sequence[float | None]
 ) -> list[Cell]:
-    """Returns the cells of a row, with the greatest two numbers ranked.
+    """Returns the cells of a row, with ranks 1 and 2 of the best numbers.
 
-    Numbers that are equal as printed, with four decimals, share a rank. A
-    single number has no rank.
+    Greater numbers are better. Only our numbers are ranked, not those of the
+    paper. Numbers that are equal to four decimals share a rank. A single number
+    has no rank.
 
     Args:
-        values: our numbers.
+        values: our numbers; None or NaN where one is missing.
         printed: the paper's numbers, in the same order.
     """
     shown = [

@@ -112,8 +112,8 @@ class City:
         stages: stage -> the drive through this stage.
         others: further drives, such as controls, which follow the route of one
             stage through another stage.
-        reference: published numbers, to which pairs and runs are added for a
-            comparison.
+        reference: published numbers for comparison. Pairs of drives and runs of
+            methods that were published are measured in addition.
     """
 
     name: str

@@ -246,11 +246,15 @@ class RecordingSurvey:
 
 
 def described_key(method: str, protocol: RetrievalProtocol) -> str:
-    """Returns the key of a method's descriptions by a second protocol.
+    """Returns the key of the descriptions that a method makes by a protocol.
+
+    The key is for descriptions by another protocol than that of the study, such
+    as the protocol of published results. The key of the method alone stands for
+    descriptions by the study's protocol.
 
     Args:
         method: key of the method.
-        protocol: the second protocol, whose name is appended.
+        protocol: the other protocol.
     """
     return f"{method},{protocol.name}"
 

@@ -51,10 +51,9 @@ def _furnish_arm(
     def place(name: str, distance: float, side: int, turn: float) -> None:
         """Places an object beside the arm, `distance` from the junction [m].
 
-        Side 1 is on the left, seen from the junction. Traffic that comes
-        towards the junction has it on the right; side -1 is the other one.
-        `turn` is the heading of the object relative to the arm's outward
-        direction [rad].
+        `side` is 1 for the left side of the arm, looking away from the
+        junction, and -1 for the right side. `turn` is the heading of the object
+        relative to the direction away from the junction [rad].
         """
         outwards = 1 if starts else -1
         edge = road.first_station if starts else road.last_station

@@ -162,10 +162,11 @@ def _share(
 def meet_sides(sides: Sides, side_hits: BeamHits, hits: BeamHits) -> np.ndarray:
     """Completes the hits of additional rays, and divides the beams' light.
 
-    The additional rays were cast only to just beyond the nearer of the two
-    surfaces at an edge. If such a ray hit the surface that the axis of its own
-    beam hits, its hit is removed. If a ray passed the nearer surface, it gets a
-    hit on the plane of the farther surface.
+    At an edge, the axes of two neighbouring beams hit two surfaces. Additional
+    rays are cast only to just beyond the nearer one. A hit of an additional ray
+    is removed if it lies on the surface that the axis of its own beam hits. If
+    this is the nearer surface, and the ray misses it, the ray gets a hit on the
+    plane of the farther one.
 
     Args:
         sides: the additional rays.

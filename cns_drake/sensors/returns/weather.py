@@ -130,7 +130,7 @@ class Scattering(NamedTuple):
 
     Attributes:
         distances: (R,) increasing distances [m].
-        counts: (R,) mean number of detected echoes of drops that are nearer
+        counts: (R,) mean number of drops per beam that are detected and nearer
             than each distance.
         energies: (R, Q) quantiles of the energy of a drop's echo at each
             distance.
