@@ -294,7 +294,11 @@ def with_unmarked_crossings(
         return (k, row) if is_inside and k not in cuts else None
 
     def course(p: np.ndarray, q: np.ndarray, z: float) -> np.ndarray | None:
-        """Returns a path (4, 3) across lanes at height z; None if blocked."""
+        """Returns the path (4, 3) of walkers across lanes, from p to q.
+
+        It lies at height z [m]. It is None if it crosses too many lanes, or
+        comes too near a way or an obstacle.
+        """
         line = LineString([p[:2], q[:2]])
         ahead = (q - p)[:2] / line.length
         over = lane_tree.query(line, "intersects")

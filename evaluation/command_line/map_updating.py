@@ -32,7 +32,7 @@ def map_update(
     output: Annotated[Path | None, typer.Option(metavar="FOLDER")] = None,
     json: Json = False,
 ) -> None:
-    """Score labels of what changed between two maps.
+    """Compute scores for labels of what changed between two maps.
 
     The command compares labels with the true labels: your own (--labels-a and
     --labels-b) or, without these options, those of a shipped change detector,

@@ -234,7 +234,12 @@ def _named_poses(table: Path, files: Sequence[Path]) -> np.ndarray:
 
 
 def simulated_drives(folder: Path, unit: str) -> list[Drive]:
-    """Returns the drives in a folder that were simulated with a LiDAR unit.
+    """Returns the drives in a folder whose LiDAR is like a real one.
+
+    Args:
+        folder: folder of simulated drives.
+        unit: name of a LiDAR preset, such as `hdl-64e`. Only drives with the
+            same rows and columns of rays are returned.
 
     Raises:
         InputError: a drive cannot be opened.

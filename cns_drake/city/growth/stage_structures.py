@@ -77,15 +77,15 @@ _MOST_SIDES = 12
 
 
 def building_site(model: Model, height: float, name: str, seed: int) -> Model:
-    """Returns a building under construction: a frame and, with room, a crane.
+    """Returns a building under construction: a frame, and a crane if it fits.
 
-    The model stays within the footprint of the building, except for the jib of
-    the crane.
+    Frame and crane stand within the footprint of the building; the jib of the
+    crane reaches beyond it.
 
     Args:
         model: the finished building.
-        height: height of the frame [m], limited to those of the archetype
-            `unfinished_tower`.
+        height: height of the frame [m]. It is reduced to the greatest height
+            of the archetype `unfinished_tower`, or raised to its least.
         name: name of the building.
         seed: seed of the random parameters.
 
