@@ -29,8 +29,8 @@ def read_rates(path: Path | None, factor: float = 1.0) -> dict[str, float]:
 
     Args:
         path: a YAML file that maps events to rates from 0 to 1, and `moved` to
-            a distance [m]; None for no file. Events that no file names have
-            their default rates.
+            a distance [m]. Events that are not in the file keep their default
+            rates. With None, all events have them.
         factor: factor by which all rates are multiplied.
 
     Raises:

@@ -75,8 +75,8 @@ class ScanContextConfig(MethodConfig):
         lateral_shift: sideways shift of the copies of `augmented-polar` [m];
             [T] 2.
         candidates: number of contexts that the search in the KD-tree returns;
-            [E] 50. If the database has several contexts of each place, the
-            search returns so many times more.
+            [E] 50. If each place has n contexts, the search returns n times
+            this number.
         search_ratio: share of all shifts of the context that are compared,
             around the shift that fits the aligning key best; [C] 0.1.
     """
@@ -206,12 +206,10 @@ class ScanContext(Method[Contexts, ContextDatabase]):
     ) -> np.ndarray | None:
         """Returns a rough pose X_PQ (4, 4) of a query in the frame of a place.
 
-        A polar context gives the heading of the query; of the lateral offset,
-        it only gives that of an augmented copy (see `lateral_shift`). A
-        Cartesian context gives the lateral offset; of the heading, it only
-        gives whether the query faces the opposite direction.
-
-        The result is None if no column is filled in both contexts.
+        Polar contexts give the heading; the lateral offset is zero, or that of
+        the augmented copy that fits best. Cartesian contexts give the lateral
+        offset; the heading is zero, or half a turn if the augmented copy fits
+        best. The result is None if no column is filled in both contexts.
         """
         chosen = np.flatnonzero(database.places == place)
         similarities, shifts = self._compare(query, database, chosen)

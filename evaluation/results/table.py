@@ -223,7 +223,7 @@ class Answers(Key):
     Attributes:
         columns: name of a column of `queries.csv` -> (Q,) values. An unknown
             value is NaN; in columns of integers it can also be -1 or infinite.
-            In the file, its cell is empty.
+            In the file, such a value is an empty cell.
     """
 
     columns: Mapping[str, np.ndarray]

@@ -106,9 +106,10 @@ class Study:
     ) -> Path:
         """Writes the report, once all jobs are done.
 
-        It consists of these files:
+        The report consists of these files:
 
-        - `report.html`: the whole report; `report.md`: the same without figures.
+        - `report.html`: the whole report, in one file.
+        - `report.md`: the report as Markdown.
         - Tables, each as .csv (with all numbers), .md and .tex: `survival`,
           `tcr`, `place_recognition`, `poses`, and `costs` if costs were
           measured.
