@@ -30,7 +30,7 @@ def read_rates(path: Path | None, factor: float = 1.0) -> dict[str, float]:
     Args:
         path: a YAML file that maps events to rates from 0 to 1, and `moved` to
             a distance [m]. Events that are not in the file keep their default
-            rates; None for all default rates.
+            rates. With None, all events have them.
         factor: factor by which all rates are multiplied.
 
     Raises:

@@ -563,7 +563,11 @@ class _Templates:
         self._system = system
 
     def place(self, instance: dict) -> tuple[Any, np.ndarray]:
-        """Returns a template, and its vertices (N, 3) in the world.
+        """Returns the template of an instance, and its vertices (N, 3) [m].
+
+        Args:
+            instance: geometry of the type `GeometryInstance`. It places the
+                template in the file's coordinates.
 
         Raises:
             LookupError, TypeError, ValueError: if the instance is faulty.

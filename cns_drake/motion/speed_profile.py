@@ -86,10 +86,10 @@ def find_speed_profile(
 
 
 def drive_positions(profile: SpeedProfile) -> np.ndarray:
-    """Returns the path parameters (N,) of the fastest drive over time [m].
+    """Returns path parameters (N,) of a drive, for `make_time_scaling` [m].
 
-    There is one for each `KNOT_PERIOD` [s], with rest at the start and at the
-    end.
+    They are `KNOT_PERIOD` seconds apart. The first few and the last few are
+    equal: the drive rests there.
     """
     u, speed, _ = profile
     times = np.concatenate(

@@ -33,13 +33,14 @@ Member = tuple[int, RigidTransform, surfaces.Surface]
 class Motion(NamedTuple):
     """The motion of a frame F in the scene's frame O during a LiDAR's turn.
 
-    The velocities are constant during the turn.
+    The velocities are constant.
 
     Attributes:
-        w: angular velocity of F [rad/s].
-        v: velocity of the origin of F [m/s].
-        duration: time that the turn takes [s].
-        start: time from the given pose of F to the start of the turn [s].
+        w: (3,) angular velocity of F, expressed in O [rad/s].
+        v: (3,) velocity of the origin of F, expressed in O [m/s].
+        duration: duration of the turn [s].
+        start: time of the start of the turn, counted from the time at which the
+            pose of F is known [s].
     """
 
     w: np.ndarray

@@ -537,7 +537,8 @@ class BackgroundWriter:
         """Queues a message for writing; waits while too many are queued.
 
         Args:
-            message: the arguments of the function that writes a message.
+            message: arguments for the function `write` that was given to the
+                constructor, such as those of `BagWriter.write`.
 
         Raises:
             Exception: the error that occurred while an earlier message was

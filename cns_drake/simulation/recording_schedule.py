@@ -62,11 +62,11 @@ def first_points_topic(scenario: Scenario) -> str:
 def drive_schedule(scenario: Scenario) -> Schedule:
     """Returns the schedule of a scenario's topics.
 
-    If the scenario gives a number of frames, the LiDARs end with the last
-    frame. Topics with a rate of their own, such as the IMU's, continue until
-    the last scan is complete, so that every scan has samples before and after
-    it. With motion distortion, this also applies to `/tf`, with which scans can
-    be corrected.
+    If the scenario gives a number of frames, no scan begins after the last
+    frame. Samples of the IMU, if it is not ideal, and odometry with a rate of
+    its own continue until the last scan is complete. So do the poses on `/tf`
+    if scans have motion distortion: such scans can thus be corrected up to
+    their last point.
 
     Raises:
         InputError: Kalibr's file cannot be used.

@@ -35,9 +35,13 @@ from cns_drake.simulation.station import make_station
 
 @dataclass(frozen=True)
 class DriveSimulation:
-    """A function without arguments that simulates a scenario's drive.
+    """A drive that is simulated when it is opened.
 
-    The call returns a `SimulatedDrive` of the scenario's first LiDAR.
+    Call the object to open the drive: `simulation()` returns a `SimulatedDrive`
+    with the scans of the scenario's first LiDAR.
+
+    Attributes:
+        scenario: the scenario of the drive.
     """
 
     scenario: Scenario

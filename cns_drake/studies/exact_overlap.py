@@ -75,7 +75,10 @@ class Sight:
 
 
 def sights(drive: SimulatedDrive) -> Callable[[int], Sight]:
-    """Returns a function: frame of a drive -> the LiDAR there, and its world.
+    """Returns a function that returns the `Sight` at a frame of a drive.
+
+    Its argument is the number of the frame. A `Sight` is valid until the next
+    call of the function.
 
     Args:
         drive: the drive.

@@ -177,8 +177,9 @@ def scan_city(
     Returns:
         `images` (N, RINGS, SECTORS, CHANNELS) uint8 polar images of the scans,
         `xy` (N, 2) positions of the sensors [m] and `drives` (N,) number of
-        each scan's drive. For a graded city also `overlaps` (N, N) float16, the
-        share of each scan that is visible from the place of each other scan.
+        each scan's drive. If the field `graded` of the city is true, also
+        `overlaps` (N, N) float16, the share of each scan that is visible from
+        the place of each other scan.
     """
     images, xy, numbers = [], [], []
     taken: list[_Taken] = []

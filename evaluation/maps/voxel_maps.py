@@ -117,26 +117,29 @@ def enter(
     samples: np.ndarray,
     num_samples: int,
 ) -> tuple[int, int, int]:
-    """Adds points to the voxels of a table.
+    """Adds points to a hash table of voxels.
+
+    A finer grid divides each voxel into cells. The first point in each cell is
+    kept as a sample. Points and samples are in the world, moved up by
+    `-Z_ORIGIN`, in which voxels begin at height 0.
 
     Args:
         points: (3, N) points in the frame of a sensor [m].
-        number: how many of the points to enter, beginning with the first.
-        X: (4, 4) pose of the sensor in the lifted world: the world, moved up so
-            that voxels begin at height 0.
+        number: number of points to add, beginning with the first.
+        X: (4, 4) pose of the sensor in the moved world.
         voxel_size: length of a voxel's side [m].
-        divisions: number of parts of a voxel's side; 0 for no samples.
-        table: (S,) slots of type `SLOT`, with room for all voxels.
-        size: number of voxels in the table up to now.
-        sampled: (S, B) uint8, one bit for each part of a slot's voxel: whether
-            the part has a sample.
-        samples: (K, 3) array to which samples are added, with room for all, in
-            the lifted world [m].
-        num_samples: number of samples up to now.
+        divisions: number of cells along a voxel's side; 0 to keep no samples.
+        table: (S,) slots of type `SLOT`; changed here. It needs room for all
+            voxels.
+        size: number of voxels in the table before.
+        sampled: (S, B) uint8, for each slot one bit per cell: whether the cell
+            has a sample; changed here.
+        samples: (K, 3) the samples [m]; changed here. It needs room for all.
+        num_samples: number of samples before.
 
     Returns:
-        New number of voxels, new number of samples, and number of skipped
-        points.
+        Number of voxels and number of samples afterwards, and number of points
+        left out because they are not finite or too far away.
     """
     scale = divisions / voxel_size
     last = np.float64(divisions - 1)

@@ -64,8 +64,8 @@ def voxel_planes(
 ) -> Planes:
     """Returns a plane for each voxel whose points lie on one.
 
-    The voxels are in the order of the public program, which depends on the
-    order of the points.
+    The planes are in the same order as in the public program of BTC, which
+    depends on the order of the points.
 
     Args:
         points: (N, 3) points [m].
@@ -152,19 +152,23 @@ def group_alike(
     normal_limit: float,
     distance_limit: float,
 ) -> np.ndarray:
-    """Returns the group (P,) of each patch; -1 if no other is similar.
+    """Divides patches into groups of similar patches.
 
-    From the last patch to the first, each is compared with all patches before
-    it, in their order. If two patches are similar and one has a group, the
-    other joins this group. If neither has a group, they form a new one. Two
-    groups are never merged.
+    As in the public program of BTC, groups that already exist are never merged.
+    The result therefore depends on the order of the patches.
 
     Args:
         centers: (P, 3) centres of the patches [m].
-        normals: (P, 3) unit.
+        normals: (P, 3) unit normals of the patches, of either sign.
         normal_limit: see `base_plane`.
         distance_limit: see `base_plane`.
+
+    Returns:
+        (P,) number of each patch's group; -1 for a patch to which no other is
+        similar.
     """
+    # From the last patch to the first, each is compared with all patches before
+    # it, in their order.
     num_planes = len(centers)
     # |n1 - n2| < d of unit vectors; either sign of a normal will do.
     min_cosine = 1.0 - 0.5 * normal_limit * normal_limit

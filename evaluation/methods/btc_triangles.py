@@ -424,19 +424,20 @@ def match(
     side_tolerance: float,
     min_similarity: float,
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Returns the triangles that are similar to those of a query.
+    """Returns the triangles of a table that are similar to those of a query.
 
-    Two triangles are similar in two respects: the difference of their sides is
-    small relative to the sides (as Euclidean norms of three numbers), and their
-    vertices have about the same heights (by the mean Dice similarity of the
-    three). Only cells of the table near those of the query are searched. For
-    large triangles, this is a stricter limit than `side_tolerance`.
+    Similar triangles have about the same side lengths, and about the same
+    binary descriptors at their vertices.
 
     Args:
         query: triangles of one cloud.
         table: table in which similar triangles are sought.
-        side_tolerance: upper limit of the sides' relative difference.
-        min_similarity: lower limit of the similarity.
+        side_tolerance: greatest difference of the side lengths, as the norm of
+            three differences divided by the norm of the query's three lengths.
+            For large triangles, the table has a smaller limit of its own: it is
+            searched only in cells near the query's lengths.
+        min_similarity: least Dice similarity of the descriptors, as the mean
+            over three vertices.
 
     Returns:
         (M,) indices of triangles of the query, non-decreasing, and (M,) indices

@@ -132,8 +132,9 @@ class LayeredDatabase:
 
     Attributes:
         places: the D descriptors.
-        first: maps of the first search.
-        second: maps of the second and the third search.
+        first: the coarsest maps of the places, for the first of the method's
+            four searches.
+        second: finer maps, for the second and the third search.
     """
 
     places: Sequence[LayeredScan]

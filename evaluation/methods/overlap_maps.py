@@ -226,21 +226,26 @@ def best_overlaps(
     starts: np.ndarray,
     moves: np.ndarray,
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Returns the largest overlap of a query with each place near some poses.
+    """Returns the best poses of a query near N initial poses, by overlap.
+
+    A scan is a stack of S binary maps of the same R rows and columns, see
+    `coarse_maps`; each row is a word of 64 bits. The overlap is the weighted
+    number of bits that are set in the maps of both scans.
 
     Args:
-        queries: (H, R, S) uint64: maps of the query, at headings of equal
+        queries: (H, R, S) uint64 maps of the query, at H headings in equal
             steps of a full turn.
-        places: (D, R + 2 m, S) uint64: maps of the places, with m empty rows on
-            either side.
-        weights: (S,) int64 weight of a common bit in each map.
-        starts: (N, 4) int64: place, heading, and shifts of the query along rows
-            and columns.
-        moves: (K, 3) int64: changes of heading and shifts to try.
+        places: (D, R + 2 m, S) uint64 maps of the places, with m empty rows
+            before and after their own.
+        weights: (S,) int64 weight of a bit of each map.
+        starts: (N, 4) int64 initial poses: number of the place, number of the
+            heading, and shifts of the query by rows and by columns.
+        moves: (K, 3) int64 changes of heading and shifts to try for each
+            initial pose.
 
     Returns:
-        (N,) int64 greatest weighted counts of common bits, and (N, 3) the first
-        heading and shifts that have them.
+        (N,) int64 greatest overlaps, and (N, 3) the heading and shifts at which
+        they occur (the first ones of several).
     """
     num_headings, num_rows, num_maps = queries.shape
     margin = (places.shape[1] - num_rows) // 2

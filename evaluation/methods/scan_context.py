@@ -53,8 +53,10 @@ class ScanContextConfig(MethodConfig):
 
     Attributes:
         variant: kind of context (descriptor): polar or Cartesian (cart). The
-            augmented kinds also add shifted copies of each place to the
-            database. The default is the one that [T] calls A-PC.
+            augmented kinds add copies of each place to the database: for
+            `augmented-polar`, as seen from `lateral_shift` to the left and to
+            the right; for `augmented-cart`, as seen by a car in the opposite
+            direction. The default is the one that [T] calls A-PC.
         voxel_size: side of the voxels to which each cloud is first thinned [m];
             [T] 0.5.
         rings: number of rings of the polar context; [T], [C] 20.
@@ -70,11 +72,11 @@ class ScanContextConfig(MethodConfig):
             5 and 2.
         cart_range: half the length and half the width of the Cartesian context
             [m]; [T] 100 and 40.
-        lateral_shift: sideways shift of the copies that an augmented kind adds
-            [m]; [T] 2.
-        candidates: number of places that the search in the KD-tree returns; [E]
-            50. With augmented places, it returns as many more contexts as each
-            place has copies.
+        lateral_shift: sideways shift of the copies of `augmented-polar` [m];
+            [T] 2.
+        candidates: number of contexts that the search in the KD-tree returns;
+            [E] 50. If each place has n contexts, the search returns n times
+            this number.
         search_ratio: share of all shifts of the context that are compared,
             around the shift that fits the aligning key best; [C] 0.1.
     """
@@ -202,9 +204,12 @@ class ScanContext(Method[Contexts, ContextDatabase]):
     def relative_pose(
         self, query: Contexts, database: ContextDatabase, place: int
     ) -> np.ndarray | None:
-        """Returns a pose with the query's heading (polar) or offset (cart).
+        """Returns a rough pose X_PQ (4, 4) of a query in the frame of a place.
 
-        Returns None if the two scans have no filled column in common.
+        Polar contexts give the heading; the lateral offset is zero, or that of
+        the augmented copy that fits best. Cartesian contexts give the lateral
+        offset; the heading is zero, or half a turn if the augmented copy fits
+        best. The result is None if no column is filled in both contexts.
         """
         chosen = np.flatnonzero(database.places == place)
         similarities, shifts = self._compare(query, database, chosen)

@@ -72,10 +72,10 @@ class PairEvidence:
 
     @property
     def visible_change(self) -> tuple[float, int]:
-        """Mean visible change, and the number of queries with a match.
+        """Mean visible change of queries with a match, and their number.
 
-        The visible change is the share of a query's scan that its right place
-        does not show.
+        The visible change of a query is the share of its scan that the scan of
+        its right place does not show, 1 minus the overlap.
         """
         return mean_visible_change(self.overlaps)
 

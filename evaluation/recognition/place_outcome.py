@@ -40,8 +40,9 @@ class PlaceOutcome:
         is_gated: whether the gate was used, which rejects places that lie too
             far away by the method's own pose estimate.
         outcomes: outcomes of Q queries.
-        columns: columns of `queries.csv`, (Q,) each. If unknown, an index is -1
-            and any other number NaN or infinite.
+        columns: name of a column of `queries.csv` -> (Q,) values. An unknown
+            value is -1 for a frame, infinite for a rank, and NaN for other
+            numbers.
         pose_errors: errors of the poses at the best places.
         radius: radius of a match [m].
     """

@@ -65,13 +65,16 @@ class Reference:
 
     Attributes:
         title: the source's name in the report.
-        counting: in words, which queries the source counted for each method
-            (the modes); used only if there are published results.
+        counting: in words, for which methods the source counted all queries,
+            and for which only those with a match; used only if there are
+            published results.
         changes: (map, earlier stage, later stage) -> TCR_sym.
         further: published changes without place recognition: label, stages and
             TCR_sym.
-        recognitions: (map, database, query, method, mode) -> numbers; each
-            method has one mode.
+        recognitions: (map, database, query, method, mode) -> numbers. The mode
+            says which queries the source counted, see
+            `PlaceRecognitionMetrics`; it is the same for all results of a
+            method.
         protocols: method -> protocol by which the source ran it, including the
             number of scans per place.
         judge: function that returns verdicts on all claims that a report's

@@ -398,11 +398,12 @@ class Ranked(NamedTuple):
 def ranking(
     rows: Iterable[Row], *, least_first: bool = False
 ) -> tuple[list[Ranked], np.ndarray]:
-    """Returns methods ranked by their means over the conditions they share.
+    """Returns methods ranked by their means over conditions.
 
-    The bootstrap draws maps if there are several, and conditions otherwise.
-    Each sample is the same for all methods. If there is a single condition, the
-    interval is that of its row.
+    Only conditions count that were measured with all methods. The intervals of
+    the means come from a bootstrap, whose samples are the same for all methods.
+    It draws maps if there are several, and conditions otherwise. For a single
+    condition, the intervals are those in the rows.
 
     Args:
         rows: rows of one metric.
@@ -410,8 +411,8 @@ def ranking(
             first.
 
     Returns:
-        The methods, the best first; and their means (B, M) in the samples. Both
-        are empty if no condition was measured with all methods.
+        The M methods, the best first; and (B, M) the mean of each method in
+        each bootstrap sample. Both are empty if no condition counts.
     """
     table: dict[tuple, dict[str, Row]] = {}
     for row in rows:

@@ -221,9 +221,9 @@ class Answers(Key):
     """The answers of a method to Q queries.
 
     Attributes:
-        columns: name of a column of `queries.csv` -> (Q,) values. An empty cell
-            is NaN in a column of real numbers, and -1, NaN or infinity in a
-            column of whole numbers.
+        columns: name of a column of `queries.csv` -> (Q,) values. An unknown
+            value is NaN; in columns of integers it can also be -1 or infinite.
+            In the file, such a value is an empty cell.
     """
 
     columns: Mapping[str, np.ndarray]
@@ -344,7 +344,12 @@ class Results:
 
 @dataclass(frozen=True)
 class QueryRows:
-    """A table of queries: the names of its factors, and all outcomes.
+    """The table in a file `queries.csv`.
+
+    Attributes:
+        factors: names of the columns that are factors of the experiment, such
+            as `query.transient.snow`.
+        answers: the answers of each method in each condition.
 
     Example:
         from evaluation import QueryRows

@@ -492,8 +492,8 @@ class SurveyFiles:
         The file contains a `PlacedDrive` and a `DescribedDrive`.
 
         Args:
-            key: key of the method, for a second protocol with the name of the
-                protocol (see `evaluation.study.surveys.described_key`).
+            key: key of the method. For descriptions by a second protocol, the
+                result of `evaluation.study.surveys.described_key`.
         """
         return Part(self.folder / f"described_{file_name(key)}.data")
 

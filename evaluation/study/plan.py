@@ -106,14 +106,20 @@ class Study:
     ) -> Path:
         """Writes the report, once all jobs are done.
 
-        Files: `report.html`, which holds everything; `report.md`; `survival`,
-        `tcr`, `place_recognition` and `poses`, and with costs `costs`, each as
-        .csv (all numbers), .md and .tex; `results.csv`, the one table of all
-        studies; `metrics.csv`, the metrics of other benchmarks;
-        `differences.csv`, the differences between methods; `why.csv`, the
-        reasons for wrong best places; `queries.csv` and
-        `queries_unchanged.csv`, every query of the pairs and of their controls;
-        and those figures that do not exist yet in the folder `figures`.
+        The report consists of these files:
+
+        - `report.html`: the whole report, in one file.
+        - `report.md`: the report as Markdown.
+        - Tables, each as .csv (with all numbers), .md and .tex: `survival`,
+          `tcr`, `place_recognition`, `poses`, and `costs` if costs were
+          measured.
+        - `results.csv`: the results, in the same form as those of studies.
+        - `metrics.csv`: the metrics of other benchmarks.
+        - `differences.csv`: the differences between methods.
+        - `why.csv`: the reasons for wrong best places.
+        - `queries.csv`, `queries_unchanged.csv`: each query of the pairs of
+          drives, and of their controls.
+        - `figures`: a folder with figures. Figures that exist are kept.
 
         Args:
             pages: name of a recording -> address of its 3-D page, relative to

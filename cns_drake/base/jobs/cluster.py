@@ -69,7 +69,7 @@ class Cluster:
         return self.num_workers if self.scheduler is None else None
 
     def connect(self, listener: Listener) -> AbstractContextManager[Workers]:
-        """Returns the workers of the cluster, until the context ends.
+        """Returns a context manager whose value is the workers of the cluster.
 
         Raises:
             InputError: if the scheduler does not answer.

@@ -303,23 +303,23 @@ def _turned(
 class CalibratedTurn:
     """The N beams of a turn, with the errors of their lasers.
 
-    Some arrays are in firing order, others in the order in which rays are cast
-    (casting order), as noted below.
+    The arrays `reported`, `p_SLset`, `range_error` and `gain` are in the order
+    in which the beams fire. All other attributes refer to the order in which
+    rays are cast (`packet_order` of the `Beams`).
 
     Attributes:
-        d_Sset: (N, 3) true unit directions of the beams in S, in casting order.
-        height: (N,) height of each beam's laser above the origin of S, in
-            casting order [m].
-        blocks: pairs of a laser height and a slice: the rows, in casting order,
-            of consecutive beams whose lasers have this height.
-        reported: (N, 3) unit directions that the unit reports, in firing order.
-        p_SLset: (N, 3) position of each beam's laser, in firing order [m].
-        beam: (N,) for each beam in casting order, its number in firing order.
-        orders: (2, N) the beams' rows in casting order, sorted in two ways: by
-            casting, and by firing. Beams that are consecutive in one of them
-            count as neighbours.
-        range_error: (N,) range error of each beam's laser, in firing order [m].
-        gain: (N,) gain of each beam's laser, in firing order.
+        d_Sset: (N, 3) true unit directions of the beams in S.
+        height: (N,) height of each beam's laser above the origin of S [m].
+        blocks: for each run of consecutive beams at the same laser height: this
+            height, and a slice that selects the beams.
+        reported: (N, 3) unit directions in S that the unit reports.
+        p_SLset: (N, 3) position of each beam's laser in S [m].
+        beam: (N,) number of each beam in firing order.
+        orders: (2, N) indices of the beams: 0, 1, ..., N - 1; and the indices
+            sorted by firing. Beams that are consecutive in one of these two
+            sequences are neighbours for `find_sides`.
+        range_error: (N,) range error of each beam's laser [m].
+        gain: (N,) gain of each beam's laser.
     """
 
     def __init__(

@@ -88,15 +88,18 @@ def start_ways(
     sides: Sides,
     side_hits: BeamHits,
 ) -> tuple[list[Light], Ways, BeamHits]:
-    """Splits the first hits of beams into returned light and further rays.
+    """Returns the light from the surfaces that beams hit first.
 
-    Opaque surfaces return light. Rays that hit panes or leaves go on.
+    A beam is represented by a ray along its axis and, near edges, by additional
+    rays; each ray carries a fraction of the beam's light. Opaque surfaces
+    return the light. Rays that hit panes or leaves can be followed further.
 
     Args:
         shots: the beams.
-        rest: (N,) fraction of each beam's light that its axis represents.
-        hits: hits of the beams' axes.
-        sides: additional rays at edges.
+        rest: (N,) fraction of its beam's light that the ray along the axis
+            carries.
+        hits: hits of the rays along the axes.
+        sides: the additional rays.
         side_hits: hits of the additional rays; rays without a hit are ignored.
 
     Returns:

@@ -158,7 +158,8 @@ class Jobs:
 
         Args:
             pair: the pair; without distractors, the result is empty.
-            needs: list to which the names of the added jobs are appended.
+            needs: list to which the names of the jobs are appended that
+                describe these drives.
 
         Returns:
             For each drive, one file for each method.
