@@ -24,13 +24,14 @@ _SEEN = 60.0
 
 
 def street_views(aged: AgedMap) -> dict[str, View]:
-    """Returns views from where many changed buildings can be seen.
+    """Returns camera views that show many changed buildings.
 
-    They look ahead from places along the map's last drive that are not close
-    together.
+    The cameras stand on the path of the map's last drive, not close together,
+    and look in the direction of travel.
 
     Returns:
-        Name of the view, `street_1` onwards in the order of the drive -> view.
+        Name -> view. The names are `street_1`, `street_2` and so on, in the
+        order in which the drive passes the cameras.
     """
     way = aged.trajectory
     times = np.linspace(0.0, way.duration, int(way.length / _SPACING) + 2)[:-1]

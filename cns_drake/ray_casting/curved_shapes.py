@@ -288,7 +288,7 @@ def _meet_capsule(
     nearest = np.full(len(d), np.inf)
 
     def take(distance: np.ndarray, end: float) -> None:
-        """Takes the distances that lie on one part of the capsule.
+        """Updates `nearest` by ranges (N,) that end on one part of the capsule.
 
         `end` is -1 or 1 for the half ball at that end, 0 for the straight part.
         """

@@ -160,9 +160,10 @@ class RayCastingScene:
         times: np.ndarray = _AT_ONCE,
         with_normals: bool = False,
     ) -> RayHits:
-        """Casts N rays from one or several poses of a sensor S.
+        """Returns the first hits of N rays from one or several poses of S.
 
-        Ray i has direction i. From every other array of length n it uses entry
+        S is a sensor, such as a LiDAR, which may move during its turn. Ray i
+        has direction i. From every other array of length n it uses entry
         i mod n.
 
         Args:
@@ -170,10 +171,10 @@ class RayCastingScene:
             d_Sset: (N, 3) unit directions, expressed in S.
             max_range: greatest range [m], one for all rays or (M,).
             R_WSset: (3, 3) or (L, 3, 3) orientations of S in the world.
-            times: (T,) times at which rays are cast, as fractions of the turn,
-                from 0 to 1.
-            with_normals: also return the normals of the surfaces, as they
-                are at the start of the turn.
+            times: (T,) times at which rays are cast, from 0 at the start of the
+                sensor's turn to 1 at its end; by default 0.
+            with_normals: whether to return also the normals of the surfaces, as
+                they are at the start of the turn.
 
         Raises:
             ValueError: N is not a multiple of K, L, M or T.

@@ -31,14 +31,16 @@ class RecordingFolder:
         return self.metadata.is_file()
 
     def check(self, overwrite: bool) -> None:
-        """Raises an error if a recording must not be written to the folder.
+        """Checks that a recording may be written to the folder.
 
-        Without `overwrite`, it must not be written if the folder contains a
-        finished recording, or only files that do not belong to a recording of
-        this name.
+        Args:
+            overwrite: whether the folder may contain anything.
 
         Raises:
-            InputError: the folder must not be used, or cannot be read.
+            InputError: the folder cannot be used, contains a finished
+                recording, or contains files none of which belongs to a
+                recording of this name. With `overwrite`, only if the folder
+                cannot be used.
         """
         with user_errors(self.path):
             if not self.path.is_dir():

@@ -478,10 +478,11 @@ class PairOfDrives:
 
 
 def control_drive(drive: Scenario, stage: str) -> Scenario:
-    """Returns a drive on the same route, by the same driver, in another stage.
+    """Returns a copy of a drive that goes through another stage of the map.
 
-    Compared with the usual drive of that stage, it shows the effect of the
-    route alone: the city is the same.
+    Route and driver stay the same. A comparison of the copy with the usual
+    drive of the other stage shows the effect of the route alone, because both
+    go through the same city.
 
     Args:
         drive: the drive.
@@ -564,14 +565,15 @@ def frozen_drives(table: str) -> dict[tuple[str, int], str]:
 def check_frozen(
     table: str, compared: Mapping[tuple[str, int], Sequence[str]]
 ) -> None:
-    """Checks that drives still have the fingerprints in a table.
+    """Checks that the drives of a comparison are those listed in a table.
 
     Maps that are not in the table are not checked.
 
     Args:
-        table: name of a file in the folder of the shipped worlds.
-        compared: (map, level of the change) -> fingerprints of the compared
-            drives.
+        table: name of a file in the folder of the shipped worlds; see
+            `frozen_drives`.
+        compared: (map, level) -> fingerprints of the compared drives. Levels
+            are degrees of difficulty, see `docs/levels.md`.
 
     Raises:
         InputError: a fingerprint differs from the table's.

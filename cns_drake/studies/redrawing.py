@@ -198,7 +198,11 @@ class RedrawCity(MakeMap):
         return redrawn_inputs(self.map_folder, self.stage, self.seed)
 
     def finish_inputs(self, draft: Path) -> None:
-        """Writes the inputs that depend on the city, after it is drawn.
+        """Writes inputs that depend on the city's structures; by default none.
+
+        An example is `stages.yaml`, which contains names of structures. This
+        method is called between writing the files of `inputs` and generating
+        the city.
 
         Args:
             draft: folder of the map, before it gets its final name.

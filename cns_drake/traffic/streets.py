@@ -311,12 +311,12 @@ class EgoBox(NamedTuple):
 def make_streets(
     graph: LaneGraph, box: EgoBox, xy: np.ndarray, yaw: np.ndarray
 ) -> Streets:
-    """Returns the arrays of a lane graph, and of the ego car at K steps.
+    """Converts a lane graph and the ego car's motion to arrays for numba.
 
     Args:
         graph: the lanes.
         box: the ego car's box.
-        xy: (K, 2) positions of the ego car's frame [m].
+        xy: (K, 2) positions of the ego car's frame, one for each time step [m].
         yaw: (K,) headings of the ego car [rad].
     """
     pieces = graph.pieces

@@ -165,7 +165,7 @@ def in_one_world(
             differ; the alternatives are `always` and `never`.
         track: reports progress.
         hold_first: whether the first drive must stay where it is, see `align`.
-        across_maps: whether the drives may be of maps of different names.
+        across_maps: whether the drives may be from maps with different names.
 
     Raises:
         InputError: the drives should be aligned, but that failed.

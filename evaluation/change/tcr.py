@@ -252,8 +252,10 @@ def temporal_change(
         target: (M, 3) float64 voxel centroids of the other map [m].
         tau: distance up to which a point is unchanged, inclusive [m].
         margin: distance by which the convex hulls are widened [m].
-        restrict_to_hull: whether O is counted inside H. False is the literal
-            equation 2, under which values may be negative.
+        restrict_to_hull: whether unchanged points count only if they lie in
+            the convex hull of the other map. With False, all unchanged points
+            count, as equation 2 of the paper literally says, and ratios can be
+            negative.
 
     Returns:
         The labels of all points; the ratios follow from them.

@@ -101,7 +101,7 @@ def aligned(
         drives: the two drives.
         when: whether to align them: `auto` (if their world frames differ),
             `always` or `never`.
-        across_maps: whether the drives may be of maps of different names.
+        across_maps: whether the drives may be from maps with different names.
     """
     from evaluation.alignment import in_one_world
 

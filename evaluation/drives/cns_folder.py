@@ -49,9 +49,10 @@ _TOLERANCE_NS = 1000
 class CnsFolderDrive(FileDrive):
     """A drive in the published layout of CNS.
 
-    The mount of the LiDAR is read from `transformation_lidar.yaml`, next to the
-    drive or up to two folders above it. Without such a file, the LiDAR is
-    mounted as in the data set: 1.6 m above the vehicle.
+    The pose X_BS of the LiDAR in the vehicle's frame is read from
+    `transformation_lidar.yaml`, next to the drive or up to two folders above
+    it. Without such a file, the LiDAR is 1.6 m above the origin of the
+    vehicle's frame, as in the data set.
     """
 
     def __init__(self, path: Path, columns: int | None = None):

@@ -59,10 +59,11 @@ _LABEL = np.dtype([("label", "<u2"), ("instance", "<u2")])
 class KittiDrive(BinDrive):
     """A drive of KITTI odometry.
 
-    Poses of the LiDAR are X_S0S = inverse(Tr) X_C0C Tr. W is S0, the frame of
-    the LiDAR at the first scan. It is not that of the camera, so that z is up.
-    If there is a `first_pose.txt`, W is the world of the recording. If there
-    are `labels`, points have the fields `label` and `instance`.
+    The files contain camera poses X_C0C. They become LiDAR poses
+    X_S0S = inverse(Tr) X_C0C Tr. The world frame W is S0, the frame of the
+    LiDAR at the first scan, whose z is up. With a file `first_pose.txt`, which
+    cns-drake exports, W is the world frame of the recording instead. With a
+    folder `labels`, points have the fields `label` and `instance`.
     """
 
     def __init__(self, path: Path, columns: int | None = None):

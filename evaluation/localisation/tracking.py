@@ -38,18 +38,19 @@ def drifting_steps(
 ) -> np.ndarray:
     """Returns the motion between poses as a drifting odometry measures it.
 
-    For each 100 m of path, one scale error applies to all lengths and one drift
-    rate to the heading. Both are drawn from normal distributions, with standard
-    deviations of `drift` and of `drift` deg per metre.
+    The odometry has a scale error of lengths and a drift rate of the heading
+    [deg/m]. They are drawn anew every 100 m of path, from normal distributions
+    of mean 0 and standard deviation `drift`.
 
     Args:
-        X_WS: (N, 4, 4) true poses.
+        X_WS: (N, 4, 4) true poses of the LiDAR.
         way: (N,) length of the path up to each pose [m].
-        drift: drift as a share of the path; 0 for none.
-        seed: seed of the draw.
+        drift: standard deviation of the errors; 0 for none. For example,
+            0.01 gives 1 % of the length, and 0.01 deg/m.
+        seed: seed of the draws.
 
     Returns:
-        (N - 1, 4, 4) poses of the LiDAR relative to its previous pose.
+        (N - 1, 4, 4) pose of the LiDAR in its frame at the previous pose.
     """
     steps = poses.inverse(X_WS[:-1]) @ X_WS[1:]
     part = (way[1:] // _DRIFT_LENGTH).astype(np.int64)

@@ -77,21 +77,20 @@ class HeightImage(NamedTuple):
 
 
 def image_axes(normal: np.ndarray, orthogonal: bool) -> np.ndarray:
-    """Returns the directions of an image on a plane, (3, 3) of length 1.
+    """Returns three unit vectors that span an image on a plane, (3, 3).
 
-    The rows of the result are: the direction in which row numbers increase; the
-    direction in which column numbers increase, which is the x axis projected
-    onto the plane; and the normal.
+    Row 0 of the result is the direction in which the row numbers of the image
+    increase, row 1 the direction in which its column numbers increase, and row
+    2 the normal. Row 1 is the x axis, moved vertically onto the plane.
 
-    In the public program, a wrong term gives the second direction a component
-    along the normal, equal to the normal's y component. Keypoints then lie on a
-    plane through the same center that is tilted by that much: on nearly level
-    ground, by about the slope of the ground itself. This function copies the
-    wrong term unless `orthogonal` is true.
+    In the authors' public program, a wrong term makes row 1 not quite
+    orthogonal to the normal. Keypoints then lie on a plane that is tilted by
+    about the slope of the ground.
 
     Args:
         normal: (3,) unit normal of the plane, z >= 0.
-        orthogonal: whether to make all directions orthogonal.
+        orthogonal: whether row 1 is orthogonal; otherwise it has the program's
+            error.
     """
     a, b, c = normal
     if orthogonal:
@@ -314,13 +313,13 @@ class Triangles:
 class TriangleTable:
     """The triangles of some clouds, sorted by cell.
 
-    A cell holds the triangles whose sides, in units of the resolution, round
-    to the same three numbers.
+    A cell contains the triangles whose sides round to the same multiples of
+    the resolution.
 
     Attributes:
         triangles: the T triangles.
         clouds: (T,) number of each triangle's cloud.
-        resolution: length that is one unit of the sides [m].
+        resolution: step to which the sides are rounded [m].
         tree: search tree over the sides [m].
     """
 
@@ -392,13 +391,14 @@ def make_triangles(
 
 
 def make_table(clouds: Sequence[Triangles], resolution: float) -> TriangleTable:
-    """Returns the triangles of several clouds, sorted by cell.
+    """Returns the triangles of several clouds, sorted for the search.
 
-    Triangles within a cell keep their order.
+    Triangles whose sides round to the same multiples of the resolution form a
+    cell. Triangles are sorted by cell, and keep their order within a cell.
 
     Args:
         clouds: triangles of each cloud; at least one.
-        resolution: length that is one unit of the sides [m].
+        resolution: step to which the sides are rounded [m].
     """
     triangles = Triangles(
         np.concatenate([cloud.sides for cloud in clouds]),

@@ -208,10 +208,11 @@ class LayeredOverlap(Method[LayeredScan, LayeredDatabase]):
         database: LayeredDatabase,
         places: Sequence[int],
     ) -> list[np.ndarray | None]:
-        """Returns, for each of several places, the pose of the query's LiDAR.
+        """Returns the poses X_PQ (4, 4) of a query's LiDAR at several places.
 
-        A pose consists of a heading and a horizontal translation; None if one
-        of the two scans has no filled cell.
+        X_PQ is relative to the LiDAR at the place. It consists of a yaw and a
+        horizontal translation. It is None if the scan of the query or of the
+        place has no filled cell.
         """
         scans = [database.places[place] for place in places]
         poses: list[np.ndarray | None] = [None] * len(scans)

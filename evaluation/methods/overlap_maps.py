@@ -182,20 +182,20 @@ def coarse_maps(
     halvings: int,
     maps: np.ndarray,
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Returns coarse maps of a scan at several headings, one word per row.
+    """Returns coarse occupancy maps of a scan, turned to several headings.
 
     Args:
-        cells: (M,) uint16, see `layer_cells`.
-        starts: (layers + 1,) index at which each layer begins and the last
-            ends.
-        turns: (H, 2) int64 by which the cells are turned about the sensor.
+        cells: (M,) uint16 occupied cells of all layers, see `layer_cells`.
+        starts: (layers + 1,) index of each layer's first cell, then M.
+        turns: (H, 2) int64 cosines and sines of the angles by which the scan is
+            turned about the sensor, in units of 2^-14; see `turns`.
         halvings: how often the number of rows and columns is halved; at
-            least 2.
+            least 2, since a row must fit into 64 bits.
         maps: (layers,) int64, number of the map into which each layer is drawn.
 
     Returns:
-        (H, R, S) uint64, R rows of S maps, in which bits are columns; and (H,
-        S) int64, number of bits set in each map.
+        (H, R, S) uint64, the R rows of S maps; bit k of a row is set if column
+        k is occupied. And (H, S) int64, number of bits set in each map.
     """
     rows, num_maps = GRID >> halvings, maps.max() + 1
     bits = np.zeros((len(turns), rows, num_maps), np.uint64)

@@ -132,8 +132,9 @@ class RingPlusPlus(Method[Ring, RingDatabase]):
       limits of their formulas. In the authors' program, which has single
       precision, rounding makes about one in ten of these values NaN, and such
       points are skipped.
-    - Rays sample the map from above until it is zero. The program's rays end at
-      the edge of the map, where rounding adds or drops a sample.
+    - The Radon transform interpolates between the last pixels of the map and
+      zeros around the map. In the authors' program, rays end at the edge of the
+      map, where rounding adds or drops a sample.
     - If there are fewer points than `neighbours`, all points are neighbours.
     - A place with an empty map is never a candidate, and a query with an empty
       map has no candidates.
@@ -190,10 +191,11 @@ class RingPlusPlus(Method[Ring, RingDatabase]):
     def relative_poses(
         self, query: Ring, database: RingDatabase, places: Sequence[int]
     ) -> list[np.ndarray | None]:
-        """Returns, for each of several places, the pose of the query's LiDAR.
+        """Returns the poses X_PQ (4, 4) of a query's LiDAR at several places.
 
-        A pose consists of a heading and a horizontal translation; None if the
-        map of one of the two scans is empty.
+        X_PQ is relative to the LiDAR at the place. It consists of a yaw and a
+        horizontal translation. It is None if the map of the query or of the
+        place is empty.
         """
         if len(query.filled) == 0:
             return [None] * len(places)

@@ -19,14 +19,16 @@ def convolve(
     step: int = 1,
     at: np.ndarray | None = None,
 ) -> np.ndarray:
-    """Returns the features of a convolution, (M, channels out).
+    """Returns the result of a sparse convolution, (M, channels out).
 
     Args:
-        cells: (N, 3) int64 distinct cells, each index below 2^20.
-        features: (N, channels in) features of the cells.
-        kernel: (offsets, channels in, channels out) weights.
-        step: distance of neighbouring cells.
-        at: (M, 3) cells of the result; None for `cells`.
+        cells: (N, 3) int64 indices of the occupied cells, without repetition
+            and below 2^20.
+        features: (N, channels in) features of the occupied cells.
+        kernel: (k^3, channels in, channels out) weights of a kernel with k
+            cells along each axis; x varies fastest.
+        step: difference of the indices of two neighbouring cells.
+        at: (M, 3) indices of the cells of the result; by default `cells`.
     """
     at = cells if at is None else at
     size = round(len(kernel) ** (1 / 3))

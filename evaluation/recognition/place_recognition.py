@@ -143,7 +143,7 @@ def run(
             (`filtered`).
         protocol: protocol of the comparison.
         track: reports progress.
-        across_maps: whether the drives may be of maps of different names.
+        across_maps: whether the drives may be from maps with different names.
         overlaps: (Q, D) share of each query's scan that each place's scan
             shows; by default computed from the scans. Used only for matches by
             overlap.

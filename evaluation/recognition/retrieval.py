@@ -106,7 +106,7 @@ def retrieve(
         method: method that describes and compares the scans.
         protocol: protocol of the comparison.
         track: called with the progress.
-        across_maps: whether the drives may be of maps with different names.
+        across_maps: whether the drives may be from maps with different names.
         overlaps: (Q, D) share of each query's scan that each place's scan
             shows; by default computed from the scans. Used only for matches by
             overlap.

@@ -121,10 +121,12 @@ class SeenSurfaces:
     def clearances(self, points: np.ndarray) -> np.ndarray:
         """Returns how far points (N, 3) lie in front of a surface, (N,) [m].
 
-        The distance is perpendicular to the plane of the three nearest returns
-        or, at edges and with fewer returns, along the line of sight to the
-        nearest of these returns. It is negative behind the surface, infinite
-        where no return is near, and NaN for a point between two surfaces.
+        The surface is known from the returns that are nearest in direction. The
+        distance is perpendicular to the plane through three of them. At edges,
+        and with fewer than three returns, it is along the line of sight: to the
+        nearest return in front of all of them, to the farthest behind them. It
+        is negative behind the surface, infinite without a return in a similar
+        direction, and NaN for a point between two surfaces.
 
         Args:
             points: (N, 3) points in this sensor's frame [m].

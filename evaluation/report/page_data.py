@@ -159,10 +159,9 @@ def make_drive(
 def camera_images(
     drive: Drive, stamps_ns: np.ndarray, on_note: Callable[[str], None]
 ) -> CameraImages | None:
-    """Returns the images of a drive's camera that are nearest to frames.
+    """Returns the camera images that are nearest in time to given frames.
 
-    Nearest means nearest in time. The result is None for a drive without a
-    camera.
+    The result is None if the drive has no camera, or no image can be decoded.
 
     Args:
         drive: the drive.

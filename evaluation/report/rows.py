@@ -204,15 +204,15 @@ class Survival(NamedTuple):
     after: Mapping[str, Row]
 
     def number(self, side: str, metric: str, end: str = "value") -> float:
-        """Returns a number of the method, with or without the change.
+        """Returns the value of a metric, or a limit of its 95 % interval.
 
         Args:
-            side: `before` (without the change) or `after` (with it).
-            metric: name of the number.
-            end: `value`, or `low` or `high` for a limit of its 95 % interval.
+            side: `before` (without the change) or `after` (with the change).
+            metric: name of the metric.
+            end: `value`; or `low` or `high` for a limit of the interval.
 
         Returns:
-            The number; NaN if it is unknown.
+            The value or limit; NaN if it is unknown.
         """
         row = getattr(self, side).get(metric)
         return math.nan if row is None else getattr(row, end)

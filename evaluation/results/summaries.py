@@ -279,10 +279,10 @@ def _curve_of(
 def paired_values(results: Results, x: str, y: str) -> list[tuple[Row, float]]:
     """Returns the rows of the metric `y`, each with a value of `x`.
 
-    If `x` is a factor, the value is that of the row itself. If it is a metric,
-    the value was measured in the same condition: for the same method and gate,
-    or else without the gate, or else without a method (such as `tcr_sym`). Rows
-    for which there is no value of `x` are left out.
+    `x` is a factor or another metric. The value of a metric comes from a row
+    with the same condition and, in this order of preference: the same method
+    and gate; the same method without the gate; no method, such as a row of
+    `tcr_sym`. Rows for which there is no value of `x` are left out.
     """
     wider: tuple[tuple[str, ...], ...] = (
         ("task", "protocol"),
@@ -452,11 +452,12 @@ def summarised(
     queries: QueryRows | None,
     charts: Iterable[Mapping[str, Any]],
 ) -> list[Summary]:
-    """Returns the numbers behind an experiment's charts.
+    """Returns numbers that sum up an experiment's charts.
 
-    For charts of the kind `lines`, these are lifetimes (metric `kept`) or
-    growth exponents (CPU times); for scatter plots, they are correlations. For
-    combined kinds of change, excesses are added.
+    A scatter plot gives `correlations`. A chart of the kind `lines` gives
+    `lifetimes` if its metric is `kept`, and `growths` if its metric is a CPU
+    time; other charts give nothing. If the experiment has kinds of change as a
+    factor, `excesses` are added, which need `queries`.
     """
     found = []
     for chart in charts:

@@ -153,14 +153,17 @@ class Key:
         return ", ".join((self.method, *settings))
 
     def but(self, *names: str) -> tuple[object, ...]:
-        """Returns the values of all columns of the key except the given ones.
+        """Returns the key without some of its columns, to group rows by.
 
-        Rows with equal results belong to the same condition apart from these
-        columns.
+        Two rows with equal results were measured under the same condition,
+        except for these columns.
 
         Args:
             names: names of the columns to leave out. With `method`, its
                 settings, such as `methods.ring++.crop`, are left out as well.
+
+        Returns:
+            The values of the remaining columns, in a fixed order.
         """
         known = [name for name in KEYS if name not in names]
         without_settings = "method" in names

@@ -233,10 +233,12 @@ def keyed(
     keys: Mapping[str | tuple[str, str], _Key],
     value: Callable[[_Item, _Key], object],
 ) -> Columns[_Item]:
-    """Returns table columns that differ only in a key, for `Table.of`.
+    """Returns similar columns for `Table.of`, such as one for each method.
+
+    All cells come from one function. Each column passes its own key to it.
 
     Args:
-        keys: name of a column -> its key.
+        keys: name of a column -> its key, such as the name of a method.
         value: function that returns a cell, given the item of the row and the
             key of the column.
     """

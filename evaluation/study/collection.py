@@ -88,9 +88,10 @@ class Run:
 
     @property
     def repeats(self) -> bool:
-        """Whether the run repeats another run by another protocol.
+        """Whether this is a method's second run on the same pair of drives.
 
-        The other protocol is that of published numbers.
+        The first run is by the study's protocol. The second run is by the
+        protocol of published numbers, for a comparison with them.
         """
         return self.queries != self.method.key
 

@@ -200,9 +200,11 @@ class _Shown:
         return cKDTree(self.standing, balanced_tree=False, compact_nodes=False)
 
     def coinciding(self, points: np.ndarray) -> float:
-        """Returns the share of points that coincide with upright objects.
+        """Returns the share of given points that coincide with this scan.
 
-        The points (N, 3), N > 0, are in the frame of the sensor [m].
+        A point coincides if it is at most 1 m from a point of the scan on an
+        upright object. The points (N, 3), N > 0, are in the frame of this
+        scan's sensor [m].
         """
         found, _ = self.tree.query(points, distance_upper_bound=_COINCIDENT)
         return float(np.isfinite(found).mean())

@@ -116,12 +116,13 @@ class Jobs:
         *,
         kept: bool = False,
     ) -> DescribedSource:
-        """Returns where a job finds the descriptions of a drive.
+        """Returns where a job gets the descriptions of a drive's scans from.
 
-        If several pairs need the descriptions, the result is the files (`Part`)
-        with the scans and with each method's descriptions; a job that writes
-        them is added. Otherwise it is the source of the drive, and the job that
-        needs the descriptions makes them itself.
+        If several pairs need the descriptions, this function adds a job that
+        writes them, and returns the files: first that with the scans, then one
+        for each method. If only one pair needs them, the function returns the
+        source of the drive, and the job of this pair makes the descriptions
+        itself.
 
         Args:
             drive: the drive.
