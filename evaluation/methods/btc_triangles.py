@@ -181,7 +181,7 @@ def height_image(
 def peaks(
     num_heights: np.ndarray, min_heights: int
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Returns the cells with the most layers nearby that are not on a line.
+    """Returns the peaks of an image: cells that have points in many layers.
 
     The image is divided into square segments, each of which has at most one
     peak: the cell that has points in the most layers, or the first of several

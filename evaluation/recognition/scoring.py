@@ -59,10 +59,10 @@ def gated(
     """Returns the scores (D,) after the gate, one array for each radius.
 
     The gate rejects places that are too far from the query according to the
-    method's own pose estimate: their scores become NaN. The same happens to all
-    places but the best `NUM_GATED`. A place for which the method estimates no
-    pose keeps its score. If the method estimates no pose at all, all scores
-    stay the same.
+    method's own pose estimate: their scores become NaN. Only the best
+    `NUM_GATED` places are tested; all other scores become NaN, too. A place for
+    which the method estimates no pose keeps its score. If the method estimates
+    no pose at all, all scores stay the same.
 
     A score s becomes s - (1 - w) |s|, where the weight w falls from 1 to 0 as
     the estimated distance passes the radius (see `gate_weight`). Positive

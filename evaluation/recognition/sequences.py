@@ -21,11 +21,11 @@ def along_the_way(
     """Returns scores (Q, D) that are averaged along the path.
 
     The new score of query q and place p is the mean of their own score and of
-    scores of earlier queries. A query at the distance d before q contributes
-    its score for the place at the distance d before p, along the database's
-    path. This holds if both drives go in the same direction; in the opposite
-    direction, it is the place at the distance d after p. Both means are
-    computed, and the better one is the new score.
+    scores of earlier queries. For two drives in the same direction, an earlier
+    query contributes its score for the place at the distance d before p, where
+    d is the distance from the earlier query to q. For two drives in opposite
+    directions, the place at the distance d after p is used instead. The new
+    score is the better of the two means. Distances are along the paths.
 
     An earlier query is left out of the mean if it has no candidates, or if the
     database's path ends within the distance d from p. If an earlier query has
