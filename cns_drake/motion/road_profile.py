@@ -31,21 +31,25 @@ _OVER_LAYERS = 0.03611499185872766
 
 
 class RoadProfile:
-    """Random heights of road surfaces, determined by place and seed.
+    """Random unevenness of road surfaces, determined by place and seed.
 
-    The heights are a sum of layers. A layer is a cubic B-spline over a square
-    lattice; its coefficients are independent normal numbers of variance s^2. If
-    the lattice has the spacing h, the spectrum of the layer along any line, at
-    the spatial frequency n [1/m], is nearly 2 s^2 h sinc(n h)^8 151/315: flat
-    up to n = 0.2 / h, and then falling steeply. From layer to layer, the
-    spacing doubles and the variance s^2 grows like h. The levels of the spectra
-    then grow like h^2, and the spectrum of the sum falls like n^-2: this is
-    G_d(n) = G_d(n0) (n / n0)^-2 of ISO 8608, with ripples of 1.5 %.
-
-    Each lattice is rotated and shifted at random, so that no street runs along
-    all lattices. A layer repeats after 512 nodes; this shows only on a street
-    along the layer's lattice.
+    Along any line, the heights have the power spectral density of ISO 8608,
+    G_d(n) = G_d(n0) (n / n0)^-2, with ripples of 1.5 %, for wavelengths 1 / n
+    from 0.35 to 90 m. Here n is the spatial frequency [1/m], n0 = 0.1 / m, and
+    G_d(n0) depends on the roughness class.
     """
+
+    # The heights are a sum of layers. A layer is a cubic B-spline over a square
+    # lattice; its coefficients are independent and normally distributed with
+    # the variance s^2. The spectrum of a layer with the spacing h is nearly
+    # 2 s^2 h sinc(n h)^8 151/315 along any line: flat up to n = 0.2 / h, and
+    # then falling steeply. From layer to layer, h doubles and s^2 grows in
+    # proportion to h. The spectra's levels therefore grow like h^2, and the
+    # spectrum of the sum falls like n^-2.
+    #
+    # Each lattice is rotated and shifted at random, so that no street runs
+    # along all lattices. A layer repeats after 512 nodes; this shows only on a
+    # street along the layer's lattice.
 
     def __init__(self, roughness: RoughnessClass, seed: int):
         """Draws the coefficients of all layers."""

@@ -129,16 +129,19 @@ class Suspension:
 
     The body heaves, rolls and pitches. Each wheel moves up and down between its
     spring and its tyre. The coordinates are the heave of the body, positive
-    upwards; its roll and pitch about x and y of B (positive with the right side
-    down and the nose down); and the heights of the wheels. All coordinates are
-    zero at rest on a level road. The body rotates about the point on the ground
-    below its centre of mass, as in the source of the shipped rates. The model
-    has no anti-dive or anti-squat geometry.
-
-    Let q be the vector of the coordinates, and g q the stretch of a spring with
-    the rate k, where g is a row vector. The stiffness matrix is the sum of k g'
-    g over all springs, and the damping matrix is the same sum over all dampers.
+    upwards [m]; its roll and pitch about x and y of B, positive with the right
+    side down and the nose down [rad]; and the heights of the wheels [m]. All
+    coordinates are zero at rest on a level road. The body rotates about the
+    point on the ground below its centre of mass. The model has no anti-dive or
+    anti-squat geometry.
     """
+
+    # The source of the shipped rates has the same centre of rotation.
+    #
+    # Let q be the vector of the coordinates, and g q the stretch of a spring
+    # with the rate k, where g is a row vector. The stiffness matrix is the sum
+    # of k g' g over all springs, and the damping matrix is the same sum over
+    # all dampers.
 
     def __init__(self, masses: CarMasses, rates: SuspensionRates):
         """Sets up the equations of motion of a car."""

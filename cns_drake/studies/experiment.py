@@ -387,10 +387,10 @@ class Condition:
             the tables.
         changes: fields that the condition sets, under `database`, `query`,
             `both` or `protocol`.
-        causes: the causes of change that are combined. For each cause, the
-            fields that it sets at the wanted level of change, then those that
-            it sets at each lower level. A map that cannot have a level takes
-            the next lower one.
+        causes: the causes of change that are combined. Each cause is a list of
+            alternatives: the fields for the wanted level of change, followed by
+            the fields for each lower level. The first alternative that is
+            possible on a map is used.
         is_baseline: whether other conditions are compared with this one.
     """
 

@@ -348,9 +348,11 @@ class DrawFreshCity(RedrawCity):
     turn_deg: float = 0.0
 
     def inputs(self) -> dict[str, bytes]:
-        """Returns name -> content of the city's inputs, without `stages.yaml`.
+        """Returns the new city's input files, without `stages.yaml`.
 
-        Each drive has a realistic driver.
+        The result maps file names to contents. The scenarios of the map's
+        drives are included; in them, a realistic driver replaces the original
+        one.
         """
         source = MapFolder(self.map_folder)
         texts = redrawn_inputs(self.map_folder, self.stage, self.seed)

@@ -96,14 +96,13 @@ def loop_errors(
 
 
 def implied_poses(loops: list[Loop], X_WL: np.ndarray) -> np.ndarray:
-    """Returns the pose of each loop's source keyframe, as the loop measures it.
+    """Returns the pose X_WK of each loop's source keyframe K, (M, 4, 4).
+
+    Each pose is X_WL X_LK, where X_LK is the loop's measurement.
 
     Args:
         loops: the M loops.
-        X_WL: (L, 4, 4) poses of the target's keyframes.
-
-    Returns:
-        (M, 4, 4) poses X_WK.
+        X_WL: (N, 4, 4) poses of all keyframes of the target.
     """
     X_LK = np.array([loop.X_LK for loop in loops]).reshape(-1, 4, 4)
     return X_WL[[loop.target for loop in loops]] @ X_LK

@@ -204,17 +204,18 @@ def compare(
     alignment: AlignmentReport | None = None,
     grids: Sequence[tuple[float, float, float]] = GRIDS,
 ) -> ChangeReport:
-    """Returns the change between two maps.
+    """Returns the change between two maps A and B.
 
     Args:
         source: the map A.
         target: the map B.
-        control: a drive on A's route in B's stage, which is compared with B; or
-            a drive on B's route in A's stage, which is compared with A. The
-            result shows the effect of the routes without a change of the city.
-            None leaves it out.
+        control: a third drive, along the route of A or B but in the stage of
+            the other map, with which it is compared. This comparison shows the
+            effect of different routes in an unchanged city. None for no
+            control.
         alignment: alignment of A and B, for the report.
-        grids: shifts of the grid [m] over which `spread` is taken.
+        grids: shifts of the voxel grid [m]. The change is also computed on each
+            shifted grid, for the report's `spread` of TCR_sym.
 
     Raises:
         InputError: A, B and the control are not in one world, or the control is

@@ -65,12 +65,12 @@ class Driving:
 class DriveComparison:
     """How the path of a drive B differs from that of a drive A.
 
-    Here, a stop is a point of A's path at which B is compared with A; stops are
-    `STOP_SPACING` apart. The cars need not stand there. B meets a stop if its
-    path passes within `MEETING_RADIUS` of it. The two drives are then compared
-    at the nearest point of B's path that has A's direction. Offsets are
-    horizontal and perpendicular to A's path. Values without a measurement are
-    NaN.
+    The drives are compared at points every `STOP_SPACING` along A's path, which
+    are called stops here, although the cars need not stand there. B meets a
+    stop if B's path passes within `MEETING_RADIUS` of the stop. In this case,
+    the stop is compared with the nearest point of B's path that has A's
+    direction. Offsets are horizontal and perpendicular to A's path. Values
+    without a measurement are NaN.
 
     Attributes:
         first, second: how A and B were driven.

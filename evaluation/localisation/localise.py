@@ -201,14 +201,14 @@ def mapped_frames(
 
 
 def way_axes(p_WS: np.ndarray, X_WS: np.ndarray) -> np.ndarray:
-    """Returns the axes of a path at N poses, as rotations R_WT (N, 3, 3).
+    """Returns rotations R_WT (N, 3, 3), where T is the frame of the path.
 
-    The columns of a rotation point along the path, to its left, and up.
+    The axes of T point along the path, to the left of it, and up.
 
     Args:
         p_WS: (N, 3) positions of a drive [m].
-        X_WS: (N, 4, 4) poses of the drive. Where it stands, the x axis of S
-            counts as the direction of the path.
+        X_WS: (N, 4, 4) poses of the drive. Where the sensor does not move, the
+            x axis of S is used as the direction of the path.
     """
     along = np.zeros_like(p_WS)
     if len(p_WS) > 1:

@@ -79,13 +79,13 @@ def move(
     larger: np.ndarray,
     larger_sampled: np.ndarray,
 ) -> None:
-    """Moves all voxels of a hash table into a larger, empty table.
+    """Copies all voxels of a hash table to a larger, empty table.
 
     Args:
         table: (S,) slots of type `SLOT`.
-        sampled: (S, B) uint8, see `enter`.
+        sampled: (S, B) uint8, B bytes of bits for each slot; see `enter`.
         larger: (L,) empty slots, to which the voxels are copied.
-        larger_sampled: (L, B) uint8, to which `sampled` is copied.
+        larger_sampled: (L, B) uint8, to which the voxels' bits are copied.
     """
     for i in range(len(table)):
         if table[i].count != 0:

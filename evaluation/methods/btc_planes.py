@@ -285,11 +285,14 @@ def _fit(
 
 
 def voxel_order(index: np.ndarray) -> np.ndarray:
-    """Returns the order (V,) in which the public program visits voxels.
+    """Returns the order in which the authors' program of BTC visits voxels.
 
     Args:
-        index: (V, 3) int64 of distinct voxels along x, y and z, in the order
-            in which they were first met.
+        index: (V, 3) int64 indices of distinct voxels along x, y and z, in the
+            order in which the voxels first occur in the cloud.
+
+    Returns:
+        (V,) rows of `index`, in the order of the program.
     """
     x, y, z = np.asarray(index, dtype=np.int64).T
     # fmod: a remainder with the sign of the dividend, as in C++.

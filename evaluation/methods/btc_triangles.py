@@ -185,17 +185,18 @@ def height_image(
 def peaks(
     num_heights: np.ndarray, min_heights: int
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Returns the cells of an image that stand out and are not on a line.
+    """Returns the peaks of an image: cells that have points in many layers.
 
     The image is divided into square segments, each of which has at most one
-    peak: the cell with the most heights, or the first of several equal ones. A
-    cell is part of a line, and no peak, if in some direction one neighbour is
-    nearly as high and the opposite neighbour is at least half as high.
+    peak: the cell that has points in the most layers, or the first of several
+    equal ones. A cell is part of a line, and no peak, if in some direction one
+    neighbour has nearly as many layers and the opposite neighbour at least half
+    as many.
 
     Args:
         num_heights: (rows, columns) number of layers with points in each cell.
             Rows and columns must be multiples of the side of a segment.
-        min_heights: number of heights that a peak needs.
+        min_heights: least number of layers with points in a peak.
 
     Returns:
         Rows (C,) and columns (C,), by segment along rows, then columns.
@@ -230,13 +231,13 @@ def peaks(
 def find_keypoints(
     image: HeightImage, center: np.ndarray, axes: np.ndarray, min_heights: int
 ) -> Keypoints:
-    """Returns the peaks of an image as points on its plane.
+    """Returns the peaks of an image (see `peaks`) as points on its plane.
 
     Args:
-        image: cloud seen along the normal.
+        image: image of a cloud, seen along the normal of the plane.
         center: (3,) center with which the image was drawn [m].
         axes: (3, 3) axes with which the image was drawn.
-        min_heights: number of heights that a keypoint needs.
+        min_heights: least number of layers with points in a keypoint's cell.
     """
     cells = peaks(count_bits(image.heights), min_heights)
     return Keypoints(
@@ -292,7 +293,8 @@ class Triangles:
     Attributes:
         sides: (T, 3) lengths, shortest first [m].
         positions: (T, 3, 3) positions of the vertices, one in each row [m].
-        heights: (T, 3) int64 binary descriptors of the vertices.
+        heights: (T, 3) int64, the binary descriptor of each vertex: bit k is
+            set if its cell has points in layer k above the plane.
     """
 
     sides: np.ndarray

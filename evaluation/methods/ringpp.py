@@ -86,13 +86,13 @@ class Ring:
     """Descriptor of one scan, with n = `cells` and F = n // 2 + 1.
 
     Attributes:
-        filled: (M,) cells of the map that are not zero, row times n plus
-            column; rows along x, columns along y.
-        features: (M, 6) float32 values of these cells.
-        spectrum: (6 F, F) complex64. Rows are channels and frequencies along
-            the rays of the Radon transform. The normalised magnitudes of these
-            frequencies are transformed again, along the angles; the columns are
-            the frequencies of this second transform.
+        filled: (M,) flat indices, row * n + column, of the cells that are not
+            zero in the map from above. Rows are along x, columns along y.
+        features: (M, 6) float32 values of the six channels in these cells.
+        spectrum: (6 F, F) complex64, F rows for each of the six channels. The
+            Radon transform of a channel is Fourier-transformed along its rays
+            (rows); the normalised magnitudes are then Fourier-transformed along
+            its angles (columns).
     """
 
     filled: np.ndarray

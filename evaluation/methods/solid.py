@@ -68,9 +68,9 @@ class SolidConfig(MethodConfig):
         return self
 
     def field(self, lidar: LidarField = _CNS) -> LidarField:
-        """Returns the beams and the field of view that the method assumes.
+        """Returns the number of rings and the field of view to assume.
 
-        Values that the settings do not give are those of the LiDAR.
+        A setting that is given overrides the value of the LiDAR.
 
         Args:
             lidar: number of rings and field of view of the LiDAR.

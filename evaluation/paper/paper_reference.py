@@ -191,7 +191,9 @@ def findings(
 
 
 def trend(change: Sequence[float], auc: Sequence[float]) -> Trend:
-    """Returns how AUC depends on TCR_sym, over three or more pairs of drives.
+    """Returns the correlation and slope of AUC over TCR_sym.
+
+    At least three pairs of drives are needed.
 
     Args:
         change: TCR_sym of each pair.

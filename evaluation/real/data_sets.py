@@ -148,11 +148,11 @@ DATA_SETS = (
 
 
 class RealScans(NamedTuple):
-    """The scans of a data set that are there, as a drive.
+    """A data set of real scans that was found on the disk.
 
     Attributes:
-        data_set: the data set.
-        drive: its scans and poses.
+        data_set: name and origin of the data set.
+        drive: scans and poses of the data set.
     """
 
     data_set: DataSet

@@ -273,8 +273,8 @@ class Features:
     """The features of all patches of a set of scans (real or simulated).
 
     Attributes:
-        rows: a dictionary for each patch.
-        place: (N,) number of the place of each patch.
+        rows: features of each of the N patches, name -> value.
+        place: (N,) number of the place at which each patch was recorded.
     """
 
     def __init__(self, places: list[list[np.ndarray]], seed: int = 0):

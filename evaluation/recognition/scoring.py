@@ -56,17 +56,17 @@ def gated(
     scores: np.ndarray,
     radii: Sequence[float],
 ) -> list[np.ndarray]:
-    """Returns the scores (D,) after the gate, for each radius.
+    """Returns the scores (D,) after the gate, one array for each radius.
 
-    The gate rejects places that lie too far from the query according to the
-    method's own pose; their scores are NaN. Only the best `NUM_GATED` places
-    are tested; all other places are no candidates either. A place for which the
-    method estimates no pose keeps its score. If the method never estimates a
-    pose, all scores stay the same.
+    The gate rejects places that are too far from the query according to the
+    method's own pose estimate: their scores become NaN. Only the best
+    `NUM_GATED` places are tested; all other scores become NaN, too. A place for
+    which the method estimates no pose keeps its score. If the method estimates
+    no pose at all, all scores stay the same.
 
-    Near the radius, the gate has a weight w from 1 to 0: a score s becomes s -
-    (1 - w) |s|. This is w times a positive score; a negative score falls by (1
-    - w) |s|.
+    A score s becomes s - (1 - w) |s|, where the weight w falls from 1 to 0 as
+    the estimated distance passes the radius (see `gate_weight`). Positive
+    scores are thus multiplied by w.
 
     Args:
         method: method that made the scores.

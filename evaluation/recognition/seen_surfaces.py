@@ -98,7 +98,9 @@ class SeenSurfaces:
         return float(np.linalg.norm(self.points, axis=1).max(initial=0.0))
 
     def share_of(self, points: np.ndarray) -> float:
-        """Returns the share of points (N, 3) that is shown; NaN without points.
+        """Returns the share of points on surfaces that the scan shows.
+
+        The result is NaN without points.
 
         Args:
             points: (N, 3) points in this sensor's frame [m].

@@ -20,16 +20,17 @@ def along_the_way(
 ) -> np.ndarray:
     """Returns scores (Q, D) that are averaged along the path.
 
-    The score of a query and a place becomes the mean of this score and those of
-    earlier queries. An earlier query, at the distance d before the query along
-    its path, contributes its score for the place at the same distance d along
-    the database's path. This place lies before the first place if both drives
-    go in the same direction, otherwise after it; the direction with the better
-    mean counts.
+    The new score of query q and place p is the mean of their own score and of
+    scores of earlier queries. For two drives in the same direction, an earlier
+    query contributes its score for the place at the distance d before p, where
+    d is the distance from the earlier query to q. For two drives in opposite
+    directions, the place at the distance d after p is used instead. The new
+    score is the better of the two means. Distances are along the paths.
 
-    An earlier query is left out of the mean if it has no candidate, or if the
-    database's path has no place at the distance d. If it has candidates, but no
-    score for this place, its least score is used.
+    An earlier query is left out of the mean if it has no candidates, or if the
+    database's path ends within the distance d from p. If an earlier query has
+    candidates, but no score for the place in question, it contributes its least
+    score.
 
     Args:
         scores: (Q, D) scores of single queries; NaN for places that are no

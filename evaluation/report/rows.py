@@ -38,11 +38,17 @@ def place_rows(
     tracks: Mapping[str, Any],
     evidence: Mapping[tuple[str, str], PairEvidence],
 ) -> Iterator[Row]:
-    """Yields the results of place recognition as rows: controls, then pairs.
+    """Yields the results of place recognition as rows of the table of results.
 
-    The rows belong to the experiment `stages`. In the control of a pair, the
-    database is driven in the query's stage. `tracks` must contain the track of
-    every drive with queries.
+    The rows of all controls come first. A control measures the same two routes
+    without a change of the city: its database is driven in the query's stage.
+
+    Args:
+        pairs: result on each pair of drives, with the result on the pair's
+            control.
+        tracks: name of a drive with queries -> the drive's time stamps and
+            poses.
+        evidence: names of database and query -> overlaps of the pair's scans.
     """
 
     def outcome(
@@ -219,13 +225,15 @@ class Survival(NamedTuple):
 
 
 def survivals(rows: Iterable[Row], stages: Mapping[str, str]) -> list[Survival]:
-    """Returns the results of each method on each pair of drives.
-
-    They are sorted by pair, and then by method in the order of tables.
+    """Pairs the results with and without a change of the city.
 
     Args:
-        rows: rows of place recognition, with and without the change.
+        rows: rows of `place_rows`: pairs of drives and their controls.
         stages: name of a drive -> its stage.
+
+    Returns:
+        One item for each method on each pair of drives, sorted by pair, and
+        then by method in the order of tables.
     """
     found: dict[
         tuple[tuple[str, str, str], str],

@@ -221,17 +221,22 @@ def lifetime(
 def lifetimes(
     results: Results, factor: str, shares: Iterable[float] = (0.9, 0.5)
 ) -> list[Summary]:
-    """Returns the value of a factor at which only a given share is left.
+    """Returns the value of a factor that leaves a given share of a result.
 
-    For example, the factor is the age of a map, and the share that of the AUC
-    of a new map.
+    An example is the age of a map at which a method has 90 % of the AUC that it
+    has in a new map. The shares that are left are the rows of the metric
+    `kept`. The least value of the factor is that of the baseline.
 
-    The shares are the rows with the metric `kept`; the least value of the
-    factor is the baseline. Each result is computed from means over the seeds,
-    and has the least and the greatest result of a single seed as its range. The
-    result is infinite if more than the share is left at the greatest value of
-    the factor. A value of the factor that was measured with one seed only, such
-    as the baseline, is used for all seeds.
+    Each returned number is computed from the means of all seeds. Its range is
+    from the least to the greatest number that a single seed gives. The number
+    is infinite if even the greatest value of the factor leaves more than the
+    given share. Rows that were measured with a single seed, such as those of
+    the baseline, count for all seeds.
+
+    Args:
+        results: table of results.
+        factor: name of the factor, whose values are numbers.
+        shares: the given shares.
     """
     groups: dict[tuple, list[Row]] = {}
     for row in results.where(metric="kept").rows:

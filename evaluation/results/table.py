@@ -549,7 +549,10 @@ class _Line:
     def value(self, column: str, kind: type) -> Any:
         """Returns a cell as a value of a type.
 
-        For an empty cell, the value is that in `_EMPTY`.
+        The value of an empty cell is -1 for int, NaN for float, and "" for str.
+
+        Raises:
+            InputError: the cell contains no value of this type.
         """
         cell = self.cells[self.columns[column]]
         if kind is bool:

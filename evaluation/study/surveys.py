@@ -276,11 +276,13 @@ def survey_recording(
         recording: the drive.
         roles: whether the drive has places of the database, queries, or both;
             the set may be empty.
-        asked: key of a description -> method, roles and protocol; empty if the
-            drive has neither places nor queries.
-        protocol: protocol of the frames that are shown and kept.
+        asked: key of a description -> method, roles and protocol of this
+            description; empty if the drive has neither places nor queries.
+        protocol: protocol that chooses the frames whose scans are shown as
+            thumbnails and, if `with_scans` is set, kept.
         track: reports progress.
-        with_scans: whether to keep the scans of places and queries.
+        with_scans: whether the result contains the scans of the places and
+            queries.
 
     Raises:
         InputError: if the recording cannot be read, or contains no points.

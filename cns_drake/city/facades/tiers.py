@@ -85,8 +85,9 @@ def add_storeys(
 ) -> float:
     """Adds `groups` times `per_group` storeys; returns the top's height [m].
 
-    If all glass has the same depth, a single pane behind the walls closes all
-    windows; no other relief may then be deeper.
+    If all glass in `facade` has the same depth, a single pane behind the walls
+    closes all windows. In this case, no other relief may be deeper than the
+    glass.
 
     Args:
         out: the building under assembly, which gets the parts.

@@ -189,7 +189,8 @@ class StreetRoom:
             structures: structures of the city.
             drives: the drives, which are kept free.
             ground: the ground on which objects stand.
-            bottom: structures of the ground.
+            bottom: structures of a guessed ground; none if the file has
+                terrain.
             found: gets the objects that are placed.
         """
         self.found = found
@@ -445,16 +446,16 @@ def dress_streets(
 ) -> StreetThings:
     """Places small objects along the streets of a city, and returns them.
 
-    Objects from the file are placed first, and then random ones. Drives are
-    kept free of objects. Without drives nothing is placed.
+    Objects from the imported file are placed first, and then random ones.
+    Drives are kept free of objects. Without drives nothing is placed.
 
     Args:
         structures: structures that already exist.
-        things: small objects from the file.
+        things: small objects from the imported file.
         streets: the streets along which objects are added.
         drives: the drives, which are kept free.
-        ground: the ground on which objects stand.
-        bottom: structures of the ground.
+        ground: heights of the ground on which objects stand.
+        bottom: structures of a guessed ground; none if the file has terrain.
         seed: seed of all random draws.
     """
     found = StreetThings()

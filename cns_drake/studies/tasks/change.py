@@ -66,12 +66,13 @@ class ChangeTask(Task):
 def map_city(
     reporter: Reporter, source: DriveSource, spacing: float | None
 ) -> tuple[VoxelMap, np.ndarray]:
-    """Returns the voxel map of a drive, in cells for the change ratio (TCR).
+    """Returns the voxel map of a drive, to compute the change ratio (TCR).
 
     Args:
         reporter: reports progress.
-        source: opens the drive.
-        spacing: distance between two scans in the map [m]; None for all scans.
+        source: function that opens the drive.
+        spacing: distance along the path between two scans in the map [m]; None
+            for all scans.
 
     Returns:
         The map, and positions (N, 3) of the sensor at all frames [m].

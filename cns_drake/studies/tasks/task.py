@@ -48,12 +48,12 @@ class Pair:
     Attributes:
         name: name of the pair. Only pairs that differ in nothing but the radius
             of a match have the same name.
-        way: the drive whose map is compared with the query's for the change
-            (TCR_sym): a drive on the query's route through the database's city
-            or, if there is none, the database drive.
-        is_as_before: whether the drives are those of the baseline, and the
-            condition changes only the protocol or adds places. Tasks without
-            queries then have nothing new to measure.
+        way: the drive whose map and the query's map give the change of the
+            city (TCR_sym). This is a drive along the query's route through the
+            database's city or, if there is none, the database drive.
+        is_as_before: whether the pair has the same drives as the baseline, and
+            differs from it only in the protocol or in additional places. Tasks
+            that use no queries have nothing new to measure for such a pair.
     """
 
     name: str
@@ -83,7 +83,8 @@ class Jobs:
         distractors: drives through other cities, in the order in which their
             places are added to databases.
         jobs: name -> job.
-        notes: notes on what is left out, as keys.
+        notes: notes on what is left out, in order and without repetition. They
+            are the keys of the dictionary.
         radii: name of a pair -> radii of a match [m].
     """
 
