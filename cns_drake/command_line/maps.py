@@ -329,7 +329,7 @@ def city(
         repair_stages: Update the names of structures in stages.yaml. Use it
             after you have added something to the plan, because additions
             renumber the structures. Structures are recognised by their
-            positions in structures.csv.
+            coordinates in structures.csv, as the last run wrote it.
     """
     with uninterrupted():
         from cns_drake.city.generation.generate import (

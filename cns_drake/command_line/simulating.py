@@ -167,10 +167,11 @@ def simulate(
             scenario file of your own.
         traffic: Number of moving vehicles. The same number of walkers is added.
             By default as the scenario says.
-        transient: Temporary changes to the city, such as snow=0.25,leaves=0.15.
-            The switches are parked_cars, leaves, snow, scaffolds, works,
-            furniture and roadsides, with values from 0 to 1, and seed. May be
-            repeated.
+        transient: Temporary changes to the city. For example,
+            snow=0.25,leaves=0.15 means 0.25 m of snow, and that 15 % of the
+            leaves are left. Other switches are parked_cars, scaffolds, works,
+            furniture and roadsides: the share that is changed or added, from 0
+            to 1. seed=N draws other ones. May be repeated.
         driver: How the car is driven. With real it wanders in its lane and
             changes lanes, as drivers of published data sets do; with none it
             keeps to the middle of the lane. By default as the scenario says.

@@ -24,7 +24,7 @@ def real(
     and queries.csv, which cns-eval compare reads.
 
     Args:
-        folder: Folder with the excerpts.
+        folder: Folder with the excerpts of public data sets.
         output: Folder for the results; created if it does not exist.
         method: Place-recognition method or registration method to run: the name
             of a shipped one, or a Python file with your own. By default all

@@ -461,8 +461,14 @@ def summarised(
 
     A scatter plot gives `correlations`. A chart of the kind `lines` gives
     `lifetimes` if its metric is `kept`, and `growths` if its metric is a CPU
-    time; other charts give nothing. If the experiment has kinds of change as a
-    factor, `excesses` are added, which need `queries`.
+    time; other charts give nothing. If the experiment has the factor `cause`,
+    `excesses` are added.
+
+    Args:
+        results: all results of the experiment.
+        queries: its answers to single queries, for `excesses`. None leaves the
+            excesses out.
+        charts: the charts as in the file of the experiment.
     """
     found = []
     for chart in charts:

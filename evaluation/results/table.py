@@ -225,8 +225,8 @@ class Answers(Key):
 
     Attributes:
         columns: name of a column of `queries.csv` -> (Q,) values. An unknown
-            value is NaN; in columns of integers it can also be -1 or infinite.
-            In the file, such a value is an empty cell.
+            value, an empty cell in the file, is NaN, infinite, or, in columns
+            of integers, -1.
     """
 
     columns: Mapping[str, np.ndarray]

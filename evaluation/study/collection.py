@@ -113,8 +113,9 @@ class City:
         stages: stage -> the drive through this stage.
         others: further drives, such as controls, which follow the route of one
             stage through another stage.
-        reference: published numbers for comparison. Pairs of drives and runs of
-            methods that were published are measured in addition.
+        reference: published numbers for comparison. A study also measures the
+            pairs of drives, and runs the protocols, for which there are
+            published numbers.
     """
 
     name: str

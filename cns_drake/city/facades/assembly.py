@@ -318,7 +318,8 @@ class Assembly:
         """Adds a mesh, and places several copies of it above one another.
 
         Args:
-            part: beginning of the names of the copies, which are parts.
+            part: beginning of the copies' names; the copies are named
+                `{part}_00`, `{part}_01` and so on.
             mesh: the mesh in the building's frame [m].
             z0: height of the lowest copy [m].
             step: vertical distance from one copy to the next [m].

@@ -550,7 +550,8 @@ class Openings:
         Args:
             glass: depths of the openings with panes [m].
             bands: strips around the wing.
-            material: material of the walls; that of the panes is `glass`.
+            material: name of the material of the walls. The panes have the
+                material named "glass".
         """
         wing = self._wing
         bands, glass = tuple(bands), tuple(glass)

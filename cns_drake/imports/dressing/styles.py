@@ -103,7 +103,7 @@ def building_use(
 
 
 def tagged_colour(tags: Mapping[str, str], part: str) -> Rgb | None:
-    """Returns the colour that tags state for a part; None if they state none.
+    """Returns the colour of a part by its tags; None without such a tag.
 
     `part` is the beginning of the tags' keys, `building` or `roof`.
     """
