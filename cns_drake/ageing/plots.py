@@ -411,13 +411,14 @@ def balconies_on(
 def renewed(
     building: Structure, moves: bool, rng: np.random.Generator
 ) -> Structure:
-    """Returns a building whose walls have another colour.
+    """Returns a building with renovated walls: they get another colour.
 
     A building without coloured walls stays the same.
 
     Args:
         building: the building.
-        moves: whether new insulation also moves the walls outwards by 15 cm.
+        moves: whether the walls get an insulation layer as well, and thus move
+            outwards by 15 cm.
         rng: random generator for the colour.
     """
     model = building.model

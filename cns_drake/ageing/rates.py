@@ -25,13 +25,13 @@ LAST_YEAR = 200
 
 
 def read_rates(path: Path | None, factor: float = 1.0) -> dict[str, float]:
-    """Returns event -> rate per year.
+    """Returns event -> rate per year, and `moved` -> distance [m].
 
     Args:
         path: a YAML file that maps events to rates from 0 to 1, and `moved` to
-            a distance [m]. Events that are not in the file keep their default
-            rates. With None, all events have them.
-        factor: factor by which all rates are multiplied.
+            a distance [m]. What is not in the file keeps its default value.
+            None for all default values.
+        factor: factor by which all rates, but not the distance, are multiplied.
 
     Raises:
         InputError: the file cannot be read or names an unknown event, or a rate

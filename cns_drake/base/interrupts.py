@@ -78,9 +78,9 @@ def interrupts_wait() -> Iterator[Callable[[], None]]:
     """Delays interrupts until the block calls the yielded function.
 
     Without the delay, KeyboardInterrupt can be raised while the arguments of a
-    C++ function are being converted; the conversion then reports a wrong type
-    instead. Only the first interrupt is delayed. A second one takes effect at
-    once, and further ones are ignored, so that files can be closed.
+    C++ function are being converted, which is reported as a wrong type. Only
+    the first interrupt is delayed. A second one takes effect at once, and
+    further ones are ignored, so that files can be closed.
     """
     waiting: list[int] = []
     struck: list[int] = []
@@ -113,8 +113,9 @@ def ignore_interrupts() -> None:
 def end_interrupted() -> NoReturn:
     """Ends an interrupted process at once, without Python's shutdown.
 
-    By then, the exception KeyboardInterrupt has closed all open files. The
-    shutdown can fail after a library was interrupted in a computation.
+    The shutdown can fail after a library was interrupted in a computation. Of
+    the files that are open, only standard output and standard error are
+    flushed.
     """
     for stream in (sys.stdout, sys.stderr):
         with contextlib.suppress(OSError, ValueError):

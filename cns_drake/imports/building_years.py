@@ -114,8 +114,9 @@ def _year(value: object) -> int | None:
 
 
 def stands_today(until: int | None) -> bool:
-    """Returns whether an object that was demolished in `until` stands today.
+    """Returns whether an object stands today, given its year of demolition.
 
-    It does if this year is None (never demolished) or in the future.
+    The object stands if the year `until` is in the future, or None (never
+    demolished).
     """
     return until is None or until > datetime.date.today().year

@@ -28,13 +28,12 @@ def make_uniform_spline(
 ) -> BsplineTrajectory:
     """Returns a quintic B-spline with evenly spaced control points.
 
-    At the i-th control point, the spline's parameter is i * spacing. The spline
-    starts at the first control point and ends at the last one, but runs only
-    near the others. Control points on a straight line give a straight line.
+    The spline starts at the first control point and ends at the last one. It
+    passes near the others: near control point i at the parameter i * spacing.
+    Control points on a straight line give a straight line.
 
-    A bound on all control points also bounds the spline. In the same way, a
-    bound on the difference quotients of the control points bounds the
-    derivatives.
+    A bound on all control points is also a bound on the spline. A bound on
+    their difference quotients is also a bound on its derivatives.
 
     Args:
         control_points: (N, D) points of any dimension D, N >= 3.

@@ -149,6 +149,9 @@ def ride_motion(moments: RideMoments) -> FrameMotion:
 
     The rotation is R_FB = R_y(pitch) R_x(roll): the body rolls about an axis
     that pitches with it.
+
+    Args:
+        moments: heave, roll and pitch at N times, with their derivatives.
     """
     heave, roll, pitch = moments.q.T
     _, droll, dpitch = moments.dq.T

@@ -89,9 +89,10 @@ class WheelMotion:
         )
 
     def rolling(self, moments: Moments) -> JointMotion:
-        """Returns the wheel's rolling angle at N times.
+        """Returns the wheel's rolling angle [rad] and its derivatives.
 
-        It is positive forwards, and zero at the start.
+        There is one row for each of the N times. The angle is zero at the start
+        and grows when the vehicle drives forwards.
         """
         u, rate, acceleration, jet = moments[:4]
         a, b, da, db, _, _ = self._ground_motion(jet)
@@ -164,9 +165,9 @@ class VehicleMotion(LeafSystem):
         - body_spatial_velocities
         - body_spatial_accelerations
 
-    `position` is the plant's q. The three other outputs are lists, over the
-    plant's bodies B, of X_WB, V_WB and A_WB, expressed in W. All outputs depend
-    only on time.
+    `position` is the plant's q. Each of the three other outputs is a list with
+    one entry per body of the plant: its pose, spatial velocity or spatial
+    acceleration in W, expressed in W. All outputs depend only on time.
 
     Example:
         from cns_drake import VehicleMotion

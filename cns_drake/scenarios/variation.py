@@ -98,9 +98,11 @@ class Family(Section):
             give numbers from 0 to 1, or `{from: 0, to: 0.6, count: 20}` for
             evenly spaced ones.
         scattered: name of a class -> share of its structures to remove at
-            random in addition, such as `{pole: 0.3}`.
-        seeds: seeds of the random draws. Each seed makes a member, and begins
-            to remove structures at another place.
+            random all over the map, besides those of `missing`, such as
+            `{pole: 0.3}`.
+        seeds: seeds of the random draws. Each seed makes a member. It
+            determines the place around which the structures of `missing` are
+            removed, the nearest first, and draws those of `scattered`.
         city_seeds: seeds of cities that are generated anew along the same
             streets. Each seed makes a member.
         routes: random routes for the members, instead of the base's route.

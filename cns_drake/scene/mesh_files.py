@@ -59,9 +59,10 @@ _JSON = 0x4E4F534A
 
 
 def unread_parts(path: Path) -> tuple[str, ...]:
-    """Returns notes on the content of a mesh file that is ignored, if any.
+    """Returns notes on what is not read from a mesh file, such as lines.
 
-    There is one note for each kind of content.
+    There is one note for each kind of content that is not read. The tuple is
+    empty if everything is read.
 
     Raises:
         ValueError: the shapes in the file would be misread.

@@ -270,10 +270,14 @@ def label_points(
 ) -> np.ndarray:
     """Returns the exact label of each point of a drive's map, (N,) uint8.
 
+    The labels are values of `evaluation.map_update.sessions.Label`. They state
+    whether the other drive observes the point and, if so, whether the world of
+    the other drive has a surface there.
+
     Args:
-        session: the map whose points are labelled.
-        other: the other drive, which observes these points or not.
-        frames: (K,) frames of the other drive from which it looks.
+        session: the drive whose map of N points is labelled.
+        other: the other drive.
+        frames: (K,) frame numbers of the scans of the other drive that count.
         track: reports progress.
     """
     unobserved, kept, changed = SIDES[session.side]
@@ -293,13 +297,14 @@ def observed(
 ) -> np.ndarray:
     """Returns which points a simulated drive observes, (N,) bool.
 
-    A point is observed if the LiDAR can see it from one of the drive's frames:
-    it is within the LiDAR's ranges and field of view, and no surface hides it.
+    A point is observed if the LiDAR can see it at one of the given frames: the
+    point is within the LiDAR's ranges and field of view, and no surface hides
+    it.
 
     Args:
         points: (N, 3) points in W [m].
         drive: the drive.
-        frames: (K,) frames of the drive from which it looks.
+        frames: (K,) frame numbers.
         track: reports progress.
     """
     result = np.zeros(len(points), bool)

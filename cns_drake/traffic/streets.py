@@ -298,7 +298,7 @@ class EgoBox(NamedTuple):
         return np.column_stack([xy + middle * ahead, yaw])
 
     def corners(self, xy: np.ndarray, yaw: np.ndarray) -> np.ndarray:
-        """Returns the corners (N, 4, 2) of the box [m].
+        """Returns the corners of the car's box at N poses, (N, 4, 2) [m].
 
         Args:
             xy: (N, 2) positions of the car's frame [m].

@@ -459,12 +459,14 @@ class TrafficPlan:
 
     Attributes:
         kinds: kind of each of the N vehicles.
-        vehicles: x, y, z of the middle of each vehicle's box on the ground [m],
-            yaw and pitch [rad].
-        walkers: x, y, z on the ground [m], yaw and phase of the gait [rad].
+        vehicles: tracks of the vehicles, with five coordinates each: x, y, z of
+            the middle of the vehicle's box on the ground [m], yaw and pitch
+            [rad].
+        walkers: tracks of the walkers, with five coordinates each: x, y, z on
+            the ground [m], yaw and phase of the gait [rad].
         left_out: number of requested bodies that are left out because they
             would collide.
-        positions: distances of the ego car along its path at times
+        positions: (K,) distances of the ego car along its path at times
             `KNOT_PERIOD` apart [m]; None if the ego car does not follow other
             vehicles.
         notes: notes for the user.

@@ -310,13 +310,14 @@ def _places(
 
 @compiled
 def find_occupants(traffic: Traffic, k: int) -> None:
-    """Makes the list of the vehicles on each piece, in place.
+    """Updates the lists of the vehicles on each piece, in place.
 
-    A vehicle is in the list of each piece on which it stands. The ego car is in
-    the lists, too.
+    A vehicle is in the list of each piece on which it stands. This includes the
+    ego car.
 
     Args:
-        traffic: the traffic, whose `head` and `entries` are set.
+        traffic: the traffic, whose arrays `head` and `entries` this function
+            overwrites.
         k: number of the time step.
     """
     streets, cars = traffic.streets, traffic.cars

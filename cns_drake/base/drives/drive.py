@@ -273,9 +273,9 @@ def index_instances(table: Any, source: str) -> dict[int, Mapping]:
 class PlacedDrive:
     """Name, world frame and map of a drive, without its scans.
 
-    It stands for a drive where only these are compared, for example in
-    `cns_drake.base.drives.drive.check_same_world`. Of the scenario, only the
-    field `map` is kept.
+    Use this object instead of an open drive to check whether two drives have
+    the same world (`cns_drake.base.drives.drive.check_same_world`). Of the
+    scenario, only the field `map` is kept.
     """
 
     name: str

@@ -136,9 +136,10 @@ def park_along_streets(draft: Draft, network: RoadNetwork) -> None:
 
 
 def plant_medians(draft: Draft) -> None:
-    """Places the `trees` of `medians` in the plan on the medians of roads.
+    """Places trees on the medians of roads.
 
-    Without `medians`, the `trees` of the city's `street` are placed.
+    Their kinds and spacing are those of the plan's field `medians` or, without
+    it, of its field `street`.
     """
     plan = draft.plan.medians or draft.plan.street
     if not plan.trees:

@@ -238,9 +238,10 @@ class WayGraph(ABC):
         return float(self.along(way)[-1]) if len(way) else 0.0
 
     def cut(self, way: list[int], longest: float) -> list[int]:
-        """Returns the first pieces of a way, no longer than `longest` [m].
+        """Returns the beginning of a way, as a list of piece numbers.
 
-        At least one piece is returned.
+        The result contains as many pieces as fit into `longest` [m] together,
+        but at least one.
         """
         kept = int(np.searchsorted(self.along(way), longest, "right"))
         return way[: max(1, kept)]

@@ -119,10 +119,10 @@ class BandGraph(search.WayGraph):
 
 
 def find_lane_drives(bands: Sequence[LaneBand]) -> list[WaypointDrive]:
-    """Returns two drives on lanes that share a part of their paths.
+    """Returns two drives along lanes; a part of their paths is the same.
 
-    There are fewer than two only if no more are found. `bands` contains the
-    lanes of the whole network, including bridges.
+    The result is one drive or an empty list if no more drives are found.
+    `bands` contains the lanes of the whole network, including bridges.
     """
     return search.find_drives(BandGraph(bands))
 

@@ -81,16 +81,16 @@ def moved_off_kerbs(
     reach: tuple[float, float],
     carriageway: BaseGeometry,
 ) -> np.ndarray:
-    """Returns how far lines must move to leave a kerb, (N,) [m].
+    """Returns how far a painted line must move to leave a kerb, (N,) [m].
 
-    A line on the border of a lane would partly lie on a kerb where only one
-    side of the border is carriageway. It moves to this side. Elsewhere it
-    stays, except right next to such a place.
+    The line is on the border of a lane. Where only one side of the border is
+    carriageway, the line would partly lie on the kerb, and is moved towards the
+    carriageway. Places next to a moved place are moved as well.
 
     Args:
-        border: (N, 3) places on the border of a lane [m].
+        border: (N, 3) places on the border of the lane [m].
         left: (N, 2) unit vectors to the left of the border.
-        reach: how far the lines extend to the left and to the right of the
+        reach: how far the line extends to the left and to the right of the
             border [m].
         carriageway: area of the carriageway in W, a prepared geometry
             (Shapely).

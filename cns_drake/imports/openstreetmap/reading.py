@@ -32,9 +32,10 @@ _CHUNK = 1 << 24
 
 
 def number_in_file(number: int) -> int:
-    """Returns the id that an object has in the file before it was sorted.
+    """Returns an object's id in the user's file, given that in the sorted file.
 
-    Sorting replaces negative ids, which editors give to new objects.
+    Editors give negative ids to new objects. When a file is sorted, these ids
+    are replaced by positive ones.
     """
     return _FIRST_NEW - number if number > _FIRST_NEW else number
 

@@ -121,8 +121,8 @@ class ImuErrors:
     def at(self, sample: int) -> np.ndarray:
         """Returns the errors of one sample, (6,).
 
-        They are those of the specific force [m/s^2] and then of the angular
-        velocity [rad/s].
+        The first three numbers are the errors of the specific force [m/s^2],
+        the last three those of the angular velocity [rad/s].
         """
         return self._of_samples(sample, 1)[0]
 

@@ -100,10 +100,9 @@ class Beams:
 
     @cached_property
     def cast_columns(self) -> np.ndarray | None:
-        """(N,) column of each beam, in packet order; None in the regular case.
+        """(N,) column of each beam, in the order of `packet_order`.
 
-        The case is regular if the columns in packet order are 0, 1, ..., C - 1,
-        again and again.
+        None if these columns are 0, 1, ..., C - 1, again and again.
         """
         columns = self.column[self.packet_order]
         turns, rest = divmod(len(columns), max(len(self.column_t_ns), 1))

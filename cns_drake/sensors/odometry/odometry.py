@@ -86,8 +86,12 @@ class OdometrySensor(LeafSystem):
     ) -> RigidTransform | None:
         """Returns the pose X_BC of a frame C in the observed frame B.
 
-        X_PC is the pose of C on the body `body`. The result is None if B is
-        fixed on another body.
+        Args:
+            body: the body P to which C is fixed.
+            X_PC: pose of C in P.
+
+        Returns:
+            The pose X_BC; None if B is fixed to another body than P.
         """
         return self.X_PB.inverse() @ X_PC if body == self._body else None
 

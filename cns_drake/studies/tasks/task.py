@@ -72,20 +72,21 @@ class Pair:
 
 @dataclass
 class Jobs:
-    """The jobs of a study, and what they share.
+    """The jobs of a study, and the data from which they are made.
 
-    Descriptions of a drive that several pairs of drives need are written to
-    files by a job of their own.
+    If several pairs of drives need the descriptions of the same drive, one job
+    writes these descriptions to files.
 
     Attributes:
         files: paths of the study's files.
         methods: the methods that are run.
-        distractors: drives through other cities, in the order in which their
-            places are added to databases.
+        distractors: drives through other cities, whose places are added to
+            each database in this order.
         jobs: name -> job.
-        notes: notes on what is left out, in order and without repetition. They
-            are the keys of the dictionary.
-        radii: name of a pair -> radii of a match [m].
+        notes: note -> None, for each note on what is left out. A dictionary
+            keeps the order and omits repetitions.
+        radii: name of a pair -> the greatest distances between a query and its
+            match that are used for this pair [m].
     """
 
     files: StudyFiles
