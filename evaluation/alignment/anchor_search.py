@@ -393,10 +393,13 @@ def fit_bent(
 
 
 def straighten(loops: list[Loop], drive: Submaps) -> np.ndarray:
-    """Returns poses X_WK (K, 4, 4) of a drive that agree with its loops.
+    """Returns poses X_WK (K, 4, 4) of a drive's keyframes, fitted to its loops.
 
-    The last keyframe is fixed during the optimisation. All poses are then moved
-    so that the first keyframe is where it was.
+    The first keyframe keeps its pose.
+
+    Args:
+        loops: loops from the drive to itself.
+        drive: the drive, with its poses before the fit.
     """
     X_WK = drive.X_WK
     V = optimise(X_WK, [_loop_ties(loops), _drive_ties(drive)], num_held=1)
@@ -408,10 +411,13 @@ def agreeing(
 ) -> np.ndarray:
     """Returns which loops agree with given poses of the keyframes, (M,) bool.
 
+    A loop agrees if its measured pose X_LK differs from the one that the given
+    poses imply by less than 1 m and 2 degrees.
+
     Args:
         loops: the M loops.
-        X_TL: (L, 4, 4) poses of the target's keyframes.
-        X_TK: (K, 4, 4) poses of the source's keyframes.
+        X_TL: (L, 4, 4) poses of the target's keyframes in its world T.
+        X_TK: (K, 4, 4) poses of the source's keyframes in T.
     """
     distances, angles = loop_errors(loops, X_TL, X_TK)
     return (distances < AGREEMENT[0]) & (angles < AGREEMENT[1])

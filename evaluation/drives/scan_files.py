@@ -26,7 +26,7 @@ _LIMITS = ((100_000.0, 900_000.0), (0.0, 10_000_000.0))
 def is_local(X_WB: np.ndarray) -> bool:
     """Returns whether poses (N, 4, 4) are in local coordinates, not in UTM.
 
-    They are if all of them are near the origin.
+    Poses are taken as local if all x and y are within 100 km of zero.
     """
     return bool((np.abs(X_WB[:, :2, 3]) < _LIMITS[0][0]).all())
 

@@ -95,12 +95,18 @@ def by_distance(
 def by_free_space(
     mine: Session, theirs: Session, track: Track = silent
 ) -> np.ndarray:
-    """Returns the labels (N,) uint8 of a map by the baseline `free-space`.
+    """Returns a label for each point of a map, by the baseline `free-space`.
+
+    The labels state whether the other drive finds the point unchanged or
+    changed, or does not observe it.
 
     Args:
-        mine: the map with N points, and its drive.
-        theirs: the map of the other drive.
+        mine: the drive whose map of N points is labelled.
+        theirs: the other drive, with its map and scans.
         track: reports progress.
+
+    Returns:
+        (N,) uint8, values of `evaluation.map_update.sessions.Label`.
     """
     unobserved, kept, changed = SIDES[mine.side]
     _check_scans(theirs)

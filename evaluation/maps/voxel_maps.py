@@ -228,11 +228,13 @@ class VoxelMap:
     ) -> VoxelMap:
         """Returns the map on a grid of larger voxels.
 
-        A voxel belongs to the larger one that holds its centroid.
+        All points of a voxel count in the larger voxel that contains their
+        centroid.
 
         Args:
             voxel_size: length of a larger voxel's side [m].
-            shift: shift of the grid of larger voxels [m].
+            shift: distances along x, y and z from the origin of this map's grid
+                to that of the grid of larger voxels [m].
         """
         x, y, z = np.add(self.origin_W, shift).tolist()
         origin = x, y, z

@@ -247,15 +247,15 @@ def find_keypoints(
 
 
 def suppress(keypoints: Keypoints, radius: float, max_number: int) -> Keypoints:
-    """Returns the keypoints with more heights than any other keypoint nearby.
+    """Returns the keypoints with more occupied layers than their neighbours.
 
-    If two neighbours have equally many heights, both are dropped.
+    If two neighbours have equally many occupied layers, both are dropped.
 
     Args:
         keypoints: all keypoints.
-        radius: distance within which keypoints are compared [m].
+        radius: distance within which keypoints are neighbours [m].
         max_number: largest number of keypoints to keep, those with the most
-            heights.
+            occupied layers.
     """
     tree = cKDTree(keypoints.positions)
     pairs = tree.query_pairs(radius, output_type="ndarray")

@@ -136,11 +136,11 @@ class Method(abc.ABC, Generic[Descriptor, Database]):
     def assumption(self, field: LidarField | None) -> str | None:
         """Returns a note on what the method assumes about a LiDAR.
 
-        By default, and if there is nothing to say, the result is None.
+        The result is None if there is nothing to say, which is the default.
 
         Args:
-            field: number of rings and vertical field of view of the LiDAR; None
-                if they are unknown.
+            field: number of rings of the LiDAR, and lowest and highest
+                elevation [deg]; None if they are unknown.
         """
         return None
 

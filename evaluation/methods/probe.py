@@ -70,9 +70,8 @@ class Probe:
     Attributes:
         heights: (rings, sectors) greatest height in each cell, scaled to unit
             length over all cells; all NaN without a point within range.
-        mu: (rings, sectors) probability that a cell has a point. It is in
-            single precision, like the authors', because its rounding near 1
-            changes the uncertainty, and thereby scores by up to 0.002.
+        mu: (rings, sectors) float32 probability that a cell has a point. Scores
+            depend on its precision, which is that of the authors' program.
     """
 
     heights: np.ndarray

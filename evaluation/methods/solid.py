@@ -68,12 +68,14 @@ class SolidConfig(MethodConfig):
         return self
 
     def field(self, lidar: LidarField = _CNS) -> LidarField:
-        """Returns the number of rings and the field of view to assume.
+        """Returns the number of rings and the elevation limits [deg] to use.
 
-        A setting that is given overrides the value of the LiDAR.
+        They are those of the LiDAR, except where the settings `elevations`,
+        `lowest_deg` and `highest_deg` replace them.
 
         Args:
-            lidar: number of rings and field of view of the LiDAR.
+            lidar: number of rings of the LiDAR, and lowest and highest
+                elevation [deg].
         """
         elevations, lowest_deg, highest_deg = lidar
         if self.elevations is not None:
@@ -103,8 +105,9 @@ class SolidDatabase:
     """Descriptors of D places.
 
     Attributes:
-        ranges: (D, ranges) of unit length; NaN for a place without points.
-        azimuths: (D, azimuths).
+        ranges: (D, ranges) range descriptors, scaled to unit length; NaN for a
+            place without points.
+        azimuths: (D, azimuths) azimuth descriptors.
     """
 
     ranges: np.ndarray

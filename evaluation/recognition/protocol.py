@@ -193,10 +193,10 @@ class RetrievalProtocol:
         return self.radius if self.gate else None
 
     def of(self, method: Method) -> RetrievalProtocol:
-        """Returns the protocol completed by a method's own choices.
+        """Returns the protocol with a method's own choices filled in.
 
-        These are the number of scans per place, and which scan stands for a
-        place.
+        A method can choose the number of scans per place, and which scan stands
+        for a place.
         """
         return replace(
             self,

@@ -146,10 +146,16 @@ class Reference:
         return next(modes, "all")
 
     def values(self, result: PlaceRecognition, mode: Mode) -> Published | None:
-        """Returns the published numbers to compare with a result, if any.
+        """Returns the published numbers of a method on a pair of drives.
 
-        The result is None if the source has no such numbers, counted the
-        queries in another mode, or used another protocol than `result`.
+        Args:
+            result: the result of the same method on the same pair.
+            mode: which queries count: `all`, or only those with a match
+                (`filtered`).
+
+        Returns:
+            The numbers; None if the source has none in this mode, or used
+            another protocol than `result`.
         """
         if not self._ran(result):
             return None

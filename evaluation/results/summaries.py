@@ -93,9 +93,10 @@ class Summary(NamedTuple):
         map: name of the map.
         task: the task from whose results it is computed.
         method: name of the method, with its settings.
-        gate: whether the gate was used.
+        gate: whether the gate was used, which rejects places by the method's
+            own pose estimate.
         value: the number.
-        low, high: its interval or range; NaN if unknown.
+        low, high: limits of its interval or range; NaN if unknown.
         n: number of conditions from which it is computed; None if unknown.
     """
 
@@ -221,22 +222,25 @@ def lifetime(
 def lifetimes(
     results: Results, factor: str, shares: Iterable[float] = (0.9, 0.5)
 ) -> list[Summary]:
-    """Returns the value of a factor that leaves a given share of a result.
+    """Returns at which values of a factor a given share of a result is left.
 
-    An example is the age of a map at which a method has 90 % of the AUC that it
-    has in a new map. The shares that are left are the rows of the metric
-    `kept`. The least value of the factor is that of the baseline.
-
-    Each returned number is computed from the means of all seeds. Its range is
-    from the least to the greatest number that a single seed gives. The number
-    is infinite if even the greatest value of the factor leaves more than the
-    given share. Rows that were measured with a single seed, such as those of
-    the baseline, count for all seeds.
+    For example, if the factor is the age of a map, this is the age at which a
+    method still has 90 % of the AUC that it has in a new map.
 
     Args:
-        results: table of results.
+        results: table of results. Its rows of the metric `kept` contain the
+            share that is left at each value of the factor; the least value is
+            that of the baseline. A row that was measured with a single seed,
+            such as that of the baseline, counts for all seeds.
         factor: name of the factor, whose values are numbers.
-        shares: the given shares.
+        shares: the given shares, from 0 to 1.
+
+    Returns:
+        For each share and each condition (such as map and method): the value of
+        the factor, computed from the means of all seeds; and as range, the
+        least and the greatest value that a single seed gives. A value is
+        infinite if more than the share is left at the greatest value of the
+        factor in the table.
     """
     groups: dict[tuple, list[Row]] = {}
     for row in results.where(metric="kept").rows:

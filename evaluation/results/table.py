@@ -155,8 +155,8 @@ class Key:
     def but(self, *names: str) -> tuple[object, ...]:
         """Returns the key without some of its columns, to group rows by.
 
-        Two rows with equal results were measured under the same condition,
-        except for these columns.
+        If two rows have the same reduced key, they were measured under
+        conditions that differ only in the columns left out.
 
         Args:
             names: names of the columns to leave out. With `method`, its

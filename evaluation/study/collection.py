@@ -113,9 +113,9 @@ class City:
         stages: stage -> the drive through this stage.
         others: further drives, such as controls, which follow the route of one
             stage through another stage.
-        reference: published numbers for comparison. A study also measures the
-            pairs of drives, and runs the protocols, for which there are
-            published numbers.
+        reference: published numbers for comparison. If there are published
+            numbers for a further pair of drives or by another protocol, a study
+            measures these, too.
     """
 
     name: str
