@@ -266,9 +266,10 @@ class _Writing:
     def table(self, new: Mapping[str, Structure]) -> None:
         """Writes the structure table of all stages.
 
-        Today's structures come first, then those of later years in the order in
-        which they are built, and last those of the past. More years after today
-        thus do not change the instance ids of structures built before.
+        Today's structures come first, then those of later years (`new`) in the
+        order in which they are built, and last those of the past. If more years
+        after today are added, the instance ids of structures built before stay
+        the same.
         """
         world = self._world
         rows: list[Mapping[str, object]] = [*world.rows.values()]

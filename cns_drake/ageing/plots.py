@@ -132,7 +132,7 @@ class Plot:
         return affinity.rotate(moved, -self.yaw, (0, 0), use_radians=True)
 
     def triangles(self, p_W: np.ndarray) -> np.ndarray:
-        """Converts triangles (M, 3, 3) in W to S [m].
+        """Converts triangles `p_W` (M, 3, 3) from the world W to S [m].
 
         Heights in S are above the plot's ground.
         """

@@ -94,10 +94,17 @@ class _Times(ProgressColumn):
 def show_progress(
     console: Console | None = None,
 ) -> contextlib.AbstractContextManager[Progress]:
-    """Shows progress bars, each one line, with elapsed and remaining time.
+    """Shows progress bars, with elapsed and remaining time, in a `with` block.
 
-    See `cns_drake.base.progress_bars.show_bars`. Without a terminal, no bar is
-    drawn; `count_progress` then prints lines.
+    Each bar is one line. Without a terminal, no bar is drawn; in this case,
+    `count_progress` prints lines.
+
+    Args:
+        console: where the bars are shown; stderr by default.
+
+    Returns:
+        A context manager whose value is the Rich `Progress` to which tasks are
+        added, see `cns_drake.base.progress_bars.show_bars`.
     """
     return show_bars(_Times(table_column=fixed_column()), console=console)
 

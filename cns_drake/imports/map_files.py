@@ -122,7 +122,11 @@ def city_facts(
     changes: Mapping[str, object] | None,
     dressing: Dressing | None = None,
 ) -> dict:
-    """Returns facts about a map: its origin, and counts of random parts.
+    """Returns facts about an imported map, as a mapping.
+
+    They are the reference system, the origin, the level of detail and the years
+    of the stages. With `changes` or `dressing`, they also count what was drawn
+    at random.
 
     Args:
         city: the city as in its file.

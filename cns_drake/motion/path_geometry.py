@@ -66,7 +66,8 @@ class SplineDerivatives:
         """Returns the value and the derivatives of the spline at N parameters.
 
         The list begins with the value, followed by the derivatives in order.
-        Each is (N, D) for a spline of D dimensions.
+        Each is (N, D) for a spline of D dimensions. Parameters beyond an end of
+        the spline count as this end.
         """
         parameter = np.clip(parameter, 0.0, self.end)
         return [spline.vector_values(parameter).T for spline in self._splines]

@@ -212,8 +212,8 @@ class Suspension:
         is exact for loads that change linearly between two rows.
 
         Args:
-            inputs: (N, W + 3) loads, see `Suspension.at_rest`; one row per
-                time.
+            inputs: (N, W + 3) loads at N times, for a car with W wheels. The
+                columns are those of `Suspension.at_rest`.
             step: time between two rows [s].
 
         Returns:

@@ -40,9 +40,9 @@ class FrameMotion(NamedTuple):
         return self.a + cross(self.alpha, r) + cross(self.w, cross(self.w, r))
 
     def of_frame(self, motion: FrameMotion) -> FrameMotion:
-        """Returns the motion in E of a frame B, given its motion in F.
+        """Returns the motion in E of a frame B, from the motion of B in F.
 
-        `self` is the motion of F in E.
+        This object is the motion of F in E; `motion` is the motion of B in F.
         """
         p, w, v, alpha, a = (rotated(self.R, vector) for vector in motion[1:])
         rotating = cross(self.alpha, p) + cross(self.w, cross(self.w, p))

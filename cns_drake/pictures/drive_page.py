@@ -186,7 +186,7 @@ def make_panel(
         title: title of the page.
         drive: record of the drive.
         changes: kinds of change that the page shows, keys of `CHANGE_RGB`.
-        shown: the stages.
+        shown: the stages of the city that the page shows.
     """
     # Only pages need templates, and the import takes a moment.
     from jinja2 import Environment, StrictUndefined

@@ -74,11 +74,11 @@ class Primitives(NamedTuple):
 
 
 def merge_first(group: RayGroup) -> Iterator[Primitives]:
-    """Yields what the first hierarchy contains of a group.
+    """Yields the geometry of a group in the first hierarchy of a scene.
 
-    These are the group's triangles, and polyhedra around its curved shapes. If
-    the group can move, the first hierarchy contains the curved shapes
-    themselves instead of polyhedra. All rays are cast on the first hierarchy.
+    All rays are cast on the first hierarchy. It contains the triangles of every
+    group. It contains curved shapes themselves only if their group can move,
+    and otherwise polyhedra around them.
     """
     members = _numbered(group)
     flat = [

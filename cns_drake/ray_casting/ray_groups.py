@@ -250,12 +250,15 @@ def group_geometries(
 def serves(
     p_WO: np.ndarray, groups: Sequence[RayGroup], p_WS: np.ndarray
 ) -> bool:
-    """Returns whether ranges are precise for a sensor at a position.
+    """Returns whether a scene gives precise ranges for a sensor's position.
+
+    A scene casts rays in float32 relative to its origin O. Ranges are precise
+    as long as the sensor is in a cube around O.
 
     Args:
-        p_WO: (3,) origin of the scene [m].
+        p_WO: (3,) position of O in the world [m].
         groups: groups of the scene.
-        p_WS: (3,) position of the sensor [m].
+        p_WS: (3,) position of the sensor in the world [m].
     """
     has_world = any(group.is_merged_world for group in groups)
     cube = _CUBE if has_world else _MOVING_CUBE

@@ -13,10 +13,11 @@ from cns_drake.base.compiled import compiled
 
 
 class Rays(NamedTuple):
-    """N rays from one pose of a sensor S or from several.
+    """N rays, cast from one or several poses of a sensor S.
 
-    Ray i has direction i. From every other array of length n it uses entry i
-    mod n.
+    O is the frame of the scene: the axes are those of the world, the origin is
+    nearby. Ray i has direction i. In all other arrays, of any length n, entry i
+    mod n belongs to ray i.
 
     Attributes:
         p_OSset: (K, 3) float32 origins [m].

@@ -113,17 +113,19 @@ def make_imu(
     """Returns an Imu message.
 
     Args:
-        quat_xyzw: orientation R_WI of the imu frame I in the map W.
-        angular_velocity: w_WI_I, shape (3,) [rad/s].
+        quat_xyzw: orientation R_WI of the imu frame I in the map W; None if
+            unknown.
+        angular_velocity: w_WI_I, shape (3,) [rad/s]; None if not measured.
         specific_force: expressed in I, shape (3,) [m/s^2]; at rest on level
-            ground +9.81 along z.
-        variances: variance of each axis of the specific force [m^2/s^4] and of
-            the angular velocity [rad^2/s^2].
+            ground +9.81 along z. None if not measured.
+        stamp_ns: time of the message [ns].
+        variances: two variances, the same for x, y and z: of the specific force
+            [m^2/s^4], and of the angular velocity [rad^2/s^2].
 
     Returns:
-        The message. In its covariances, the standard deviation of a value
-        without noise is 1e-6, and the covariance of a value that is None begins
-        with -1 (REP 145).
+        The message. For a value without noise, its covariance states a standard
+        deviation of 1e-6. For a value that is None, its covariance begins with
+        -1 (REP 145).
     """
     force_variance, turn_variance = variances
     return ros_types.make_message(
@@ -260,9 +262,10 @@ def make_compressed_image(
 
 
 def make_camera_info(camera: CameraInfo, frame_id: str, stamp_ns: int) -> Any:
-    """Returns a CameraInfo message of a pinhole without distortion.
+    """Returns a CameraInfo message of a pinhole camera without distortion.
 
-    The camera's frame has z ahead and y down.
+    `frame_id` names the camera's frame, with z ahead and y down. `stamp_ns` is
+    the time of the message [ns].
     """
     K = camera.intrinsic_matrix()
     return ros_types.make_message(

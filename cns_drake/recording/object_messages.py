@@ -165,10 +165,15 @@ def marked_detections(
 
 
 def marked_boxes(who: Sequence[tuple[int, str]], numbers: np.ndarray) -> Any:
-    """Returns a SceneUpdate with the boxes of N objects, without a time.
+    """Returns a SceneUpdate message with the boxes of N objects.
 
-    It replaces all earlier boxes. A placeholder stands for the time stamp. The
-    arguments are those of `marked_detections`.
+    The message deletes all boxes that were sent before. Its time stamps are a
+    placeholder. The boxes are in the map frame W.
+
+    Args:
+        who: instance id and class of each object.
+        numbers: (N, 10) position [m], orientation (x, y, z, w) and size [m] of
+            each box.
     """
     stamp = messages.make_header(messages.MAP_FRAME, _STAMP_MARK_NS).stamp
     entities = []

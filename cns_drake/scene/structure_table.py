@@ -84,10 +84,10 @@ class StructureTable:
         return StructureTable(entries)
 
     def labels(self, names: Sequence[str]) -> Labels:
-        """Returns labels and instance ids of geometries.
+        """Returns the labels and instance ids of G geometries, by structure.
 
         Args:
-            names: for each of G geometries, the name of its structure.
+            names: name of each geometry's structure.
         """
         table = self.completed(names)
         entries = [table[name] for name in names]

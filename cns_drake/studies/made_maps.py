@@ -134,7 +134,7 @@ class MadeMaps:
     def want_age(
         self, drive: Scenario, years: Any, rates: Any, seed: int
     ) -> tuple[str, str]:
-        """Registers that `make` ages a drive's city by some years.
+        """Requests that `make` ages a drive's city by some years.
 
         Args:
             drive: the drive.
@@ -144,8 +144,8 @@ class MadeMaps:
             seed: seed of the events.
 
         Returns:
-            The drive's own map and stage, because the aged map does not exist
-            yet.
+            Map and stage of the drive as it is, because the aged map does not
+            exist yet.
 
         Raises:
             InputError: years, or a rate, are out of range.
@@ -157,11 +157,11 @@ class MadeMaps:
         return str(drive.map), str(drive.stage)
 
     def want_redrawn(self, drive: Scenario, seed: Any) -> tuple[str, str]:
-        """Registers that `make` generates a drive's city anew from a seed.
+        """Requests that `make` generates a drive's city anew from a seed.
 
         Returns:
-            The drive's own map and stage, because the new map does not exist
-            yet.
+            Map and stage of the drive as it is, because the new map does not
+            exist yet.
 
         Raises:
             InputError: the seed is out of range.

@@ -385,16 +385,20 @@ def train(
         weights: Any,
         counts: Any,
     ) -> Any:
-        """Takes one step of Adam; jitted.
+        """Takes one step of Adam; compiled by JAX.
 
         Args:
             values: weights of the network.
             first: running means of the gradients.
-            second: running means of their squares.
+            second: running means of the squared gradients.
             step: number of the step, from 0.
             images: images of the scans of a batch.
             weights: targets, see `Batch.weights`.
             counts: see `Batch.counts`.
+
+        Returns:
+            The new `values`, `first` and `second`; the loss of the batch before
+            the step; and the share of its queries whose best place was right.
         """
         (value, right), slope = jax.value_and_grad(loss, has_aux=True)(
             values, images, weights, counts

@@ -55,8 +55,8 @@ def make_signals(graph: LaneGraph, begin: np.ndarray) -> Signals:
 
     Args:
         graph: lane graph with P pieces and C crossings.
-        begin: (P + C, P + C) distances along paths through junctions at which
-            they begin to meet crossings [m]; see
+        begin: (P + C, P + C) distances along each path [m] at which small
+            vehicles begin to meet other paths and crossings, see
             `cns_drake.traffic.streets.find_conflicts`.
     """
     pieces = graph.pieces

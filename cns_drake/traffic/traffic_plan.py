@@ -330,9 +330,10 @@ class Follower:
         return self._box.middles(jet.p[:, :2], jet.yaw)
 
     def positions(self) -> np.ndarray:
-        """Returns the distances along the path at even times of the drive [m].
+        """Returns the distances along the path at evenly spaced times [m].
 
-        The times are `KNOT_PERIOD` apart and begin with the drive.
+        The first time is the start of the drive; successive times are
+        `KNOT_PERIOD` apart.
         """
         every = round(KNOT_PERIOD / STEP)
         u = np.array(self.u[self._start :: every])

@@ -119,8 +119,8 @@ def room_for_walkers(walkways: Sequence[Walkway]) -> int:
 def gait_rate(speed: np.ndarray) -> np.ndarray:
     """Returns the rate at which the phase of walkers' gait changes [rad/s].
 
-    A stride consists of two steps; its length is 0.4 m plus the distance that
-    is walked in 0.7 s.
+    `speed` contains the walking speeds [m/s]. A stride consists of two steps;
+    its length is 0.4 m plus the distance walked in 0.7 s.
     """
     return 2.0 * np.pi * speed / (0.7 * speed + 0.4)
 

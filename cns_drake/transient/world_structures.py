@@ -301,9 +301,9 @@ class GroundSurface:
         return np.where(np.isfinite(found), found, np.nan)
 
     def lowest(self, area: BaseGeometry, default: float) -> float:
-        """Returns the least height at the corners of an area [m].
+        """Returns the least height of the ground at the corners of an area [m].
 
-        The result is `default` if there is no ground.
+        The result is `default` if there is no ground at any corner.
         """
         z = self.heights(shapely.get_coordinates(area))
         z = z[np.isfinite(z)]

@@ -171,10 +171,10 @@ class Candidates:
     Attributes:
         source: (M,) keyframes of the source.
         target: (M,) keyframes of the target.
-        p_S: (M, 3) position of the first keyframe in the source's world [m].
-        p_T: (M, 3) position of the second keyframe in the target's world [m].
-        turn: (M,) angle about the vertical from the source's world to the
-            target's at which the two keyframes look alike [rad].
+        p_S: (M, 3) positions of the source's keyframes in its world S [m].
+        p_T: (M, 3) positions of the target's keyframes in its world T [m].
+        turn: (M,) angle about the vertical from S to T at which the two
+            keyframes look alike [rad].
     """
 
     source: np.ndarray

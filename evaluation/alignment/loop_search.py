@@ -219,9 +219,12 @@ class LoopSearch:
 
 
 def find_self_loops(drive: Submaps, most: int, track: Track) -> list[Loop]:
-    """Registers a drive's keyframes to its earlier ones at the same place.
+    """Returns the loops between keyframes of the same drive.
 
-    At most `most` pairs are tried, evenly along the drive.
+    A keyframe and the nearest earlier keyframe are a pair if they lie at the
+    same place and the path between them is long enough. At most `most` pairs,
+    evenly spread over the drive, are registered. A pair that cannot be
+    registered makes no loop.
     """
     pairs = []
     for k in range(len(drive)):

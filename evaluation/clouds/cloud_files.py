@@ -457,14 +457,15 @@ def read_cloud(
 ) -> np.ndarray:
     """Returns the points of a point cloud file.
 
-    The ending of its name gives the format: `.pcd` and `.ply` in all their
-    encodings; `.npy` holds N x 3 or N x 4 numbers or a structured array; `.bin`
-    is KITTI's sequence of float32 x y z intensity, or one of other columns.
+    The ending of the file's name gives the format: `.pcd` and `.ply` in all
+    their encodings; `.npy` with an N x 3 or N x 4 array or a structured array;
+    `.bin` with float32 numbers, such as KITTI's x, y, z and intensity of each
+    point.
 
     Args:
         path: an existing file of a scan; see `read_blocks` for maps.
-        columns: number of columns of a `.bin`; by default guessed from the
-            values.
+        columns: number of float32 numbers for each point in a `.bin`; by
+            default guessed from the values.
         on_note: is called with notes on how the file was read.
 
     Returns:

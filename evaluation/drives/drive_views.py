@@ -105,10 +105,10 @@ class CountedDrive(MovedDrive):
 
 
 class RecentScans(DriveView):
-    """Another drive, whose last scans stay in memory.
+    """A view of a drive that keeps its last scans in memory.
 
-    Each scan is read only once by a program that asks for scans in increasing
-    order, or goes back by fewer scans than are kept.
+    Each scan is read from the drive only once if a program asks for scans in
+    increasing order, or goes back by fewer scans than are kept.
     """
 
     def __init__(self, drive: Drive, kept: int):

@@ -82,6 +82,10 @@ def by_distance(
 ) -> np.ndarray:
     """Returns the labels (N,) uint8 of a map by the baseline `distance`.
 
+    A point is kept if the other map has a point within 0.5 m. Otherwise it is
+    gone (older map) or new (newer map); see
+    `evaluation.map_update.sessions.Label`.
+
     Args:
         mine: the map with N points, and its drive.
         theirs: the map of the other drive.
@@ -196,6 +200,11 @@ def by_m3c2(
     mine: Session, theirs: Session, track: Track = silent
 ) -> np.ndarray:
     """Returns the labels (N,) uint8 of a map by the baseline `m3c2`.
+
+    A point is gone (older map) or new (newer map) if the M3C2 distance of the
+    two maps there exceeds its level of detection and 0.1 m. Otherwise it is
+    kept, or unobserved if a map lacks points to measure this distance. See
+    `evaluation.map_update.sessions.Label`.
 
     Args:
         mine: the map with N points, and its drive.

@@ -292,7 +292,7 @@ def voxel_order(index: np.ndarray) -> np.ndarray:
             order in which the voxels first occur in the cloud.
 
     Returns:
-        (V,) rows of `index`, in the order of the program.
+        (V,) row numbers of `index`, in the order of the program.
     """
     x, y, z = np.asarray(index, dtype=np.int64).T
     # fmod: a remainder with the sign of the dividend, as in C++.

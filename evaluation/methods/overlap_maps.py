@@ -186,16 +186,19 @@ def coarse_maps(
 
     Args:
         cells: (M,) uint16 occupied cells of all layers, see `layer_cells`.
-        starts: (layers + 1,) index of each layer's first cell, then M.
+        starts: (layers + 1,) index in `cells` at which each layer begins; the
+            last entry is M.
         turns: (H, 2) int64 cosines and sines of the angles by which the scan is
-            turned about the sensor, in units of 2^-14; see `turns`.
-        halvings: how often the number of rows and columns is halved; at
-            least 2, since a row must fit into 64 bits.
-        maps: (layers,) int64, number of the map into which each layer is drawn.
+            turned about the sensor, in units of 2^-14.
+        halvings: how often the number of rows and columns is halved; at least
+            2, since a row must fit into 64 bits.
+        maps: (layers,) int64, number of the map, from 0 to S - 1, into which
+            each layer is drawn.
 
     Returns:
-        (H, R, S) uint64, the R rows of S maps; bit k of a row is set if column
-        k is occupied. And (H, S) int64, number of bits set in each map.
+        (H, R, S) uint64, the R rows of the S maps at each heading; bit k of a
+        row is set if column k is occupied. (H, S) int64, the number of occupied
+        cells of each map.
     """
     rows, num_maps = GRID >> halvings, maps.max() + 1
     bits = np.zeros((len(turns), rows, num_maps), np.uint64)

@@ -399,12 +399,14 @@ def _part(number: int, total: int) -> str:
 def aims(
     results: Sequence[PlaceRecognition], changes: Sequence[ChangeResult]
 ) -> list[Finding]:
-    """Returns whether the shipped cities meet each target set for them.
+    """Returns, for each target of the shipped cities, whether it is met.
 
-    The list is empty unless the results of all the paper's pairs are present.
+    The targets compare results in the shipped cities with those of the paper.
+    The list is empty unless `results` contains all of the paper's pairs of
+    drives.
 
-    RING++ is scored on the queries with a match, all other methods on all
-    queries, as the paper seems to have done.
+    As the paper seems to do, RING++ is scored on the queries with a match, and
+    all other methods on all queries.
     """
     differences = _differences(results)
     if differences.keys() != {

@@ -71,7 +71,10 @@ class _Part(NamedTuple):
 
 
 class Measuring:
-    """Measures data sets, one after the other.
+    """Runs place recognition and localisation on real data sets.
+
+    With simulated recordings, it also measures how well a classifier tells real
+    from simulated scans.
 
     Attributes:
         rows: the results.

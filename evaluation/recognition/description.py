@@ -109,10 +109,11 @@ def describe_drive(
     visit: Callable[[int, np.ndarray], None] | None = None,
     further: Iterable[Request] = (),
 ) -> list[DescribedDrive]:
-    """Describes the places and queries of a drive, each cloud once.
+    """Describes the places and queries of a drive.
 
-    If a frame is both a place and a query, and the method describes both in the
-    same way, it is described only once. Clouds are shared between methods.
+    Each cloud is made only once for all methods. A frame that is both a place
+    and a query is described only once by a method that describes both in the
+    same way.
 
     Args:
         drive: the drive.
@@ -121,18 +122,21 @@ def describe_drive(
         protocol: protocol by which frames of places and queries are chosen, and
             their clouds made.
         track: reports progress.
-        visit: function that is called with the number and the cropped scan (N,
-            3) of each described frame. The scan is in the sensor's frame. If
-            the drive has only queries, the scan is turned, tilted and hidden
-            like the query.
-        further: requests for descriptions by other protocols.
+        visit: function that is called with the frame number and the scan (N, 3)
+            of each place and query that `protocol` chooses. The scan is cropped
+            to the protocol's range, in the sensor's frame. If the drive has
+            only queries, the scan is changed as the protocol says: turned,
+            tilted or without a sector.
+        further: requests for further descriptions: each is a method, the roles
+            to describe, and a protocol.
 
     Returns:
-        The descriptions by each method, then those of the further requests.
+        One description for each method, followed by one for each entry of
+        `further`.
 
     Raises:
-        InputError: if the drive cannot be read, it lacks a field that a
-            method needs, or no described cloud has a point within range.
+        InputError: if the drive cannot be read, it lacks a field that a method
+            needs, or no described cloud has a point within range.
     """
     requests = [*((one, roles, protocol) for one in methods), *further]
     describing = [_Describing(drive, *request) for request in requests]

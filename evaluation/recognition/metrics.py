@@ -170,9 +170,9 @@ def areas_under(precision: np.ndarray, recall: np.ndarray) -> np.ndarray:
 
 
 def recall_of(tp: np.ndarray, fn: np.ndarray) -> np.ndarray:
-    """Returns the recall TP / (TP + FN), an array of the same shape.
+    """Returns the recall TP / (TP + FN); 0 where TP + FN is 0.
 
-    It is 0 where TP + FN is 0.
+    The counts `tp` and `fn` and the result are arrays of the same shape.
     """
     return tp / np.maximum(tp + fn, 1)
 
@@ -416,8 +416,9 @@ def compared_by_auc(
     """Returns the AUC difference between any two of several methods.
 
     Args:
-        answers: method -> its outcomes on each set of queries. All methods
-            answered the same queries, in the same blocks.
+        answers: method -> its outcomes on each set of queries. The queries must
+            be the same for all methods, and so must their blocks of the route,
+            see `QueryOutcomes.blocks`.
 
     Returns:
         (first method, second method) -> AUC of the first minus that of the

@@ -118,13 +118,14 @@ class PlaceOutcome:
         interval: Interval = UNKNOWN,
         n: int | None = None,
     ) -> Number:
-        """Returns a number as a result of the outcome's method and gate.
+        """Returns a `Number` of this outcome: a metric with its value.
 
         Args:
-            metric: name of the number.
-            value: the number.
+            metric: name of the metric.
+            value: value of the metric.
             interval: its 95 % interval.
-            n: number of queries from which it is computed; by default all.
+            n: number of queries from which the value is computed; by default
+                all.
         """
         count = len(self.outcomes) if n is None else n
         return Number(

@@ -76,12 +76,13 @@ class CameraImages:
     files: list[bytes]
 
     def to_data(self, step: int) -> dict:
-        """Returns every `step`-th image, ready for JSON.
+        """Returns every `step`-th image, and the image of each frame, for JSON.
 
         Returns:
-            `files`, the images as base64; and, for each of the K frames,
-            `nearest`, the number of the image that is nearest in time, and
-            `later`, how much later than the frame this image is [s].
+            A mapping with `files`, the images as base64 text, and two lists
+            with an entry for each of the K frames: `nearest`, the index in
+            `files` of the image that is nearest in time; and `later`, how much
+            later than the frame this image is [s].
         """
         times_ns = self.times_ns[::step]
         nearest = _nearest(times_ns, self.stamps_ns)

@@ -149,7 +149,7 @@ def draw(
     *,
     alone: bool = False,
 ) -> Drawn:
-    """Draws a chart from a table of results.
+    """Returns a chart, drawn from a table of results.
 
     Args:
         chart: description of the chart, as in an experiment's file.

@@ -138,10 +138,10 @@ def excesses(queries: QueryRows) -> list[Summary]:
 
     Let a and b be the shares of the baseline's AUC that are left under each
     cause by itself, and ab the share that is left under both causes together.
-    The excess is a * b - ab. It is 0 if the causes do not interact, because the
-    shares then multiply.
+    The excess is the product a * b minus ab. It is 0 if the causes do not
+    interact, because the shares then multiply.
 
-    An excess is computed for each cause whose name joins the names of two
+    The result has a summary for each cause whose name joins the names of two
     causes by "+", if both were also measured by themselves (at their strongest
     level). AUCs are means over the seeds.
     """

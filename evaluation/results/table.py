@@ -376,10 +376,11 @@ class QueryRows:
 
     @classmethod
     def read(cls, path: str | Path) -> QueryRows:
-        """Returns the table in a file `queries.csv`, or in a folder with one.
+        """Returns the table in the file `queries.csv`.
 
-        All columns of a query except `query_frame`, `correct`, `has_match` and
-        `score` may be missing.
+        `path` is this file or the folder that contains it. All columns of a
+        query except `query_frame`, `correct`, `has_match` and `score` may be
+        missing.
 
         Raises:
             InputError: as `Results.read`.

@@ -230,10 +230,10 @@ class RecordingSurvey:
         placed: names of the drive, its world frame and its map.
         described: key of a method -> its descriptions of the places and
             queries; empty if the drive has neither.
-        scans: scans of places and queries; None if they are not kept. With a
-            map, they are a `KeptDrive` and as recorded. Without one, they are
-            arrays (N, 3) float32, and the queries are changed as the protocol
-            says: turned, tilted or without a sector.
+        scans: scans of places and queries; None if they are not kept. If there
+            is a map, this is a `KeptDrive` with the recorded scans. Otherwise
+            it is a list of arrays (N, 3) float32, in which queries are changed
+            as the protocol says: turned, tilted or without a sector.
         drive: the drive with its map; None without a map.
         fine: (K, 3) cloud for pictures in W [m]; None without a map.
     """

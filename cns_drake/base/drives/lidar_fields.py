@@ -45,7 +45,9 @@ _FIELDS = {
 
 
 def lidar_field(unit: object) -> LidarField | None:
-    """Returns rings and field of view of a LiDAR model; None if it is unknown.
+    """Returns the number of rings and the field of view of a LiDAR model.
+
+    The result is None if the model is unknown.
 
     Args:
         unit: name of a preset or model in lower case, such as `os1-64` or

@@ -268,7 +268,8 @@ def revolved(
 
     The profile is a list of (radius, z) pairs from the bottom up [m]. If the
     last radius is zero, the surface ends in a tip; otherwise a lid closes the
-    top. The circle is approximated by a polygon of `count` sides.
+    top. The circle is approximated by a polygon of `count` sides. `center`
+    contains x and y of the axis [m].
     """
 
     def ring(radius: float) -> np.ndarray:
@@ -289,8 +290,9 @@ def revolved(
 def extruded(profile: Sequence[Point], x0: float, x1: float) -> Mesh:
     """Returns a roof: a line in y and z, extruded along x, with end walls.
 
-    The line consists of (y, z) points with increasing y [m]. The end walls
-    reach down to the height of the first point.
+    The line consists of (y, z) points with increasing y [m]. It is extruded
+    from x = `x0` to x = `x1` [m]. The end walls reach down to the height of the
+    first point.
     """
     base = profile[0][1]
     faces = Faces()

@@ -530,7 +530,8 @@ class Openings:
     def layout(self, edge: int, length: float) -> list[walls.Relief]:
         """Returns all reliefs of a wall, as the layout of a `Facade`.
 
-        Bands of the facade are interrupted at arches.
+        Bands of the facade are interrupted at arches. `edge` is the number of
+        the wall. `length`, the length of the wall [m], is not used.
         """
         found: list[walls.Relief] = []
         for relief in self._reliefs[edge]:

@@ -96,20 +96,21 @@ class Draft:
         return np.random.default_rng([self.plan.seed, zlib.crc32(key)])
 
     def task(self, *words: str | int) -> np.random.Generator:
-        """Starts a task: a new range of numbers for names, and a new generator.
+        """Starts a task, such as placing trees; returns its random generator.
 
-        The result is the random generator, as from `rng`; for the range of
-        numbers, see `open_range`. `words` are the name of the task.
+        The generator is that of `rng`. The numbers in the names of the task's
+        structures begin in a new range, see `open_range`. `words` are the name
+        of the task.
         """
         self.open_range()
         return self.rng(*words)
 
     def open_range(self) -> None:
-        """Lets the numbers in names go on after the next multiple of 50.
+        """Makes the numbers in new names begin after the next multiple of 50.
 
-        It is called before each task, such as placing a row of trees. One
-        structure more or less in a task then does not change the names of
-        structures in later tasks, to which `stages.yaml` refers.
+        It is called before each task, such as placing a row of trees. If a task
+        places a few structures more or fewer, the names of structures in later
+        tasks, to which `stages.yaml` refers, stay the same.
         """
         for kind, count in self._counts.items():
             self._counts[kind] = -(-count // _RANGE) * _RANGE

@@ -105,7 +105,8 @@ def lot_at(
     The result is None if the line ends before the lot does, or bends too much.
 
     Args:
-        line: line along a street, which is on its right [m].
+        line: line along a street [m]. The street is to the right of the line,
+            the lot to the left.
         start: distance along the line at which the front begins [m].
         width: length of the front [m].
         depth: depth of the lot, away from the street [m].

@@ -81,7 +81,7 @@ class Bare:
 def all_laid_bare(
     buildings: Sequence[Imported], ground: Ground, seed: int
 ) -> list[Bare]:
-    """Splits buildings into walls, roof and other surfaces.
+    """Returns buildings, split into walls, roof and other surfaces.
 
     A variant of a building, such as a lower one in an earlier stage, has the
     style of the original.

@@ -121,9 +121,10 @@ class FacadePlan:
         return is_low and self.to_drive < reach + _BESIDE
 
     def probes(self) -> np.ndarray:
-        """Returns places (N + 1, 3) in front of N openings and the top [m].
+        """Returns points (N + 1, 3) before N openings and the wall's top [m].
 
-        An opening, or the wall's top, is hidden if its place cannot be seen.
+        The points are in W, just in front of the wall. An opening, or the top,
+        is hidden if the point in front of it cannot be seen.
         """
         panel = self.panel
         at = [((o.x0 + o.x1) / 2, (o.z0 + o.z1) / 2) for o in self.openings]

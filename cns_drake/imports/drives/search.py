@@ -198,8 +198,8 @@ class WayGraph(ABC):
         """Returns (N,) bool: pieces that an arm of the second drive must avoid.
 
         An arm is the part of the second drive before it joins the first drive,
-        or after it leaves it. Pieces to avoid are the pieces of the drives so
-        far, and pieces close to them.
+        or the part after it has left the first drive. Pieces to avoid are the
+        pieces of the drives so far, and pieces close to them.
 
         Args:
             pieces: numbers of the pieces of the drives so far.
@@ -247,10 +247,11 @@ class WayGraph(ABC):
         return way[: max(1, kept)]
 
     def links(self, closed: np.ndarray | None = None) -> csr_array:
-        """Returns the costs from piece to next piece, as a matrix (N, N).
+        """Returns the costs from piece to next piece, a sparse matrix (N, N).
 
-        Pieces that are not open, and those in the mask `closed` (N,), have no
-        edges.
+        By default, a cost is the length of the way between the pieces' middles
+        [m]. Pieces that are not open, and those in the mask `closed` (N,), have
+        no edges.
         """
         is_open = self.is_open if closed is None else self.is_open & ~closed
         before, after, costs = self._links

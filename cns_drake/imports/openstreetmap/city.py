@@ -136,9 +136,9 @@ def import_openstreetmap(
         year_attribute: tag with the year of construction; None for the usual
             tags.
         dressed: whether to read more: the sea, areas of ground by their
-            material, and buildings that were demolished at an unknown date.
-            Tunnels, and bridges over other ways, are then left out; bridges at
-            ground level get parapets.
+            material, and buildings that were demolished at an unknown date. If
+            so, tunnels, and bridges over other ways, are left out, and bridges
+            at ground level get parapets.
 
     Raises:
         InputError: if the file cannot be read, has no building, or is larger

@@ -243,9 +243,10 @@ class Local:
         return self.metres(offset)
 
     def metres(self, offset: np.ndarray) -> np.ndarray:
-        """Converts differences of places (..., 2) from degrees to metres.
+        """Converts differences of longitude and latitude to metres.
 
-        They are differences of longitude and latitude.
+        `offset` (..., 2) contains the differences in longitude and latitude
+        [deg]. The result (..., 2) contains the distances east and north [m].
         """
         return np.asarray(offset * self._metres)
 

@@ -61,7 +61,7 @@ class ImuSection(Mount):
         """Returns the number of samples per second.
 
         This is `rate` if given, or else the rate in Kalibr's file, or else the
-        scan rate.
+        scan rate. `scan_rate` is the number of scans per second.
 
         Raises:
             InputError: Kalibr's file cannot be used.

@@ -238,11 +238,11 @@ class NoisyImu(LeafSystem):
 
 
 class VehicleImu(LeafSystem):
-    """Measures like an ideal accelerometer and gyroscope on a vehicle.
+    """Measures like an accelerometer and a gyroscope on a vehicle.
 
-    Up to rounding, the values are those of Drake's `Accelerometer` and
-    `Gyroscope`. This system is much faster, because it computes many samples at
-    once from a known trajectory.
+    Up to rounding and added errors, the values are those of Drake's
+    `Accelerometer` and `Gyroscope`. This system is much faster, because it
+    computes many samples at once from a known trajectory.
 
     .. pydrake_system::
 
@@ -253,10 +253,10 @@ class VehicleImu(LeafSystem):
         - samples
 
     `specific_force` [m/s^2] and `angular_velocity` w_WI [rad/s] are vectors of
-    size 3, expressed in the IMU's frame I. Between two samples, the error of
-    the earlier one is added. `samples` is abstract, of type `ImuSamples`: the
-    last 256 samples up to the time of the context. All outputs depend only on
-    time.
+    size 3, expressed in the IMU's frame I. At a time between two samples, they
+    are the exact values plus the error of the earlier sample. `samples` is
+    abstract, of type `ImuSamples`: the last 256 samples up to the time of the
+    context. All outputs depend only on time.
     """
 
     def __init__(

@@ -195,12 +195,13 @@ def make_pattern(
 
 
 def describe_unit(config: LidarSection) -> dict[str, Any]:
-    """Returns what the data sheet and serial number tell a LiDAR's user.
+    """Returns facts about a LiDAR that are stored in its recordings.
 
     Returns:
-        The keys are `preset`, `unit_seed`, and `elevations_deg`: the nominal
-        elevations of the lasers [deg], empty for a preset without rings. The
-        true angles differ from them by the errors of the individual unit.
+        A mapping with the keys `preset`, `unit_seed`, and `elevations_deg`: the
+        nominal elevations of the lasers [deg], empty for a preset without
+        rings. The true angles differ from them by the errors of the individual
+        unit.
     """
     nominal = getattr(make_pattern(config), "elevations_rad", ())
     return {

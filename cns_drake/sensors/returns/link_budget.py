@@ -146,10 +146,10 @@ def range_deviation(budget: LinkBudget, snr: np.ndarray) -> np.ndarray:
 
 @compiled
 def echo_energy(budget: LinkBudget, snr: _Value, distance: _Value) -> _Value:
-    """Returns the energy that the unit infers from SNR and distance [m].
+    """Returns the energy that a LiDAR infers from the SNR of an echo.
 
-    Energy is the reflectivity of a target times the cosine of incidence. The
-    unit assumes clear air.
+    `distance` is the range of the echo [m]. The energy is the reflectivity of
+    the target times the cosine of incidence. The LiDAR assumes clear air.
     """
     gain = np.exp(2.0 * budget.own_extinction * distance)
     return snr * distance * distance * gain / budget.scale
