@@ -85,7 +85,7 @@ def test_no_arguments_show_the_help():
 
 def test_simulate_and_overwrite(files, tmp_path, capfd):
     arguments = ("simulate", files / "drive.yaml", "--output", tmp_path)
-    result = run(*arguments)
+    result = run_here(capfd, *arguments)
     assert result.returncode == 0
     assert "3 frames" in result.stdout
     assert (tmp_path / "drive" / "metadata.yaml").is_file()

