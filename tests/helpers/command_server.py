@@ -22,6 +22,8 @@ import subprocess
 import sys
 import tempfile
 
+from _pytest.monkeypatch import MonkeyPatch
+
 from cns_drake.base.compiled import start_compiler
 from cns_drake.base.jobs import processes
 from cns_drake.base.jobs.fingerprint import code_digest
@@ -29,9 +31,11 @@ from cns_drake.base.jobs.processes import ALLOCATION
 from cns_drake.base.process import look_seldom
 from cns_drake.simulation.simulation import simulate
 from evaluation.study import chosen_methods
+from helpers.studies import leave_figures_unrendered
 from helpers.tiny_drive import tiny_scenario
 
-# Environment variable with the methods that a study compares.
+# Environment variable with the methods that a study compares; its figures are
+# not rendered, either.
 METHODS_VARIABLE = "CNS_DRAKE_TEST_METHODS"
 
 _CLIENT = """#!{python} -IS
@@ -144,6 +148,7 @@ def _answer(client: socket.socket) -> None:
         if METHODS_VARIABLE in environment:
             methods = tuple(environment[METHODS_VARIABLE].split())
             chosen_methods.shipped_methods = lambda: methods
+            leave_figures_unrendered(MonkeyPatch())
         module = _PROGRAMS[Path(words[0]).name]
         sys.exit(importlib.import_module(module).main())
     status = os.waitstatus_to_exitcode(os.waitpid(process, 0)[1])

@@ -17,6 +17,7 @@ import yaml
 from evaluation.drives import open_drive
 from helpers.layered_scans import town
 from helpers.small_cityjson import write_blocks
+from helpers.small_map import write_town
 from helpers.small_opendrive import straight, write_roads
 
 
@@ -27,6 +28,7 @@ def _write_sources(folder: Path) -> None:
         straight("1", 0, 0, 150, 0),
         straight("2", 150, 0, 300, 0),
     )
+    write_town(folder / "boxes", {"01": "metropolis_01"}, 20)
 
 
 def _write_own_drives(folder: Path) -> None:
@@ -137,7 +139,6 @@ RECIPES = {
             "town.html",
         ),
         prepare=_write_own_drives,
-        all_methods=True,
     ),
     "imported scenario": Recipe(
         'map: .\nstage: "01"',
@@ -181,6 +182,8 @@ RECIPES = {
     ),
     "study of an own city": Recipe(
         ".venv/bin/cns-drake study stages town --quick",
+        # The other tasks are those of the recipe study.
+        changes=(("--quick", "--quick --task change"),),
         after=("repair stages",),
         makes=("town_change/results.csv",),
     ),
@@ -213,11 +216,12 @@ RECIPES = {
         changes=(
             ("--frames 200", "--frames 2"),
             ("metropolis_01", "suburbia_01"),
+            # The page of a whole city takes as long as all the rest.
+            (" --recording drive.html", ""),
         ),
         makes=(
             "recordings/suburbia_01/metadata.yaml",
             "recordings/suburbia_01/suburbia_01_0.mcap",
-            "drive.html",
         ),
     ),
     "evaluation": Recipe(
@@ -274,11 +278,12 @@ RECIPES = {
     ),
     "help: film": Recipe(
         "cns-drake film metropolis_01 --output metropolis.webp",
+        # A few boxes, which are drawn at once.
         changes=(
-            ("metropolis_01", "town/sequence_01.yaml --traffic 0"),
+            ("metropolis_01", "boxes/sequence_01.yaml --traffic 0"),
             ("metropolis.webp", "town.webp --seconds 1 --size 64x36"),
         ),
-        after=("own city",),
+        after=("imported scenario",),
         prints=("town.webp: 8 images",),
         makes=("town.webp",),
     ),
@@ -621,6 +626,7 @@ RECIPES = {
         changes=(
             ("[suburbia, riverside]", "town"),
             ("[1, 2, 3]", "[1]"),
+            ("leaves: [1.0, 0.0]", "leaves: [1.0]"),
         ),
         file="season_and_age.yaml",
     ),

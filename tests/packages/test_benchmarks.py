@@ -25,7 +25,7 @@ RUNS = {
         ),
         "of ideal",
     ),
-    "many_houses.py": (("--houses", 60), "60 houses: "),
+    "many_houses.py": (("--houses", 16), "16 houses: "),
     "ray_casting_rates.py": (("{drive}", "--rounds", 1), "Mrays/s"),
     "recording.py": (
         ("{drive}", "--rounds", 1, "--frames", 2),

@@ -25,6 +25,7 @@ KINDS = {
     },
     "module": {"evaluation.py": FAILING},
 }
+HIDING = ("evaluation.py", "evaluation/__init__.py")
 LIBRARY = """
 import sys
 from cns_drake import InputError, Lidar, add_lidar, load_scenario
@@ -69,11 +70,17 @@ def run_script(folder, text):
     return run(folder, "script.py")
 
 
-def test_the_simulator_never_loads_an_evaluation(folder):
-    done = run_script(
-        folder, f"{LIBRARY}assert 'evaluation' not in sys.modules"
-    )
-    assert (done.stdout, done.returncode) == ("works\n", 0), done.stderr
+def test_the_simulator_never_loads_an_evaluation_and_a_study_names_it(folder):
+    """A folder that is no package hides nothing."""
+    unloaded = "assert 'evaluation' not in sys.modules\n"
+    done = run_script(folder, LIBRARY + unloaded + STUDY)
+    assert done.returncode == 0, done.stderr
+    works, *lines = done.stdout.splitlines()
+    assert works == "works"
+    assert len(lines) == any((folder / f).is_file() for f in HIDING)
+    for line in lines:
+        assert line.startswith(f"{folder}/evaluation"), done.stderr
+        assert "hides the package of that name" in line
 
 
 @pytest.mark.parametrize("folder", ["package"], indirect=True)
@@ -82,29 +89,14 @@ def test_the_user_keeps_theirs(folder):
     assert (done.stdout, done.returncode) == ("works\n", 0), done.stderr
 
 
-@pytest.mark.parametrize(
-    "folder", ["package", "failing", "module"], indirect=True
-)
-def test_a_study_from_python_names_what_hides_its_evaluation(folder):
-    done = run_script(folder, STUDY)
-    (line,) = done.stdout.splitlines()
-    assert line.startswith(f"{folder}/evaluation"), done.stderr
-    assert "hides the package of that name" in line
-
-
-@pytest.mark.parametrize("folder", ["folder"], indirect=True)
-def test_a_folder_without_a_package_hides_nothing(folder):
-    done = run_script(folder, STUDY)
-    assert (done.stdout, done.returncode) == ("", 0), done.stderr
-
-
-@pytest.mark.parametrize("path", [(), (".",)])
-def test_a_program_leaves_out_the_current_folder(folder, path):
-    done = run(folder, "-m", "cns_drake", "list", path=path)
+def test_a_program_leaves_out_the_current_folder(folder):
+    """Python adds it twice: for `-m`, and by its name."""
+    done = run(folder, "-m", "cns_drake", "list", path=["."])
     assert done.returncode == 0, done.stderr
     assert "metropolis_04" in done.stdout
 
 
+@pytest.mark.parametrize("folder", ["failing"], indirect=True)
 def test_diagram_script(folder):
     done = run(folder, ROOT / "diagrams/downtown_01.py", "--help")
     assert done.returncode == 0, done.stderr

@@ -87,11 +87,11 @@ def test_it_runs_the_main_job_without_the_checkout(wheel, tmp_path):
     )
     assert where.startswith(str(site))
     run(
-        *(python, "-m", "cns_drake", "simulate", "metropolis_04"),
+        *(python, "-m", "cns_drake", "simulate", "suburbia_01"),
         *("--frames", "2", "--output", "output"),
         **options,
     )
-    drive = "output/metropolis_04"
+    drive = "output/suburbia_01"
     said = run(tmp_path / "venv/bin/cns-eval", "tcr", drive, drive, **options)
     assert "TCR_sym" in said
-    assert list(tmp_path.glob("cache/cns-drake/worlds-*/metropolis/roads.yaml"))
+    assert list(tmp_path.glob("cache/cns-drake/worlds-*/suburbia/roads.yaml"))

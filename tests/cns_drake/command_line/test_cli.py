@@ -12,6 +12,7 @@ import pytest
 import yaml
 
 from cns_drake.__main__ import main
+from cns_drake.command_line.drive_script import run_script
 from cns_drake.scenarios.shipped import recordable_drives
 
 pytestmark = pytest.mark.slow
@@ -84,7 +85,7 @@ def test_no_arguments_show_the_help():
 
 def test_simulate_and_overwrite(files, tmp_path, capfd):
     arguments = ("simulate", files / "drive.yaml", "--output", tmp_path)
-    result = run(*arguments)
+    result = run_here(capfd, *arguments)
     assert result.returncode == 0
     assert "3 frames" in result.stdout
     assert (tmp_path / "drive" / "metadata.yaml").is_file()
@@ -173,6 +174,20 @@ def test_diagram_script_has_options():
     assert shown.returncode == 0
     for option in ("frames", "output", "lidar", "recording", "graphviz"):
         assert f"--{option}" in shown.stdout
+
+
+def test_diagram_script_records_and_makes_a_page(files, tmp_path, capfd):
+    page = tmp_path / "drive.html"
+    status, out, _ = run_program(
+        capfd,
+        "a.py",
+        lambda: run_script(str(files / "drive.yaml"), "A drive."),
+        *("--frames", 2, "--output", tmp_path, "--recording", page),
+    )
+    assert status == 0
+    assert "2 frames" in out
+    assert (tmp_path / "drive" / "metadata.yaml").is_file()
+    assert page.stat().st_size > 100_000
 
 
 @pytest.mark.parametrize(

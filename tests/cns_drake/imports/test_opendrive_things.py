@@ -82,8 +82,8 @@ def test_a_road_over_another_is_a_bridge(tmp_path):
     rise = cubic("elevation", 0, 6.0, 0, 0, 0, "s")
     path = write_roads(
         tmp_path / "a.xodr",
-        straight("1", -100, 0, 100, 0),
-        straight("2", 0, -100, 0, 100, elevation=rise),
+        straight("1", -60, 0, 60, 0),
+        straight("2", 0, -60, 0, 60, elevation=rise),
     )
     _, raised = split_levels(
         [
@@ -95,8 +95,8 @@ def test_a_road_over_another_is_a_bridge(tmp_path):
     assert {band.road.name for band in raised} == {"2"}
     # The bridge is a little longer than the roads below: 5.5 m, and 10 m.
     s = np.concatenate([band.s for band in raised])
-    assert 81.0 < s.min() < 90.0
-    assert 110.0 < s.max() < 119.0
+    assert 41.0 < s.min() < 50.0
+    assert 70.0 < s.max() < 79.0
     built = build_town(path, 0)
     # No kerb lies across the road where the bridge begins, and those of the
     # road below go on.
@@ -106,7 +106,7 @@ def test_a_road_over_another_is_a_bridge(tmp_path):
     assert kerbs.footprint_W.contains(LineString([(-9, 3.6), (9, 3.6)]))
     decks = [s for s in built.city.structures if s.name.startswith("bridge")]
     assert {one.semantic_class for one in decks} >= {"road", "other-structure"}
-    below = LineString([(-100, 0), (100, 0)]).buffer(1.0)
+    below = LineString([(-60, 0), (60, 0)]).buffer(1.0)
     walls = [
         one.footprint_W
         for one in built.city.structures
@@ -120,14 +120,14 @@ def test_a_road_over_another_is_a_bridge(tmp_path):
 def test_bridges_and_tunnels_that_are_not_built_are_counted(tmp_path):
     rise = cubic("elevation", 0, 6.0, 0, 0, 0, "s")
     spans = "".join(
-        f'<{tag} id="{tag}" s="50" length="20" type="concrete"/>'
+        f'<{tag} id="{tag}" s="30" length="20" type="concrete"/>'
         for tag in ("bridge", "tunnel")
     )
     more = f"<objects>{spans}</objects>"
     path = write_roads(
         tmp_path / "a.xodr",
-        straight("1", -60, 0, 60, 0, more=more),
-        straight("2", 0, -60, 0, 60, elevation=rise, more=more),
+        straight("1", -40, 0, 40, 0, more=more),
+        straight("2", 0, -40, 0, 40, elevation=rise, more=more),
     )
     rows = build_town(path, 0, dressed=True).faults.rows()
     assert {kind: number for kind, number, _ in rows} == {

@@ -248,8 +248,8 @@ def test_an_aged_city_has_another_name(small_map, tmp_path):
 def test_two_worlds_and_changed_worlds_are_refused(
     short_recording, tmp_path, small_map
 ):
-    other = open_survey("riverside_01")
-    with pytest.raises(InputError, match="riverside"):
+    other = survey(tmp_path / "elsewhere", [GROUND])
+    with pytest.raises(InputError, match="elsewhere"):
         write_truth(open_survey(short_recording), other, tmp_path / "out")
     assert not (tmp_path / "out").exists()
     table = small_map / "structures.csv"

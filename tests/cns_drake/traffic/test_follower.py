@@ -11,7 +11,7 @@ from cns_drake.roads.lane_path import LanePath, Speeds
 from cns_drake.scenarios.planning import count_frames, plan_drive
 from cns_drake.scenarios.scenario import DriverConfig, TrafficConfig
 from cns_drake.scenarios.scenario_files import load_scenario
-from cns_drake.simulation.loaded_drive import plan_scenario_traffic
+from cns_drake.simulation.loaded_drive import load_stage, plan_scenario_traffic
 from cns_drake.traffic.lane_graph import LaneGraph, Piece
 from cns_drake.traffic.streets import STEP, EgoBox, make_streets
 from cns_drake.traffic.traffic_plan import Follower, find_runs
@@ -128,20 +128,25 @@ def test_alone_it_drives_as_it_may():
 
 @cache
 def followed(follows=True, vehicles=40, walkers=10):
-    scenario = load_scenario("riverside_01").model_copy(
+    scenario = load_scenario("riverside_01")
+    # The first two legs, on which it stops for others.
+    route = scenario.route.model_copy(update={"root": scenario.route.root[:2]})
+    scenario = scenario.model_copy(
         update={
+            "route": route,
             "traffic": TrafficConfig(vehicles=vehicles, walkers=walkers),
             "driver": DriverConfig(follows=follows),
         }
     )
     trajectory = plan_drive(scenario)
-    plan = plan_scenario_traffic(scenario, trajectory)
-    return scenario, trajectory, plan
+    world = load_stage(scenario, with_vehicle=False) if walkers else None
+    plan = plan_scenario_traffic(scenario, trajectory, world)
+    return scenario, trajectory, world, plan
 
 
 @pytest.mark.slow
 def test_a_drive_among_others():
-    scenario, plain, plan = followed()
+    scenario, plain, world, plan = followed()
     drive = plan_drive(scenario, plan.positions)
     times = np.arange(0.0, drive.duration, 0.05)
     speed = np.linalg.norm(drive.path_motion(times).v, axis=1)
@@ -150,7 +155,7 @@ def test_a_drive_among_others():
     assert count_frames(scenario, drive) > count_frames(scenario, plain)
     bound = scenario.speeds.longitudinal_acceleration
     assert np.abs(drive.path_parameter(times)[2]).max() < 1.1 * bound
-    again = plan_scenario_traffic(scenario, drive)
+    again = plan_scenario_traffic(scenario, drive, world)
     np.testing.assert_array_equal(again.positions, plan.positions)
     np.testing.assert_array_equal(again.vehicles.values, plan.vehicles.values)
     # Nobody meets the car.

@@ -462,7 +462,12 @@ def vehicles_in_streets(graph, xy):
 
 @pytest.mark.slow
 @pytest.mark.parametrize(
-    "name", ["downtown", "riverside", "suburbia", "metropolis"]
+    "name",
+    [
+        *("downtown", "metropolis"),
+        pytest.param("riverside", marks=pytest.mark.night),
+        pytest.param("suburbia", marks=pytest.mark.night),
+    ],
 )
 def test_traffic_flows(name):
     """Signals and walkers hold vehicles up for a while, and never for ever."""
