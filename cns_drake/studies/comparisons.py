@@ -150,7 +150,7 @@ class PairOfDrives:
         }
 
     def build(self, condition: Condition, seed: int) -> Compared:
-        """Returns the two drives of a condition, changed as it says.
+        """Returns both drives, with the changes that a condition sets.
 
         Raises:
             MissingError: the map lacks what the condition needs.

@@ -414,12 +414,15 @@ def free_acceleration(car: Any, v0: float) -> float:
 def interaction(car: Any, gap: float, approach: float) -> float:
     """Returns by how much a vehicle ahead reduces the acceleration [m/s^2].
 
-    This is a (s* / gap)^2 of the Intelligent Driver Model, with the desired gap
-    s* = s0 + max(0, v T + v dv / (2 sqrt(a b))).
+    This is the interaction term of the Intelligent Driver Model,
+
+        a (s* / gap)^2, with s* = s0 + max(0, v T + v dv / (2 sqrt(a b))),
+
+    where s* is the desired gap and s0 = `STANDSTILL_GAP`.
 
     Args:
-        car: the vehicle, a record of dtype `VEHICLE`: its speed v, headway T,
-            acceleration a and deceleration b.
+        car: the vehicle behind, a record of dtype `VEHICLE`, with speed v,
+            headway T, acceleration a and deceleration b.
         gap: gap from bumper to bumper [m].
         approach: dv, the vehicle's speed minus the speed of the vehicle ahead
             [m/s].

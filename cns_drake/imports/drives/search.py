@@ -216,9 +216,10 @@ class WayGraph(ABC):
 
     @abstractmethod
     def drive(self, way: Sequence[int]) -> WaypointDrive | Obstacle:
-        """Returns the drive along a way, or the place (2,) of an obstacle.
+        """Returns the drive along a way, or the place (2,) where it fails [m].
 
-        `way` is a sequence of piece numbers.
+        A drive fails at an obstacle or a bend that is too tight, see
+        `steerable_drive`. `way` is a sequence of piece numbers.
         """
 
     @abstractmethod
