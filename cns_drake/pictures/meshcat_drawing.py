@@ -93,7 +93,7 @@ def draw_body(
 
 
 def draw_marker(meshcat: Meshcat, path: str) -> None:
-    """Draws a large upright cone whose tip points down at a frame's origin.
+    """Draws a large cone that stands on its tip at the origin of a frame.
 
     Args:
         meshcat: Meshcat's server.

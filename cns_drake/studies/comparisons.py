@@ -71,8 +71,8 @@ class Compared:
         protocol: protocol of the queries.
         distractors: number of places of other cities that are added to the
             database, to make recognition harder.
-        asked: field -> value, for the fields of the protocol that the condition
-            sets.
+        asked: field -> value, for the fields of the protocol by which the
+            condition turns, tilts or partly hides the queries.
     """
 
     database: Scenario

@@ -441,7 +441,8 @@ def is_walked(traffic: Traffic, c: int, way: int, is_large: bool) -> bool:
     Args:
         traffic: the traffic.
         c: number of the crossing.
-        way: number of the path through the junction, or lane, of the vehicle.
+        way: number of the vehicle's piece that leads over the crossing: a path
+            through a junction, or a lane.
         is_large: whether the vehicle is large.
     """
     one, place = traffic.crossings[c], traffic.streets.over[way, c]
@@ -542,14 +543,14 @@ def find_prior(traffic: Traffic, i: int) -> tuple[float, float, float]:
 
 @compiled
 def rear_on_way(streets: Streets, car: Any) -> float:
-    """Returns the place of a vehicle's rear along its path in a junction [m].
+    """Returns how far a vehicle's rear is along a path in a junction [m].
 
-    The result is negative before the junction.
+    The result is negative if the rear has not reached the junction.
 
     Args:
-        streets: arrays of all lanes.
-        car: the vehicle, a record of dtype `VEHICLE`, whose `held` is its path
-            through the junction.
+        streets: arrays of all lanes and paths in junctions.
+        car: the vehicle, a record of dtype `VEHICLE`. The path is the one in
+            its field `held`, which is kept free for it.
     """
     rear = car.s - car.length
     if car.path[CURRENT] == car.held:

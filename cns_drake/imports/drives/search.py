@@ -261,9 +261,10 @@ class WayGraph(ABC):
 
 
 def find_drives(graph: WayGraph) -> list[WaypointDrive]:
-    """Returns two drives that share a part, one drive, or none.
+    """Returns two drives that share a part of their paths, if there are any.
 
-    There are fewer than two only if no more are found.
+    If no second drive is found, the list has one drive; if no drive is found,
+    it is empty.
     """
     for _ in range(_MOST_TRIES):
         way = _longest(graph)

@@ -56,10 +56,10 @@ class Pair:
         protocol: protocol of place recognition.
         distractors: number of places of other cities that are added to the
             database.
-        is_as_before: whether the condition sets a field of the protocol, or
-            distractors. The drives are then assumed to be those of another
-            condition, and tasks whose results depend only on the drives
-            measure nothing.
+        is_as_before: whether the condition turns, tilts or partly hides the
+            queries, or adds distractors. Tasks whose results depend only on the
+            drives then measure nothing, because the drives are assumed to be
+            those of another condition.
     """
 
     name: str
