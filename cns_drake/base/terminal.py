@@ -132,12 +132,17 @@ def example(*lines: str) -> str:
 
 
 def run(app: typer.Typer, program: str) -> NoReturn:
-    """Runs a command line; for bad usage or input it prints one line.
+    """Runs the command line of a program, and ends the process.
 
-    A traceback is shown only with `--traceback`. The exit status is 0 on
-    success, 1 if jobs failed, and 130 after an interrupt or SIGTERM, which
-    closes open files first. It is 2, with one line on stderr, for bad usage or
-    input, unusable files, lack of memory and missing system libraries.
+    The exit status is 0 on success, 1 if jobs failed, and 130 after an
+    interrupt or SIGTERM; open files are closed first. For bad usage or input,
+    unusable files, lack of memory and missing system libraries, it is 2. In all
+    these cases of failure, one line on stderr names the fault. A traceback is
+    shown only with `--traceback`.
+
+    Args:
+        app: the command line.
+        program: name of the program, with which messages begin.
     """
     message: str | None = None
     look_seldom()

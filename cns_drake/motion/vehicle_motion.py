@@ -105,9 +105,10 @@ class WheelMotion:
         )
 
     def travel(self, moments: Moments) -> JointMotion:
-        """Returns the upward motion of the wheel in the body at N times [m].
+        """Returns the suspension travel of the wheel at N times [m].
 
-        The result is zero for a vehicle without springs.
+        This is the upward motion of the wheel relative to the body. It is zero
+        for a vehicle without springs.
         """
         ride = moments.ride
         if ride is None:

@@ -93,11 +93,11 @@ def draw_body(
 
 
 def draw_marker(meshcat: Meshcat, path: str) -> None:
-    """Draws a large arrow that points down to the origin of its path.
+    """Draws a large cone that stands on its tip at the origin of a frame.
 
     Args:
         meshcat: Meshcat's server.
-        path: path in Meshcat of the arrow.
+        path: path of the cone in Meshcat. The frame is that of this path.
     """
     meshcat.SetObject(
         path,

@@ -288,9 +288,12 @@ def _meet_capsule(
     nearest = np.full(len(d), np.inf)
 
     def take(distance: np.ndarray, end: float) -> None:
-        """Updates `nearest` by ranges (N,) that end on one part of the capsule.
+        """Updates `nearest` with hits on one part of the capsule.
 
-        `end` is -1 or 1 for the half ball at that end, 0 for the straight part.
+        Args:
+            distance: (N,) ranges to the sphere or cylinder of this part [m].
+            end: -1 or 1 for the hemisphere at that end of the axis, 0 for the
+                straight part.
         """
         place = along + distance * d_along
         fits = np.abs(place) <= half

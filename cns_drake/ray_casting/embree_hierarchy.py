@@ -139,7 +139,8 @@ def merge_curved(members: Sequence[Member]) -> Iterator[Primitives]:
     single precision).
 
     Args:
-        members: index, pose X_LG and surface of each geometry of the group.
+        members: index, pose X_LG in the group's frame L, and surface of each
+            geometry G of the group.
     """
     cones: list[tuple[int, ArrayLike]] = []
     capsules: list[tuple[int, ArrayLike]] = []

@@ -38,7 +38,7 @@ class Repair:
     Attributes:
         output: the new file.
         num_messages: number of recovered messages.
-        seconds: time between the earliest and the latest of them [s].
+        seconds: time between the earliest and the latest recovered message [s].
         num_faults: number of parts of the file that could not be read; 0 if the
             file was whole.
         first_fault: description of the first such part.

@@ -150,9 +150,10 @@ def merge_surfaces(
 
 
 class GeometryReader:
-    """Reads all geometry with a given Drake role.
+    """Reads all geometry with a given Drake role from a SceneGraph.
 
-    Later calls read only what has changed since the call before.
+    The first call of `read` reads everything. Each later call reads only the
+    geometry that has changed since the previous call.
     """
 
     def __init__(self, role: Role):

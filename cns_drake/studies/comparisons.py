@@ -71,8 +71,8 @@ class Compared:
         protocol: protocol of the queries.
         distractors: number of places of other cities that are added to the
             database, to make recognition harder.
-        asked: field -> value, for the fields of the protocol that the condition
-            sets.
+        asked: field -> value, for the fields of the protocol by which the
+            condition turns, tilts or partly hides the queries.
     """
 
     database: Scenario
@@ -150,7 +150,7 @@ class PairOfDrives:
         }
 
     def build(self, condition: Condition, seed: int) -> Compared:
-        """Returns the two drives of a condition, changed as it says.
+        """Returns both drives, with the changes that a condition sets.
 
         Raises:
             MissingError: the map lacks what the condition needs.

@@ -186,10 +186,11 @@ class MadeMaps:
         return str(self._aged_folder(*key)), f"{number + 2:02d}"
 
     def redrawn(self, drive: Scenario, seed: int) -> tuple[str, str]:
-        """Returns the map folder and the stage of another city for a drive.
+        """Returns the folder and the stage of a redrawn map for a drive.
 
-        The city has the same streets as the drive's own, and is generated from
-        a seed.
+        The redrawn map has the streets of the drive's own map, and another
+        city, which is generated from `seed`. Call `want_redrawn` first, with
+        the same arguments.
         """
         source = map_folder(drive).path.resolve()
         return str(self.folder / f"{source.name}_c{seed}"), _STAGE

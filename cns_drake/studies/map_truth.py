@@ -205,7 +205,7 @@ def write_truth(
 ) -> tuple[Mapping[str, Counter[int]], list[StructureChange]]:
     """Writes the maps of two drives, with exact labels of what changed.
 
-    The files are described in `evaluation.map_update.sessions`. In addition,
+    `evaluation.map_update.sessions` describes the files of the maps. The files
     `structures.csv` and `index.html` show how much of each structure is gone or
     new.
 
@@ -219,8 +219,8 @@ def write_truth(
             aged map has.
 
     Returns:
-        The number of points with each label: A or B -> label -> number. And the
-        change of each structure.
+        Numbers of points: A or B -> label -> number of the map's points with
+        this label; and a list with the change of each structure.
 
     Raises:
         InputError: the drives are of different worlds, or the folder cannot be

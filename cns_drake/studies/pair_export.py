@@ -266,12 +266,14 @@ def compare_runs(
 
 @dataclass(frozen=True)
 class Run:
-    """An exported drive.
+    """An exported drive with N clouds.
 
     Attributes:
-        folder: folder of its clouds, relative to that of the data set.
-        X_WS: (N, 4, 4) poses of the LiDAR.
-        city: number of the city; cities are put `CITY_DISTANCE` apart.
+        folder: folder of the clouds, relative to the data set's folder.
+        X_WS: (N, 4, 4) poses of the LiDAR at the clouds, in the city's world.
+        city: number of the city, from 0. The northings of its clouds are
+            increased by `city * CITY_DISTANCE`, so that clouds of different
+            cities never match.
     """
 
     folder: str

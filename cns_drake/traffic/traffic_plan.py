@@ -393,9 +393,10 @@ class Tracks:
     present: np.ndarray | None = None
 
     def at(self, t: float | np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Returns coordinates and their rates, (N, D) each, at a time [s].
+        """Returns the bodies' coordinates at a time t [s], and their rates.
 
-        For several times (T,), both results are (T, N, D).
+        The rates are first time derivatives. Both results are (N, D); for
+        several times (T,), they are (T, N, D).
         """
         k, u, beyond = self._interval(t)
         p0, p1 = self.values[k], self.values[k + 1]
@@ -766,14 +767,15 @@ def plan_queues(
 ) -> TrafficPlan:
     """Plans vehicles that stand in queues in all lanes between junctions.
 
-    A vehicle is absent while the ego car is at its place.
+    A vehicle is absent while the ego car is at the vehicle's place.
 
     Args:
         graph: lanes and crossings.
-        seed: seed of kinds and gaps.
+        seed: seed of the random kinds of vehicles and gaps between them.
         duration: duration of the drive [s].
-        ego: function times -> positions and headings of the ego car.
-        ego_box: size of the ego car.
+        ego: function that takes times (K,) [s], and returns positions (K, 2)
+            [m] and headings (K,) [rad] of the ego car.
+        ego_box: the rectangle on the ground that the ego car covers.
     """
     rng = np.random.default_rng(seed)
     kinds, rows = [], []

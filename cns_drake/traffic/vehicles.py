@@ -415,12 +415,15 @@ def free_acceleration(car: Any, v0: float) -> float:
 def interaction(car: Any, gap: float, approach: float) -> float:
     """Returns by how much a vehicle ahead reduces the acceleration [m/s^2].
 
-    This is a (s* / gap)^2 of the Intelligent Driver Model, with the desired gap
-    s* = s0 + max(0, v T + v dv / (2 sqrt(a b))).
+    This is the interaction term of the Intelligent Driver Model,
+
+        a (s* / gap)^2, with s* = s0 + max(0, v T + v dv / (2 sqrt(a b))),
+
+    where s* is the desired gap and s0 = `STANDSTILL_GAP`.
 
     Args:
-        car: the vehicle, a record of dtype `VEHICLE`: its speed v, headway T,
-            acceleration a and deceleration b.
+        car: the vehicle behind, a record of dtype `VEHICLE`, with speed v,
+            headway T, acceleration a and deceleration b.
         gap: gap from bumper to bumper [m].
         approach: dv, the vehicle's speed minus the speed of the vehicle ahead
             [m/s].
@@ -439,7 +442,8 @@ def is_walked(traffic: Traffic, c: int, way: int, is_large: bool) -> bool:
     Args:
         traffic: the traffic.
         c: number of the crossing.
-        way: number of the path through the junction, or lane, of the vehicle.
+        way: number of the vehicle's piece that leads over the crossing: a path
+            through a junction, or a lane.
         is_large: whether the vehicle is large.
     """
     one, place = traffic.crossings[c], traffic.streets.over[way, c]
@@ -540,14 +544,14 @@ def find_prior(traffic: Traffic, i: int) -> tuple[float, float, float]:
 
 @compiled
 def rear_on_way(streets: Streets, car: Any) -> float:
-    """Returns the place of a vehicle's rear along its path in a junction [m].
+    """Returns how far a vehicle's rear is along a path in a junction [m].
 
-    The result is negative before the junction.
+    The result is negative if the rear has not reached the junction.
 
     Args:
-        streets: arrays of all lanes.
-        car: the vehicle, a record of dtype `VEHICLE`, whose `held` is its path
-            through the junction.
+        streets: arrays of all lanes and paths in junctions.
+        car: the vehicle, a record of dtype `VEHICLE`. The path is the one in
+            its field `held`, which is kept free for it.
     """
     rear = car.s - car.length
     if car.path[CURRENT] == car.held:

@@ -157,18 +157,21 @@ def in_one_world(
     hold_first: bool = False,
     across_maps: bool = False,
 ) -> Alignment | None:
-    """Moves two drives into one world if needed; else returns None.
+    """Aligns two drives, so that both are in one world, if `when` asks for it.
 
     Args:
         first, second: the drives.
-        when: `auto` aligns the drives only if the names of their world frames
-            differ; the alternatives are `always` and `never`.
+        when: `auto` to align the drives only if the names of their world frames
+            differ, `always` or `never`.
         track: reports progress.
         hold_first: whether the first drive must stay where it is, see `align`.
         across_maps: whether the drives may be from maps with different names.
 
+    Returns:
+        Both drives in one world; None if they were not aligned.
+
     Raises:
-        InputError: the drives should be aligned, but that failed.
+        InputError: the drives cannot be aligned, or are from different maps.
     """
     if not across_maps:
         check_same_map(first, second)

@@ -114,9 +114,10 @@ class LoopSearch:
 
     Attributes:
         source: drive of the keyframes K to register.
-        target: drive of the keyframes L.
-        loops: keyframe of the source -> its loop.
-        tried: keyframe -> guess X_TK from which it was last registered.
+        target: drive of the keyframes L, with the world frame T.
+        loops: keyframe of the source -> the loop found for it.
+        tried: keyframe of the source -> (4, 4) guess X_TK from which it was
+            last registered.
         num_attempts: number of registrations that were tried.
     """
 

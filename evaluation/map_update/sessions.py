@@ -129,9 +129,12 @@ class MapBuilder:
         self._points: list[np.ndarray] = []
 
     def add(self, scan: np.ndarray, X_WS: np.ndarray) -> None:
-        """Adds a scan, a structured array (N,), to the map.
+        """Adds a scan to the map.
 
-        The LiDAR is at the pose X_WS (4, 4).
+        Args:
+            scan: structured array (N,) with x, y, z in the LiDAR's frame S [m].
+                The map keeps the fields `label` and `instance`, if any.
+            X_WS: (4, 4) pose of the LiDAR.
         """
         points = np.zeros(len(scan), _MAP_DTYPE)
         p_W = poses.transform(X_WS, xyz(scan))

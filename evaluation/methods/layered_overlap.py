@@ -114,11 +114,15 @@ class LayeredScan:
 
 @dataclass(frozen=True)
 class CoarseMaps:
-    """Coarse maps of places, or of a query at some headings.
+    """Coarse occupancy maps of N places, or of a query at N headings.
+
+    There are four maps for each place or heading: one for low and middle
+    points, and one each for high points, poles and kerbs.
 
     Attributes:
-        bits: (N, R, 4) uint64, R rows of four maps, one word per row. Maps of
-            places have additional empty rows on either side.
+        bits: (N, R, 4) uint64, the R rows of each map. Bit k of a row is set if
+            column k is occupied. Maps of places have additional empty rows at
+            both ends.
         counts: (N, 4) int64 number of bits set in each map.
     """
 

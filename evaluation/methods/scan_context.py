@@ -124,7 +124,8 @@ class ContextDatabase:
     Attributes:
         columns: (M, rows, columns) images with columns of unit length.
         filled: (M, columns) float64, 1 where a column is not all zero.
-        aligning_keys: (M, columns).
+        aligning_keys: (M, columns) column means of the contexts, from which
+            the shift between two contexts is first guessed.
         places: (M,) place of each context.
         tree: search tree over the retrieval keys.
         num_places: D.

@@ -257,9 +257,10 @@ class _Describing:
         return set().union(*self._members.values())
 
     def add(self, seen: _Seen) -> None:
-        """Adds a frame as place, query or both, to be described with a batch.
+        """Adds a frame as a place, a query or both.
 
-        It is described when enough frames for a batch are waiting.
+        Frames are described together, once enough of them for a batch have been
+        added.
         """
         clouds = {
             role: seen.cloud(

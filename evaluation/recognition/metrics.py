@@ -89,10 +89,11 @@ class PrCurve:
 
     @property
     def auc(self) -> float:
-        """Area under the curve by trapezoids, up to its greatest recall.
+        """Area under the precision-recall curve, by the trapezoidal rule.
 
-        From recall 0 to its first point, the curve has that point's precision.
-        The area is 0 if nothing is ever accepted.
+        The area is from recall 0 to the greatest recall of the curve. Left of
+        the first point, the precision is that of the first point. The area is 0
+        if no answer is ever accepted.
         """
         return float(areas_under(self.precision[None], self.recall[None])[0])
 
@@ -282,15 +283,15 @@ def own_samples(
 def paired_samples(
     outcomes: QueryOutcomes, other: QueryOutcomes
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Returns metrics of bootstrap samples that draw the blocks of another.
+    """Returns metrics of bootstrap samples, paired with those of `other`.
 
     Sample k draws the same blocks of queries as sample k of
-    `own_samples(other)`. The metrics of the two can thus be subtracted, sample
-    by sample.
+    `own_samples(other)`. The metrics of both methods or conditions can thus be
+    subtracted, sample by sample.
 
     Args:
         outcomes: outcomes of Q queries.
-        other: other outcomes of as many queries.
+        other: outcomes of as many queries with another method or condition.
 
     Returns:
         AUC, R@1 and strict AUC of the samples of `outcomes`, each (B,).
@@ -366,15 +367,15 @@ def mean_auc_difference(
 ) -> Difference:
     """Returns the mean AUC difference of two methods, with its p-value.
 
-    The mean is over one or more sets of queries (mode all). The p-value is that
-    of a t test. For a set with n blocks, the test has n - 1 degrees of freedom.
-    The standard error is the standard deviation over bootstrap samples, which
-    draw the same blocks for both methods, times the root of n / (n - 1). Sets
-    of queries are independent, so that their variances and degrees of freedom
-    add up.
+    The mean is over one or more sets of queries. All queries count, with or
+    without a match. The p-value is that of a t test. For a set with n blocks of
+    the route, the test has n - 1 degrees of freedom. The standard error is the
+    standard deviation over bootstrap samples, which draw the same blocks for
+    both methods, times the root of n / (n - 1). Sets of queries are
+    independent, so that variances and degrees of freedom of the sets add up.
 
     Args:
-        pairs: outcomes of both methods on each set.
+        pairs: for each set, the outcomes of both methods.
     """
     value, variance, freedom = 0.0, 0.0, 0
     for first, second in pairs:

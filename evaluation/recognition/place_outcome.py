@@ -250,9 +250,9 @@ def pose_numbers(
 
     Args:
         now: outcome of the method in a condition.
-        before: outcome of the method in the baseline, with which the kept share
-            (success in the condition divided by success in the baseline) is
-            computed; None to leave it out.
+        before: outcome of the method in the baseline. With it, the results
+            include `kept`, the success in the condition divided by that in the
+            baseline.
     """
     errors = now.pose_errors
     value = pose_success(errors, now.outcomes)

@@ -121,17 +121,21 @@ class SeenSurfaces:
         )
 
     def clearances(self, points: np.ndarray) -> np.ndarray:
-        """Returns how far points (N, 3) lie in front of a surface, (N,) [m].
+        """Returns how far points lie in front of the seen surface, (N,) [m].
 
-        The surface is known from the returns that are nearest in direction. The
-        distance is perpendicular to the plane through three of them. At edges,
-        and with fewer than three returns, it is along the line of sight: to the
-        nearest return in front of all of them, to the farthest behind them. It
-        is negative behind the surface, infinite without a return in a similar
-        direction, and NaN for a point between two surfaces.
+        Distances are negative for points behind the surface. Up to four returns
+        in directions near that of the point show where the surface is:
+
+        - Three or more returns with similar ranges: the distance is
+          perpendicular to a plane through three of these returns.
+        - Fewer returns, or an edge between two surfaces: the distance is along
+          the line of sight. For a point nearer than all these returns, it is to
+          the nearest return; for a point farther than all, to the farthest. For
+          all other points, the result is NaN.
+        - No return: the result is infinite.
 
         Args:
-            points: (N, 3) points in this sensor's frame [m].
+            points: (N, 3) points in the sensor's frame [m].
         """
         return self._look(points)[1]
 

@@ -638,7 +638,7 @@ def query_table(
     tracks: Mapping[str, DriveTrack],
     evidence: Evidence,
 ) -> Table:
-    """Returns a table with a row for each result and query, in their order.
+    """Returns a table with a row for each query of each result, in order.
 
     Args:
         results: results of methods on pairs of drives.

@@ -194,14 +194,16 @@ def _headline(
 
 
 class Survival(NamedTuple):
-    """Results of a method on a pair of drives, with and without the change.
+    """Results of a method on a pair of drives, and on the pair's control.
+
+    The control has the same two routes without a change of the city.
 
     Attributes:
-        pair: map, stage of the database, and of the query.
+        pair: name of the map, stage of the database drive, and stage of the
+            query drive.
         method: name of the method.
-        before: rows of the control, without the change; empty if there is no
-            control.
-        after: rows with the change.
+        before: metric -> result on the control; empty if there is no control.
+        after: metric -> result on the pair, with the change of the city.
     """
 
     pair: tuple[str, str, str]

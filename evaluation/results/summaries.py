@@ -463,15 +463,16 @@ def summarised(
 ) -> list[Summary]:
     """Returns numbers that sum up an experiment's charts.
 
-    A scatter plot gives `correlations`. A chart of the kind `lines` gives
-    `lifetimes` if its metric is `kept`, and `growths` if its metric is a CPU
-    time; other charts give nothing. If the experiment has the factor `cause`,
-    `excesses` are added.
+    A scatter plot is summed up by the function `correlations` of this module. A
+    chart of the kind `lines` is summed up by `lifetimes` if its metric is
+    `kept`, and by `growths` if its metric is a CPU time. Other charts give no
+    numbers. For an experiment with the factor `cause`, the result also contains
+    the numbers of `excesses`.
 
     Args:
         results: all results of the experiment.
-        queries: its answers to single queries, for `excesses`. None leaves the
-            excesses out.
+        queries: answers to single queries, for `excesses`; None to leave these
+            numbers out.
         charts: the charts as in the file of the experiment.
     """
     found = []

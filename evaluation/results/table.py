@@ -269,8 +269,7 @@ class Results:
     def of(cls, rows: Iterable[Row]) -> Results:
         """Returns a table of rows.
 
-        The names of its factors are in the order in which they appear in the
-        rows.
+        The table's factors are in the order in which they appear in `rows`.
         """
         rows = tuple(rows)
         return cls(_factor_names(rows), rows)
@@ -366,10 +365,9 @@ class QueryRows:
 
     @classmethod
     def of(cls, answers: Iterable[Answers]) -> QueryRows:
-        """Returns a table of answers.
+        """Returns a table with the answers of methods to queries.
 
-        The names of its factors are in the order in which they appear in the
-        answers.
+        The table's factors are in the order in which they appear in `answers`.
         """
         answers = tuple(answers)
         return cls(_factor_names(answers), answers)

@@ -305,7 +305,8 @@ def title(label: str) -> str:
     """Returns the name of a method as its authors write it, with its settings.
 
     Args:
-        label: name of the method as on the command line, and its settings.
+        label: name of the method as on the command line and, after a comma, its
+            settings, if any.
     """
     method, comma, settings = label.partition(",")
     return f"{_METHOD_TITLES.get(method, method)}{comma}{settings}"

@@ -43,11 +43,11 @@ class MethodChoice:
         return " ".join([self.name, *settings])
 
     def make(self) -> Method:
-        """Returns the method.
+        """Returns the chosen method, with its settings.
 
         Raises:
-            InputError: if its file cannot be used, or a setting is not known
-                or does not fit.
+            InputError: if the method's file cannot be used, or a setting is
+                unknown or does not fit.
         """
         # The file runs once: a second run would make another type of its
         # descriptions.

@@ -204,7 +204,7 @@ class KeptDrive:
     scans: dict[int, np.ndarray] = field(default_factory=dict)
 
     def keep(self, frame: int, scan: np.ndarray, max_range: float) -> None:
-        """Keeps a scan.
+        """Stores a scan in `scans`.
 
         Args:
             frame: number of the frame.

@@ -145,10 +145,11 @@ class Site:
 
     @property
     def bounds(self) -> tuple[float, float, float, float]:
-        """x0, y0, x1, y1 of a rectangular footprint [m].
+        """Least x and y, and greatest x and y, of a rectangular footprint [m].
 
         Raises:
-            ValueError: the footprint is not a rectangle along the axes of S.
+            ValueError: the footprint is not a rectangle along the x and y axis
+                of the building's frame.
         """
         if not self.is_rectangle:
             raise ValueError(f"{self.name} needs a rectangular footprint")

@@ -439,9 +439,7 @@ def add_steps(
     rise: float,
     room: float = 9.0,
 ) -> None:
-    """Adds steps that lead down and away from a wall.
-
-    Their material is `base`.
+    """Adds steps of the material `base` that lead down and away from a wall.
 
     Args:
         out: the building under assembly, which gets the parts.

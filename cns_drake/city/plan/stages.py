@@ -144,7 +144,8 @@ def load_stages(
     Raises:
         InputError: if the file cannot be read or has a wrong key or type; if
             the stages are out of order; if the last stage lacks anything; if a
-            name is unknown or absent twice; or if a pattern matches nothing.
+            name is unknown, or listed as absent more than once; or if a pattern
+            matches nothing.
     """
     content = read_yaml(path) if text is None else parse_yaml(text)
     stages = validated(Stages, content, path)

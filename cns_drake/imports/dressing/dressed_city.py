@@ -180,10 +180,14 @@ class DriveViews:
         return np.asarray(self._tree.query(middles)[0] <= reach + distance)
 
     def distances(self, panels: Sequence[Panel], most: float) -> np.ndarray:
-        """Returns (N,) distances from walls to the drives that see them [m].
+        """Returns distances from walls to the drives that see them, (N,) [m].
 
-        The distance is that to the nearest viewpoint that sees the wall. It is
-        infinite if no viewpoint within `most` [m] sees it.
+        A distance is to the nearest viewpoint of a drive that sees the wall,
+        and infinite if none sees it.
+
+        Args:
+            panels: the N walls.
+            most: greatest distance at which a viewpoint counts [m].
         """
         pairs = [self._looks(panel, most) for panel in panels]
         counts = [len(distance) for _, distance in pairs]

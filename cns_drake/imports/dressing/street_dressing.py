@@ -48,10 +48,11 @@ FROM_EDGE = 0.6
 def beside_street(
     xy: np.ndarray, streets: Sequence[Street], courses: Sequence[LineString]
 ) -> tuple[np.ndarray, float]:
-    """Returns a place beside the nearest street, and the heading to it [rad].
+    """Returns a place beside the nearest street, and a heading to face it.
 
-    A place on a carriageway, or close to it, is moved to 0.6 m beside it. Any
-    other place stays.
+    A place on the carriageway, or close to it, is moved to 0.6 m from the edge
+    of the carriageway. Any other place stays. The heading is from the place to
+    the middle of the street [rad].
 
     Args:
         xy: (2,) the place in W [m].

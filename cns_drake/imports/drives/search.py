@@ -216,9 +216,10 @@ class WayGraph(ABC):
 
     @abstractmethod
     def drive(self, way: Sequence[int]) -> WaypointDrive | Obstacle:
-        """Returns the drive along a way, or the place (2,) of an obstacle.
+        """Returns the drive along a way, or the place (2,) where it fails [m].
 
-        `way` is a sequence of piece numbers.
+        A drive fails at an obstacle or a bend that is too tight, see
+        `steerable_drive`. `way` is a sequence of piece numbers.
         """
 
     @abstractmethod
@@ -262,9 +263,10 @@ class WayGraph(ABC):
 
 
 def find_drives(graph: WayGraph) -> list[WaypointDrive]:
-    """Returns two drives that share a part, one drive, or none.
+    """Returns two drives that share a part of their paths, if there are any.
 
-    There are fewer than two only if no more are found.
+    If no second drive is found, the list has one drive; if no drive is found,
+    it is empty.
     """
     for _ in range(_MOST_TRIES):
         way = _longest(graph)

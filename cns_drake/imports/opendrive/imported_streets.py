@@ -324,7 +324,7 @@ def bridge_decks(bands: Sequence[LaneBand]) -> Iterator[Structure]:
 
 
 def bridge_ends(bands: Sequence[LaneBand]) -> BaseGeometry:
-    """Returns narrow areas across the ends of bridges, in W [m].
+    """Returns narrow strips across the lanes at both ends of bridges, in W [m].
 
     `bands` contains the lanes on bridges.
     """

@@ -70,9 +70,9 @@ class Bridges:
 
 
 def bridges_of(ways: Iterable[OsmWay], local: Local) -> Bridges:
-    """Finds the bridges and the tunnels among the ways of a file.
+    """Returns the bridges and the tunnels among the ways of a file.
 
-    `local` converts places of the file to metres.
+    `local` converts longitudes and latitudes to coordinates in metres.
     """
     used = [
         way

@@ -258,9 +258,11 @@ def driven_ways(tags: Mapping[str, str]) -> tuple[bool, bool]:
 
 
 def lanes_beside(tags: Mapping[str, str], width: float) -> float:
-    """Returns the distance from a street's middle to its outermost lane [m].
+    """Returns the distance of the outermost lane from the street's middle [m].
 
-    `width` is the width of the carriageway [m].
+    The distance is to the middle of the lane. It is 0 on a two-way street on
+    which two cars cannot pass each other, because cars keep to the middle
+    there. `width` is the width of the carriageway [m].
     """
     lanes = tag_value(tags, "lanes", count, _LANES_OF_STREET, None)
     if not lanes:

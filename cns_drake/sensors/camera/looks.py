@@ -241,10 +241,11 @@ def look_of(
     """Returns the name of the `Look` of a geometry, a key of `LOOKS`.
 
     Args:
-        name: name of the geometry.
-        semantic_class: class of its structure.
-        rgb: its colour, from 0 to 1.
-        corners: number of its vertices.
+        name: name of the geometry in Drake, which may end in `/` and the name
+            of a part.
+        semantic_class: class of the structure.
+        rgb: colour of the geometry, from 0 to 1.
+        corners: number of the geometry's vertices.
     """
     red, green, blue = rgb
     part = name.rpartition("/")[2]

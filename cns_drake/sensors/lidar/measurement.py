@@ -126,7 +126,7 @@ class MeasurementModel:
         max_range: float,
         frame: int,
     ) -> Returns:
-        """Converts exact ranges to the returns that the LiDAR reports.
+        """Returns the returns that the LiDAR reports, given exact ranges.
 
         Args:
             true_ranges: (num_beams,) float32 distance to the nearest surface

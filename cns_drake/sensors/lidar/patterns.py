@@ -69,7 +69,8 @@ class Beams:
             the same geometry, which makes packets of rays fast.
 
     Raises:
-        ValueError: a ring or a firing time does not fit into a point.
+        ValueError: a ring or a firing time is not a whole number that fits the
+            field `ring` or `t` of a point.
     """
 
     d_Sset: np.ndarray

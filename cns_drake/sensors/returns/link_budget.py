@@ -134,11 +134,12 @@ def detection_probability(snr: ArrayLike) -> np.ndarray:
 
 @compiled
 def range_deviation(budget: LinkBudget, snr: np.ndarray) -> np.ndarray:
-    """Returns the standard deviation of ranges from shot to shot [m].
+    """Returns the standard deviation of a laser's ranges from shot to shot [m].
 
-    The total deviation is inversely proportional to the root of the SNR (Wagner
-    et al., 2006), down to a limit set by the unit's clock and the shape of its
-    pulses. The error that is constant for each laser is subtracted from it.
+    The standard deviation over all lasers and shots is inversely proportional
+    to the root of the SNR (Wagner et al., 2006), down to a limit set by the
+    unit's clock and the shape of the pulses. The variance of the error that is
+    constant for each laser is subtracted from the variance of all ranges.
     """
     whole = np.maximum(budget.range_noise / np.sqrt(snr), budget.range_floor)
     return np.sqrt(whole**2 - budget.range_bias**2)

@@ -46,14 +46,20 @@ class Pair:
     """A database drive and a query drive that are measured together.
 
     Attributes:
-        name: name of the pair. Only pairs that differ in nothing but the radius
-            of a match have the same name.
-        way: the drive whose map and the query's map give the change of the
-            city (TCR_sym). This is a drive along the query's route through the
-            database's city or, if there is none, the database drive.
-        is_as_before: whether the pair has the same drives as the baseline, and
-            differs from it only in the protocol or in additional places. Tasks
-            that use no queries have nothing new to measure for such a pair.
+        name: name of the pair. Two pairs have the same name only if they are
+            equal but for the radius of a match.
+        database, query: the drives.
+        way: the drive with which the query drive is compared to measure the
+            change of the city (TCR_sym). It runs along the query's route
+            through the database's city; without such a drive, it is the
+            database drive.
+        protocol: protocol of place recognition.
+        distractors: number of places of other cities that are added to the
+            database.
+        is_as_before: whether the condition turns, tilts or partly hides the
+            queries, or adds distractors. Tasks whose results depend only on the
+            drives then measure nothing, because the drives are assumed to be
+            those of another condition.
     """
 
     name: str
@@ -101,8 +107,8 @@ class Jobs:
     def expect(self, pair: Pair) -> None:
         """Registers a pair of drives.
 
-        Register all pairs before jobs are added: this shows which descriptions
-        of drives are needed by several pairs.
+        Register all pairs before you add jobs: `described` has to know which
+        drives' descriptions several pairs need.
         """
         self.radii.setdefault(pair.name, set()).add(pair.protocol.radius)
         for drive, role in pair.roles:
