@@ -256,9 +256,23 @@ def fresh_versions() -> list[Version]:
 
 
 def draw_fresh_cities(
-    maps: Sequence[str], numbers: Sequence[int], output: Path, cluster: Cluster
+    maps: Sequence[str],
+    numbers: Sequence[int],
+    output: Path,
+    cluster: Cluster,
+    source: object,
 ) -> list[Path]:
     """Draws fresh cities; returns their map folders, `<output>/<map>_fNN`.
+
+    Args:
+        maps: names of shipped maps; all of them if there is none.
+        numbers: numbers of the versions; all of them if there is none.
+        output: folder of the maps.
+        cluster: does the work.
+        source: file of the experiment, for errors.
+
+    Returns:
+        The folders, sorted by map, then by number.
 
     Raises:
         InputError: a version is unknown or could not be drawn.
@@ -272,7 +286,8 @@ def draw_fresh_cities(
             if one not in known:
                 there = ", ".join(map(str, dict.fromkeys(known)))
                 raise InputError(
-                    f"{what}: no fresh version {one!r} (there are: {there})"
+                    f"{source}: {what}: no fresh version {one!r} (there are:"
+                    f" {there})"
                 )
     steps = [
         DrawFreshCity(
