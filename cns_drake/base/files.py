@@ -79,8 +79,8 @@ def draft_folder(folder: Path, *, replaces: bool = False) -> Iterator[Path]:
     replaced, for which `replaces` must be true.
 
     Raises:
-        InputError: if `folder` cannot be written, or is not empty and
-            `replaces` is false.
+        InputError: if `folder` cannot be written, is not empty and `replaces`
+            is false, or another process is writing it.
     """
     # `.` has no name.
     place = Path(os.path.abspath(folder))
@@ -88,17 +88,20 @@ def draft_folder(folder: Path, *, replaces: bool = False) -> Iterator[Path]:
     draft = part / place.name
     if not replaces:
         check_new_folder(folder)
-    try:
-        with user_errors(folder):
-            # A run that was killed may have left one behind.
+    with user_errors(folder):
+        place.parent.mkdir(parents=True, exist_ok=True)
+    with sole_writer(folder):
+        try:
+            with user_errors(folder):
+                # A run that was killed may have left one behind.
+                shutil.rmtree(part, ignore_errors=True)
+                draft.mkdir(parents=True)
+                yield draft
+                if replaces and os.path.lexists(place):
+                    os.replace(place, part / "replaced")
+                os.replace(draft, place)
+        finally:
             shutil.rmtree(part, ignore_errors=True)
-            draft.mkdir(parents=True)
-            yield draft
-            if replaces and os.path.lexists(place):
-                os.replace(place, part / "replaced")
-            os.replace(draft, place)
-    finally:
-        shutil.rmtree(part, ignore_errors=True)
 
 
 def remove_folder(folder: Path) -> None:
@@ -343,6 +346,20 @@ def exclusive(path: Path, on_wait: Callable[[], None]) -> Iterator[None]:
             while not _lock(lock, stack, on_wait):
                 pass
         yield
+
+
+def sole_writer(folder: Path) -> contextlib.AbstractContextManager[None]:
+    """Returns a context in which no other process writes a new folder.
+
+    Raises:
+        InputError: as the context begins, if another process is writing it, or
+            the lock cannot be written.
+    """
+
+    def refuse() -> None:
+        raise InputError(f"{folder}: another process is writing this folder")
+
+    return exclusive(part_path(Path(os.path.abspath(folder))), refuse)
 
 
 def remove_lock(path: Path) -> None:

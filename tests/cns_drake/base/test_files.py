@@ -178,6 +178,20 @@ def test_a_new_folder_takes_no_name_that_is_taken(tmp_path, monkeypatch):
         assert (tmp_path / name / "a").exists()
 
 
+def test_two_writers_of_one_folder(tmp_path):
+    folder = tmp_path / "folder"
+    with draft_folder(folder) as draft:
+        (draft / "a").touch()
+        with (
+            pytest.raises(InputError, match=f"^{folder}: another process is"),
+            draft_folder(folder),
+        ):
+            pytest.fail("begun")
+        assert (draft / "a").exists()
+    assert [path.name for path in tmp_path.iterdir()] == ["folder"]
+    assert (folder / "a").exists()
+
+
 def test_a_file_that_may_be_missing(tmp_path):
     assert not is_there(tmp_path / "a")
     (tmp_path / "a").touch()
