@@ -88,8 +88,6 @@ def draft_folder(folder: Path, *, replaces: bool = False) -> Iterator[Path]:
     draft = part / place.name
     if not replaces:
         check_new_folder(folder)
-    with user_errors(folder):
-        place.parent.mkdir(parents=True, exist_ok=True)
     with sole_writer(folder):
         try:
             with user_errors(folder):
@@ -312,7 +310,7 @@ def check_writable(path: Path) -> None:
     """
     with user_errors(path):
         part = _new_part(path)
-        path.parent.mkdir(parents=True, exist_ok=True)
+        make_folder(path.parent)
         part.touch()
         part.unlink()
 
@@ -321,10 +319,13 @@ def make_folder(path: Path) -> None:
     """Makes a folder, with its parents, unless it is there already.
 
     Raises:
-        InputError: if it cannot be made.
+        InputError: if it cannot be made, or a file has its name.
     """
     with user_errors(path):
-        path.mkdir(parents=True, exist_ok=True)
+        try:
+            path.mkdir(parents=True, exist_ok=True)
+        except FileExistsError:
+            raise InputError(f"{path}: not a folder") from None
 
 
 @contextlib.contextmanager
