@@ -56,6 +56,7 @@ from cns_drake.studies.tasks.task import Jobs, NamedDrive, Pair, Task
 from cns_drake.studies.tasks.update import MapTask
 from evaluation.methods import optional_methods
 from evaluation.recognition.protocol import RetrievalProtocol
+from evaluation.results.charts import check
 from evaluation.results.page import write_page
 from evaluation.results.table import (
     LAST,
@@ -192,6 +193,9 @@ class Study:
         if self.experiment.frozen is not None:
             with errors_at(f"{self.source}: frozen"):
                 frozen_drives(self.experiment.frozen)
+        for chart in self.experiment.charts:
+            with errors_at(self.source):
+                check(chart)
         self._conditions = conditions(self.experiment)
         self._protocol = self._protocol_of(self._conditions[0])
         self._made = MadeMaps(self.output / "cities")

@@ -664,6 +664,8 @@ def test_maps_of_conditions_are_made_first(town, tmp_path, monkeypatch):
         ),
         ({"protocol": {"base": "best"}}, "protocol.base: 'best' is none of"),
         ({"frozen": "no.csv"}, "frozen: .*no.csv: No such file"),
+        ({"charts": [{"kind": "pie"}]}, "charts: kind: 'pie' is none of"),
+        ({"charts": [{"kind": "matrix"}]}, "charts: matrix: .*a name is"),
     ],
 )
 def test_faults_before_any_work(town, tmp_path, fields, fault):
