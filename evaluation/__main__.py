@@ -1,6 +1,20 @@
-"""`python -m evaluation` is `cns-eval`."""
+"""`python -m evaluation` is the command `cns-eval`."""
 
-from evaluation.command_line.cli import main
+from collections.abc import Callable
+
+from cns_drake.base.start import start
+
+
+def main() -> None:
+    """Runs the command."""
+    start("cns-eval", _load)
+
+
+def _load() -> Callable[[], None]:
+    from evaluation.command_line.cli import main as run
+
+    return run
+
 
 if __name__ == "__main__":
     main()

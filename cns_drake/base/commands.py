@@ -69,9 +69,14 @@ class Command(TyperCommand):
     declaration.
     """
 
-    def __init__(self, *args: Any, help: str, params: list, **settings: Any):
-        """Copies each parameter's help from the docstring."""
-        text, _, entries = help.partition("\n\nArgs:\n")
+    def __init__(
+        self, *args: Any, help: str | None, params: list, **settings: Any
+    ):
+        """Copies each parameter's help from the docstring.
+
+        With `python -OO` there are no docstrings, and no help.
+        """
+        text, _, entries = (help or "").partition("\n\nArgs:\n")
         helps = {}
         for entry in re.split(r"\n(?! )", textwrap.dedent(entries)):
             name, _, meaning = entry.partition(": ")

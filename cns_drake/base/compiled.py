@@ -11,6 +11,7 @@ from typing import TypeVar
 import numba
 
 from cns_drake.base.files import cache_folder
+from cns_drake.base.interrupts import uninterrupted
 
 _Function = TypeVar("_Function", bound=Callable)
 
@@ -68,7 +69,9 @@ def _for_all(
                 file.parent.mkdir(parents=True, exist_ok=True)
                 stream = stack.enter_context(file.open("a"))
                 fcntl.lockf(stream, fcntl.LOCK_EX)
-            return compile_for(tuple(map(numba.types.unliteral, types)))
+            # LLVM crashes if an interrupt ends a function that it calls.
+            with uninterrupted():
+                return compile_for(tuple(map(numba.types.unliteral, types)))
 
     return compile_once
 

@@ -9,6 +9,7 @@ import re
 
 from cns_drake.base.errors import InputError
 from cns_drake.base.files import read_text, write_text
+from cns_drake.base.number_rows import other_separator
 
 # Control characters: no table needs them, and a terminal would obey them.
 _CONTROL = re.compile(r"[\x00-\x08\x0e-\x1f\x7f-\x9f]")
@@ -58,8 +59,9 @@ def read_rows(path: Path) -> list[tuple[int, list[str]]]:
     Cells are stripped of surrounding spaces. Empty rows are left out.
 
     Raises:
-        InputError: the file cannot be read, is not CSV in UTF-8 or holds a
-            control character.
+        InputError: the file cannot be read, is not CSV in UTF-8, holds a
+            control character, or its first line is separated by other
+            characters than commas.
     """
     text = read_text(path)
     try:
@@ -67,6 +69,7 @@ def read_rows(path: Path) -> list[tuple[int, list[str]]]:
         for number, line in enumerate(lines, start=1):
             if _CONTROL.search(line):
                 raise InputError(f"{path}: line {number}: a control character")
+        check_separator(path, text)
         reader = csv.reader(lines, skipinitialspace=True)
         rows = [
             (reader.line_num, [cell.strip() for cell in row]) for row in reader
@@ -74,6 +77,16 @@ def read_rows(path: Path) -> list[tuple[int, list[str]]]:
     except csv.Error as error:
         raise InputError(f"{path}: not CSV: {error}") from error
     return [(line, row) for line, row in rows if any(row)]
+
+
+def check_separator(path: Path, text: str) -> None:
+    """Raises an error if a CSV's first line has no commas between its cells.
+
+    Raises:
+        InputError: semicolons or tabs separate the cells.
+    """
+    if fault := other_separator(text.strip().partition("\n")[0], ","):
+        raise InputError(f"{path}: {fault}")
 
 
 def read_records(

@@ -165,9 +165,7 @@ def describe_validation_error(
     # pydantic puts this before the message of one of our validators.
     message = fault["msg"].removeprefix("Value error, ")
     message += _advice(fault, model)
-    more = error.error_count() - 1
-    tail = f" (and {more} more)" if more else ""
-    return f"{source}: {field}: {message}{tail}"
+    return f"{source}: {field}: {message}"
 
 
 def _urgency(fault: Mapping[str, Any]) -> int:

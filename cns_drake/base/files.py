@@ -79,8 +79,8 @@ def draft_folder(folder: Path, *, replaces: bool = False) -> Iterator[Path]:
     replaced if `replaces` is true; otherwise it is an error.
 
     Raises:
-        InputError: if `folder` cannot be written, or is not empty and
-            `replaces` is false.
+        InputError: if `folder` cannot be written, is not empty and `replaces`
+            is false, or another process is writing it.
     """
     # `.` has no name.
     place = Path(os.path.abspath(folder))
@@ -88,17 +88,18 @@ def draft_folder(folder: Path, *, replaces: bool = False) -> Iterator[Path]:
     draft = part / place.name
     if not replaces:
         check_new_folder(folder)
-    try:
-        with user_errors(folder):
-            # A run that was killed may have left one behind.
+    with sole_writer(folder):
+        try:
+            with user_errors(folder):
+                # A run that was killed may have left one behind.
+                shutil.rmtree(part, ignore_errors=True)
+                draft.mkdir(parents=True)
+                yield draft
+                if replaces and os.path.lexists(place):
+                    os.replace(place, part / "replaced")
+                os.replace(draft, place)
+        finally:
             shutil.rmtree(part, ignore_errors=True)
-            draft.mkdir(parents=True)
-            yield draft
-            if replaces and os.path.lexists(place):
-                os.replace(place, part / "replaced")
-            os.replace(draft, place)
-    finally:
-        shutil.rmtree(part, ignore_errors=True)
 
 
 def remove_folder(folder: Path) -> None:
@@ -313,7 +314,7 @@ def check_writable(path: Path) -> None:
     """
     with user_errors(path):
         part = _new_part(path)
-        path.parent.mkdir(parents=True, exist_ok=True)
+        make_folder(path.parent)
         part.touch()
         part.unlink()
 
@@ -322,10 +323,13 @@ def make_folder(path: Path) -> None:
     """Makes a folder, with its parents, unless it is there already.
 
     Raises:
-        InputError: if it cannot be made.
+        InputError: if it cannot be made, or a file has its name.
     """
     with user_errors(path):
-        path.mkdir(parents=True, exist_ok=True)
+        try:
+            path.mkdir(parents=True, exist_ok=True)
+        except FileExistsError:
+            raise InputError(f"{path}: not a folder") from None
 
 
 @contextlib.contextmanager
@@ -347,6 +351,20 @@ def exclusive(path: Path, on_wait: Callable[[], None]) -> Iterator[None]:
             while not _lock(lock, stack, on_wait):
                 pass
         yield
+
+
+def sole_writer(folder: Path) -> contextlib.AbstractContextManager[None]:
+    """Returns a context in which no other process writes a new folder.
+
+    Raises:
+        InputError: as the context begins, if another process is writing it, or
+            the lock cannot be written.
+    """
+
+    def refuse() -> None:
+        raise InputError(f"{folder}: another process is writing this folder")
+
+    return exclusive(part_path(Path(os.path.abspath(folder))), refuse)
 
 
 def remove_lock(path: Path) -> None:

@@ -6,6 +6,14 @@ import warnings
 
 import numpy as np
 
+# Separator of columns -> its name.
+_SEPARATORS = {
+    ";": "semicolons",
+    "\t": "tabs",
+    ",": "commas",
+    None: "white space",
+}
+
 
 def parse_rows(
     lines: Sequence[str] | Sequence[bytes],
@@ -63,11 +71,27 @@ def _fault(
         words = [word.strip() for word in text.split(separator)]
         kinds = kinds or ["f"] * len(words)
         if len(words) != len(kinds):
-            return f"row {row}: {len(words)} columns instead of {len(kinds)}"
+            fault = f"{len(words)} columns instead of {len(kinds)}"
+            return f"row {row}: {other_separator(text, separator) or fault}"
         for word, kind in zip(words, kinds, strict=True):
             if kind != "U" and not is_number(word):
                 return f"row {row}: could not convert {word[:40]!r} to a number"
     return "not rows of numbers"
+
+
+def other_separator(line: str, expected: str | None) -> str:
+    """Returns an error if a line has another separator, or else "".
+
+    `expected` is the right separator; None is white space.
+    """
+    for sign in ";\t,":
+        is_text = sign == "\t" and (expected is None or expected in line)
+        if sign in line and sign != expected and not is_text:
+            return (
+                f"separated by {_SEPARATORS[sign]} instead of"
+                f" {_SEPARATORS[expected]}"
+            )
+    return ""
 
 
 def is_number(word: str) -> bool:

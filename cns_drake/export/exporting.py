@@ -101,17 +101,18 @@ def export_drive(
                     " mount; give another folder"
                 )
     part = files.part_path(folder)
-    try:
-        for note in _notes(drive, layout):
-            on_note(note)
-        _write_drive(drive, layout, part, on_frame)
-        for path, text in outer.items():
-            files.make_folder(path.parent)
-            files.write_text(path, text)
-        with files.user_errors(folder):
-            os.replace(part, folder)
-    finally:
-        shutil.rmtree(part, ignore_errors=True)
+    with files.sole_writer(folder):
+        try:
+            for note in _notes(drive, layout):
+                on_note(note)
+            _write_drive(drive, layout, part, on_frame)
+            for path, text in outer.items():
+                files.make_folder(path.parent)
+                files.write_text(path, text)
+            with files.user_errors(folder):
+                os.replace(part, folder)
+        finally:
+            shutil.rmtree(part, ignore_errors=True)
     return folder
 
 

@@ -3,16 +3,23 @@
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 import math
+from pathlib import Path
 import re
 from typing import Any
 
-from cns_drake.base.csv_files import read_records
+from cns_drake.base.csv_files import read_records, whole_number
 from cns_drake.base.errors import InputError, errors_at, validated
 from cns_drake.base.jobs.fingerprint import fingerprint
+from cns_drake.scenarios.planning import count_frames, plan_drive
 from cns_drake.scenarios.scenario import Scenario
-from cns_drake.scenarios.scenario_files import map_folder
+from cns_drake.scenarios.scenario_files import (
+    check_files,
+    map_folder,
+    world_file,
+)
 from cns_drake.scenarios.shipped import worlds_folder
 from cns_drake.scenarios.variation import Family, vary
+from cns_drake.scene.world import load_world
 from cns_drake.sensors.lidar.config import WeatherConfig
 from cns_drake.simulation.loaded_drive import load_ways
 from cns_drake.studies.experiment import (
@@ -148,6 +155,8 @@ class PairOfDrives:
             "database": {},
             "query": {},
         }
+        # Worlds, with what they lack, that were loaded without an error.
+        self._loaded: set[tuple[Path, tuple[str, ...]]] = set()
 
     def build(self, condition: Condition, seed: int) -> Compared:
         """Returns both drives, with the changes that a condition sets.
@@ -351,6 +360,7 @@ class PairOfDrives:
         self._fit(drive, left)
         if left:
             drive = drive.with_fields(left, f"{self.source}: {side}")
+            self._check_map(side, drive, left)
         for name in set(_SEEDED) & set(left):
             # Sections without random draws get no seed, so that equal ones stay
             # equal.
@@ -451,6 +461,20 @@ class PairOfDrives:
                     f"{given} {name} do not fit the roads; {most} move"
                 )
                 traffic = fields["traffic"] = {**traffic, name: most}
+
+    def _check_map(self, side: str, drive: Scenario, given: Changes) -> None:
+        """Checks that the given fields of a drive fit its map."""
+        where = f"{self.source}: {side}"
+        with errors_at(where, f"{drive.source}: "):
+            check_files(drive)
+            # Other sections seldom fail, and a plan takes time.
+            if set(given) - {*_SEEDED, "seed"}:
+                count_frames(drive, plan_drive(drive))
+        world = world_file(drive), drive.without
+        if "without" in given and world not in self._loaded:
+            with errors_at(f"{where}.without"):
+                load_world(world[0], without=drive.without)
+            self._loaded.add(world)
 
     def _named(
         self, side: str, drive: Scenario, condition: Condition, seed: int
@@ -556,10 +580,16 @@ def frozen_drives(table: str) -> dict[tuple[str, int], str]:
         drives.
 
     Raises:
-        InputError: there is no such file.
+        InputError: there is no such file, or a level is no number.
     """
-    rows = read_records(worlds_folder() / table, _FROZEN)
-    return {(row["map"], int(row["level"])): row["drives"] for _, row in rows}
+    path = worlds_folder() / table
+    return {
+        (
+            row["map"],
+            whole_number(row["level"], f"{path}: line {line}: level"),
+        ): row["drives"]
+        for line, row in read_records(path, _FROZEN)
+    }
 
 
 def check_frozen(

@@ -15,7 +15,7 @@ import itertools
 import json
 import math
 from pathlib import Path
-from typing import Annotated, Any, Literal, get_type_hints
+from typing import Annotated, Any, Literal, NamedTuple, get_type_hints
 
 from pydantic import (
     BeforeValidator,
@@ -678,23 +678,34 @@ def base_protocol(
         raise InputError(f"{source}: {place}.{name}:{fault}") from None
 
 
+class MethodVariant(NamedTuple):
+    """A method with one combination of its settings.
+
+    Attributes:
+        name: name of the method, or its Python file.
+        settings: (name, value) of each setting, as text.
+        columns: path of each varied setting, such as `methods.solid.ranges` ->
+            its value in a table.
+    """
+
+    name: str
+    settings: tuple[tuple[str, str | tuple[str, ...]], ...]
+    columns: Changes
+
+
 def method_variants(
     methods: Mapping[str, Mapping[str, Any]],
-) -> list[tuple[str, tuple[tuple[str, str | tuple[str, ...]], ...], Changes]]:
+) -> list[MethodVariant]:
     """Returns each method with each combination of its varied settings.
 
     Args:
         methods: name of a method -> its settings. A setting with a list of
             values is varied.
 
-    Returns:
-        For each variant: the method's name; all its settings, as pairs of name
-        and value; and the varied settings as columns of a table, path -> value.
-
     Raises:
         ValueError: a setting has no values, or the same value twice.
     """
-    found: Any = []
+    found = []
     for name, settings in methods.items():
         place = f"methods.{name}"
         fixed, varied = _split(settings, (place,))
@@ -705,7 +716,7 @@ def method_variants(
                 for path, one in {**fixed, **chosen}.items()
             )
             columns = {path: _shown(one) for path, one in chosen.items()}
-            found.append((name, given, columns))
+            found.append(MethodVariant(name, given, columns))
     return found
 
 

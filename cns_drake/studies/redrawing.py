@@ -298,7 +298,11 @@ def fresh_versions() -> list[Version]:
 
 
 def draw_fresh_cities(
-    maps: Sequence[str], numbers: Sequence[int], output: Path, cluster: Cluster
+    maps: Sequence[str],
+    numbers: Sequence[int],
+    output: Path,
+    cluster: Cluster,
+    source: object,
 ) -> list[Path]:
     """Generates fresh versions of shipped maps; returns their map folders.
 
@@ -310,6 +314,16 @@ def draw_fresh_cities(
         numbers: numbers of the versions; all versions if empty.
         output: folder for the maps, which are named `<map>_f<number>`.
         cluster: runs the jobs.
+
+    Args:
+        maps: names of shipped maps; all of them if there is none.
+        numbers: numbers of the versions; all of them if there is none.
+        output: folder of the maps.
+        cluster: does the work.
+        source: file of the experiment, for errors.
+
+    Returns:
+        The folders, sorted by map, then by number.
 
     Raises:
         InputError: a version is unknown or could not be generated.
@@ -323,7 +337,8 @@ def draw_fresh_cities(
             if one not in known:
                 there = ", ".join(map(str, dict.fromkeys(known)))
                 raise InputError(
-                    f"{what}: no fresh version {one!r} (there are: {there})"
+                    f"{source}: {what}: no fresh version {one!r} (there are:"
+                    f" {there})"
                 )
     steps = [
         DrawFreshCity(

@@ -28,6 +28,7 @@ from cns_drake.studies.comparisons import (
     PairOfDrives,
     beside,
     check_frozen,
+    frozen_drives,
 )
 from cns_drake.studies.experiment import (
     CAUSE,
@@ -55,6 +56,7 @@ from cns_drake.studies.tasks.task import Jobs, NamedDrive, Pair, Task
 from cns_drake.studies.tasks.update import MapTask
 from evaluation.methods import optional_methods
 from evaluation.recognition.protocol import RetrievalProtocol
+from evaluation.results.charts import check
 from evaluation.results.page import write_page
 from evaluation.results.table import (
     LAST,
@@ -196,6 +198,12 @@ class Study:
             self._tasks[name] = TASKS[name](settings, self.source)
         with errors_at(f"{self.source}: methods", "--method: "):
             self._variants = self._choose_methods()
+        if self.experiment.frozen is not None:
+            with errors_at(f"{self.source}: frozen"):
+                frozen_drives(self.experiment.frozen)
+        for chart in self.experiment.charts:
+            with errors_at(self.source):
+                check(chart)
         self._conditions = conditions(self.experiment)
         self._protocol = self._protocol_of(self._conditions[0])
         self._made = MadeMaps(self.output / "cities")
@@ -220,7 +228,6 @@ class Study:
         for some in drives:
             for _ in self._simulated(some, made=False):
                 pass
-        make_folder(self.output)
         for name in (RESULTS, QUERIES, "index.html"):
             is_there(self.output / name)  # Nothing else may have its name.
         self._made.make(self.cluster)
@@ -229,6 +236,7 @@ class Study:
             raise InputError(
                 f"{self.source}: no condition that can be measured"
             )
+        make_folder(self.output)
         self._announce(jobs)
         run_jobs(jobs.values(), self.cluster)
         note("writing the tables and the page")
@@ -291,6 +299,13 @@ class Study:
         known: set[str] = set()
         for one in wanted:
             # A wrong name is found before any map is made.
+            if self.experiment.fresh and (
+                isinstance(one, MadeMap) or one not in shipped_maps()
+            ):
+                raise InputError(
+                    f"{self.source}: {FRESH}: {getattr(one, 'name', one)}: no"
+                    " shipped map"
+                )
             if isinstance(one, str) and not Path(one).is_dir():
                 try:
                     recordable_map(one)
@@ -320,14 +335,14 @@ class Study:
         path = shipped_maps().get(one, Path(one))
         versions = self.experiment.fresh
         if versions:
-            if one not in shipped_maps():
-                raise InputError(
-                    f"{self.source}: {FRESH}: {one}: no shipped map"
-                )
             cities = draw_fresh_cities(
-                [one], versions, self.output / "cities", self.cluster
+                [one],
+                versions,
+                self.output / "cities",
+                self.cluster,
+                self.source,
             )
-            for number, folder in zip(versions, cities, strict=True):
+            for number, folder in zip(sorted(versions), cities, strict=True):
                 yield _Drives(one, {FRESH: number}, self._pairs(folder))
             return
         if path.is_dir() and not MapFolder(path).drives():

@@ -97,6 +97,8 @@ class Method(abc.ABC, Generic[Descriptor, Database]):
     batch_size: ClassVar[int] = 1
     skips_places: ClassVar[bool] = False
     rerank_best: ClassVar[int] = 0
+    # The Python file of a user's own method.
+    _file: ClassVar[Path | None] = None
 
     def __init__(self, config: MethodConfig | None = None):
         self.config = self.Config() if config is None else config
@@ -383,12 +385,13 @@ def make_method(name: str, parameters: Mapping[str, Any]) -> Method:
                 f"{name}: no parameter {key!r} (known: {', '.join(known)})"
                 f"{did_you_mean(key, known)}"
             )
-    try:
-        return method(method.Config(**parameters))
-    except ValidationError as error:
-        fault = error.errors()[0]
-        field = ".".join(str(part) for part in fault["loc"])
-        raise InputError(f"{name}: {field}: {fault['msg']}") from error
+    with _faults(file) if (file := method._file) else contextlib.nullcontext():
+        try:
+            return method(method.Config(**parameters))
+        except ValidationError as error:
+            fault = error.errors()[0]
+            field = ".".join(str(part) for part in fault["loc"])
+            raise InputError(f"{name}: {field}: {fault['msg']}") from error
 
 
 def load_method(path: Path) -> type[Method]:
@@ -432,11 +435,17 @@ def load_method(path: Path) -> type[Method]:
             f"{path}: {method.__name__}: scans_per_place: {scans!r} is not a"
             " positive whole number"
         )
+    method._file = path
     for name in _CALLED:
-        if name in vars(method):
-            setattr(
-                method, name, with_named_faults(getattr(method, name), path)
-            )
+        # Also those that another class of the file defines.
+        function = inspect.getattr_static(method, name)
+        if function is inspect.getattr_static(Method, name):
+            continue
+        if isinstance(function, staticmethod | classmethod):
+            own = with_named_faults(function.__func__, path)
+            setattr(method, name, type(function)(own))
+        else:
+            setattr(method, name, with_named_faults(function, path))
     return method
 
 
@@ -483,11 +492,10 @@ def with_named_faults(function: Callable, path: Path) -> Callable:
 def _faults(path: Path) -> Iterator[None]:
     try:
         yield
-    except InputError:
+    except (InputError, KeyboardInterrupt):
         raise
-    # Without this, a SystemExit in the file would end the program without an
-    # error.
-    except (Exception, SystemExit) as error:
+    # A SystemExit in the file would end the program without an error.
+    except BaseException as error:
         # Python makes the name of a module's file absolute.
         lines = [
             frame.lineno

@@ -22,7 +22,7 @@ from typing import Any
 
 import numpy as np
 
-from cns_drake.base.csv_files import csv_text
+from cns_drake.base.csv_files import check_separator, csv_text
 from cns_drake.base.errors import InputError
 from cns_drake.base.files import read_bytes, write_text
 from evaluation.recognition.place_outcome import Number
@@ -628,6 +628,7 @@ class _Cells:
         file = path / usual if path.is_dir() else path
         try:
             text = read_bytes(file).decode("utf-8-sig")
+            check_separator(file, text)
             reader = csv.reader(io.StringIO(text, newline=""), strict=True)
             (_, names), *rows = [
                 (reader.line_num, [cell.strip(" ") for cell in row])

@@ -3,11 +3,14 @@
 import os
 from pathlib import Path
 import shutil
+import signal
 import subprocess
 import sys
 
 from helpers import documents
 import pytest
+
+from cns_drake.base import compiled
 
 _SCRIPT = """
 import numba
@@ -106,3 +109,15 @@ def test_nothing_is_compiled_twice(tmp_path):
         check=True,
     )
     assert result.stdout == "4 1 Counter()\n7 [(int64, int64)]\n"
+
+
+def test_an_interrupt_waits_until_a_function_is_compiled(tmp_path):
+    done = []
+
+    def compile_for(types):
+        signal.raise_signal(signal.SIGINT)
+        done.append(types)
+
+    with pytest.raises(KeyboardInterrupt):
+        compiled._for_all(compile_for, tmp_path / "one.lock")(())
+    assert done == [()]

@@ -53,12 +53,20 @@ def test_a_column_of_an_earlier_version_has_its_name_of_now(tmp_path):
         (b"a,b\n1,2,3\n", "line 2: 3 cells instead of 2"),
         (b"a,b\n1,\xff\n", "not UTF-8"),
         (b"a,b\n1," + b"7" * 200_000, "not CSV: field larger"),
+        (b"a;b\n1;2\n", "separated by semicolons instead of commas"),
+        (b"\n1,5;2,5\n", "separated by semicolons instead of commas"),
+        (b"a\tb\n1\t2\n", "separated by tabs instead of commas"),
     ],
 )
 def test_tables_that_are_none(tmp_path, content, fault):
     path = write(tmp_path, content)
     with pytest.raises(InputError, match=rf"table\.csv: {fault}"):
         read_records(path, ("b",))
+
+
+@pytest.mark.parametrize("content", [b"a,\tb\n1,2\n", b"a,b\n;,2\n"])
+def test_other_separators_beside_commas(tmp_path, content):
+    assert read_records(write(tmp_path, content), ("b",))[0][1]["b"] == "2"
 
 
 def test_an_error_is_one_printable_line(tmp_path):

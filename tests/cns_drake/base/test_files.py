@@ -12,6 +12,7 @@ from cns_drake.base.files import (
     draft_folder,
     exclusive,
     is_there,
+    make_folder,
     part_path,
     read_bytes,
     user_errors,
@@ -77,7 +78,7 @@ def test_check_leaves_an_existing_file_alone(tmp_path):
 def test_check_refuses_what_cannot_be_written(tmp_path):
     file = tmp_path / "file"
     file.write_text("")
-    with pytest.raises(InputError, match=r"page\.html: "):
+    with pytest.raises(InputError, match=f"{file}: not a folder"):
         check_writable(file / "page.html")
     with pytest.raises(InputError, match="a folder has this name"):
         check_writable(tmp_path)
@@ -176,6 +177,27 @@ def test_a_new_folder_takes_no_name_that_is_taken(tmp_path, monkeypatch):
             assert draft.name == name
             (draft / "a").touch()
         assert (tmp_path / name / "a").exists()
+
+
+def test_a_file_where_a_folder_is_needed(tmp_path):
+    file = tmp_path / "file"
+    file.touch()
+    with pytest.raises(InputError, match=f"^{file}: not a folder$"):
+        make_folder(file)
+
+
+def test_two_writers_of_one_folder(tmp_path):
+    folder = tmp_path / "folder"
+    with draft_folder(folder) as draft:
+        (draft / "a").touch()
+        with (
+            pytest.raises(InputError, match=f"^{folder}: another process is"),
+            draft_folder(folder),
+        ):
+            pytest.fail("begun")
+        assert (draft / "a").exists()
+    assert [path.name for path in tmp_path.iterdir()] == ["folder"]
+    assert (folder / "a").exists()
 
 
 def test_a_file_that_may_be_missing(tmp_path):

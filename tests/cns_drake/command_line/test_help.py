@@ -7,6 +7,7 @@ import pytest
 import typer
 
 import cns_drake
+from cns_drake.base.commands import Command
 from cns_drake.command_line import cli
 from cns_drake.sensors.lidar.presets import LIDAR_PRESETS
 from evaluation.command_line import cli as evaluation_cli
@@ -120,3 +121,9 @@ def test_completion(program, begun, completed, capsys, monkeypatch):
     monkeypatch.setenv("COMP_WORDS", words)
     monkeypatch.setenv("COMP_CWORD", str(len(words.split()) - 1))
     assert run(capsys, program).split() == completed
+
+
+def test_a_command_without_docstrings():
+    # As with `python -OO`.
+    command = Command("run", help=None, params=[], callback=lambda: None)
+    assert command.help == ""

@@ -597,6 +597,21 @@ FAULTS = [
         "{database: {version: 3}, query: {years: 5}}",
         "database.version: a city drawn anew does not age by query.years",
     ),
+    ("query: {without: [nothing]}", "query.without: .*no structure nothing to"),
+    ("both: {without: [nothing]}", "database.without: .*no structure nothing"),
+    ("query: {map: nowhere}", "query: map: 'nowhere' is neither"),
+    ("query: {map: metropolis, stage: '09'}", "query.stage: '09': .* has 01"),
+    (
+        "database: {route: [{road: x, lane: 1, direction: forward}]}",
+        r"database: route.0 \(x forward\): no road 'x'",
+    ),
+    ("query: {waypoints: no.csv}", "query: waypoints: no.csv: no such file"),
+    ("query: {frames: 99999}", "query: frames: 99999 is too many: the drive"),
+    (
+        "cases: {a: {query: {traffic: {fcd: no.xml}}}}",
+        "query: traffic.fcd: no.xml: no such file",
+    ),
+    ("query: {imu: {kalibr: no.yaml}}", "query: imu.kalibr: no.yaml: no such"),
     ("database: {rates: 2}", "database.rates: those of no years"),
     ("both: {rates: 2}", "both.rates: those of no years"),
     (

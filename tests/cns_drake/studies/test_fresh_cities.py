@@ -131,10 +131,12 @@ def test_a_version_of_a_small_city(tmp_path, turn_deg):
 def test_versions_that_are_none(tmp_path):
     for maps, numbers, fault in (
         (("atlantis",), (), "map: no fresh version 'atlantis'"),
-        ((), (6,), "both.fresh: no fresh version 6"),
+        ((), (6,), "mine: both.fresh: no fresh version 6"),
     ):
         with pytest.raises(InputError, match=fault):
-            draw_fresh_cities(maps, numbers, tmp_path / "out", Cluster())
+            draw_fresh_cities(
+                maps, numbers, tmp_path / "out", Cluster(), "mine"
+            )
     assert not (tmp_path / "out").exists()
 
 
@@ -143,7 +145,9 @@ def test_only_what_is_asked_for_is_drawn(tmp_path, monkeypatch):
     monkeypatch.setattr(
         redrawing, "run_jobs", lambda jobs, cluster: drawn.extend(jobs)
     )
-    folders = draw_fresh_cities(["suburbia"], [2, 4], tmp_path, Cluster())
+    folders = draw_fresh_cities(
+        ["suburbia"], [2, 4], tmp_path, Cluster(), "mine"
+    )
     assert [folder.name for folder in folders] == [
         "suburbia_f02",
         "suburbia_f04",

@@ -70,3 +70,10 @@ def test_maps_of_ones_own_are_not_frozen():
         check_frozen(TABLE, known | {("suburbia", 1): ["any"]})
     with pytest.raises(InputError, match=r"nothing\.csv"):
         check_frozen("nothing.csv", known)
+
+
+def test_levels_of_a_table_are_numbers(tmp_path):
+    table = tmp_path / "frozen.csv"
+    table.write_text("map,level,drives\ntown,1,a\ntown,high,b\n")
+    with pytest.raises(InputError, match=f"^{table}: line 3: level: 'high' is"):
+        frozen_drives(str(table))

@@ -291,5 +291,5 @@ def test_all_that_cannot_be_drawn_are_named(town, tmp_path):
 def test_a_folder_of_cities_that_is_none_is_named(town, tmp_path):
     output = tmp_path / "cities"
     output.write_text("a file")
-    with pytest.raises(InputError, match="/cities: File exists"):
+    with pytest.raises(InputError, match="/cities: not a folder"):
         redraw_here(town, [4], output)

@@ -663,6 +663,9 @@ def test_maps_of_conditions_are_made_first(town, tmp_path, monkeypatch):
             "methods: solid: ranges: ",
         ),
         ({"protocol": {"base": "best"}}, "protocol.base: 'best' is none of"),
+        ({"frozen": "no.csv"}, "frozen: .*no.csv: No such file"),
+        ({"charts": [{"kind": "pie"}]}, "charts: kind: 'pie' is none of"),
+        ({"charts": [{"kind": "matrix"}]}, "charts: matrix: .*a name is"),
     ],
 )
 def test_faults_before_any_work(town, tmp_path, fields, fault):
@@ -694,6 +697,19 @@ def test_faults_before_any_work(town, tmp_path, fields, fault):
         ({"query": {"years": 0.5}}, "mine: query.years: 0.5 is not"),
         ({"both": {"fresh": 1}}, "mine: both.fresh: .*town: no shipped map"),
         (
+            {
+                "maps": [
+                    {"name": "a", "age": "suburbia", "years": 1, "seed": 1}
+                ],
+                "both": {"fresh": 1},
+            },
+            "mine: both.fresh: a: no shipped map",
+        ),
+        (
+            {"maps": ["suburbia"], "both": {"fresh": [1, 6]}},
+            "mine: both.fresh: no fresh version 6",
+        ),
+        (
             {"database": {"stage": "earlier 1"}},
             "mine: no condition that can be measured",
         ),
@@ -707,7 +723,21 @@ def test_faults_before_anything_is_made(
     )
     with pytest.raises(InputError, match=f"^{fault}"):
         run_study(experiment(town, **fields), tmp_path / "out", Cluster())
-    assert not list((tmp_path / "out").glob("*"))
+    assert not (tmp_path / "out").exists()
+
+
+@pytest.mark.parametrize("given", [[3, 1], 3, [5, 4, 2]])
+def test_fresh_cities_have_their_numbers(tmp_path, monkeypatch, given):
+    monkeypatch.setattr(redrawing, "run_jobs", lambda jobs, cluster: None)
+    wanted = experiment("suburbia", both={"fresh": given})
+    study = Study(wanted, tmp_path, "mine.yaml", Cluster())
+    monkeypatch.setattr(study, "_pairs", lambda folder: [(folder, folder)])
+    found = {
+        one.factors["both.fresh"]: one.pairs[0][0].name
+        for one in study._drives_of("suburbia")
+    }
+    numbers = given if isinstance(given, list) else [given]
+    assert found == {one: f"suburbia_f{one:02d}" for one in numbers}
 
 
 @pytest.mark.parametrize("name", ["results.csv", "queries.csv", "index.html"])

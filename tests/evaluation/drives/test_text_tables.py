@@ -23,6 +23,8 @@ from evaluation.drives.text_tables import (
         (b"", "no row of numbers"),
         (b"\xff\n", "not a text file"),
         (b"1 2\n3\n", "row 2: 1 columns instead of 2"),
+        (b"1 2\n3;4\n", "row 2: separated by semicolons instead of white"),
+        (b"1 2\n3,4\n", "row 2: separated by commas instead of white space"),
     ],
 )
 def test_tables_that_are_none(tmp_path, text, fault):
@@ -33,6 +35,22 @@ def test_tables_that_are_none(tmp_path, text, fault):
         return
     with pytest.raises(InputError, match=f"^{path}: .*{fault}"):
         read_numbers(path, float)
+
+
+@pytest.mark.parametrize(
+    ("row", "fault"),
+    [
+        ("1;2;3", "separated by semicolons instead of commas"),
+        ("1\t2\t3", "separated by tabs instead of commas"),
+        ("1 2 3", "1 columns instead of 3"),
+        ("1,\t2", "2 columns instead of 3"),
+    ],
+)
+def test_rows_of_poses_with_another_separator(tmp_path, row, fault):
+    path = tmp_path / "poses.csv"
+    path.write_text(f"time{row[1]}x{row[1]}y\n{row}\n")
+    with pytest.raises(InputError, match=f"^{path}: row 1: {fault}"):
+        read_stamped_rows(path, 2, ",")
 
 
 def test_a_table_of_many_gigabytes(tmp_path):

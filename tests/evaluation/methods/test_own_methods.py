@@ -130,6 +130,12 @@ class Own(Method):
             "line 10: SystemExit",
         ),
         ("    def desc", "    Config = dict\n    def desc", "Config: <class"),
+        (
+            "return len(points)",
+            "raise type('Stop', (BaseException,), {})('x')",
+            "line 10: Stop: x",
+        ),
+        ("return len(points)", "raise GeneratorExit", "line 10: GeneratorExit"),
     ],
 )
 @pytest.mark.parametrize("command", ["pr", "scores"])
@@ -149,6 +155,50 @@ def test_faults_of_a_method_are_one_line(
         words += ["--output", tmp_path / "scores.csv"]
     assert_refused(capsys, [*words, "--method", path], fault)
     assert not (tmp_path / "scores.csv").exists()
+
+
+@pytest.mark.parametrize(
+    ("parent", "own", "fault"),
+    [
+        (
+            "class Parent(Method):\n"
+            "    def describe_place(self, points):\n        exit(0)",
+            "Parent",
+            "line 9: SystemExit: 0",
+        ),
+        (
+            "class Parent(Method):\n"
+            "    @staticmethod\n"
+            "    def describe_place(points):\n        exit(len(points) < 1)",
+            "Parent",
+            "line 10: SystemExit: False",
+        ),
+        (
+            "class Parent(Method):\n"
+            "    @classmethod\n"
+            "    def describe_place(cls, points):\n        exit(cls.name)",
+            "Parent",
+            "line 10: SystemExit: own_p",
+        ),
+        (
+            "class Config(Method.Config):\n"
+            "    def model_post_init(self, _):\n        exit(0)",
+            "Method",
+            "line 9: SystemExit: 0",
+        ),
+    ],
+)
+def test_faults_outside_the_class_of_the_method(
+    capsys, towns, tmp_path, monkeypatch, parent, own, fault
+):
+    monkeypatch.setattr(method, "_METHODS", dict(method._METHODS))
+    text = _WHOLE.replace("{number}", "p").replace("(Method)", f"({own})")
+    if own == "Method":
+        text = text.replace("    def desc", "    Config = Config\n    def desc")
+    path = tmp_path / "own.py"
+    path.write_text(text.replace("@register", f"{parent}\n\n@register"))
+    words = ["pr", towns / "town_01", towns / "town_02", "--method", path]
+    assert_refused(capsys, words, f"own.py: {fault}")
 
 
 @pytest.mark.parametrize("name", ["own.py", "./own.py", "sub/../own.py"])

@@ -1,0 +1,33 @@
+"""How both programs start."""
+
+from collections.abc import Callable
+import sys
+
+from cns_drake.base.errors import InputError
+from cns_drake.base.interrupts import (
+    end_interrupted,
+    interrupt_on_termination,
+    uninterrupted,
+)
+from cns_drake.base.process import look_seldom
+
+
+def start(program: str, load: Callable[[], Callable[[], None]]) -> None:
+    """Imports and runs a program; an interrupt meanwhile is not an error.
+
+    Args:
+        program: name of the program.
+        load: function that imports the program's main function and returns it.
+    """
+    try:
+        interrupt_on_termination()
+        look_seldom()
+        with uninterrupted():
+            run = load()
+        run()
+    except InputError as error:
+        print(f"{program}: error: {error}", file=sys.stderr)
+        sys.exit(error.exit_status)
+    except KeyboardInterrupt:
+        print(f"{program}: interrupted", file=sys.stderr)
+        end_interrupted()
