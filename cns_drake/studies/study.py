@@ -416,9 +416,13 @@ class Study:
                 for one in found:
                     planned.expect(one.pair)
             for name, task in self._tasks.items():
+                seen: set[tuple[str, str]] = set()
                 for one in found:
-                    if task.asks or not one.pair.is_as_before:
+                    drives = one.pair.database.name, one.pair.query.name
+                    is_new = not one.pair.is_as_before or drives not in seen
+                    if task.asks or is_new:
                         one.parts[name] = task.measure(one.pair, planned)
+                    seen.add(drives)
             jobs |= planned.jobs
             notes |= planned.notes
             measured += found

@@ -58,8 +58,8 @@ class Pair:
             database.
         is_as_before: whether the condition turns, tilts or partly hides the
             queries, or adds distractors. Tasks whose results depend only on the
-            drives then measure nothing, because the drives are assumed to be
-            those of another condition.
+            drives then measure nothing if they have measured the same drives
+            under an earlier condition.
     """
 
     name: str

@@ -405,6 +405,19 @@ def test_queries_that_are_asked_otherwise_are_no_other_drives(town, tmp_path):
     }
 
 
+def test_the_change_is_measured_if_all_queries_are_turned(town, tmp_path):
+    _, measured = planned(
+        experiment(
+            town,
+            tasks=["change"],
+            database={"stage": ["last", "first"]},
+            query={"turn_queries": True},
+        ),
+        tmp_path,
+    )
+    assert [set(one.parts) for one in measured] == [{"change"}, {"change"}]
+
+
 def test_the_sensor_of_a_place_is_no_change_of_the_city(
     town, tmp_path, jobs_done
 ):
