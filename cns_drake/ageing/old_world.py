@@ -37,7 +37,7 @@ _OWN_MESH = re.compile(rf"{MESH_FOLDER}/[^/]+\.obj")
 
 
 class OldWorld:
-    """The last stage of a map, which is today.
+    """The last stage of a map, which stands for the present.
 
     Attributes:
         columns: names of the columns of the map's structure table.

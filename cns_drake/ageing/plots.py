@@ -284,7 +284,11 @@ def storey_on(
 ) -> Structure | None:
     """Returns an additional storey for a building; None without a flat roof.
 
-    `triangles` (M, 3, 3) are those of the building on the plot, in W [m].
+    Args:
+        plot: plot on which the building stands.
+        triangles: (M, 3, 3) triangles of the building in W [m].
+        name: name of the storey, which is a structure of its own.
+        rng: random generator for the colour.
     """
     inside = plot.triangles(triangles)
     flat = inside[np.abs(unit_normals(inside)[:, 2]) > 0.99]

@@ -162,10 +162,13 @@ def is_there(path: Path) -> bool:
 def read_bytes(path: Path, limit: int = _WRITTEN_BYTES) -> bytes:
     """Returns the content of a file, after checking its size.
 
-    The default limit [bytes] is ample for files written by hand.
+    Args:
+        path: the file.
+        limit: greatest size of the file [bytes]; the default is ample for files
+            written by hand.
 
     Raises:
-        InputError: if it cannot be read, does not exist or is too large.
+        InputError: if the file cannot be read, does not exist or is too large.
     """
     check_regular(path)
     with user_errors(path), open(path, "rb") as stream:

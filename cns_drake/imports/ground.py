@@ -144,8 +144,11 @@ def ground_of(
     """Returns the ground of a city: its terrain or, without one, a guess.
 
     The guess is a smooth ground through the lowest points of the structures.
-    With `below_bridges`, those of bridges and tunnels do not count, unless the
-    city has no other structures.
+
+    Args:
+        structures: structures of the city.
+        below_bridges: whether bridges and tunnels are ignored in the guess,
+            unless the city has no other structures.
     """
     corners = joined(one.triangles for one in structures).reshape(-1, 3)
     terrain = [one for one in structures if one.kind == "TINRelief"]
@@ -169,9 +172,14 @@ def ground_of(
 def bottom_of(
     structures: Sequence[Imported], ground: Ground
 ) -> list[Structure]:
-    """Returns the structures of a guessed ground; none if there is a terrain.
+    """Returns the guessed ground of a city without a terrain, as a structure.
 
-    A terrain from the file is already among `structures`.
+    If the imported file has a terrain, it is among `structures`, and the result
+    is empty.
+
+    Args:
+        structures: structures of the city.
+        ground: the guessed ground, see `ground_of`.
     """
     if any(one.kind == "TINRelief" for one in structures):
         return []

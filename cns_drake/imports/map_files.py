@@ -104,10 +104,14 @@ def triangles_in(obj: str) -> int:
 
 
 def stage_size(sdf: str, triangles: Mapping[str, int]) -> tuple[int, int]:
-    """Counts the structures and the triangles in the SDF text of a stage.
+    """Returns the numbers of structures and of triangles in a stage.
 
-    Only structures with a surface count. `triangles` maps the path of a mesh in
-    the map's folder to its number of triangles.
+    Only structures with a surface count.
+
+    Args:
+        sdf: SDF text of the stage.
+        triangles: path of a mesh in the map's folder -> its number of
+            triangles.
     """
     structures = set(re.findall('visual name="([^"/]+)', sdf))
     meshes = re.findall("<uri>([^<]+)</uri>", sdf)

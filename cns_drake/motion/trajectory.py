@@ -135,9 +135,9 @@ class BodyRide:
         self._splines = [spline, spline.derivative(), spline.derivative(2)]
 
     def at(self, t: ArrayLike) -> RideMoments:
-        """Returns heave, roll and pitch of the body at times (N,).
+        """Returns heave, roll and pitch of the body at times (N,) [s].
 
-        Before and after the ride, the body rests.
+        Before and after the drive, the body rests.
         """
         times = np.clip(np.atleast_1d(t), 0.0, self._end)
         q, dq, ddq = (spline(times) for spline in self._splines)

@@ -160,6 +160,12 @@ def make_drive_page(
     the change (additional parts in violet). Other panels show the images of
     cameras. Below the time line are plots of the speed and the IMU. On a phone,
     the panels are one sheet, which is folded when the page opens.
+
+    Args:
+        drive: what is shown of the drive.
+        world: world of the stage.
+        shown: the stage, and the other stage with which it is compared, if any.
+        title: title of the page.
     """
     with _quiet():
         meshcat = geometry.Meshcat(MeshcatParams(host="127.0.0.1", port=0))
@@ -548,7 +554,8 @@ class MeshcatRecorder(LeafSystem):
         """Adds a moving object to the page.
 
         Only the pose of the object's first frame is recorded. All other frames
-        keep the poses relative to it that they have at the start of the drive.
+        keep the poses in the first frame that they have at the start of the
+        drive.
 
         Args:
             name: name of the object, unique in the page.

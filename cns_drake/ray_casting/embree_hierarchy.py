@@ -101,10 +101,11 @@ def merge_first(group: RayGroup) -> Iterator[Primitives]:
 
 
 def merge_second(group: RayGroup) -> Iterator[Primitives]:
-    """Yields what the second hierarchy contains of a group.
+    """Yields the curved shapes of a group that cannot move.
 
-    These are the curved shapes, if the group cannot move. Only rays that hit a
-    polyhedron of the first hierarchy, or start in one, are cast on the second.
+    They are in a second hierarchy: only rays that hit a polyhedron around these
+    shapes, or start in one, are cast on them. A group that can move yields
+    nothing.
     """
     if group.frame_id is None:
         yield from merge_curved(_numbered(group))

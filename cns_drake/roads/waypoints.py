@@ -38,19 +38,23 @@ def load_waypoint_path(
     contains names, the columns can be in another order, and there can be more
     columns.
 
-    The path is the line from waypoint to waypoint. Its corners are rounded by
-    arcs of 8 m radius, or less if half of the shorter neighbouring segment is
-    too short for this. At a right angle, the path is up to 3.3 m from the
-    corner. The height follows a monotone cubic over the distance travelled.
+    The path is the line from waypoint to waypoint, with corners rounded by arcs
+    of 8 m radius. Where the waypoints are too close together, the radius is
+    smaller: an arc takes at most half of each segment. At a right angle, the
+    path is up to 3.3 m from the corner. The height follows a monotone cubic
+    over the distance travelled.
 
-    The points of the path are about `spacing` apart [m]. With `u_turns`, the
-    car turns round in its tightest loop where the waypoints lead back. The far
-    end of the loop is at the waypoint.
+    Args:
+        path: the file.
+        spacing: approximate distance between the points of the path [m].
+        u_turns: whether the car turns round in its tightest loop where the path
+            turns by more than 150 degrees at a waypoint. The far end of the
+            loop is at the waypoint. Without `u_turns`, such a turn is an error.
 
     Raises:
-        InputError: a line of the file is not usable, or the path is too short
-            for a drive. The message names the file and, where there is one, the
-            line.
+        InputError: a line of the file is not usable, the path turns too
+            sharply, or its length is not that of a drive. The message names the
+            file and, where there is one, the line.
     """
     path = Path(path)
     points, lines = read_waypoints(path)

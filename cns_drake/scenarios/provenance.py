@@ -129,11 +129,15 @@ def recording_code() -> str:
 
 
 def digest_file(path: Path, watch: FileWatch | None = None) -> str:
-    """Returns the SHA-256 digest of a model and of the files that it names.
+    """Returns the SHA-256 digest of a file and, for a model, of what it names.
+
+    A model in SDF or URDF names other files, such as meshes.
 
     Args:
-        watch: records size and time of each file before the file is read, so
-            that a later change can be noticed; None records nothing.
+        path: the file.
+        watch: object that records size and time of each file before the file is
+            read, so that a later change can be noticed; by default nothing is
+            recorded.
 
     Raises:
         InputError: a file cannot be read.

@@ -113,7 +113,7 @@ def read_xml(path: Path) -> Element:
     """Returns the root element of an XML file.
 
     Raises:
-        InputError: it cannot be read, or is not the XML of a model.
+        InputError: the file cannot be read, or is not the XML of a model.
     """
     check_model(path)
     return read_elements(path, encoding="utf-8")

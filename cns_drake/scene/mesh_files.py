@@ -79,9 +79,9 @@ def unread_parts(path: Path) -> tuple[str, ...]:
 
 
 def check_gltf(path: Path) -> tuple[str, ...]:
-    """Returns notes on the content of a glTF file that is ignored, if any.
+    """Returns notes on ignored content of a glTF file, one for each kind.
 
-    There is one note for each kind of content. The file is text or binary.
+    The file can be text (`.gltf`) or binary (`.glb`).
 
     Raises:
         ValueError: the file is not glTF, or its shapes would be misread; the

@@ -165,10 +165,10 @@ class SimulatedDrive(Drive):
         return self._lidar.GetOutputPort("scan").Eval(self._at(index))
 
     def look(self, index: int) -> tuple[RayCastingScene, RigidTransform]:
-        """Returns the world for ray casting, and the LiDAR's pose X_WS.
+        """Returns the world as a scene for ray casting, and the pose X_WS.
 
-        Both belong to the time stamp of scan `index`. The scene is valid until
-        the next call of `look` or `scan`.
+        Both are those at the time stamp of scan `index`; X_WS is the pose of
+        the LiDAR. The scene is valid until the next call of `look` or `scan`.
         """
         scene = self._lidar.EvalScene(self._at(index))
         return scene, self.X_WBs[index] @ self.X_BS

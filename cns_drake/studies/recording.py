@@ -69,7 +69,8 @@ def plan_recordings(
 ) -> list[Job]:
     """Returns a job for each recording that is not finished yet.
 
-    Each job has the name of its recording. A note says which are finished.
+    Each job has the name of its recording. The names of the finished recordings
+    are printed on stderr.
 
     Args:
         scenarios: the scenarios to record.

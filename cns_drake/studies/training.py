@@ -348,8 +348,7 @@ def train(
         seed: seed of all draws.
         state: file with the state of the training. If it exists, the training
             continues from there.
-        digest: digest of the scans; a state that belongs to other scans is
-            refused.
+        digest: digest of the scans.
         track: reports progress.
         on_step: is called with the number of each step and the weights.
 
@@ -358,8 +357,8 @@ def train(
         queries whose best place is right.
 
     Raises:
-        InputError: there is nothing to pair, the state is another training's,
-            or JAX is not installed.
+        InputError: no city has two drives that meet, the state is damaged or
+            belongs to a training with other arguments, or JAX is not installed.
     """
     import_jax()
     import jax

@@ -226,10 +226,11 @@ def play_trace(
     ego: EgoPath,
     ego_box: EgoBox,
 ) -> TrafficPlan:
-    """Returns the traffic of a SUMO trace that begins with the drive.
+    """Returns the traffic of a SUMO trace for a drive.
 
-    Road users that would collide with the ego car are left out, because SUMO's
-    simulation did not contain the ego car.
+    The first time of the trace is the start of the drive. Road users that would
+    collide with the ego car are left out, because SUMO's simulation did not
+    contain the ego car.
 
     Args:
         trace: the trace that SUMO wrote.

@@ -386,22 +386,27 @@ def find_conflicts(
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Returns where paths of vehicles, and crossings, are in conflict.
 
-    Two different paths through a junction ("ways") are in conflict if the areas
-    that vehicles sweep on them meet. Lanes are in conflict only with crossings
-    without marks.
+    A path through a junction is called a way. Two different ways are in
+    conflict if the areas that vehicles sweep on them overlap; a way and a
+    crossing, if the swept area overlaps the crossing. A lane is in conflict
+    only with crossings whose attribute `marked` is False.
 
     Args:
-        graph: lane graph with P pieces and C crossings.
+        graph: lane graph with P pieces (ways and parts of lanes) and C
+            crossings.
 
     Returns:
-        Three arrays (2, P + C, P + C). The first index is 0 for two small
-        vehicles and 1 if at least one is large; the second index a and the
-        third index b number the pieces and then the crossings. The first array
-        is the distance of a vehicle's front along a at which it begins to meet
-        the area of b [m]; inf if they never meet. The second is the distance of
-        a vehicle's rear along a from which on b is free again [m]; 0 if they
-        never meet, or if a is a crossing. The third is `SPLIT` or `MERGE` where
-        two ways meet only at their beginning or end, in a lane that they share.
+        Three arrays (2, P + C, P + C) with indices k, a, b. k is 0 for two
+        small vehicles, and 1 if at least one is large. a and b are numbers of
+        pieces or, from P on, of crossings.
+
+        - Distance of a vehicle's front along a at which it reaches the area of
+          b [m]; inf without a conflict, or if a is a crossing.
+        - Distance of a vehicle's rear along a at which it leaves the area of b
+          [m]; 0 without a conflict, or if a is a crossing.
+        - `SPLIT` for two ways that overlap only at their beginning, since they
+          come from the same lane; `MERGE` for two that overlap only at their
+          end, since they lead to the same lane; otherwise 0.
     """
     small_axles = (-1.6, 1.75)
     num_pieces = len(graph.pieces)

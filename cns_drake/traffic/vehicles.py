@@ -492,6 +492,10 @@ def find_prior(traffic: Traffic, i: int) -> tuple[float, float, float]:
     it follows the earlier vehicle instead. Vehicles wait only for vehicles that
     were permitted earlier, so no vehicle waits forever.
 
+    Args:
+        traffic: all vehicles and crossings.
+        i: number of the vehicle.
+
     Returns:
         The distance to the place where the vehicle must stop [m], inf for none;
         the gap to the vehicle that it must follow [m], inf for none; and the

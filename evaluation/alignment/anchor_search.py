@@ -242,7 +242,8 @@ def find_guesses(candidates: Candidates) -> list[Guess]:
     """Returns the guesses with the most agreeing candidates, best first.
 
     A guess is computed from two candidates, and refined with all candidates
-    that agree with it. These candidates are not used for further guesses.
+    that agree with it. Candidates that agree with a guess are not used for
+    further guesses.
     """
     trials = _trials(candidates)
     is_left = np.ones(len(candidates.turn), dtype=bool)

@@ -36,10 +36,10 @@ class Submaps:
 
     Attributes:
         drive: the drive.
-        X_WS: (N, 4, 4) poses of its frames.
-        travelled: (N,) length of the path so far [m].
-        frames: (K,) keyframes.
-        X_WK: (K, 4, 4) poses of the keyframes.
+        X_WS: (N, 4, 4) poses of the LiDAR at all frames of the drive.
+        travelled: (N,) length of the path from the start to each frame [m].
+        frames: (K,) frame numbers of the keyframes.
+        X_WK: (K, 4, 4) poses of the LiDAR at the keyframes.
     """
 
     def __init__(self, drive: Drive):

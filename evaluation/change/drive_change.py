@@ -209,10 +209,10 @@ def compare(
     Args:
         source: the map A.
         target: the map B.
-        control: a third drive, along the route of A or B but in the stage of
-            the other map, with which it is compared. This comparison shows the
-            effect of different routes in an unchanged city. None for no
-            control.
+        control: map of a third drive, which follows the route of A in the stage
+            of B, or the route of B in the stage of A. It is compared with the
+            map of the same stage. This comparison shows the effect of different
+            routes in an unchanged city. None for no control.
         alignment: alignment of A and B, for the report.
         grids: shifts of the voxel grid [m]. The change is also computed on each
             shifted grid, for the report's `spread` of TCR_sym.

@@ -133,9 +133,10 @@ class DirectedChange:
     """Which points of a map, the source, are unchanged in another, the target.
 
     Attributes:
-        in_hull: (N,) bool, the set H: source points in the target's hull.
-        unchanged: (N,) bool, the set O: the points of H that have a target
-            point within tau.
+        in_hull: (N,) bool, the set H: source points in the convex hull of the
+            target.
+        unchanged: (N,) bool, the set O: points of H that have a target point
+            within the distance `tau`, see `temporal_change`.
         distances: (N,) distance to the nearest target point [m]; infinite
             if there is none.
     """

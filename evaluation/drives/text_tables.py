@@ -280,13 +280,18 @@ class Trajectory:
 
 
 def read_matrices(path: Path, separator: str | None) -> Trajectory:
-    """Reads a trajectory: rows with a time and a 3 x 4 matrix.
+    """Returns the trajectory in a table of times and poses.
 
-    The matrix is the upper part of a pose, row by row.
+    Each row of the table is a time and 12 numbers: the upper three rows of the
+    4 x 4 pose, one after the other.
+
+    Args:
+        path: the file.
+        separator: text between columns; None for white space.
 
     Raises:
-        InputError: if the table does not have that form, a matrix is no
-            rotation, or the poses are out of order.
+        InputError: if the table does not have this form, the left 3 x 3 part of
+            a pose is no rotation, or the poses are not in order of time.
     """
     stamps_ns, values = read_stamped_rows(path, 12, separator)
     return _in_order(path, stamps_ns, pose_matrices(path, values))

@@ -64,6 +64,11 @@ _BLOCK, _PART, _AT = 1.0, 0.2, 0.12
 def run_baseline(name: str, pair: Pair, track: Track = silent) -> Labels:
     """Returns the labels of both maps by a shipped change detector.
 
+    Args:
+        name: name of the detector, a key of `BASELINES`.
+        pair: the two sessions.
+        track: reports progress.
+
     Raises:
         InputError: the sessions lack data that the detector needs, or its
             package is not installed.

@@ -377,7 +377,9 @@ class Pair(NamedTuple):
 
 
 def read_pair(folder: Path) -> Pair:
-    """Reads the maps of the two drives in a folder, A and B.
+    """Returns the sessions of the two drives in a folder, with their maps.
+
+    The drives are in the subfolders A and B.
 
     Raises:
         InputError: a map is missing or cannot be read.

@@ -317,12 +317,12 @@ class VoxelAccumulator:
 
         Args:
             points: structured array of shape (N,) with x, y, z [m].
-            X_WS: (4, 4) pose of the frame in which they are expressed;
-                identity if left out.
+            X_WS: (4, 4) pose of the frame in which the points are expressed; by
+                default the points are in the world.
 
         Returns:
-            Number of points left out because they are not finite, or too far
-            away for the numbers of voxels.
+            Number of points left out because they are not finite, or 2^31
+            voxels or more from the origin along an axis.
         """
         X = np.array(np.eye(4) if X_WS is None else X_WS, dtype=np.float64)
         X[2, 3] -= Z_ORIGIN

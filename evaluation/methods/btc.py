@@ -266,10 +266,10 @@ class Btc(Method[BtcDescription, BtcDatabase]):
         database: BtcDatabase,
         places: Sequence[int],
     ) -> list[np.ndarray | None]:
-        """Returns, for each of several places, the pose of the query's LiDAR.
+        """Returns the pose X_PQ of a query's LiDAR Q at each of several places.
 
-        It is the pose on which most of the matching triangles agree; None if
-        too few triangles match or agree.
+        P is the LiDAR of the place. X_PQ is the pose on which most of the
+        matching triangles agree; None if too few triangles match or agree.
         """
         some = self.build_database([database.places[place] for place in places])
         found = dict(self._motions(query, some, None))
@@ -338,17 +338,19 @@ def align(query: np.ndarray, place: np.ndarray) -> np.ndarray:
 
 
 def find_motion(query: np.ndarray, place: np.ndarray) -> np.ndarray | None:
-    """Returns the motion on which most pairs of triangles agree.
+    """Returns the pose on which most of M pairs of triangles agree.
 
-    Every pair (or, if there are many, every n-th pair) proposes the motion that
+    Every pair (or, if there are many, every n-th pair) proposes the pose that
     aligns its two triangles.
 
     Args:
-        query: (M, 3, 3) vertices, M > 0.
-        place: (M, 3, 3) vertices of their partners.
+        query: (M, 3, 3) vertices of the query's triangles in the query's frame
+            Q [m], M > 0.
+        place: (M, 3, 3) vertices of the matching triangles of the place in the
+            place's frame P [m].
 
     Returns:
-        X_PQ (4, 4), the first one if several motions are equally good; None if
+        X_PQ (4, 4), the first one if several poses are equally good; None if
         too few pairs agree.
     """
     stride = len(query) // _TRIALS + 1
@@ -378,7 +380,8 @@ def plane_overlap(
         query: patches of the query, at least one.
         place: patches of the place, at least one.
         X_PQ: (4, 4) the query's frame in that of the place.
-        normal_limit: upper limit of the difference of the two normals.
+        normal_limit: upper limit of the length of the difference of the two
+            unit normals; either sign of a normal will do.
         distance_limit: upper limit of a center's distance from the plane of the
             other patch [m].
     """

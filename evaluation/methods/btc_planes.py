@@ -91,7 +91,8 @@ def base_plane(
 
     Args:
         planes: patches of the voxels.
-        normal_limit: greatest difference of the normals of similar patches.
+        normal_limit: greatest length of the difference of the unit normals of
+            similar patches; either sign of a normal will do.
         distance_limit: greatest distance of each center from the plane of the
             other patch [m].
 
@@ -118,7 +119,8 @@ def merge(
     """Merges similar patches; returns the merged planes.
 
     Args:
-        planes: patches to merge. The groups depend on their order.
+        planes: patches to merge. Which of them are merged depends on the order
+            of the patches.
         normal_limit: see `base_plane`.
         distance_limit: see `base_plane`.
         keep_single: whether to keep patches that are similar to no other.

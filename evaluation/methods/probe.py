@@ -78,10 +78,11 @@ class Probe:
     mu: np.ndarray
 
     def evidence(self) -> tuple[np.ndarray, np.ndarray]:
-        """Returns what a comparison needs: probabilities and their log-odds.
+        """Returns the occupancy p of each cell and its log-odds.
 
-        The probabilities that cells are occupied are first moved towards 1/2
-        where they are uncertain. Both arrays are (rings, sectors).
+        p is the probability `mu`, moved towards 1/2 by the fraction
+        sqrt(mu (1 - mu)) of its distance from 1/2. Both arrays are (rings,
+        sectors).
         """
         mu = self.mu.astype(np.float64)
         sigma = np.sqrt(mu * (1.0 - mu))
@@ -95,7 +96,8 @@ class ProbeDatabase:
     """Descriptors of D places.
 
     Attributes:
-        spectra: (D, rings, frequencies) of the heights.
+        spectra: (D, rings, frequencies) spectra of `Probe.heights` over the
+            azimuth.
         mu: (D, rings, sectors), see `Probe`.
         evidence: two arrays (D, rings, sectors), see `Probe.evidence`.
     """

@@ -113,8 +113,8 @@ class RingDatabase:
     Attributes:
         places: the D descriptors.
         is_empty: (D,) bool, whether a place's map has no points.
-        reference: function that returns the conjugate spectrum of a place's map
-            from above.
+        reference: function that takes the index of a place, and returns the
+            complex conjugate of the spectrum of its bird's-eye view.
     """
 
     places: Sequence[Ring]

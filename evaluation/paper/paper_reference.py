@@ -156,11 +156,12 @@ class Trend:
 def findings(
     results: Sequence[PlaceRecognition], changes: Sequence[ChangeResult]
 ) -> list[Finding]:
-    """Returns which of the paper's findings hold, if there are data for them.
+    """Returns a verdict on each of the paper's findings that can be tested.
 
-    Only results on the paper's maps, with its methods and its protocol, count.
-    If a method has several results on a pair, the first one counts, as in the
-    report's tables.
+    A finding can be tested if `results` and `changes` contain the data that it
+    is about. Only results on the paper's maps, with its methods and its
+    protocol, count. If a method has several results on a pair, the first one
+    counts, as in the report's tables.
     """
     shown = {
         (*r.pair, r.method): r

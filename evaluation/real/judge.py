@@ -88,7 +88,10 @@ def places_of(drive: Drive) -> list[list[np.ndarray]]:
 
 
 def patches(scan: np.ndarray, rng: np.random.Generator) -> Iterator[np.ndarray]:
-    """Yields up to sixteen square pieces of a scan, at random positions.
+    """Yields up to sixteen patches of a scan, at random positions.
+
+    A patch contains the points (M, 5) in a square with sides of 8 m, in the
+    form of `scan`.
 
     Args:
         scan: (N, 5) the scan, see `scan_table`.
@@ -272,8 +275,10 @@ def _quantile(values: np.ndarray, part: float) -> float:
 class Features:
     """The features of all patches of a set of scans (real or simulated).
 
+    A patch is a square piece of a scan.
+
     Attributes:
-        rows: features of each of the N patches, name -> value.
+        rows: for each of the N patches, name of a feature -> its value.
         place: (N,) number of the place at which each patch was recorded.
     """
 
@@ -311,9 +316,10 @@ class Features:
 
 
 def common_names(sets: list[Features]) -> list[str]:
-    """Returns the names of the features that are common in all of several sets.
+    """Returns the names of features that are common in each of several sets.
 
-    A feature is common if at least a tenth of a set's patches have it.
+    A feature is common in a set of scans if at least a tenth of the set's
+    patches have it.
     """
     names = list(dict.fromkeys(n for s in sets for row in s.rows for n in row))
     shares = [np.isfinite(one.of(names)).mean(axis=0) for one in sets]

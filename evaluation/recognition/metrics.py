@@ -354,7 +354,7 @@ class Difference:
         value: the first area minus the second.
         interval: 95 % interval.
         p_value: two-sided p-value under the hypothesis that there is no
-            difference; NaN with a single block.
+            difference; NaN if a route has a single bootstrap block.
     """
 
     value: float

@@ -189,7 +189,7 @@ class Number(NamedTuple):
 def place_numbers(
     now: PlaceOutcome, before: PlaceOutcome | None
 ) -> Iterator[Number]:
-    """Yields a method's place recognition results in a condition.
+    """Yields a method's place recognition results in a condition, one by one.
 
     Intervals are by bootstrap over blocks of the route. Each bootstrap sample
     draws the same blocks in the condition and in the baseline, in which nothing
@@ -197,8 +197,12 @@ def place_numbers(
 
     Args:
         now: outcome of the method in the condition.
-        before: outcome of the method in the baseline, with which `kept`, `lost`
-            and `found` are computed; None to leave these out.
+        before: outcome of the method in the baseline; None to leave out the
+            results that compare with it. These are `kept` and its variants
+            (result in the condition / result in the baseline); `lost`, the
+            number of queries that are right in the baseline only; `found`, the
+            number that are right in the condition only; and
+            `visible_change_added`.
     """
     outcomes = now.outcomes
     values = _areas(outcomes)

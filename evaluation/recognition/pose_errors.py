@@ -43,8 +43,8 @@ class PoseMetrics:
     """Quality of the poses of one method on one pair of drives.
 
     Medians and quantiles are over the accepted matches: queries whose best
-    place is a match, and whose score reaches the threshold with the greatest F1
-    (mode `all`).
+    place is a match, and whose score reaches the threshold with the greatest
+    F1. This F1 counts all queries, also those without a match.
 
     Attributes:
         num_accepted: number of accepted matches.
@@ -116,9 +116,13 @@ def pose_metrics(
     outcomes: QueryOutcomes,
     metrics: PlaceRecognitionMetrics,
 ) -> PoseMetrics:
-    """Returns a summary of pose errors.
+    """Returns a summary of the pose errors of a method on a pair of drives.
 
-    `metrics` must be those of the mode `all`.
+    Args:
+        errors: errors of the poses of Q queries.
+        outcomes: outcomes of the same queries.
+        metrics: place recognition metrics of the same queries, of the mode
+            `all`.
     """
     accepted = np.zeros(len(outcomes), dtype=bool)
     if metrics.f1_max_index is not None:

@@ -127,7 +127,8 @@ def score_places(
         is_known: (D,) bool, which places may be candidates. If this excludes a
             place, the query is compared with every place, because a search for
             a few best places might return only excluded ones.
-        gate_radius: radius of a match for `gated` [m]; None without a gate.
+        gate_radius: radius of a match [m], at which the gate takes effect (see
+            `gated`); None without a gate.
         exhaustive: whether to compare also with places that a search would skip
             only to save time.
         where: the name of the current query, for errors.

@@ -103,7 +103,7 @@ class SeenSurfaces:
         The result is NaN without points.
 
         Args:
-            points: (N, 3) points in this sensor's frame [m].
+            points: (N, 3) points in the frame of the scan's sensor [m].
         """
         return self.shares_of(points).shown
 

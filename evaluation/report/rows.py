@@ -234,8 +234,8 @@ def survivals(rows: Iterable[Row], stages: Mapping[str, str]) -> list[Survival]:
         stages: name of a drive -> its stage.
 
     Returns:
-        One item for each method on each pair of drives, sorted by pair, and
-        then by method in the order of tables.
+        A `Survival` for each method on each pair of drives, sorted by pair, and
+        within a pair by method in the order of tables.
     """
     found: dict[
         tuple[tuple[str, str, str], str],

@@ -319,11 +319,15 @@ def paired_values(results: Results, x: str, y: str) -> list[tuple[Row, float]]:
 def growths(results: Results, over: str, metric: str) -> list[Summary]:
     """Returns how fast a metric grows with a factor or another metric.
 
-    The result is an exponent: 1 if the metric grows in proportion, 2 if it
-    grows with the square.
+    Rows of the same experiment, map and method, all with or all without the
+    gate, form a curve of the metric. For each two neighbouring points of a
+    curve, there is a summary whose value is an exponent: 1 if the metric grows
+    in proportion between them, 2 if it grows with the square.
 
-    Points with the same map, method and gate form a curve. Each exponent is
-    computed between a point of a curve and the one before it.
+    Args:
+        results: the table of results.
+        over: name of the factor or metric on the x axis of the curve.
+        metric: name of the metric on the y axis of the curve.
     """
     groups: dict[tuple, list[tuple[float, Row]]] = {}
     for row, at in paired_values(results, over, metric):
@@ -344,12 +348,17 @@ def growths(results: Results, over: str, metric: str) -> list[Summary]:
 def correlations(
     results: Results, x: str, metric: str = "auc"
 ) -> list[Summary]:
-    """Returns how well a factor or metric predicts each method's losses.
+    """Returns how well a factor or metric predicts where each method fails.
 
-    The result is Spearman's rank correlation of `x` with 1 - metric, over the
-    conditions in which both are known. Its interval is by bootstrap over these
-    conditions. `results` must contain either only rows with the gate or only
-    rows without it.
+    For each method, the value is Spearman's rank correlation of `x` with
+    1 - `metric`, over the conditions in which `x` and `metric` are known. Its
+    interval is by bootstrap over these conditions.
+
+    Args:
+        results: the table of results, with rows either all with or all without
+            the gate.
+        x: name of the factor or metric.
+        metric: name of a metric of place recognition.
     """
     points: dict[str, list[tuple[float, float]]] = {}
     for row, at in paired_values(results, x, metric):

@@ -129,6 +129,10 @@ def change_stems(
 
     The first figure shows which points changed, the second figure the sets of
     points from which TCR is computed.
+
+    Args:
+        city: the city.
+        pair: recordings in the earlier and in the later stage of the city.
     """
     # Underscores join the parts. They are escaped in all but the first, so that
     # two pairs of stages never share a name.

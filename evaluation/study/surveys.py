@@ -104,13 +104,15 @@ class DriveSource(Protocol):
 
 @dataclass(frozen=True)
 class RecordedDrive:
-    """A recorded drive, in any format that can be read; a call opens it.
+    """A recorded drive, in any format that `open_drive` reads.
+
+    An object is called without arguments, and returns the opened `Drive`.
 
     Attributes:
         path: file or folder of the recording.
         lidar: name of the LiDAR, for recordings with several.
-        columns: number of columns of `.bin` files; by default guessed from the
-            values.
+        columns: number of values per point in `.bin` files; by default guessed
+            from the values.
     """
 
     path: Path
@@ -123,9 +125,9 @@ class RecordedDrive:
     def identity(self) -> list[list]:
         """Returns what identifies the recording: its options and its files.
 
-        Each file counts by its name, its size and its time. A recording of
-        cns-drake counts by its fingerprint instead of times, so that a copy is
-        the same recording.
+        Each file counts by its name, its size and the time of its last change.
+        In a recording of cns-drake, a fingerprint takes the place of the times,
+        so that a copy is the same recording.
         """
         with user_errors(self.path):
             path = self.path.resolve(strict=True)
@@ -246,11 +248,11 @@ class RecordingSurvey:
 
 
 def described_key(method: str, protocol: RetrievalProtocol) -> str:
-    """Returns the key of the descriptions that a method makes by a protocol.
+    """Returns the key of descriptions in `RecordingSurvey.described`.
 
-    The key is for descriptions by another protocol than that of the study, such
-    as the protocol of published results. The key of the method alone stands for
-    descriptions by the study's protocol.
+    Use it if the method described the scans by another protocol than that of
+    the study, such as the protocol of published results. The key of
+    descriptions by the study's own protocol is that of the method.
 
     Args:
         method: key of the method.

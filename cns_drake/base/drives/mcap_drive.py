@@ -149,10 +149,10 @@ class McapDrive(Drive):
 
     @property
     def distortion_note(self) -> str | None:
-        """Note that the scans contain motion distortion; None if they do not.
+        """A note for the user if the scans contain motion distortion.
 
-        It is also None for recordings of real LiDARs, which do not state
-        whether their scans are distorted.
+        It is None if they do not, and for recordings of real LiDARs, which do
+        not state whether their scans are distorted.
         """
         if not self.lidar_section.get("motion_distortion"):
             return None
@@ -222,7 +222,7 @@ class McapDrive(Drive):
         """Noise of the IMU as text in Kalibr's file format; None without noise.
 
         Raises:
-            InputError: if it is no text.
+            InputError: the recording's attachment with the noise is no text.
         """
         data = self._file.attachment(_KALIBR)
         try:

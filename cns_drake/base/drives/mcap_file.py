@@ -233,7 +233,7 @@ class McapFile:
         """Returns the serialised message at a location.
 
         Raises:
-            InputError: if the chunk is damaged.
+            InputError: if the chunk that contains the message is damaged.
         """
         return self._message(self._chunk(int(location["chunk"])), location)
 

@@ -101,12 +101,14 @@ class RecordContent(ReadDataStream):
 def uncompress(chunk: Chunk) -> bytes:
     """Returns the uncompressed records of a chunk.
 
-    Their size is limited, so that a small file cannot fill the memory.
+    The uncompressed size is limited, so that a small file cannot fill the
+    memory.
 
     Raises:
-        ValueError: if it is damaged, too large or of unknown compression.
-        RuntimeError: if lz4 finds it damaged.
-        zstandard.ZstdError: if zstd finds it damaged.
+        ValueError: if the chunk is damaged, too large or of unknown
+            compression.
+        RuntimeError: if lz4 finds that the chunk is damaged.
+        zstandard.ZstdError: if zstd finds that the chunk is damaged.
     """
     size = chunk.uncompressed_size
     if size > CHUNK_LIMIT_BYTES:

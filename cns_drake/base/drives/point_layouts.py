@@ -68,10 +68,12 @@ def to_points(message: Any) -> np.ndarray:
 
 
 def to_records(message: Any) -> np.ndarray:
-    """Returns a PointCloud2's points as records, even without coordinates.
+    """Returns the points of a message sensor_msgs/msg/PointCloud2 as records.
+
+    The points need not have coordinates.
 
     Returns:
-        (height * width,) under the message's field names.
+        (height * width,) structured array with the fields of the message.
 
     Raises:
         ValueError: if the message contradicts itself.

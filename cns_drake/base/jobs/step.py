@@ -96,10 +96,10 @@ class Step(abc.ABC):
         """
 
     def made_of(self, inputs: Mapping[str, object]) -> dict[str, object]:
-        """Returns the inputs, and the digest of the step's code as `code`.
+        """Returns the inputs, with the digest of the step's code as `code`.
 
-        A fingerprint of the result tells whether the step's files are up to
-        date; see `cns_drake.base.jobs.fingerprint`.
+        The step's files are up to date if they carry the fingerprint of this
+        dictionary; see `cns_drake.base.jobs.fingerprint`.
         """
         return {**inputs, "code": code_digest(type(self).__module__)}
 

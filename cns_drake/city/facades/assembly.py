@@ -57,7 +57,7 @@ class Site:
     def outline(self) -> np.ndarray:
         """Corners (N, 2) of the ground [m], counter-clockwise from the front.
 
-        Those of a rectangle are rounded inwards to whole centimetres.
+        The corners of a rectangle are rounded inwards to whole centimetres.
         """
         exterior = self.footprint.exterior
         points = np.array(exterior.coords[:-1], dtype=float)
@@ -169,12 +169,15 @@ class Archetype(BaseModel, frozen=True, extra="forbid"):
         any_outline: whether the footprint can be any simple polygon; otherwise
             it must be a rectangle.
         party_walls: whether a building can stand wall to wall with a neighbour;
-            otherwise it keeps the distance `overhang` from blind edges.
-        colours: name of a part -> colours, of which each building draws one.
-            The name of another part stands for its colour. The first entry is
-            the colour of all parts without a colour of their own.
-        choices: name -> colours that are drawn while the building is made.
-        materials: names in `colours` whose pieces become one part each.
+            otherwise it keeps the distance `overhang` from the edges of the
+            footprint towards neighbours.
+        colours: name of a part -> colours, of which each building draws one; or
+            the name of an earlier part, whose colour this part gets as well.
+            The colour of the first part is that of all parts without an entry.
+        choices: further lists of colours, by name, from which single elements
+            of a building draw.
+        materials: names in `colours`; all pieces of the same name become one
+            part.
         parameters: name -> value or formula of each parameter, in the order in
             which they are computed (see `cns_drake.city.formulas.value_of`).
     """
@@ -236,7 +239,7 @@ class Assembly:
         return pick(self.rng, choices)
 
     def some_of(self, words: str, low: int, high: int) -> list[str]:
-        """Returns a random number of words from the beginning of a text.
+        """Returns the first words of a text; how many of them is random.
 
         The number of words is at least `low` and less than `high`.
         """

@@ -358,9 +358,12 @@ def steps(x0: float, x1: float, reach: float, rise: float, count: int) -> Mesh:
 
 
 def beam(start: ArrayLike, end: ArrayLike, width: float) -> Mesh:
-    """Returns a bar of square section between two points [m].
+    """Returns a bar of square section between two points.
 
-    The points must not lie vertically above one another.
+    Args:
+        start, end: (3,) middles of the two ends [m]. They must not lie
+            vertically above one another.
+        width: side of the square [m].
     """
     start, end = np.asarray(start, float), np.asarray(end, float)
     length = float(np.linalg.norm(end - start))

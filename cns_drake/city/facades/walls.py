@@ -73,7 +73,7 @@ Relief = Patch | Arch
 
 
 class Corner(NamedTuple):
-    """A corner of a face of a wall, in panel coordinates [m].
+    """A corner of a face of a wall: x along the wall, z up, depth inwards [m].
 
     `row` is the number of the row of cells to which the face belongs.
     """

@@ -549,8 +549,8 @@ class Openings:
         """Adds the walls, their foundation and their panes to the building.
 
         Args:
-            glass: depths of the openings with panes [m].
-            bands: strips around the wing.
+            glass: depths behind the wall at which openings have panes [m].
+            bands: strips of the walls that run around the wing.
             material: name of the material of the walls. The panes have the
                 material named "glass".
         """

@@ -147,9 +147,12 @@ def lay_out(network: RoadNetwork, plan: CityPlan, source: str) -> City:
 
 
 def build_along(streets: Streets, plan: CityPlan, source: str) -> City:
-    """Makes a city along given streets.
+    """Returns a city along given streets.
 
-    `source` is the file of the plan, named in error messages.
+    Args:
+        streets: the streets.
+        plan: plan of what stands along the streets.
+        source: file of the plan, named in error messages.
 
     Raises:
         InputError: if the plan names something unknown, or something in it has

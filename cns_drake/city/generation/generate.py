@@ -68,14 +68,15 @@ class _Row(NamedTuple):
 def find_renaming(
     stages: Path, table: Path, structures: Sequence[Structure]
 ) -> Renaming:
-    """Finds out how names in `stages.yaml` must change for the current city.
+    """Returns how names in `stages.yaml` must change for the current city.
 
-    Structures at the same place, before and now, count as the same structure.
+    A structure of the earlier city and one of the current city count as the
+    same structure if they are of one kind and at the same place.
 
     Args:
         stages: the file `stages.yaml`.
-        table: the file `structures.csv` of the city for which `stages` was
-            written.
+        table: the file `structures.csv` of the earlier city, for which `stages`
+            was written.
         structures: the structures of the current city.
 
     Raises:
@@ -362,8 +363,11 @@ def render_city(
 ) -> dict[str, str]:
     """Returns the text of every generated file of a city, by relative path.
 
-    `stages_text` is the new content of `stages.yaml`; by default the file is
-    read.
+    Args:
+        world: folder of the map; relative paths start at it.
+        city: the city.
+        progress: is called with a line of text after each step.
+        stages_text: new content of `stages.yaml`; by default the file is read.
 
     Raises:
         InputError: if the stages cannot be used or the city has too many

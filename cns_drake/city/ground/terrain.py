@@ -110,8 +110,10 @@ def ground_structures(
 ) -> list[Structure]:
     """Returns the structures of the ground of all districts.
 
-    `shape` gives the height of all ground except water. `water_level` is the
-    height of the water [m].
+    Args:
+        districts: the districts.
+        shape: height of all ground except water.
+        water_level: height of the water in W [m].
     """
     structures = []
     # Land within water is a bridge, below which there is water.

@@ -201,7 +201,11 @@ def plan_facade(
 def with_shops(plan: FacadePlan, paving: upper_sides.UpperSides) -> FacadePlan:
     """Returns the plan with shop windows on the ground floor, where possible.
 
-    `paving` is the paving in front of the wall.
+    Only wide openings towards the street become shop windows.
+
+    Args:
+        plan: plan of the wall.
+        paving: upper sides of the paving in front of the wall.
     """
     top = plan.floor + plan.style.storey - 0.75
     top = min(top, plan.ground + _SHOP_HEIGHT)

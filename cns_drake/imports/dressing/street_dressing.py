@@ -456,7 +456,8 @@ def dress_streets(
         streets: the streets along which objects are added.
         drives: the drives, which are kept free.
         ground: heights of the ground on which objects stand.
-        bottom: structures of a guessed ground; none if the file has terrain.
+        bottom: structures of the guessed ground; empty if the imported file has
+            a terrain.
         seed: seed of all random draws.
     """
     found = StreetThings()

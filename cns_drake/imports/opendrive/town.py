@@ -361,7 +361,7 @@ class Town:
         drives: the proposed drives, at most two.
         lanes: text of the lane file; None if there are no lanes for traffic.
         kinds: kind of structure -> number of structures.
-        faults: counts of repaired and omitted parts of the file.
+        faults: the repaired and omitted parts of the file, by kind of fault.
     """
 
     roads: RoadMap

@@ -351,9 +351,13 @@ def standing_buildings(
 ) -> Iterator[OsmArea]:
     """Yields buildings and building parts that stand, or once stood.
 
-    Those below the ground and the like are left out, and counted as faults.
-    Buildings demolished at an unknown date are left out unless `with_gone` is
-    set.
+    All other buildings, such as those below the ground, are left out.
+
+    Args:
+        areas: buildings and building parts.
+        faults: counts to which the omitted buildings are added.
+        with_gone: whether to yield also buildings that were demolished at an
+            unknown date.
     """
     for one in areas:
         absent = why_absent(one.tags)

@@ -218,8 +218,12 @@ def street_width(
     """Returns the width of a street's carriageway [m]; None for other ways.
 
     Without a tag for the width, it follows from the number of lanes or the kind
-    of street. `where` contains the id of the street, and the faults to add to;
-    None if faults are not counted.
+    of street.
+
+    Args:
+        tags: tags of the street.
+        where: id of the street, and the counts to which faults of its tags are
+            added. By default such faults are not counted.
     """
     kind = tags.get("highway", "").removesuffix("_link")
     usual: float | None = TABLES["streets"].get(kind)

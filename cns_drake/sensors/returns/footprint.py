@@ -162,11 +162,14 @@ def _share(
 def meet_sides(sides: Sides, side_hits: BeamHits, hits: BeamHits) -> np.ndarray:
     """Completes the hits of additional rays, and divides the beams' light.
 
-    At an edge, the axes of two neighbouring beams hit two surfaces. Additional
-    rays are cast only to just beyond the nearer one. A hit of an additional ray
-    is removed if it lies on the surface that the axis of its own beam hits. If
-    this is the nearer surface, and the ray misses it, the ray gets a hit on the
-    plane of the farther one.
+    At an edge, the axis of a beam hits one surface, and the axis of its
+    neighbour another. An additional ray of the beam is cast only to just beyond
+    the nearer of the two surfaces. There are two corrections:
+
+    - If the ray hits the same surface as the axis of its own beam, the hit is
+      removed.
+    - If the ray hits nothing, and the axis of its own beam hits the nearer
+      surface, the ray gets a hit on the plane of the farther surface.
 
     Args:
         sides: the additional rays.

@@ -201,7 +201,7 @@ def texture(
     normal_matrices: np.ndarray,
     p_WLset: np.ndarray,
 ) -> Light:
-    """Varies the energy and distance of light as the texture of surfaces does.
+    """Returns light whose energies and distances vary with surface texture.
 
     Each spot of a surface has an albedo and a height above the mean surface.
     Both are hashes of the spot's position in the surface's own frame, so that
@@ -216,8 +216,8 @@ def texture(
             i of `d_Wset` starts at position i mod K.
         d_Wset: (B, 3) unit directions of the rays in the world.
         materials: materials of the geometries.
-        group_of, normal_matrices, p_WLset: frame of each geometry, as
-            `RayCastingScene.surface_frames` returns it.
+        group_of, normal_matrices, p_WLset: the three arrays that
+            `RayCastingScene.surface_frames` returns.
     """
     energy, distance = light.energy.copy(), light.distance.copy()
     # As names of their own, fields are fast.

@@ -62,9 +62,13 @@ class SheetRow:
 class LinkBudget(NamedTuple):
     """The parameters of a unit's SNR and range noise.
 
+    The echo of a target at the range r [m] has the SNR S e exp(-2 (alpha +
+    alpha_0) r) / r^2. Here e is the target's reflectivity times the cosine of
+    incidence, and alpha the extinction coefficient of the weather [1/m].
+
     Attributes:
-        scale: S in SNR(e, r) = S e exp(-2 (alpha + alpha_0) r) / r^2 [m^2].
-        own_extinction: alpha_0 in the same equation [1/m].
+        scale: S in this equation [m^2].
+        own_extinction: alpha_0 in this equation [1/m].
         range_noise: standard deviation of a range at an SNR of 1 [m].
         range_floor: least standard deviation, at any SNR [m].
         range_bias: standard deviation of the range error that is constant for

@@ -193,7 +193,8 @@ def follow(
             faint to be followed.
 
     Returns:
-        The light that comes back, in several parts.
+        The light that comes back, as one `Light` for each step. In a step,
+        every ray goes on to the next surface.
     """
     found: list[Light] = []
     for step in range(_MOST_STEPS):

@@ -57,12 +57,12 @@ def normal(
 ) -> np.ndarray:
     """Returns standard normal random numbers.
 
+    The random numbers are the normal quantiles of uniform numbers, computed
+    with PPND7, the short form of AS 241 (Wichura, Applied Statistics 37, 1988),
+    which is exact to seven digits.
+
     The arguments are those of
     `cns_drake.sensors.returns.random_numbers.uniform`.
-
-    They are the normal quantiles of uniform numbers, computed with PPND7, the
-    short form of AS 241 (Wichura, Applied Statistics 37, 1988), which is exact
-    to seven digits.
     """
     result = uniform(key, beam, draw)
     for k, u in enumerate(result):

@@ -24,10 +24,12 @@ class Response:
 
     Attributes:
         slope: the intensity of a diffuse target is `full` plus `slope` times
-            the logarithm of its energy. A slope of 0 means that intensity is
-            proportional to energy, as the data sheet says.
-        full: intensity of an energy of 1.
-        far: range up to which the unit compensates intensity for distance [m].
+            the natural logarithm of its energy. With a slope of 0, this formula
+            does not hold: intensity is proportional to energy, as the data
+            sheet says.
+        full: intensity of an energy of 1, if `slope` is not 0.
+        far: range up to which the unit compensates intensity for distance [m],
+            if `slope` is not 0; otherwise it does so at every range.
         floor: intensities below this are reported as 0, whatever the gain.
         least: echoes of less energy are not reported even at close range, where
             the unit turns its power down.
@@ -148,10 +150,11 @@ class UnitSheet:
         return _LIGHT * self.pulse_ns * 1e-9 / 2.0
 
     def aimed(self, pattern: _Pattern) -> _Pattern:
-        """Returns a pattern with the elevations of one real unit, if known.
+        """Returns a pattern with the elevations that were measured on one unit.
 
-        If they are not known, or the pattern has another number of rings, the
-        pattern is returned unchanged.
+        If the elevations are not known (see `Head`), or the pattern is not
+        spinning or has another number of rings, the pattern is returned
+        unchanged.
         """
         own = tuple(map(math.radians, self.head.elevations_deg))
         if not isinstance(pattern, SpinningPattern):

@@ -128,6 +128,10 @@ def _extinction(number: np.ndarray) -> float:
 class Scattering(NamedTuple):
     """Statistics of the echoes of drops and fog that a unit detects.
 
+    The energy of an echo is the reflectivity of the Lambertian target that
+    would return an equally strong echo from the same distance, if it filled the
+    beam and faced the unit.
+
     Attributes:
         distances: (R,) increasing distances [m].
         counts: (R,) mean number of drops per beam that are detected and nearer

@@ -95,8 +95,8 @@ def measure_change(
         first, second: files with the results of `map_city` for the two drives.
 
     Returns:
-        Metric, such as `tcr_sym` -> its value, and the number of voxels from
-        which it is computed.
+        Name of a metric, such as `tcr_sym` -> pair of its value and the number
+        of voxels from which the value is computed.
     """
     a, b = (
         Surveyed(name, *part.read())

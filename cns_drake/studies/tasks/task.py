@@ -271,7 +271,7 @@ class Task(abc.ABC):
 
     @abc.abstractmethod
     def measure(self, pair: Pair, jobs: Jobs) -> Part:
-        """Adds the jobs that measure a pair of drives.
+        """Adds the jobs that measure a pair of drives to `jobs`.
 
         Returns:
             The file to which the last job writes the result.
@@ -299,8 +299,9 @@ class Task(abc.ABC):
     def answers(self, found: Any) -> Iterable[Answered]:
         """Yields the answers of each method to all queries; by default none.
 
-        Each item is the method, whether its gate was used, and column of
-        `queries.csv` -> values (Q,).
+        Each item has three parts: the method; whether the gate was used (see
+        `evaluation.recognition.scoring.gated`); and a mapping from columns of
+        `queries.csv` to values (Q,).
 
         Args:
             found: the task's result for a pair of drives.
