@@ -280,7 +280,17 @@ def with_unmarked_crossings(
     node = 1 + max((max(way.start, way.end) for way in walkways), default=0)
 
     def beside(p: np.ndarray, reach: np.ndarray) -> tuple[int, int] | None:
-        """Returns the first walkway on one side, and its nearest row."""
+        """Returns where walkers who start at p step onto a walkway.
+
+        Args:
+            p: (2,) the start in W [m].
+            reach: (2,) direction and greatest distance of the walkway [m].
+
+        Returns:
+            Index of the nearest walkway in this direction, and index of its
+            point nearest to p. None if there is no walkway, if this point is
+            near its end, or if a crossing begins on this walkway already.
+        """
         ray = LineString([p, p + reach])
         near = side_tree.query(ray, "intersects")
         if not len(near):

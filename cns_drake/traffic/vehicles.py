@@ -554,8 +554,8 @@ def rear_on_way(streets: Streets, car: Any) -> float:
 
     Args:
         streets: arrays of all lanes and paths in junctions.
-        car: the vehicle, a record of dtype `VEHICLE`. The path is the one in
-            its field `held`, which is kept free for it.
+        car: the vehicle, a record of dtype `VEHICLE`. The path is the one
+            that is reserved for this vehicle, in the record's field `held`.
     """
     rear = car.s - car.length
     if car.path[CURRENT] == car.held:

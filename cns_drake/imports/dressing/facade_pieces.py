@@ -153,8 +153,9 @@ class FacadePlan:
     def without(self, is_hidden: np.ndarray) -> FacadePlan:
         """Returns the plan without hidden openings.
 
-        `is_hidden` (N + 1,) says which of the places that `probes` returns are
-        hidden: those of the openings, and that of the wall's top.
+        Args:
+            is_hidden: (N + 1,) whether each of the N openings is hidden, and
+                then whether the wall's top is, in the order of `probes`.
         """
         pairs = zip(self.openings, is_hidden[:-1], strict=True)
         return replace(

@@ -128,17 +128,18 @@ def import_openstreetmap(
 ) -> ForeignCity:
     """Imports a city from an OpenStreetMap file.
 
-    The origin of the map is the centre of its buildings. Bridges and tunnels
-    become streets on the ground.
+    The origin of the map is the centre of its buildings. The ground is level.
+    Bridges and tunnels become streets on the ground, unless `dressed` is set.
 
     Args:
         path: the file.
         year_attribute: tag with the year of construction; None for the usual
             tags.
-        dressed: whether to read more: the sea, areas of ground by their
-            material, and buildings that were demolished at an unknown date. If
-            so, tunnels, and bridges over other ways, are left out, and bridges
-            at ground level get parapets.
+        dressed: whether to read the file for a city with details. The city then
+            has the sea, areas of ground by their material, and buildings that
+            were demolished at an unknown date. Tunnels, and bridges over other
+            ways, are left out; all other bridges are streets on the ground with
+            parapets.
 
     Raises:
         InputError: if the file cannot be read, has no building, or is larger

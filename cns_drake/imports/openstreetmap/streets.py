@@ -149,14 +149,14 @@ def raised(
     areas: Iterable[BaseGeometry],
     source: tuple[str, ImportFaults],
 ) -> Iterator[Imported]:
-    """Yields one solid on the ground that fills areas; nothing without areas.
+    """Yields one solid on the ground that fills areas, if there are any.
 
     Args:
         name: name of the solid.
         look: kind, class, colour and height of the solid.
         areas: the areas in W [m].
-        source: id of the element in the file, and the faults to which new ones
-            are added.
+        source: id of the element in the file; and a counter of faults, to which
+            the faults of these areas are added.
     """
     solids = [
         np.concatenate(faces.extruded(polygon, 0.0, look.z, *source))
