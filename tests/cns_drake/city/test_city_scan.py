@@ -1,9 +1,8 @@
 """Scans of a real stage against oracles that share no code with us.
 
 Drake's signed distance shows whether a point lies on the geometry that is
-reported as hit. Open3D casts the same rays at the SDF's meshes, which are read
-here: its own reader takes most of a test's time. That shows whether anything was
-in the way.
+reported as hit. Open3D casts the same rays, which shows whether anything was in
+the way. The SDF's meshes are read here, because its reader takes seconds.
 """
 
 import functools
