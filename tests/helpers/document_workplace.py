@@ -75,7 +75,7 @@ class Workplace:
             for piece in documents.pieces(page)
         ]
         self._followed: dict[str, str] = {}
-        self._printed: dict[str, str] = {}
+        self._printed: dict[tuple[str, bool], str] = {}
         server = CommandServer(folder / ".venv")
         self._started.callback(server.close)
         for name in ("diagrams", "pyproject.toml"):
@@ -123,7 +123,9 @@ class Workplace:
     ) -> str:
         # The help of commands names them without their folder.
         command = f".venv/bin/{command.removeprefix('.venv/bin/')}"
-        if command not in self._printed:
+        # A study of other methods is another run.
+        key = command, METHODS_VARIABLE in environment
+        if key not in self._printed:
             done = subprocess.run(
                 ["bash", "-euo", "pipefail", "-c", command],
                 cwd=self.folder,
@@ -133,8 +135,8 @@ class Workplace:
                 check=False,
             )
             assert done.returncode == 0, f"{place}: {command}\n{done.stderr}"
-            self._printed[command] = done.stdout
-        return self._printed[command]
+            self._printed[key] = done.stdout
+        return self._printed[key]
 
     def _start(self, command: str, ready: str) -> None:
         process = subprocess.Popen(
