@@ -86,10 +86,10 @@ def find_speed_profile(
 
 
 def drive_positions(profile: SpeedProfile) -> np.ndarray:
-    """Returns path parameters (N,) of a drive, for `make_time_scaling` [m].
+    """Returns path parameters (N,) [m] of a drive, for `make_time_scaling`.
 
-    They are `KNOT_PERIOD` seconds apart. The first few and the last few are
-    equal: the drive rests there.
+    They are given at times that are `KNOT_PERIOD` apart. The first few and the
+    last few are equal: the drive rests there.
     """
     u, speed, _ = profile
     times = np.concatenate(

@@ -233,7 +233,7 @@ class Trajectory:
         """Returns a drive along the same path with another timing.
 
         Args:
-            positions: (N,) path parameters at evenly spaced times [m], see
+            positions: (N,) path parameters [m] at evenly spaced times, see
                 `cns_drake.motion.speed_profile.make_time_scaling`.
         """
         drive = copy.copy(self)
@@ -304,7 +304,7 @@ class Trajectory:
 
 
 def pose_at(moments: Moments, row: int = 0) -> RigidTransform:
-    """Returns X_WB at one of the N times of `moments`, time number `row`."""
+    """Returns the pose X_WB at the time with the index `row` in `moments`."""
     jet = moments.jet
     X_WF = RigidTransform(
         RollPitchYaw(0.0, -jet.climb[row], jet.yaw[row]), jet.p[row]

@@ -88,10 +88,9 @@ class DriveRecord:
         specific_forces_I: specific force in the IMU's frame I [m/s^2].
         angular_velocities_I: angular velocity w_WI_I [rad/s].
         num_points: number of points in each scan as measured.
-        limbs: for moving objects of several geometry frames: leading frame ->
-            (frame -> its constant pose in the leading frame), for all frames of
-            the object.
-        names: leading frame -> name of the object in the page.
+        limbs: for each moving object other than the vehicle: its first frame
+            -> its frames, each with its constant pose in the first frame.
+        names: first frame of an object -> name of the object in the page.
         images: name of a camera -> the images to show: index of the frame, and
             JPEG.
     """

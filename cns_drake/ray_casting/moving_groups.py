@@ -33,12 +33,11 @@ class KnownPoses(NamedTuple):
     def find(
         self, frame: FrameId, calc_X_WF: Callable[[FrameId], RigidTransform]
     ) -> RigidTransform:
-        """Returns the pose of a frame.
+        """Returns the pose X_WF of a frame F.
 
         Args:
             frame: the frame F.
-            calc_X_WF: function that returns the pose of a frame that is not
-                stored.
+            calc_X_WF: function that computes the pose if F is not in `rows`.
         """
         row = self.rows.get(frame)
         if row is None:

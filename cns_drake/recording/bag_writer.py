@@ -455,7 +455,8 @@ def take_over_frames(
     """Copies the complete frames of an interrupted run to the new run.
 
     A frame consists of a message on `frame_topic` and all messages until the
-    next message on this topic. A latched topic has a single message, at tick 0.
+    next message on this topic. A latched topic has a single message, at the
+    start of the recording.
 
     Args:
         bag: open bag of the new run, to which nothing has been written yet.

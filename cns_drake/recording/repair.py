@@ -86,7 +86,11 @@ def repair_mcap(
             )
 
     def read(before: int) -> Iterator[McapRecord | Fault]:
-        """Yields the file's records; `before` counts bytes done earlier."""
+        """Yields the records of the file, and reports progress.
+
+        The file is read twice; `before` is 0 in the first pass, and the size of
+        the file in the second [bytes].
+        """
         with user_errors(path), open(path, "rb") as stream:
             for record in read_records(stream):
                 on_bytes(before + stream.tell(), 2 * size)

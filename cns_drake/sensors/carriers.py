@@ -59,8 +59,8 @@ def connect_motion(
     Args:
         builder: builder of a diagram with all these systems.
         motion: system with the kinematic output ports of a MultibodyPlant, such
-            as `body_poses`; None for the plant of `body`.
-        body: a body of the plant.
+            as `body_poses`; None for the plant itself.
+        body: any body of the plant; not used if `motion` is given.
         inputs: name of an output port of `motion` -> the input port that is
             connected to it.
     """

@@ -124,7 +124,8 @@ class MadeMap(Section):
 
     Attributes:
         name: name of the new map.
-        age: name of the map to age. Give either `age` or `import`.
+        age: name of the map to age. Give either this map or a file to
+            import.
         years: number of years by which to age the map.
         import_file: file of a real city to import, in the folder `files` of the
             experiment.

@@ -198,14 +198,14 @@ class RedrawCity(MakeMap):
         return redrawn_inputs(self.map_folder, self.stage, self.seed)
 
     def finish_inputs(self, draft: Path) -> None:
-        """Writes inputs that depend on the city's structures; by default none.
+        """Writes inputs that contain names of structures; by default none.
 
-        An example is `stages.yaml`, which contains names of structures. This
-        method is called between writing the files of `inputs` and generating
-        the city.
+        An example is `stages.yaml`. To find the names, call
+        `cns_drake.city.generation.city_structures.make_city` with `draft`.
 
         Args:
-            draft: folder of the map, before it gets its final name.
+            draft: folder of the map, before it gets its final name. It already
+                contains the files of `inputs`, but not the generated city.
         """
 
     def sources(self) -> dict[str, object]:

@@ -124,9 +124,10 @@ def _drives(folder: Path) -> list[Scenario]:
 def control_drives(drives: Sequence[Scenario]) -> list[Scenario]:
     """Returns the control drives of a map's drives.
 
-    Each follows the route of one of the other drives through the stage of the
-    last drive. Compared with the last drive, it shows the effect of the route
-    alone, because the city is the same.
+    The last drive is the one in the last stage. Each other drive has a control
+    drive, which follows the same route, but through the last stage. The control
+    drive and the last drive see the same city, so a comparison of these two
+    shows the effect of the route alone.
     """
     last = max(drives, key=lambda drive: drive.stage or "")
     return [

@@ -306,8 +306,9 @@ def with_unmarked_crossings(
     def course(p: np.ndarray, q: np.ndarray, z: float) -> np.ndarray | None:
         """Returns the path (4, 3) of walkers across lanes, from p to q.
 
-        It lies at height z [m]. It is None if it crosses too many lanes, or
-        comes too near a way or an obstacle.
+        Where it crosses lanes, it lies at the height `z` [m]. The result is
+        None if the path would cross too many lanes, or come too close to an
+        obstacle, a junction or the end of a lane.
         """
         line = LineString([p[:2], q[:2]])
         ahead = (q - p)[:2] / line.length
@@ -412,11 +413,11 @@ def distances_along(points: np.ndarray) -> np.ndarray:
 
 
 def without_dead_ends(pieces: Sequence[Piece]) -> list[Piece]:
-    """Returns the pieces from which a vehicle never reaches a dead end.
+    """Returns pieces without those that vehicles cannot leave or reach.
 
     Three kinds of pieces are removed: lanes that lead nowhere, pieces that lead
-    only to such lanes, and lanes to which no piece leads. The remaining pieces
-    are numbered again.
+    only to such lanes, and pieces to which no remaining piece leads. The
+    remaining pieces are numbered again.
     """
     alive = set(range(len(pieces)))
     while True:

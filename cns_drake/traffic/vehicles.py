@@ -377,7 +377,8 @@ def find_ahead(
 ) -> tuple[float, float]:
     """Returns the gap to the next vehicle ahead [m], and its speed [m/s].
 
-    Only vehicles on the same piece count. Without one, the gap is inf.
+    Only vehicles on the same piece count. If none is ahead there, the gap is
+    infinite and the speed 0.
 
     Args:
         traffic: the traffic.

@@ -105,6 +105,9 @@ class Bay:
     def grow(self, car: Structure, cars: Obstacles, others: Obstacles) -> None:
         """Enlarges the bay up to other objects, and halfway to other cars.
 
+        The bay grows by at most 0.5 m in front and behind, and by at most 0.25
+        m on each side.
+
         Args:
             car: the car in the bay.
             cars: areas of all parked cars.

@@ -247,8 +247,11 @@ def best_overlaps(
             initial pose.
 
     Returns:
-        (N,) int64 greatest overlaps, and (N, 3) the heading and shifts at which
-        they occur (the first ones of several).
+        For each initial pose: the greatest overlap, (N,) int64; and the number
+        of the heading and the shifts by rows and by columns at which it occurs,
+        (N, 3) int64. If several of the `moves` give this overlap, the first one
+        counts. If all of them shift the query by more than m rows, the overlap
+        is -1.
     """
     num_headings, num_rows, num_maps = queries.shape
     margin = (places.shape[1] - num_rows) // 2

@@ -447,8 +447,8 @@ class PlaceRecognitionMetrics:
         auc_strict: area under the curve with recall = TP / N at each of its
             points.
         f1_max: greatest F1 on the curve; 0 if nothing is accepted.
-        f1_max_index: index of that point on the curve; None if the curve is
-            empty.
+        f1_max_index: index of the point of the curve with this F1; None if the
+            curve is empty.
         recall_at_n: (25,) R@1 to R@25.
         recall_at_1_percent: R@N, where N is a hundredth of the number of
             places.

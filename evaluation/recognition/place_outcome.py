@@ -73,9 +73,9 @@ class PlaceOutcome:
             retrieval: retrieval of Q queries and D places.
             query: time stamps (Q,) [ns] and positions (Q, 3) [m] of the
                 queries.
-            drives: name of each place's drive (D names). The first one is the
-                drive through the query's own city; distances to places of all
-                other drives are unknown.
+            drives: name of each place's drive (D names). The first name is
+                that of the drive through the query's own city; distances to
+                places of all other drives are unknown.
             overlaps: (Q,) how much of the query's scan the best of its matches
                 shows, see `evaluation.recognition.overlap_truth`; NaN without a
                 match.

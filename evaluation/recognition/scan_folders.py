@@ -37,8 +37,9 @@ def write_scores(
 
     Columns are `query`, `database` (file stems) and `score`, which is empty if
     the place is no candidate. Rows are sorted by the names of query and place.
-    The file appears under its name only when it is complete. Methods that match
-    drives take the queries as one drive, in the order of names.
+    The file appears under its name only when it is complete. A method with its
+    own `score_in_drive` gets the queries as those of one drive, in the order of
+    their names.
 
     Args:
         method: method that describes and compares the scans.
@@ -57,9 +58,9 @@ def write_scores(
         The number of points left out because they are not finite.
 
     Raises:
-        InputError: if the method matches sequences, for which scans need
-            poses, a folder or a scan cannot be read, a scan has no point
-            within the limits of the protocol, or the output cannot be
+        InputError: if the method's setting `sequence` is not 0 (it needs the
+            poses of scans), a folder or a scan cannot be read, a scan has no
+            point within the limits of the protocol, or the output cannot be
             written.
     """
     if method.config.sequence:

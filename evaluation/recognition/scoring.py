@@ -58,15 +58,14 @@ def gated(
 ) -> list[np.ndarray]:
     """Returns the scores (D,) after the gate, one array for each radius.
 
-    The gate rejects places that are too far from the query according to the
-    method's own pose estimate: their scores become NaN. Only the best
-    `NUM_GATED` places are tested; all other scores become NaN, too. A place for
-    which the method estimates no pose keeps its score. If the method estimates
-    no pose at all, all scores stay the same.
+    The gate tests the `NUM_GATED` places with the best scores. The method
+    estimates the distance of each from the query, and `gate_weight` returns a
+    weight w from 1 (near) to 0 (far). If w is 0, the place is rejected: its
+    score becomes NaN. Otherwise the score s becomes s - (1 - w) |s|; a positive
+    score is thus multiplied by w. A place for which the method estimates no
+    pose keeps its score. Scores of places that are not tested become NaN.
 
-    A score s becomes s - (1 - w) |s|, where the weight w falls from 1 to 0 as
-    the estimated distance passes the radius (see `gate_weight`). Positive
-    scores are thus multiplied by w.
+    If the method estimates no pose at all, all scores stay the same.
 
     Args:
         method: method that made the scores.

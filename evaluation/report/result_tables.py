@@ -177,13 +177,15 @@ def recognition_table(
 ) -> Table:
     """Returns Table II: a row for each pair, some columns for each method.
 
-    Only the table that is compared with the reference contains F1.
+    The columns of a method are AUC, strict AUC and R@1, and F1 if `mode` is
+    None.
 
     Args:
         results: results of one protocol.
         changes: change between the drives of each pair.
-        mode: which queries count; by default those that the reference counts
-            for each method.
+        mode: which queries count: `all`, or only those with a match
+            (`filtered`); None for those that the reference counts for each
+            method.
         reference: published results to compare with.
         evidence: names of a database and a query -> why queries went wrong.
 

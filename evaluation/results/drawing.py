@@ -44,7 +44,10 @@ def unit(rgb: tuple[int, int, int]) -> tuple[float, float, float]:
 
 
 def plain(text: str) -> str:
-    """Returns text with escaped dollars, which would begin a formula."""
+    """Returns text with its dollar signs escaped for matplotlib.
+
+    A dollar sign that is not escaped begins a formula.
+    """
     return text.replace("$", r"\$")
 
 

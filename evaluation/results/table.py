@@ -117,7 +117,8 @@ class Key:
         database: name of the drive that makes the database.
         query: name of the drive whose scans are the queries.
         seed: seed of everything that is random.
-        factors: name -> value of each factor of the condition that applies.
+        factors: name -> value of each factor of the experiment. A factor that
+            does not apply is missing or None.
         task: `place`, `pose`, `localise`, `map`, `change`, `cost` or another.
         method: method, estimator or baseline; "" for the task `change`.
         gate: whether places were rejected by the method's own pose.
@@ -339,7 +340,10 @@ class Results:
         )
 
     def distinct(self, column: str) -> list[Any]:
-        """Returns the distinct values of a column in order, without None."""
+        """Returns the distinct values of a column, without None.
+
+        The values are in the order in which they appear first.
+        """
         found = dict.fromkeys(row[column] for row in self.rows)
         return [value for value in found if value is not None]
 

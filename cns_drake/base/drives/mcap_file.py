@@ -122,7 +122,7 @@ class _Contents:
 
     @classmethod
     def of(cls, summary: Summary) -> "_Contents":
-        """Returns the contents of a summary."""
+        """Returns the contents of a file, as its summary section lists them."""
         chunks = sorted(
             summary.chunk_indexes, key=lambda chunk: chunk.chunk_start_offset
         )

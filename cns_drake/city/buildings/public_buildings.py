@@ -161,8 +161,9 @@ class Chapel(Building):
     def build(self) -> None:
         """Adds all parts of the chapel, parallel to the site's longer sides.
 
-        The door is at the front of the site, or on its left if the longer sides
-        lie along x. The building's site must be a rectangle.
+        The door is at the front of the site. If the site is wider than it is
+        deep, the door is on the left, as seen from the front. The site must be
+        a rectangle.
         """
         x0, y0, x1, y1 = self.site.bounds
         if y1 - y0 >= x1 - x0:

@@ -166,12 +166,12 @@ def _clipped(
 
 
 def enclosed(edges: np.ndarray) -> MultiPolygon:
-    """Returns the area that cut walls enclose, with holes for courtyards [m].
+    """Returns the area that a building's walls enclose at a height [m].
 
-    `edges` (N, 2, 2) contains start and end of the edges of a cut, with the
-    area on their left, as from `cut_at`. Niches in the walls, and gaps between
-    walls and objects in front of them, count as enclosed. Coordinates are whole
-    millimetres.
+    Courtyards are holes in the area. `edges` (N, 2, 2) contains start and end
+    of the edges along which `cut_at` cuts the walls [m]; the area is on their
+    left. Niches in the walls, and gaps between walls and objects in front of
+    them, count as enclosed. Coordinates of the area are whole millimetres.
     """
     edges = edges[np.ptp(edges, axis=1).max(axis=1) > 0.001]
     lines = shapely.linestrings(edges)

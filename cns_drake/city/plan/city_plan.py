@@ -194,8 +194,9 @@ class LinePlan(_Model):
         objects: weights of the objects in the random choice, by name.
         points: points of the line [m]. The objects face its right side.
         spacing: smallest and largest distance between two objects [m]. Without
-            it, each straight part of the line is one object of the same length,
-            as for fences and hedges.
+            it, each straight part of the line becomes one object, such as a
+            fence or a hedge, which is as long as this part. Long or steep parts
+            become several objects, end to end.
         yaw_deg: angle by which each object is turned from its usual heading
             along the line [deg].
         kind: first part of the objects' names in the tables; by default the

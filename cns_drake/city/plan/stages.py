@@ -71,8 +71,8 @@ class Stages(_Model):
         stages: stages by number, in ascending order. A number has two digits in
             quotes, such as `"01"`.
         lots: use of a lot before its building exists (`car_park`, `market`,
-            `garden`, `yard` or `empty`) and names of the buildings with this
-            use. By default the use of a lot depends on its size.
+            `garden`, `yard` or `empty`) -> names of the buildings whose lots
+            have this use. By default the use of a lot depends on its size.
     """
 
     stages: dict[StageName, Stage]

@@ -110,9 +110,10 @@ def tag_value(
     Args:
         tags: tags of an element.
         key: key of the tag.
-        read: function that returns the value of a text; None if it cannot.
+        read: function that converts the text of the tag to its value; it
+            returns None for a text that it cannot convert.
         most: greatest plausible value. A greater one is counted as a fault, as
-            is a text that `read` cannot read.
+            is a text that `read` cannot convert.
         where: id of the element, and the faults to add to; None if faults are
             not counted.
         least: least plausible value. A smaller one is counted as a fault.

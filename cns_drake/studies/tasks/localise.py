@@ -142,9 +142,10 @@ def measure_localisation(
         spacing: distance between two queries [m].
 
     Returns:
-        For each method, an array for each entry of `starts`: (K,) records of
-        `evaluation.localisation.localise.QUERY`, one per scan. The list is
-        empty if the query is nowhere near the map.
+        An array for each entry of `starts` with the first method, then with the
+        second, and so on. Each contains one record of
+        `evaluation.localisation.localise.QUERY` per query. If no query is near
+        the map, there are no arrays.
     """
     mapped, asked = database(), query()
     maps: dict[tuple[float, int], estimators.LocalisationMap] = {}
