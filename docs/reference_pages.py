@@ -113,10 +113,7 @@ def pages() -> dict[str, str]:
         ),
         "family.md": _fields_page(
             "Fields of a family of drives",
-            "[Families](../scenarios.md#families) shows an example. A family "
-            "has a member for every combination of the values of `missing`, "
-            "`seeds`, `city_seeds`, `routes` and `lidars`. The fields `ride` "
-            "and `imu` apply to all members.",
+            "[Families](../scenarios.md#families) shows an example.",
             FAMILY | {"Ride": RideConfig, "IMU": ImuSection},
         ),
         "city.md": _fields_page(

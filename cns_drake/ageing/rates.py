@@ -122,7 +122,8 @@ class Tally:
             event: name of the event.
             share: probability of the event in this draw.
             hit: whether the event happened.
-            things: number of objects at risk.
+            things: number that is added to the objects at risk. It is 0 in the
+                further draws for the same objects.
         """
         self.expected[event] += share
         self.exposure[event] += things

@@ -65,10 +65,11 @@ def depart(
     """Returns the path of a driver who wanders and changes lanes.
 
     The car, including its mirrors, keeps 0.3 m from all obstacles, as seen from
-    above. Where this is not possible, the car stays on the line.
+    above. Where this is not possible, the car stays on `path`.
 
     Args:
-        path: the line, with points every `FINE_SPACING`.
+        path: the path of a driver who does neither, with points every
+            `FINE_SPACING`.
         spacing: distance between the points of the result [m].
         obstacles: index of the edges of obstacles, such as kerbs and walls.
         source: text with which error messages begin.

@@ -86,6 +86,9 @@ class DrawnRoutes(Section):
 class Family(Section):
     """A family of drives: a base drive and what varies among its members.
 
+    There is a member for each combination of the values of `missing`, `seeds`,
+    `city_seeds`, `routes` and `lidars`. All other fields apply to all members.
+
     Attributes:
         base: name or file of the drive that provides the map, route, speeds and
             sensors of all members.
@@ -94,20 +97,19 @@ class Family(Section):
         towards: another stage of the map, usually an earlier one. Only
             structures that do not exist in this other stage are removed.
             Structures that are lower there keep their height.
-        missing: shares of the structures to remove. Each share makes a member:
-            give numbers from 0 to 1, or `{from: 0, to: 0.6, count: 20}` for
-            evenly spaced ones.
+        missing: shares of the structures to remove: numbers from 0 to 1, or
+            `{from: 0, to: 0.6, count: 20}` for evenly spaced ones.
         scattered: name of a class -> share of its structures to remove at
             random all over the map, besides those of `missing`, such as
             `{pole: 0.3}`.
-        seeds: seeds of the random draws. Each seed makes a member. It
-            determines the place around which the structures of `missing` are
-            removed, the nearest first, and draws those of `scattered`.
+        seeds: seeds of the random draws. A seed determines the place around
+            which the structures of `missing` are removed, the nearest first,
+            and which structures of `scattered` are removed.
         city_seeds: seeds of cities that are generated anew along the same
-            streets. Each seed makes a member.
+            streets.
         routes: random routes for the members, instead of the base's route.
         lidars: presets of LiDARs, such as `[cns, os1-64]`, that replace the
-            LiDARs of the base. Each preset makes a member.
+            LiDARs of the base.
         ride: ride of all members, instead of the base's.
         imu: IMU of all members, instead of the base's.
     """

@@ -413,9 +413,10 @@ def evaluation_sets(runs: Sequence[Run]) -> tuple[list[dict], list[dict]]:
         runs: drives; each is a database and a set of queries.
 
     Returns:
-        Two lists with a dictionary for each drive, number of a cloud -> its
-        file, northing and easting. In the second list, each query also
-        contains, for each other drive, the numbers of the clouds that match it.
+        The list of databases, and the list of queries. Both contain a
+        dictionary for each drive: number of a cloud -> its file, northing and
+        easting. An entry of the second list also contains, for each other
+        drive, the numbers of the clouds that match the query.
     """
     trees = [cKDTree(run.positions) for run in runs]
 

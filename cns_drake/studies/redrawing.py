@@ -438,14 +438,15 @@ def _turned_bounds(bounds: Sequence[float], turn_deg: float) -> list[float]:
 
 
 def kept_names(stages: Any, names: Sequence[str]) -> Any:
-    """Returns the content of `stages.yaml` without structures that are missing.
+    """Returns `stages.yaml` without structures that a new city lacks.
 
-    A city that is drawn anew can have fewer houses in a row than the stages of
-    the map name. Groups without any remaining structure are left out.
+    A city that is drawn anew can have fewer houses in a row than the original
+    city, for which the file was written. Groups that lose all their structures
+    are left out.
 
     Args:
         stages: the content of the file.
-        names: names of the structures that the city has.
+        names: names of the structures of the new city.
     """
     if isinstance(stages, list):
         return [

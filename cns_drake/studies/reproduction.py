@@ -145,7 +145,8 @@ def recording_info(
     Args:
         scenario: scenario of the recording.
         output: folder of the recordings.
-        is_waiting: whether a job of the recording's name must make it first.
+        is_waiting: whether the recording does not exist yet, and a job with the
+            name of the scenario will make it.
     """
     assert scenario.stage is not None  # It has a map.
     return RecordingInfo(

@@ -93,9 +93,11 @@ class TrainingScans:
 
     @classmethod
     def of(cls, parts: Sequence["TrainingScans"]) -> "TrainingScans":
-        """Joins the scans of several cities, one item for each city.
+        """Joins the scans of several cities into one object.
 
-        The cities are numbered in the order of the items.
+        Args:
+            parts: the scans of each city. The result numbers the cities in
+                this order.
         """
         overlaps = [part.overlaps for part in parts]
         return cls(

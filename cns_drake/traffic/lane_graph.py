@@ -284,10 +284,10 @@ def with_unmarked_crossings(
 
         Args:
             p: (2,) the start in W [m].
-            reach: (2,) direction and greatest distance of the walkway [m].
+            reach: (2,) vector from p [m]. Only walkways that it crosses count.
 
         Returns:
-            Index of the nearest walkway in this direction, and index of its
+            Index of the nearest walkway that `reach` crosses, and index of its
             point nearest to p. None if there is no walkway, if this point is
             near its end, or if a crossing begins on this walkway already.
         """

@@ -170,13 +170,17 @@ class TrafficMotion(LeafSystem):
         - moving_instances
         - objects
 
-    All outputs depend only on time. `geometry_pose` is for the SceneGraph in
-    which the bodies are registered. The four other outputs are abstract.
-    `frame_poses` is a `KnownPoses`: the same poses X_WL in one array over all
-    limbs. `body_spatial_velocities` is a list over all limbs of V_WL, expressed
-    in W; from it, a LiDAR computes where a limb is later in its turn.
-    `moving_instances` contains the instance ids (N,) of bodies that are faster
-    than `MOVING_SPEED`, and `objects` a `RecordedObjects` for recorders.
+    A limb L is a rigid part of a vehicle or walker. All outputs depend only on
+    time; all except the first are abstract:
+
+    - `geometry_pose`: the poses X_WL of all limbs, for the SceneGraph in which
+      they are registered.
+    - `frame_poses`: the same poses as a `KnownPoses`, one array for all limbs.
+    - `body_spatial_velocities`: list of the velocities V_WL of all limbs,
+      expressed in W, from which a LiDAR computes the poses later in its turn.
+    - `moving_instances`: (N,) instance ids of the vehicles and walkers that are
+      faster than `MOVING_SPEED`.
+    - `objects`: a `RecordedObjects`, for recorders.
     """
 
     def __init__(

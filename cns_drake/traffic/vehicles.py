@@ -486,12 +486,13 @@ def lane_over(streets: Streets, car: Any, c: int) -> tuple[int, float, float]:
 def find_prior(traffic: Traffic, i: int) -> tuple[float, float, float]:
     """Returns what the i-th vehicle must stop for, and whom it must follow.
 
-    The vehicle stops before a crossing that walkers use, in junctions and in
-    lanes. It also stops where its path through the junction meets the path of a
-    vehicle that was permitted to enter earlier and has not yet passed this
-    place. If both vehicles come from the same lane, or leave for the same lane,
-    it follows the earlier vehicle instead. Vehicles wait only for vehicles that
-    were permitted earlier, so no vehicle waits forever.
+    The i-th vehicle stops before any crossing that walkers use, whether the
+    crossing lies in a junction or not. It also stops where its path through a
+    junction meets the path of a vehicle that was permitted to enter earlier and
+    has not yet passed this place. If both vehicles come from the same lane, or
+    leave for the same lane, the i-th vehicle follows the earlier one instead.
+    Vehicles wait only for vehicles that were permitted earlier, so no vehicle
+    waits forever.
 
     Args:
         traffic: all vehicles and crossings.

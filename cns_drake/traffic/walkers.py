@@ -353,7 +353,7 @@ def _place_walkers(
     rows: list[tuple[int, int, np.ndarray, float, int]] = []
 
     def place(way: int, forward: bool, at: int, group: int) -> bool:
-        """Places a walker unless another one is near; returns if it did."""
+        """Places a walker; returns False instead if another one is near."""
         points = walkways[way].points
         line = points if forward else points[::-1]
         x, y = (line[at + 1] - line[at])[:2]

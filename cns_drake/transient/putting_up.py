@@ -194,7 +194,11 @@ class _Stretch:
     def rectangle(
         self, x: float, length: float, y0: float, y1: float
     ) -> shapely.Polygon:
-        """Returns an area along the kerb, centred on x, from y0 to y1 [m]."""
+        """Returns a rectangle beside the kerb, in W; all lengths in [m].
+
+        It has the given length along the kerb, with its middle at `x`, and
+        extends from y0 to y1 across the kerb.
+        """
         x0, x1 = x - length / 2, x + length / 2
         return shapely.Polygon(
             [self.place(*at) for at in ((x0, y0), (x1, y0), (x1, y1), (x0, y1))]

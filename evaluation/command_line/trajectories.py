@@ -29,8 +29,8 @@ def drives(
     Every 5 m along A, the command measures how B differs from A: sideways
     offset, lane, heading and height. It also prints which share of the time
     each car stands, and its speeds. For comparison, it shows the same numbers
-    for two pairs of real drives, so that you can see whether your drives differ
-    as real drives do: Boreas, 28 days apart, and KAIST 01 and 02 of MulRan.
+    for two pairs of real drives: two drives of Boreas, 28 days apart, and KAIST
+    01 and 02 of MulRan.
 
     Args:
         first: Recorded drive A.

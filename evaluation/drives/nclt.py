@@ -55,8 +55,8 @@ class NcltDrive(FileDrive):
 
     The unit hangs upside down, and its field of view reaches up to 30.67 deg.
     The files contain scans from which the motion during a turn has been
-    removed. Rings are numbered upwards, unlike lasers, whose numbers alternate
-    between high and low ones.
+    removed. The rings of the points are numbered by elevation, from the lowest;
+    they are not the laser numbers of the unit.
     """
 
     def __init__(self, path: Path, columns: int | None = None):

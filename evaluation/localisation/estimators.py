@@ -66,8 +66,9 @@ class Settings:
     Attributes:
         voxel: side of the voxels to which the map is thinned [m].
         scan_voxel: side of the voxels to which a scan is thinned [m].
-        width: greatest distance of a pair of points [m]. VGICP pairs a point
-            with the Gaussian of its own voxel at any distance.
+        width: greatest distance between corresponding points [m]. With VGICP,
+            a point corresponds to the Gaussian of its own voxel if the mean of
+            this Gaussian is not farther away.
         last_width: `width` of a second alignment, which starts from the result
             of the first [m]; 0 for no second alignment. The robust estimators
             shrink their width down to this value.

@@ -248,7 +248,8 @@ def read_labels(path: Path, session: Session, *, truth: bool) -> np.ndarray:
         path: an array `.npy` of integers, or a cloud `.ply` with a property
             `truth`, `change` or `prediction` for each point.
         session: the session to which the labels belong.
-        truth: whether the labels are exact ones, which may be IGNORED.
+        truth: whether the labels are exact labels. Only these may have the
+            value `Label.IGNORED`.
 
     Returns:
         (N,) uint8.

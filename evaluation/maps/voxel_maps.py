@@ -120,8 +120,9 @@ def enter(
     """Adds points to a hash table of voxels.
 
     A finer grid divides each voxel into cells. The first point in each cell is
-    kept as a sample. Points and samples are in the world, moved up by
-    `-Z_ORIGIN`, in which voxels begin at height 0.
+    kept as a sample. Voxels and samples are in the moved world: the world
+    frame, but with heights greater by `-Z_ORIGIN`, so that voxels begin at
+    height 0.
 
     Args:
         points: (3, N) points in the frame of a sensor [m].

@@ -191,11 +191,11 @@ class RingPlusPlus(Method[Ring, RingDatabase]):
     def relative_poses(
         self, query: Ring, database: RingDatabase, places: Sequence[int]
     ) -> list[np.ndarray | None]:
-        """Returns the poses X_PQ (4, 4) of a query's LiDAR at several places.
+        """Returns a query's pose X_PQ relative to each of several places.
 
-        X_PQ is relative to the LiDAR at the place. It consists of a yaw and a
-        horizontal translation. It is None if the map of the query or of the
-        place is empty.
+        X_PQ (4, 4) is the pose of the query's LiDAR frame Q in the LiDAR frame
+        P of a place. It consists of a yaw and a horizontal translation. It is
+        None if the map of the query or of the place is empty.
         """
         if len(query.filled) == 0:
             return [None] * len(places)

@@ -122,7 +122,8 @@ class ContextDatabase:
     """All contexts of D places, in one array of M >= D.
 
     Attributes:
-        columns: (M, rows, columns) images with columns of unit length.
+        columns: (M, rows, columns) the contexts, with each column scaled to
+            unit length; a column without points is all zero.
         filled: (M, columns) float64, 1 where a column is not all zero.
         aligning_keys: (M, columns) column means of the contexts, from which
             the shift between two contexts is first guessed.

@@ -173,7 +173,10 @@ class _Seen:
         self._clouds: dict[tuple, np.ndarray] = {}
 
     def sensor(self, protocol: RetrievalProtocol) -> QuerySensor | None:
-        """Returns the sensor of the frame's query; None if it is unchanged."""
+        """Returns the query's sensor; None if the protocol does not change it.
+
+        The protocol can turn, tilt and partly hide the sensor.
+        """
         if protocol not in self._sensors:
             self._sensors[protocol] = protocol.query_sensor(self.frame)
         return self._sensors[protocol]

@@ -108,10 +108,10 @@ class SeenSurfaces:
         return self.shares_of(points).shown
 
     def shares_of(self, points: np.ndarray) -> Shares:
-        """Returns the shares of points (N, 3) that are shown and hidden.
+        """Returns which shares of points this scan shows and hides.
 
         Args:
-            points: (N, 3) points in this sensor's frame [m].
+            points: (N, 3) points in the frame of the scan's sensor [m].
         """
         if len(points) == 0:
             return Shares(math.nan, math.nan)

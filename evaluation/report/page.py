@@ -84,8 +84,9 @@ class Report:
 
     Attributes:
         changes: change between the stages of each map.
-        pairs: place recognition of all pairs of drives, each with that of its
-            control (the same routes without a change of the city), if any.
+        pairs: place recognition results of each pair of drives and, if there
+            is one, of its control (the same routes without a change of the
+            city).
         recognitions: place recognition of all pairs without their controls, and
             of drives compared with themselves.
         differences: AUC differences between methods.

@@ -198,10 +198,10 @@ def draw(
 
 
 def check(chart: Mapping[str, Any]) -> dict[str, str]:
-    """Checks the description of a chart, without a table.
+    """Checks the description of a chart before there are results.
 
     Returns:
-        The keys of this kind of chart.
+        The fields of the description that this kind of chart uses.
 
     Raises:
         InputError: the kind is unknown, or the description lacks a key.
@@ -220,10 +220,13 @@ def check(chart: Mapping[str, Any]) -> dict[str, str]:
 
 
 def styles(labels: Sequence[str]) -> dict[str, tuple[str, str, str]]:
-    """Returns how each method is drawn: title -> colour, line style and marker.
+    """Returns the colour, line style and marker of each method in charts.
 
     Args:
         labels: names of the methods, with their settings.
+
+    Returns:
+        Method as written in the legend (see `title`) -> the three values.
     """
     others = [name for name in labels if name not in METHOD_STYLES]
     return {

@@ -83,10 +83,11 @@ def choose_cluster(num_jobs: int | None, scheduler: str | None) -> Cluster:
     """Returns where jobs run according to --jobs and --scheduler.
 
     Args:
-        num_jobs: `--jobs`: number of jobs that run at a time, on this machine.
-        scheduler: `--scheduler`. Without both options, the environment variable
-            DASK_SCHEDULER_ADDRESS names the scheduler. Without that, the jobs
-            run on this machine, one for each core.
+        num_jobs: `--jobs`: number of jobs that run at a time on this machine.
+        scheduler: `--scheduler`: address of a Dask scheduler. If neither option
+            is given, the environment variable DASK_SCHEDULER_ADDRESS contains
+            the address. If this variable is not set, the jobs run on this
+            machine, one for each core.
 
     Raises:
         InputError: if both are given, or the number is not from 1 to 1024.

@@ -56,7 +56,7 @@ def add_ground(
     extras: Sequence[Mesh] = (),
     part: str = "ground",
 ) -> float:
-    """Adds the ground floor and its foundation; returns its height [m].
+    """Adds ground floor and foundation; returns the floor's height [m].
 
     Args:
         out: the building under assembly, which gets the parts.

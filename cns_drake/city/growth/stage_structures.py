@@ -166,10 +166,10 @@ USES: tuple[LotUse, ...] = get_args(LotUse)
 
 
 def use_by_size(structure: Structure) -> LotUse:
-    """Returns the use of an empty lot by default: it depends on the area.
+    """Returns what a lot without its building is used for by default.
 
-    `structure` is the building whose lot is empty. The use is a garden, a yard,
-    a market or, on the largest lots, a car park.
+    With increasing area of the lot, this is a garden, a yard, a market or a car
+    park. `structure` is the building that stands on the lot in other stages.
     """
     area = structure.model.footprint.area
     if area > 900:

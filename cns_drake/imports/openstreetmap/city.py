@@ -342,7 +342,7 @@ class _Block:
     roof: float
 
     def replaced(self, polygon: Polygon, low: float, high: float) -> _Block:
-        """Returns what remains of this block, with a flat roof."""
+        """Returns this block with another shape, and with a flat roof."""
         plain = {k: v for k, v in self.tags.items() if k != "roof:shape"}
         return _Block(self.name, plain, polygon, low, high, 0.0)
 

@@ -155,8 +155,8 @@ def raised(
         name: name of the solid.
         look: kind, class, colour and height of the solid.
         areas: the areas in W [m].
-        source: id of the element in the file; and a counter of faults, to which
-            the faults of these areas are added.
+        source: pair of the element's id in the file, for messages, and the
+            fault counter that counts invalid areas.
     """
     solids = [
         np.concatenate(faces.extruded(polygon, 0.0, look.z, *source))

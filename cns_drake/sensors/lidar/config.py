@@ -76,8 +76,7 @@ class LidarSection(Mount):
         rate: turns per second [Hz]. The rate of the fastest LiDAR of the drive
             must be a multiple of it. If the lasers of a unit fire at a fixed
             rate, a slower turn has more columns.
-        layout: fields of each recorded point, after one of these drivers or
-            programs.
+        layout: driver or program whose format the recorded points have.
     """
 
     xyz: Triple = (0.0, 0.0, 1.6)

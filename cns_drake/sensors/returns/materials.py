@@ -83,13 +83,16 @@ def find_materials(
 ) -> Materials:
     """Returns the materials of geometries.
 
-    Structures that are missing in the table have no class. `is_wet` makes the
-    ground wet.
+    A geometry with the perception property ("lidar", "reflectivity") is a
+    smooth Lambertian reflector of this reflectivity. So is a geometry whose
+    structure has a value in the column `reflectivity` of `structures`; the
+    property takes precedence. For all others, class and colour count.
 
-    The perception property ("lidar", "reflectivity") overrides the column
-    `reflectivity` of a table of structures, which overrides class and colour.
-    Surfaces whose reflectivity is given in one of these two ways are smooth
-    Lambertian reflectors.
+    Args:
+        geometries: the geometries.
+        structures: table of structures. A structure that is missing there has
+            no class.
+        is_wet: whether the ground is wet.
     """
     names = [geometry.structure for geometry in geometries]
     table = structures.completed(names)

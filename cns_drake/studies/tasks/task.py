@@ -49,17 +49,16 @@ class Pair:
         name: name of the pair. Two pairs have the same name only if they are
             equal but for the radius of a match.
         database, query: the drives.
-        way: the drive with which the query drive is compared to measure the
-            change of the city (TCR_sym). It runs along the query's route
-            through the database's city; without such a drive, it is the
-            database drive.
+        way: drive along the query's route through the database's city, if there
+            is one; otherwise the database drive. The change of the city
+            (TCR_sym) is measured between this drive and the query drive.
         protocol: protocol of place recognition.
         distractors: number of places of other cities that are added to the
             database.
-        is_as_before: whether the condition turns, tilts or partly hides the
-            queries, or adds distractors. Tasks whose results depend only on the
-            drives then measure nothing if they have measured the same drives
-            under an earlier condition.
+        is_as_before: whether the condition differs from others in more than
+            the drives: it turns, tilts or partly hides the queries, or adds
+            distractors. If so, a task whose results depend only on the drives
+            skips the pair if it has measured the same drives already.
     """
 
     name: str
