@@ -265,7 +265,10 @@ def find_guesses(candidates: Candidates) -> list[Guess]:
         pairs = agreement[best] & is_left
         for _ in range(3):
             turn, move = _fit(candidates, pairs)
-            pairs = _agrees(candidates, turn, move)
+            agreeing = _agrees(candidates, turn, move)
+            if not agreeing.any():
+                break
+            pairs = agreeing
         guesses.append(Guess(yaw_pose(turn, *move), np.flatnonzero(pairs)))
         is_left &= ~pairs & ~agreement[best]
         trials = [

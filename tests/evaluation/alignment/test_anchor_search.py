@@ -45,6 +45,24 @@ def test_some_drift_is_forgiven():
     assert np.count_nonzero(best.pairs < 60) >= 55
 
 
+@pytest.mark.filterwarnings("error")
+@pytest.mark.parametrize("seed", [100, 170, 173])
+def test_a_refined_guess_with_which_nothing_agrees(seed):
+    """All candidates are wrong, and agree by chance only."""
+    rng = np.random.default_rng(seed)
+    number = int(rng.integers(3, 80))
+    zeros = np.zeros(number)
+    p_S, p_T = (
+        np.column_stack([rng.uniform(-60, 60, (number, 2)), zeros])
+        for _ in range(2)
+    )
+    turn = rng.uniform(-0.4, 0.4, number)
+    keyframes = np.arange(number)
+    for guess in find_guesses(Candidates(keyframes, keyframes, p_S, p_T, turn)):
+        assert np.isfinite(guess.X_TS).all()
+        assert len(guess.pairs)
+
+
 def test_guesses_come_in_the_order_of_their_votes():
     first, second = (
         rigid([50.0, 0.0, 0.0], 10.0),
