@@ -203,7 +203,11 @@ class _Stretch:
     def footprint(
         self, model: Model, x: float, y: float, turn: float = 0.0
     ) -> BaseGeometry:
-        """Returns the footprint in W of a model at a place, turned [m, rad]."""
+        """Returns the footprint of a model in W [m].
+
+        `x` and `y` [m] are the place of the model in the frame of the stretch,
+        and `turn` [rad] is its heading in this frame.
+        """
         at = self.place(x, y).tolist()
         return placed(model.footprint, at, turn + self.yaw)
 

@@ -330,12 +330,13 @@ def common_names(sets: list[Features]) -> list[str]:
 def tell_apart(real: Features, simulated: Features, names: list[str]) -> float:
     """Returns how well a classifier tells real from simulated patches, as AUC.
 
-    The result is the mean over folds of places; NaN if a set has only one
-    place.
+    The AUC is the mean of a cross-validation in up to three folds. All patches
+    of a place are in the same fold. The result is NaN if all real patches, or
+    all simulated ones, are from one place.
 
     Args:
-        real: features of real patches.
-        simulated: features of simulated patches.
+        real: features and places of real patches.
+        simulated: features and places of simulated patches.
         names: names of the features that the classifier uses.
     """
     sets = [_in_folds(one) for one in (real, simulated)]
