@@ -70,10 +70,11 @@ def scan_table(scan: np.ndarray) -> np.ndarray:
 
 
 def places_of(drive: Drive) -> list[list[np.ndarray]]:
-    """Returns the scans of a drive, at most 40, grouped by place.
+    """Returns at most 40 scans of a drive, as a list of scans for each place.
 
-    Scans less than 30 m from the first scan of a place belong to this place.
-    Each scan is a table as `scan_table` returns it.
+    A place is a run of successive scans that are less than 30 m from the first
+    scan of the run; where the drive comes back later, a new place begins. Each
+    scan is a table as `scan_table` returns it.
     """
     step = -(-len(drive) // _MOST_SCANS)
     places: list[list[np.ndarray]] = []

@@ -290,9 +290,8 @@ def dress_buildings(
         streets: the streets that doors and shops face.
         ground: the ground on which buildings stand.
         seed: seed of all random draws.
-        always: structures that exist in all stages. A wall that these
-            structures hide from the drives gets no details. None for all
-            structures.
+        always: structures that exist in all stages; None if all do. A wall that
+            buildings among them hide from the drives gets no details.
         paving: triangles (M, 3, 3) of terrain, streets and sidewalks, on which
             doors stand [m].
     """
