@@ -270,7 +270,15 @@ def frame(building: Structure, seed: int) -> Model:
 def scaffold_before(
     plot: Plot, height: float, name: str, rng: np.random.Generator
 ) -> Structure:
-    """Returns a scaffold in front of a building with a given height [m]."""
+    """Returns a scaffold that stands in front of a building.
+
+    Args:
+        plot: plot of the building.
+        height: height of the building [m]. The scaffold is as high, up to a
+            limit of its own.
+        name: name of the scaffold.
+        rng: random generator for the scaffold.
+    """
     x0, y0, x1, _ = plot.inside(plot.area).bounds
     length = min(x1 - x0, _LONGEST)
     xy = plot.place((x0 + x1) / 2, y0)

@@ -357,17 +357,17 @@ def city(
 def maps_and_years(
     words: list[str], first: list[int]
 ) -> tuple[list[str], tuple[int, ...]]:
-    """Separates the maps from the years among a command's arguments.
+    """Separates the maps from the years in a command such as `a b --years 5 9`.
 
-    Only the first year belongs to the option --years. All further years arrive
-    as arguments, after the names of the maps.
+    The parser takes only the first year after --years as the option's value. It
+    appends all further years to the arguments, after the names of the maps.
 
     Args:
-        words: the arguments: maps, then years.
-        first: the years that belong to the option.
+        words: the arguments: names of maps, then the further years.
+        first: the values of the option, one each time that it is given.
 
     Returns:
-        The maps, and all years.
+        The names of the maps, and all years.
 
     Raises:
         InputError: a word begins like an option.

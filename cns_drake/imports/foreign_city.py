@@ -200,7 +200,8 @@ class ForeignCity:
         structures: the structures of the city.
         origin: origin of the map in the file's coordinates: metres east, north
             and up, or latitude and longitude [deg].
-        reference_system: name of the reference system of these coordinates.
+        reference_system: name of the reference system of the file's
+            coordinates.
         faults: counts of parts that were repaired or left out. Small objects
             count as left out, until a dressed city places them.
         streets: streets with known lanes, in which drives are searched.

@@ -498,8 +498,10 @@ class Scenario(Section):
 
         Args:
             changes: field -> new value, or a mapping of the changes in a
-                section. Setting `world` removes `map` and `route`, setting
-                `route` removes `waypoints`, and vice versa.
+                section. Setting `world` removes `map`, `stage`, `route` and
+                `aside`, setting `map` removes `world`, setting `route` removes
+                `waypoints` and `u_turns`, and setting `waypoints` removes
+                `route` and `aside`.
             source: the file or argument that error messages name.
 
         Raises:

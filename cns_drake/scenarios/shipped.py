@@ -50,7 +50,10 @@ def shipped_maps() -> dict[str, Path]:
 
 
 def recordable_maps() -> list[str]:
-    """Returns the shipped maps that have a drive whose stage ships as well."""
+    """Returns the names of the shipped maps with a drive that can be recorded.
+
+    A drive can be recorded if the map has the stage through which it goes.
+    """
     return [
         name
         for name, folder in shipped_maps().items()

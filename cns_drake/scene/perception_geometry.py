@@ -166,7 +166,7 @@ class GeometryReader:
         inspector: SceneGraphInspector,
         hidden: Collection[GeometryId] = frozenset(),
     ) -> tuple[PerceptionGeometry, ...]:
-        """Returns every geometry of the role that is not hidden.
+        """Returns all geometry with the reader's role, except hidden geometry.
 
         The order is that of `GetAllGeometryIds`, which Drake documents as
         stable, so the result depends only on the SceneGraph. For a geometry

@@ -367,7 +367,11 @@ class _Tiles:
         self._middles = _TILE * (cells[starts] + 0.5)
 
     def near(self, p_WS: np.ndarray, reach: float) -> list[int]:
-        """Returns the tiles with points left within a distance [m]."""
+        """Returns the numbers of the tiles near a sensor at `p_WS` (3,) [m].
+
+        Tiles beyond `reach` [m], and tiles whose points have all been observed,
+        are left out.
+        """
         away = np.linalg.norm(self._middles - p_WS[:2], axis=1)
         near = np.flatnonzero(away <= reach + _TILE)
         return [int(tile) for tile in near if len(self.left[tile])]

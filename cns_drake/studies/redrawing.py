@@ -117,10 +117,11 @@ class MakeMap(Step):
             )
 
     def check(self) -> bool:
-        """Returns whether the folder of the map exists already.
+        """Returns whether a job step has made a map in this folder before.
 
         Raises:
-            InputError: another file or folder has its name.
+            InputError: the folder, or a file of its name, exists but is not a
+                map that a job step made.
         """
         with files.user_errors(self.folder):
             is_there = os.path.lexists(self.folder)
@@ -310,16 +311,10 @@ def draw_fresh_cities(
     buildings, plants and objects.
 
     Args:
-        maps: names of the maps; all maps if empty.
-        numbers: numbers of the versions; all versions if empty.
+        maps: names of shipped maps; all of them if empty.
+        numbers: numbers of the versions; all of them if empty.
         output: folder for the maps, which are named `<map>_f<number>`.
         cluster: runs the jobs.
-
-    Args:
-        maps: names of shipped maps; all of them if there is none.
-        numbers: numbers of the versions; all of them if there is none.
-        output: folder of the maps.
-        cluster: does the work.
         source: file of the experiment, for errors.
 
     Returns:

@@ -207,7 +207,11 @@ class _Stretch:
     def footprint(
         self, model: Model, x: float, y: float, turn: float = 0.0
     ) -> BaseGeometry:
-        """Returns the footprint in W of a model at a place, turned [m, rad]."""
+        """Returns the footprint of a model in W [m].
+
+        `x` and `y` [m] are the place of the model in the frame of the stretch,
+        and `turn` [rad] is its heading in this frame.
+        """
         at = self.place(x, y).tolist()
         return placed(model.footprint, at, turn + self.yaw)
 
@@ -228,12 +232,13 @@ class _Stretch:
 
         Args:
             around: the ground and what stands on it.
-            suffix: end of its name.
-            semantic_class: its class.
-            model: its shape.
-            x, y: its place [m].
-            turn: its heading relative to the kerb [rad].
-            length: distance between its two ends [m]; at 0 it stands upright.
+            suffix: end of the object's name.
+            semantic_class: class of the object.
+            model: shape of the object.
+            x, y: place of the object in the frame of the stretch [m].
+            turn: heading of the object relative to the kerb [rad].
+            length: distance between the two ends of the object [m]; an object
+                of length 0 stands upright.
         """
         ground, yaw = around.ground, self.yaw + turn
         middle = self.place(x, y)

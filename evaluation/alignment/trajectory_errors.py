@@ -200,9 +200,9 @@ def segment_errors(
         Y: (N, 4, 4) estimated poses, in any world.
 
     Returns:
-        For each segment of 100 m: (K,) index of its first pose, (K,) index of
-        its last pose, and (K, 4, 4) true end pose relative to the estimated end
-        pose.
+        For each segment of 100 m: (K,) index of its first pose; (K,) index of
+        its last pose; and (K, 4, 4) error, the true last pose in the frame of
+        the estimated last pose if both first poses are made equal.
     """
     along = travelled(X[:, :3, 3])
     starts = np.arange(0, len(X), _STEP)

@@ -246,7 +246,7 @@ def temporal_change(
     margin: float = HULL_MARGIN,
     restrict_to_hull: bool = True,
 ) -> TemporalChange:
-    """Returns the temporal change ratios between two maps.
+    """Compares two maps by their temporal change ratios (TCR).
 
     Args:
         source: (N, 3) float64 voxel centroids, in the common world frame [m].
@@ -259,7 +259,8 @@ def temporal_change(
             negative.
 
     Returns:
-        The labels of all points; the ratios follow from them.
+        Which points of each map are unchanged. The ratios are properties of
+        this result; `symmetric` is TCR_sym.
 
     Raises:
         ValueError: if a coordinate is not finite.
@@ -283,7 +284,7 @@ def covered(
     trajectories: tuple[np.ndarray, ...],
     radius: float = COVERAGE_RADIUS,
 ) -> np.ndarray:
-    """Returns which points lie near each of several trajectories.
+    """Returns which points lie near all of several trajectories.
 
     Even without a change, two routes see different parts of a city. This hardly
     affects points near both routes.
@@ -296,7 +297,7 @@ def covered(
             does not count, as a tall facade is seen from its foot.
 
     Returns:
-        (N,) bool.
+        (N,) bool, whether a point is near every trajectory.
 
     Example:
         from evaluation import covered

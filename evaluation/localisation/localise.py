@@ -159,10 +159,10 @@ class OneScan(FileDrive):
         )
 
     def scan(self, index: int) -> np.ndarray:
-        """Returns the whole cloud, including points at the origin.
+        """Returns all points of the cloud, also those at the origin.
 
-        In scans of a LiDAR, a point at the origin marks a beam without a return
-        and is left out. Any other cloud can have a real point there.
+        Other drives leave out points at the origin, since these stand for beams
+        without a return. In this cloud, such a point can be real.
         """
         return self._read(self._files[index], 0)
 

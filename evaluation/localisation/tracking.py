@@ -38,15 +38,15 @@ def drifting_steps(
 ) -> np.ndarray:
     """Returns the motion between poses as a drifting odometry measures it.
 
-    The odometry has a scale error of lengths and a drift rate of the heading
-    [deg/m]. They are drawn anew every 100 m of path, from normal distributions
+    The odometry has a relative error of lengths, and a drift of the heading
+    [deg/m]. Both are drawn anew every 100 m of path, from normal distributions
     of mean 0 and standard deviation `drift`.
 
     Args:
         X_WS: (N, 4, 4) true poses of the LiDAR.
         way: (N,) length of the path up to each pose [m].
-        drift: standard deviation of the errors; 0 for none. For example,
-            0.01 gives 1 % of the length, and 0.01 deg/m.
+        drift: standard deviation of both errors; 0 for none. For example, 0.01
+            means 1 % of each length and 0.01 deg/m of heading.
         seed: seed of the draws.
 
     Returns:

@@ -339,10 +339,10 @@ def make_triangles(
     Args:
         keypoints: the K keypoints.
         num_neighbours: number of nearest keypoints that are used, including the
-            keypoint itself. (If a cloud has fewer keypoints, the public program
-            reads beyond its array.)
+            keypoint itself; all keypoints if there are fewer.
         side_range: limits of the sides [m].
     """
+    # The public program reads beyond its array if there are fewer keypoints.
     num_neighbours = min(num_neighbours, len(keypoints))
     if num_neighbours < 3:
         return Triangles(

@@ -250,10 +250,11 @@ def check_number(
         method: the method.
         function: name of the method's function, for the error message.
         found: the returned values.
-        number: number of values that are right.
+        number: how many values the function must return.
 
     Raises:
-        InputError: the function has returned something else.
+        InputError: the function has returned more or fewer values, or no
+            sequence.
     """
     count = len(found) if isinstance(found, Sequence | np.ndarray) else None
     if count != number:

@@ -218,7 +218,7 @@ def trend(change: Sequence[float], auc: Sequence[float]) -> Trend:
 
 
 def paper_trend(method: str) -> Trend:
-    """Returns how a method's AUC depends on TCR_sym in the paper's Table II."""
+    """Returns the trend of a method's AUC in the paper's Table II."""
     return trend(*zip(*paper().auc_over_change(method), strict=True))
 
 

@@ -70,10 +70,11 @@ def scan_table(scan: np.ndarray) -> np.ndarray:
 
 
 def places_of(drive: Drive) -> list[list[np.ndarray]]:
-    """Returns the scans of a drive, at most 40, grouped by place.
+    """Returns at most 40 scans of a drive, as a list of scans for each place.
 
-    Scans less than 30 m from the first scan of a place belong to this place.
-    Each scan is a table as `scan_table` returns it.
+    A place is a run of successive scans that are less than 30 m from the first
+    scan of the run; where the drive comes back later, a new place begins. Each
+    scan is a table as `scan_table` returns it.
     """
     step = -(-len(drive) // _MOST_SCANS)
     places: list[list[np.ndarray]] = []
@@ -330,12 +331,13 @@ def common_names(sets: list[Features]) -> list[str]:
 def tell_apart(real: Features, simulated: Features, names: list[str]) -> float:
     """Returns how well a classifier tells real from simulated patches, as AUC.
 
-    The result is the mean over folds of places; NaN if a set has only one
-    place.
+    The AUC is the mean of a cross-validation in up to three folds. All patches
+    of a place are in the same fold. The result is NaN if all real patches, or
+    all simulated ones, are from one place.
 
     Args:
-        real: features of real patches.
-        simulated: features of simulated patches.
+        real: features and places of real patches.
+        simulated: features and places of simulated patches.
         names: names of the features that the classifier uses.
     """
     sets = [_in_folds(one) for one in (real, simulated)]

@@ -184,9 +184,17 @@ class _Seen:
     def cloud(
         self, sensor: QuerySensor | None, kind: _Kind, max_range: float
     ) -> np.ndarray:
-        """Returns the frame's cloud as a sensor sees it.
+        """Returns the frame's cloud (N, 3), as `gather` returns it.
 
-        Equal arguments return the same array.
+        With further fields, the cloud is a structured array (N,). A second call
+        with equal arguments returns the same array.
+
+        Args:
+            sensor: turn and hidden sector that are applied to the sensor; None
+                for the sensor as recorded.
+            kind: number of merged scans, how many of these come before the
+                frame, and names of the further fields.
+            max_range: greatest absolute x, y and z of a point [m].
         """
         key = sensor, kind, max_range
         if key not in self._clouds:

@@ -84,7 +84,7 @@ class PrCurve:
 
     @property
     def counted(self) -> np.ndarray:
-        """(K,) number of queries that count: TP + FP + FN."""
+        """(K,) TP + FP + FN at each threshold: all but the true negatives."""
         return self.true_positives + self.false_positives + self.false_negatives
 
     @property

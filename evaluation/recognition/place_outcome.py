@@ -279,9 +279,10 @@ def pose_numbers(
 def kept_share(
     changed: np.ndarray | float, unchanged: np.ndarray | float
 ) -> np.ndarray:
-    """Returns the share of a result that is kept: changed / unchanged.
+    """Returns `changed` / `unchanged`, NaN where `unchanged` is 0 or NaN.
 
-    It is NaN where `unchanged` is 0 or NaN.
+    For a result with a change and the same result without it, the quotient is
+    the share of the result that the change leaves.
     """
     with np.errstate(invalid="ignore", divide="ignore"):
         share = np.divide(changed, unchanged)

@@ -128,10 +128,10 @@ class SeenSurfaces:
 
         - Three or more returns with similar ranges: the distance is
           perpendicular to a plane through three of these returns.
-        - Fewer returns, or an edge between two surfaces: the distance is along
-          the line of sight. For a point nearer than all these returns, it is to
-          the nearest return; for a point farther than all, to the farthest. For
-          all other points, the result is NaN.
+        - Fewer returns, or returns from two surfaces at an edge: the distance
+          is along the line of sight. A point nearer than all these returns has
+          its distance from the nearest one, and a point farther than all of
+          them that from the farthest one. A point between them gets NaN.
         - No return: the result is infinite.
 
         Args:

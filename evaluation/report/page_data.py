@@ -76,13 +76,13 @@ class CameraImages:
     files: list[bytes]
 
     def to_data(self, step: int) -> dict:
-        """Returns every `step`-th image, and the image of each frame, for JSON.
+        """Returns every `step`-th image, and which one each frame shows.
 
         Returns:
-            A mapping with `files`, the images as base64 text, and two lists
-            with an entry for each of the K frames: `nearest`, the index in
-            `files` of the image that is nearest in time; and `later`, how much
-            later than the frame this image is [s].
+            A mapping for JSON. `files` contains the images as base64 text. Two
+            lists have an entry for each of the K frames: `nearest` is the index
+            in `files` of the image that is nearest in time, and `later` is the
+            time of this image minus that of the frame [s].
         """
         times_ns = self.times_ns[::step]
         nearest = _nearest(times_ns, self.stamps_ns)

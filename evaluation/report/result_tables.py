@@ -163,7 +163,12 @@ class _Counted(NamedTuple):
         return cls(result, result.by_mode[mode], printed)
 
     def at_f1_max(self, counts: np.ndarray) -> int | None:
-        """Returns the count at the point of the curve with the greatest F1."""
+        """Returns the entry of `counts` for the threshold with the greatest F1.
+
+        `counts` (K,) contains a number of queries, such as TP, for each
+        threshold of the precision-recall curve. The result is None if the curve
+        is empty.
+        """
         index = self.metrics.f1_max_index
         return None if index is None else int(counts[index])
 

@@ -587,7 +587,14 @@ class _Line:
         return cell or None
 
     def key(self, factors: Iterable[str]) -> dict[str, Any]:
-        """Returns the attributes of the line's `Key`."""
+        """Returns the arguments with which to make the `Key` of this line.
+
+        `factors` contains the names of the columns with factors. Factors whose
+        cells are empty are left out.
+
+        Raises:
+            InputError: a cell is empty or has a value that is not allowed.
+        """
         values: dict[str, Any] = {
             name: self.text(name) for name in ("experiment", "map", "task")
         }

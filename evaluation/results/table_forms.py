@@ -252,8 +252,8 @@ def keyed(
 def protocol_columns(path: str) -> Columns[Any]:
     """Returns columns of `Table.of` that show the protocol of each item.
 
-    There is a column for each option of the protocol, and a last one for its
-    name.
+    There is a column for each option of the protocol; the last column contains
+    the name of the protocol.
 
     Args:
         path: attribute of an item that contains its protocol, such as

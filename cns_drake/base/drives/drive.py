@@ -86,10 +86,13 @@ def driven_way(scenario: Mapping | None) -> dict | None:
 
 
 def read_scenario(folder: Path) -> Mapping | None:
-    """Returns the content of an exported drive's `scenario.yaml`, if any.
+    """Returns the content of `scenario.yaml` in an exported drive's folder.
+
+    The result is None if there is no such file.
 
     Raises:
-        InputError: if it is not a mapping in YAML.
+        InputError: the file is not a mapping in YAML, or its field `name` is
+            not a valid name of a drive.
     """
     path = folder / "scenario.yaml"
     if not is_there(path):

@@ -55,9 +55,10 @@ class Site:
 
     @property
     def outline(self) -> np.ndarray:
-        """Corners (N, 2) of the ground [m], counter-clockwise from the front.
+        """Corners (N, 2) of the footprint, counter-clockwise [m].
 
-        The corners of a rectangle are rounded inwards to whole centimetres.
+        The first two corners are the ends of the front. The corners of a
+        rectangle are rounded inwards to whole centimetres.
         """
         exterior = self.footprint.exterior
         points = np.array(exterior.coords[:-1], dtype=float)
@@ -109,9 +110,10 @@ class Site:
     def blind_in(self, number: int, count: int) -> frozenset[int]:
         """Returns the blind edges of one of several units side by side.
 
-        A unit is blind where it touches the next unit. The two outermost units
-        are also blind where the site is. The result contains 3 for a blind edge
-        on the left, and 1 for one on the right.
+        Edges between two units are blind. The left edge of the first unit, and
+        the right edge of the last one, are blind if the same edge of the site
+        is blind. The result contains 3 if the unit's left edge is blind, and 1
+        if its right edge is.
 
         Args:
             number: number of the unit, counted from 0 on the left.

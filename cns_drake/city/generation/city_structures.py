@@ -104,7 +104,9 @@ def meshes_of(structures: Iterable[Structure]) -> dict[str, Mesh]:
 
 
 def make_city(world: Path) -> City:
-    """Makes the city described by `roads.yaml` and `city.yaml` in a folder.
+    """Returns the city of a map folder, from its `roads.yaml` and `city.yaml`.
+
+    No file is written.
 
     Raises:
         InputError: if one of the files cannot be used.

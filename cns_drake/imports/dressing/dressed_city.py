@@ -180,10 +180,10 @@ class DriveViews:
         return np.asarray(self._tree.query(middles)[0] <= reach + distance)
 
     def distances(self, panels: Sequence[Panel], most: float) -> np.ndarray:
-        """Returns distances from walls to the drives that see them, (N,) [m].
+        """Returns how far from a drive each wall is seen, (N,) [m].
 
-        A distance is to the nearest viewpoint of a drive that sees the wall,
-        and infinite if none sees it.
+        This is the distance from the wall to the nearest viewpoint on a drive
+        from which the wall is visible; infinite without such a viewpoint.
 
         Args:
             panels: the N walls.
@@ -290,9 +290,8 @@ def dress_buildings(
         streets: the streets that doors and shops face.
         ground: the ground on which buildings stand.
         seed: seed of all random draws.
-        always: structures that exist in all stages. A wall that these
-            structures hide from the drives gets no details. None for all
-            structures.
+        always: structures that exist in all stages; None if all do. A wall that
+            buildings among them hide from the drives gets no details.
         paving: triangles (M, 3, 3) of terrain, streets and sidewalks, on which
             doors stand [m].
     """

@@ -62,7 +62,7 @@ class Opening(NamedTuple):
 
     Attributes:
         row: number of the storey, from 0.
-        nth: number of the bay, counted from the nearer end of the wall, from 0.
+        nth: number of bays between this bay and the nearer of the wall's ends.
         x0: left end, seen from outside.
         x1: right end.
         z0: height of the lower edge.
@@ -151,11 +151,13 @@ class FacadePlan:
         return max((low if is_near else self.ground) + _THRESHOLD, 0.0)
 
     def without(self, is_hidden: np.ndarray) -> FacadePlan:
-        """Returns the plan without hidden openings.
+        """Returns the plan without its hidden openings.
+
+        The field `top_is_free` of the result is false if the top is hidden.
 
         Args:
-            is_hidden: (N + 1,) whether each of the N openings is hidden, and
-                then whether the wall's top is, in the order of `probes`.
+            is_hidden: (N + 1,) bool, which of the points that `probes` returns
+                are hidden: those of the N openings, and last that of the top.
         """
         pairs = zip(self.openings, is_hidden[:-1], strict=True)
         return replace(

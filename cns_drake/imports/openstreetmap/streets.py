@@ -201,7 +201,8 @@ def street_surfaces(
 ) -> Iterator[Imported]:
     """Yields the carriageways, their sidewalks, and paths for people.
 
-    Tunnels and bridges over other ways are left out, and counted as faults.
+    Tunnels, and bridges over streets or railways, are left out and counted as
+    faults.
     """
     faults = features.faults
     for kind, ids in (

@@ -345,10 +345,10 @@ class StreetTraffic:
         return [node for node, arms in self._arms.items() if len(arms) > 2]
 
     def setback(self, arm: _Arm) -> float:
-        """Returns how far before the end of a stretch its lanes end [m].
+        """Returns how far before an end of a stretch its lanes stop [m].
 
-        `arm` is the number of the stretch, and 0 for its first end or -1 for
-        its last.
+        `arm` is a pair: the number of the stretch; and 0 for the end where its
+        line starts, or -1 for the other end.
         """
         stretch = self.stretches[arm[0]]
         wanted = [self._wanted_setback((arm[0], end)) for end in (0, -1)]

@@ -102,11 +102,11 @@ class Lidar(LeafSystem):
     the world frame; `positions_W` is `point_cloud_W` without the colours.
     `X_WS` is the pose of S at the time of the output.
 
-    A scan is one turn of the LiDAR. The turn starts at the time of the output;
-    that of a causal LiDAR ends at this time, so that a controller may use the
-    scan at once. By default all beams are cast from the pose of S at the time
-    of the output, which follows from the pose of P in the SceneGraph (a
-    deskewed scan).
+    A scan is one turn of the LiDAR. The turn starts at the time of the output.
+    With a causal LiDAR, the turn ends at this time instead, so that a
+    controller may use the scan at once. By default all beams are cast from the
+    pose of S at the time of the output, which follows from the pose of P in the
+    SceneGraph (a deskewed scan).
 
     If the port `sweep` is connected, poses of P from a `Sweep` replace this
     pose: one pose for the whole turn or, with motion distortion, one for each
