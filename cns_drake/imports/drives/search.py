@@ -98,8 +98,8 @@ def steerable_drive(
 ) -> WaypointDrive | Obstacle:
     """Returns the drive along waypoints, or the place (2,) where it fails.
 
-    A drive fails at an obstacle, at a bend that is too tight for the car, or in
-    its middle if it is too short.
+    A drive fails at an obstacle, or at a bend that is too tight for the car. If
+    a drive is too short, the result is the place in its middle.
 
     Args:
         waypoints: (N, 2) or (N, 3) places [m].
