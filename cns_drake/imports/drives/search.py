@@ -570,7 +570,8 @@ def simplified_drive(
     """Returns a drive with few waypoints along a line, or where it fails.
 
     The tolerances are tried one after the other, until a drive fits into the
-    free space. If none fits, the result is the place (2,) of an obstacle [m].
+    free space. If none fits, the result is the place (2,) where the last one
+    fails [m]; see `steerable_drive`.
 
     Args:
         xy: (N, 2) places on the line, about 1 m apart [m].
