@@ -247,7 +247,15 @@ class _Writing:
         self.finish(stage, text, meshes)
 
     def finish(self, stage: str, text: str, meshes: Mapping[str, Mesh]) -> None:
-        """Writes a stage's meshes that are not there yet, and counts it."""
+        """Writes the meshes of a stage, and counts its contents.
+
+        Meshes that an earlier stage also uses are not written again.
+
+        Args:
+            stage: name of the stage.
+            text: SDF text of the stage.
+            meshes: name -> mesh, for meshes that the city of today lacks.
+        """
         for uri in ElementTree.fromstring(text).iter("uri"):
             place = str(uri.text)
             if place not in self._triangles:

@@ -106,7 +106,10 @@ class Plot:
     def facing(
         cls, area: BaseGeometry, streets: BaseGeometry, z: float
     ) -> Plot:
-        """Returns the plot with a given area, facing the nearest street."""
+        """Returns the plot on an area in W [m], facing the nearest street.
+
+        `z` is the height of the ground [m].
+        """
         rectangle = shapely.orient_polygons(area.minimum_rotated_rectangle)
         corners = shapely.get_coordinates(rectangle)
         middles = shapely.points((corners[:-1] + corners[1:]) / 2)

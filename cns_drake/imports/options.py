@@ -66,8 +66,8 @@ class ImportOptions:
             stage: today.
         year_attribute: attribute with the year of construction; None for the
             usual attributes.
-        undated: first stage with the buildings whose year is unknown: `first`,
-            `last` or `never`.
+        undated: which stages contain the buildings whose year is unknown: all
+            stages (`first`), only the last stage (`last`), or none (`never`).
         lod: level of detail to read; None for the highest of each object.
         seed: seed of everything that is drawn at random: the changes of `grow`,
             the details of `dressed`, and the buildings of a town that is built

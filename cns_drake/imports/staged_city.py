@@ -83,15 +83,15 @@ def _cropped(one: Imported, ways: BaseGeometry, distance: float) -> Imported:
 def with_gone(
     gone: Sequence[Imported], others: Iterable[Imported]
 ) -> list[Imported]:
-    """Returns the past city: former buildings, and all else that stood then.
+    """Returns the structures of a past city: `others`, and former buildings.
 
     Where a building of today stands in the place of a former building, the
-    result contains only one of the two: the building of today if its year of
+    result contains only one of them: the building of today if its year of
     construction is known, and otherwise the former building.
 
     Args:
-        gone: buildings that were demolished at an unknown date.
-        others: the structures of today.
+        gone: the former buildings, demolished at an unknown date.
+        others: structures of today, which stood in the past city as well.
     """
     others = list(others)
     later = [one for one in others if one.kind.startswith("Building")]

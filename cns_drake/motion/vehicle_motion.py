@@ -52,11 +52,11 @@ class WheelMotion:
 
     The wheel's centre is at p_BC = (x, y, r) in the vehicle frame, where r is
     its radius. Let s be the vehicle's speed and m its turn rate about the z
-    axis, both per unit of the path parameter. The ground below the wheel then
-    moves relative to the vehicle with a velocity of direction (s - m y, m x).
-    The steering angle d is therefore given by tan(d) = m x / (s - m y), so that
-    a wheel on the rear axle (x = 0) is not steered. The rolling rate is the
-    length of this vector divided by r.
+    axis, both per unit of the path parameter. The velocity of the wheel over
+    the ground is then v = (s - m y, m x), expressed in the vehicle frame. The
+    wheel rolls in this direction: tan(d) = m x / (s - m y) gives its steering
+    angle d, so that a wheel on the rear axle (x = 0) is not steered. The
+    rolling rate is the length of v divided by r.
 
     While the body moves on its springs, the wheel stays on the road's surface
     in the world: relative to the body, it moves up by as much as the body moves

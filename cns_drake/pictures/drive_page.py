@@ -552,9 +552,8 @@ class MeshcatRecorder(LeafSystem):
     def show_too(self, name: str, frames: Sequence[FrameId]) -> None:
         """Adds a moving object to the page.
 
-        Only the pose of the object's first frame is recorded. All other frames
-        keep the poses in the first frame that they have at the start of the
-        drive.
+        The object moves as a rigid body: only the motion of the first frame is
+        recorded, and all other frames follow it.
 
         Args:
             name: name of the object, unique in the page.

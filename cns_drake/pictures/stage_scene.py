@@ -65,8 +65,8 @@ class View(BaseModel):
     ) -> tuple[np.ndarray, np.ndarray]:
         """Returns where points are in the picture of the camera.
 
-        Points outside the picture are left out. Points behind an object are
-        not.
+        Points outside the picture are left out, but not points that an object
+        hides.
 
         Args:
             p_WQset: (N, 3) points in W [m].
@@ -164,8 +164,8 @@ def render(
     """Returns an image of a scene with sun, shadows, sky light and haze.
 
     Args:
-        scene: scene with the same geometries, on which rays are cast.
-        geometries: the geometries of the scene, with their colours.
+        scene: the scene, on which rays are cast.
+        geometries: the scene's geometries, in order, with their colours.
         X_WC: pose of the camera: x forward, y left, z up.
         width, height: size of the image in pixels.
         fov_y_deg: vertical field of view [deg].

@@ -69,7 +69,7 @@ class Placed(NamedTuple):
 
     @classmethod
     def of(cls, groups: Sequence[RayGroup], rows: Sequence[int]) -> Placed:
-        """Returns the current poses of the groups with the given rows."""
+        """Returns the current poses of the groups with the indices `rows`."""
         chosen = [groups[row] for row in rows]
         return cls(
             np.array(rows, int),

@@ -102,9 +102,9 @@ class PartFile(io.BufferedRandom):
         self.replaying = os.fstat(descriptor).st_size > 0
 
     def starts_like(self, content: bytes) -> bool:
-        """Returns whether the existing file starts with this content.
+        """Returns whether the existing file and a content begin alike.
 
-        A shorter file must be equal to the beginning of the content.
+        They are compared up to the end of the shorter one.
         """
         self.seek(0)
         found = self.read(len(content))

@@ -247,7 +247,12 @@ def _turn_round(
     road = network.roads[leg.road]
 
     def lanes_at(travelled: float) -> tuple[np.ndarray, float]:
-        """Returns the lane's pose, and how far left the other lane is."""
+        """Returns the pose of the lane, and the distance to the opposite lane.
+
+        The pose, x, y [m] and heading [rad], (3,), is that at the distance
+        `travelled` from the entry of the road [m]. The opposite lane is on the
+        left.
+        """
         offsets = [
             _moved_right(
                 road,

@@ -43,15 +43,16 @@ def add_mcap_recorder(
     on the same body as the odometry are in `/tf_static`; those of all other
     sensors are in `/tf`.
 
-    `rates` sets the rates of single sensors. Without `period`, each LiDAR is
-    recorded once per turn. An IMU that was added with a rate is recorded at
-    this rate.
+    A sensor with an entry in `rates` is recorded at this rate, and an IMU that
+    was added with a rate at its own rate. All other sensors are recorded once
+    per `period`. Without `period`, each LiDAR is recorded once per turn, and
+    all other sensors once per turn of the first LiDAR.
 
     Args:
         builder: builder of a diagram with the sensors.
         folder: the rosbag2 folder to write.
-        period: time between two messages of a sensor without an entry in
-            `rates` [s]; by default the duration of a turn of the first LiDAR.
+        period: time between two messages of a sensor without a rate [s]. It can
+            be left out if there is a LiDAR.
         rates: name of a LiDAR or a camera, `imu` or `odometry` -> messages
             per second.
         lidars: LiDARs to record; each needs a different name.

@@ -144,8 +144,8 @@ class MadeMaps:
             seed: seed of the events.
 
         Returns:
-            Map and stage of the drive as it is, because the aged map does not
-            exist yet.
+            Map and stage of the drive without the ageing, because the aged map
+            does not exist yet.
 
         Raises:
             InputError: years, or a rate, are out of range.

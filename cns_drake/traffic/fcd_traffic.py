@@ -323,9 +323,10 @@ class Heights:
         self._heading = np.arctan2(steps[:, 1], steps[:, 0])
 
     def at(self, xy: np.ndarray) -> np.ndarray:
-        """Returns heights (N,) at places (N, 2), from the nearest points [m].
+        """Returns the heights (N,) of the ground at places (N, 2) [m].
 
-        Nearer points have more weight.
+        Each is a mean of the heights of the nearest points, weighted by
+        nearness.
         """
         distance, near = self._tree.query(xy, k=min(4, len(self._z)))
         distance, near = (

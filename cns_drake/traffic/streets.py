@@ -476,7 +476,10 @@ def swept_hulls(
     length = along[-1]
 
     def at(s: np.ndarray) -> np.ndarray:
-        """Returns places on the way, which goes straight on beyond its ends."""
+        """Returns the places (M, 2) at distances (M,) along the way [m].
+
+        Beyond its ends, the way goes on straight.
+        """
         inside = np.clip(s, 0.0, length)
         xy = np.column_stack([np.interp(inside, along, x) for x in line.T])
         first = (line[1] - line[0]) / math.dist(line[1], line[0])

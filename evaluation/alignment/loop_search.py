@@ -222,10 +222,10 @@ class LoopSearch:
 def find_self_loops(drive: Submaps, most: int, track: Track) -> list[Loop]:
     """Returns the loops between keyframes of the same drive.
 
-    A keyframe and the nearest earlier keyframe are a pair if they lie at the
-    same place and the path between them is long enough. At most `most` pairs,
-    evenly spread over the drive, are registered. A pair that cannot be
-    registered makes no loop.
+    Each keyframe is paired with an earlier keyframe at the same place, if there
+    is one at least 50 m of path before it; if there are several, with the
+    nearest. At most `most` pairs, evenly spread over the drive, are registered.
+    A pair that cannot be registered makes no loop.
     """
     pairs = []
     for k in range(len(drive)):

@@ -48,7 +48,7 @@ class QuerySensor:
         tilt_deg: float,
         hidden_deg: float,
     ) -> QuerySensor:
-        """Draws a query's random turn, tilt and hidden sector.
+        """Returns a query's sensor, turned, tilted and partly hidden at random.
 
         The result depends on the frame's number but not on the drive, so that
         queries at the same frames of two drives are turned alike.

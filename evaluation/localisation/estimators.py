@@ -273,12 +273,13 @@ class Fit:
 
     Attributes:
         share: share of the scan's points that lie on a surface of the map.
-        residual: root mean square distance of points from the planes of their
-            pairs [m]; NaN without a pair.
+        residual: root mean square distance of the scan's points from the planes
+            at the nearest points of the map, without points more than 1 m from
+            the map [m]; NaN if no point is left.
         covariance: (6, 6) covariance of a small motion about the LiDAR, in axes
             of W: turn [rad], move [m]. It is the inverse Hessian of the
             point-to-plane error, corrected for the noise of the normals, times
-            the square of the residual.
+            the square of the residual, or of 0.01 m if the residual is less.
     """
 
     share: float

@@ -58,9 +58,10 @@ MOVES = (*range(252, 260), 10, 11, 13, 15, 18, 20, 30, 31, 32)
 class Label(IntEnum):
     """What happened to a point of a map: kept, gone, new or not observed.
 
-    Points of the older map A are unobserved (0), kept (1) or gone (2). Points
-    of the newer map B are kept (1), new (3) or newly seen (4). IGNORED (255)
-    occurs only in true labels of your own; scores leave out such points.
+    Points of the older map A are kept (1), gone (2) or unobserved (0: the drive
+    of B did not look there). Points of the newer map B are kept (1), new (3) or
+    newly seen (4: the drive of A did not look there). IGNORED (255) occurs only
+    in true labels of your own; scores leave out such points.
     """
 
     UNOBSERVED = 0

@@ -199,7 +199,8 @@ def peaks(
         min_heights: least number of layers with points in a peak.
 
     Returns:
-        Rows (C,) and columns (C,), by segment along rows, then columns.
+        Row (C,) and column (C,) of each peak. Peaks are in the order of their
+        segments: from left to right, one row of segments after the other.
     """
     rows, columns = (length // _SEGMENT for length in num_heights.shape)
     segments = (

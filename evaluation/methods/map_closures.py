@@ -59,10 +59,11 @@ class MapClosuresDatabase:
 
     Attributes:
         num_places: number of local maps that queries may find.
-        program: object of the package that stores all local maps.
-        num_queries: number of queries that were added to the local maps.
-        query: the last query.
-        found: place -> number of inliers and pose X_PQ (4, 4) of the last
+        program: object of the package that stores all local maps: those of the
+            places, and those of all queries so far.
+        num_queries: number of queries so far.
+        query: local map of the last query Q.
+        found: place P -> number of inliers, and pose X_PQ (4, 4) of the last
             query.
     """
 

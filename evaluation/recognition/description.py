@@ -212,7 +212,7 @@ class _Seen:
 
     @property
     def most_points(self) -> int:
-        """Number of points of the frame's largest cloud."""
+        """Number of points of the largest cloud so far; 0 without a cloud."""
         return max(map(len, self._clouds.values()), default=0)
 
 

@@ -52,7 +52,8 @@ class PairEvidence:
             points or of the place's, whichever is less. NaN if `fits` is NaN
             for every method.
         fits: method -> (Q,) the same share for the query and its wrong best
-            place; NaN if the best place is right, or less than two radii away.
+            place; NaN if the best place is right, or at most twice the
+            protocol's radius away.
         unchanged: (Q,) `overlaps` of the control, which is the same comparison
             without a change of the city; None without a control.
     """
@@ -130,18 +131,23 @@ def mean_visible_change(overlaps: np.ndarray) -> tuple[float, int]:
 
 
 def fault_kinds(result: PlaceRecognition, evidence: PairEvidence) -> list[str]:
-    """Returns the reason for each query's wrong best place.
+    """Returns the reason why each query's best place is wrong.
 
     Returns:
-        For each of Q queries, the first reason that applies: "" if the best
-        place is right; `no_place` if the query has no match; `no_candidate` if
-        the method finds no place or rejects all places; `too_far` if the best
-        place is less than two radii away, but not a match; `hidden` if the
-        right place shows less than half of the query's scan, and most of the
-        rest is hidden from its sensor; `no_overlap` if it shows less than half
-        for another reason; `changed` if at least a quarter of the surroundings
-        is new or gone; `twin` if the best place fits the query as well as the
-        right place does; otherwise `elsewhere`.
+        For each of Q queries, "" if the best place is right, and otherwise the
+        first of these reasons that applies:
+
+        - `no_place`: the query has no match.
+        - `no_candidate`: the method finds no place, or rejects all places.
+        - `too_far`: the distance to the best place is at most twice the radius
+          of the protocol, but the place is no match.
+        - `hidden`: the right place shows less than half of the query's scan,
+          and at least half of the rest is hidden from the place's sensor.
+        - `no_overlap`: the right place shows less than half of the query's
+          scan, for another reason.
+        - `changed`: at least a quarter of the surroundings is new or gone.
+        - `twin`: the best place fits the query as well as the right place does.
+        - `elsewhere`: no other reason applies.
     """
     retrieval = result.retrieval
     little = evidence.overlaps < _ENOUGH

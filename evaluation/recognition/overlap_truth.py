@@ -210,13 +210,13 @@ def read_overlaps(
 
     Args:
         path: path of the table.
-        query_frames: (Q,) frames of the queries. The table must have a row for
-            each query and place.
+        query_frames: (Q,) frames of the queries. For each query in turn, the
+            table must have a row for each place.
         database_frames: (D,) frames of the places.
 
     Raises:
         InputError: the file cannot be read, a number is impossible, or the
-            frames differ.
+            rows are not those of all queries and places, in order.
     """
     expected = [
         (int(frame), int(place))

@@ -151,8 +151,8 @@ def faults(
         (Q,) the first reason that applies: "" if the best place is right;
         `no_place` if the query has no match; `no_candidate` if the method finds
         no place, or rejects all places; `other_city` if the best place is in
-        another city; `too_far` if the best place is less than two radii away,
-        but not a match; otherwise `elsewhere`.
+        another city; `too_far` if the best place is no match, but at most twice
+        the radius away; otherwise `elsewhere`.
     """
     wrong = [
         ~outcomes.has_match,

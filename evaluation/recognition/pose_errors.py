@@ -86,14 +86,14 @@ def pose_error(
 
 
 def checked_pose(method: Method, X_PQ: object) -> np.ndarray | None:
-    """Returns a pose estimated by a method, after checking that it is one.
+    """Returns a method's estimate after checking that it is a pose, or None.
 
     Args:
         method: the method, for the error message.
         X_PQ: result of `Method.relative_pose`: a pose (4, 4) or None.
 
     Raises:
-        InputError: the result is something else.
+        InputError: `X_PQ` is neither a pose nor None.
     """
     if X_PQ is None:
         return None

@@ -169,9 +169,10 @@ class RetrievalProtocol:
     def name(self) -> str:
         """Name of the protocol: `fair`, `paper`, `recorded` or `own`.
 
-        `paper` and `recorded` leave queries as recorded. The first of several
-        merged scans stands for a place in `paper`, the middle one in
-        `recorded`.
+        `fair` turns queries and tilts them by up to 1.5 deg; `paper` and
+        `recorded` leave queries as recorded. Of several merged scans, the first
+        stands for a place in `paper`, and the middle one in `recorded`. All
+        other changes of queries are `own`.
         """
         if self._asked == FAIR_PROTOCOL._asked:
             return "fair"

@@ -79,7 +79,10 @@ class View:
     pixels_per_metre: float = 3.0
 
     def axes(self) -> np.ndarray:
-        """Returns directions (3, 3) right, up and towards the camera, in W."""
+        """Returns the directions right, up and towards the camera in W, (3, 3).
+
+        Each row is a unit vector.
+        """
         azimuth = math.radians(self.azimuth_deg)
         elevation = math.radians(self.elevation_deg)
         towards = [

@@ -78,9 +78,9 @@ class Reference:
         protocols: method -> protocol by which the source ran it, including the
             number of scans per place.
         judge: function that returns verdicts on all claims that a report's
-            numbers can test. It takes the results of the report, the results
-            that the report repeated by the source's protocol, and the changes
-            between stages.
+            numbers can test. It takes a list of results on pairs of drives
+            (first those of the report's own protocol, then those of the
+            source's protocol), and the changes between stages.
     """
 
     title: str = ""

@@ -472,7 +472,7 @@ class _Faults(NamedTuple):
 def fault_table(
     results: Sequence[PlaceRecognition], evidence: Evidence
 ) -> Table:
-    """Returns the reasons for wrong best places for print."""
+    """Returns a table, for print, of the reasons why best places are wrong."""
 
     def share(one: _Faults, kind: str) -> str | None:
         part = one.kinds[kind] / max(one.wrong, 1)

@@ -148,9 +148,9 @@ def beside(results: Results) -> dict[str, dict[str, float]]:
     """Returns further columns of the ranking: column -> method -> mean.
 
     The columns are shares of the queries with a match: queries whose best place
-    is right; queries whose best place is wrong, but less than two radii away;
-    and queries with a correct pose. The means are over the pairs of drives with
-    results of all methods.
+    is right; queries whose best place is wrong, but at most twice the radius of
+    a match away; and queries with a correct pose. The means are over the pairs
+    of drives with results of all methods.
     """
     rows = results.where({STAGE: OWN})
     r1, far, matched, pose = (

@@ -189,8 +189,8 @@ def compare(
         metric: the metric to compare. If several tasks have it, the results of
             `place` are compared.
         protocol: name of the protocol whose rows count. By default, rows of the
-            same protocol are compared; for rankings, only `fair` counts, or the
-            only protocol of a table.
+            same protocol are compared. For rankings, the default is `fair` or,
+            in a table without it, the table's only protocol.
         gate: whether to compare the rows with the gate (true) or without it
             (false).
         rankings: whether to compare only the rankings, each over its own

@@ -226,15 +226,16 @@ class Answers(Key):
 
     Attributes:
         columns: name of a column of `queries.csv` -> (Q,) values. An unknown
-            value, an empty cell in the file, is NaN, infinite, or, in columns
-            of integers, -1.
+            value (an empty cell in the file) is -1 in columns of integers, ""
+            in columns of text, and otherwise NaN. If no candidate is a true
+            match, `first_right_rank` is infinite, or -1 if read from a file.
     """
 
     columns: Mapping[str, np.ndarray]
 
     @cached_property
     def outcomes(self) -> QueryOutcomes:
-        """Outcome of each query; the number of places is unknown."""
+        """Outcome of each query, with `num_places` 0, since it is unknown."""
         columns = self.columns
         is_right = np.asarray(columns["correct"], dtype=bool)
         ranks = np.full(len(is_right), math.inf)
@@ -688,7 +689,15 @@ class _Cells:
     def keyed(
         self,
     ) -> Iterator[tuple[_Line, dict[str, Any], tuple[object, ...]]]:
-        """Yields each line, the attributes of its `Key`, and `Key.but()`."""
+        """Yields each line of the file with its key.
+
+        Yields:
+            The line; the attributes of its `Key`, by name; and all values of
+            the `Key` as a tuple, by which lines can be grouped.
+
+        Raises:
+            InputError: a line has too few or too many cells, or a wrong key.
+        """
         names = (*_BEFORE, *self.factors, *_BEHIND)
         known: dict[tuple[str, ...], tuple[dict, tuple[object, ...]]] = {}
         for number, cells in self.rows:

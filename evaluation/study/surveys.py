@@ -248,15 +248,14 @@ class RecordingSurvey:
 
 
 def described_key(method: str, protocol: RetrievalProtocol) -> str:
-    """Returns the key of descriptions in `RecordingSurvey.described`.
+    """Returns the key of descriptions by another protocol than the study's.
 
-    Use it if the method described the scans by another protocol than that of
-    the study, such as the protocol of published results. The key of
-    descriptions by the study's own protocol is that of the method.
+    It is a key of `RecordingSurvey.described`. Descriptions by the study's own
+    protocol have the key of their method.
 
     Args:
         method: key of the method.
-        protocol: the other protocol.
+        protocol: the other protocol, such as that of published results.
     """
     return f"{method},{protocol.name}"
 

@@ -137,7 +137,10 @@ class _Contents:
         )
 
     def is_whole(self) -> bool:
-        """Returns whether the statistics confirm a summary."""
+        """Returns whether all contents are there that the statistics count.
+
+        Without statistics, the result is False.
+        """
         counts = self.statistics
         used = set().union(*self.indexes)
         return counts is not None and (

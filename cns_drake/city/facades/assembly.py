@@ -178,8 +178,8 @@ class Archetype(BaseModel, frozen=True, extra="forbid"):
             The colour of the first part is that of all parts without an entry.
         choices: further lists of colours, by name, from which single elements
             of a building draw.
-        materials: names in `colours`; all pieces of the same name become one
-            part.
+        materials: names of the parts that are made of many pieces, such as
+            `trim`; each is a key of `colours`, or `glass`.
         parameters: name -> value or formula of each parameter, in the order in
             which they are computed (see `cns_drake.city.formulas.value_of`).
     """

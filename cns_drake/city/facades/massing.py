@@ -136,7 +136,7 @@ def rounded(
 def flat(points: ArrayLike, z: float, *, up: bool = True) -> Mesh:
     """Returns a horizontal surface that fills an outline, at the height z.
 
-    The surface faces upwards, or downwards unless `up` is set.
+    The surface faces upwards or, if `up` is False, downwards.
     """
     points = np.asarray(points, dtype=float)
     if _is_convex(points):

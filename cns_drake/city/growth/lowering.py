@@ -109,8 +109,8 @@ def cut_at(mesh: Mesh, height: float) -> tuple[Mesh, np.ndarray]:
 
     Returns:
         The lower part, and start and end of the edges, (N, 2, 2) [m]. Each edge
-        is the line along which one face is cut; the back of the face is on the
-        left.
+        is the line along which one face is cut. Seen from above, the back of
+        the face is on the left of the edge.
     """
     corners: list[_Point] = []
     faces: list[tuple[int, ...]] = []

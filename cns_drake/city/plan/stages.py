@@ -25,7 +25,7 @@ class Growth(_Model):
         height: height of these structures at this stage, measured from the
             ground below them [m].
         structures: names of the structures, as in `structures.csv`. `*` stands
-            for any text and `?` for any letter.
+            for any text and `?` for any one character.
         but: names of structures to which this does not apply, although they are
             in `structures`.
     """
@@ -94,8 +94,8 @@ class Stages(_Model):
     def heights(self, stage: str) -> dict[str, float]:
         """Returns name -> height [m] of structures that still have to grow.
 
-        The heights are those in the stage `stage`. Structures that do not exist
-        there yet can be among them; see `absent`.
+        The heights are those in the stage `stage`. The result can contain
+        structures that do not exist yet in this stage; see `absent`.
 
         Raises:
             KeyError: if there is no such stage.
@@ -143,9 +143,9 @@ def load_stages(
 
     Raises:
         InputError: if the file cannot be read or has a wrong key or type; if
-            the stages are out of order; if the last stage lacks anything; if a
-            name is unknown, or listed as absent more than once; or if a pattern
-            matches nothing.
+            the stages are out of order; if the last stage is not the whole
+            city; if a name is unknown, or listed as absent more than once; or
+            if a pattern matches nothing.
     """
     content = read_yaml(path) if text is None else parse_yaml(text)
     stages = validated(Stages, content, path)
@@ -164,7 +164,14 @@ class _Names:
         self._known = set(self._all)
 
     def of(self, field: str, patterns: Iterable[str]) -> list[str]:
-        """Returns the structures that names and patterns match, in order."""
+        """Returns the names of the structures that patterns match.
+
+        They are in the order of the patterns and, for one pattern, in the order
+        of the city's structures. A pattern can be a name.
+
+        Raises:
+            InputError: a pattern matches nothing; the error names `field`.
+        """
         found: list[str] = []
         for pattern in patterns:
             names = [pattern]

@@ -98,8 +98,8 @@ def steerable_drive(
 ) -> WaypointDrive | Obstacle:
     """Returns the drive along waypoints, or the place (2,) where it fails.
 
-    A drive fails at an obstacle, at a bend that is too tight for the car, or in
-    its middle if it is too short.
+    A drive fails at an obstacle, or at a bend that is too tight for the car. If
+    a drive is too short, the result is the place in its middle.
 
     Args:
         waypoints: (N, 2) or (N, 3) places [m].
@@ -570,7 +570,8 @@ def simplified_drive(
     """Returns a drive with few waypoints along a line, or where it fails.
 
     The tolerances are tried one after the other, until a drive fits into the
-    free space. If none fits, the result is the place (2,) of an obstacle [m].
+    free space. If none fits, the result is the place (2,) where the last one
+    fails [m]; see `steerable_drive`.
 
     Args:
         xy: (N, 2) places on the line, about 1 m apart [m].

@@ -75,15 +75,16 @@ def add_lidar(
             keep moving during a turn (see `Lidar`).
         motion: source of the bodies' velocities for motion distortion; by
             default the plant.
-        range_noise: standard deviation of the Gaussian errors of ranges [m].
-        dropout: probability that a return is lost.
+        range_noise: standard deviation of the Gaussian errors of ranges [m]; 0
+            for calibrated returns, which have their own.
+        dropout: probability that a return is lost; 0 for calibrated returns.
         seed: seed of noise, dropout and calibrated returns. Random numbers
-            depend on the seed, the name and the number of the frame. The option
-            `measurement`, a `MeasurementModel`, replaces `range_noise`,
-            `dropout` and `seed`.
+            depend on the seed, the name and the number of the frame.
         returns: `ideal`, `calibrated` by the data sheet of a preset, or a
             `CalibratedReturns`.
-        options: further arguments of `Lidar`, such as `causal`.
+        options: further arguments of `Lidar`, such as `causal`; also
+            `measurement`, a `MeasurementModel` to give instead of
+            `range_noise`, `dropout` and `seed`.
 
     Returns:
         The system, with the ports `scan`, `point_cloud_S`, `point_cloud_W` and
@@ -96,8 +97,8 @@ def add_lidar(
             SceneGraph.
         TypeError: an argument is of the wrong type.
         ValueError: the diagram has a system of that name, the noise is out of
-            range, motion distortion needs a body, or calibrated returns need a
-            preset.
+            range or given twice, motion distortion needs a body, or calibrated
+            returns need a preset.
 
     Warns:
         UserWarning: the SceneGraph has no geometry that the LiDAR could see.

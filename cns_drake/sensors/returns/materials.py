@@ -45,8 +45,9 @@ class Materials(NamedTuple):
     Attributes:
         kind: (G,) uint8, `LAMBERT`, `RETRO`, `GLASS`, `LEAVES` (for volumes of
             leaves), `SPRAYS` (for sheets that stand for leaves on a twig) or
-            `BEADS`, the retro-reflector of road markings, which works at any
-            angle: EN 1436 measures it 1.24 deg above the road.
+            `BEADS` (for the beads of road markings, which reflect light back to
+            its source even if it grazes the road; EN 1436 measures them at
+            1.24 deg).
         reflectivity: (G,) float32 reflectivity. That of a retro-reflector is
             relative to a Lambertian target of reflectivity 1 that faces the
             beam.

@@ -102,9 +102,10 @@ class Weather:
             diameters_mm: (D,) diameters of drops, or of melted flakes [mm].
 
         Returns:
-            A pair for rain if it rains, and then a pair for snow if it snows:
-            the numbers N(D) at these diameters [1/(m3 mm)], and the
-            reflectivity of a drop or flake.
+            A pair for rain if it rains, followed by a pair for snow if it
+            snows. Each pair consists of the number density N(D) at the
+            diameters, (D,) [1/(m3 mm)], and the reflectivity of a drop or
+            flake.
         """
         kinds = []
         if self.rain > 0.0:

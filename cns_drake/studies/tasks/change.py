@@ -28,7 +28,7 @@ _WHOLE_COST, _COST = 60.0, 20.0
 class ChangeTask(Task):
     """Measures the change (TCR_sym) between two drives or their cities.
 
-    The query drive is compared with a drive on the query's route through the
+    The query drive is compared with a drive on the same route through the
     database's city, so that only the city differs. If there is no such drive,
     the query drive is compared with the database drive.
     """

@@ -104,20 +104,22 @@ def measure_costs(
     num_distractors: int,
     methods: tuple[MethodChoice, ...],
 ) -> dict[str, tuple[int, dict[str, float]]]:
-    """Returns the CPU times of methods, and their numbers of places.
+    """Returns the CPU times of methods, and the sizes of their databases.
 
     Args:
         reporter: reports progress.
         database, query: described drives, one file (`Part`) for each method.
         distractors: described drives through other cities, each with one file
             for each method.
-        num_distractors: number of their places that are added to the database.
+        num_distractors: number of the distractors' places that are added to the
+            database.
         methods: methods to measure.
 
     Returns:
-        Key of a method -> number of places, and times [ms]: `query_ms` is the
-        median CPU time to compare a query with all places, `build_ms` the CPU
-        time to build the database from descriptions.
+        Key of a method -> number of places in its database; and a dictionary of
+        CPU times [ms]. `query_ms` is the median time to compare a query with
+        all places; `build_ms` is the time to build the database from
+        descriptions.
     """
     found = {}
     for k, choice in enumerate(reporter.track(methods, "", len(methods))):

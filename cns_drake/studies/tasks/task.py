@@ -106,8 +106,8 @@ class Jobs:
     def expect(self, pair: Pair) -> None:
         """Registers a pair of drives.
 
-        Register all pairs before you add jobs: `described` has to know which
-        drives' descriptions several pairs need.
+        Register all pairs before you call `described`, which must know how many
+        pairs need the descriptions of a drive.
         """
         self.radii.setdefault(pair.name, set()).add(pair.protocol.radius)
         for drive, role in pair.roles:
