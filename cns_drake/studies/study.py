@@ -418,11 +418,11 @@ class Study:
             for name, task in self._tasks.items():
                 seen: set[tuple[str, str]] = set()
                 for one in found:
-                    drives = one.pair.database.name, one.pair.query.name
-                    is_new = not one.pair.is_as_before or drives not in seen
+                    both = one.pair.database.name, one.pair.query.name
+                    is_new = not one.pair.is_as_before or both not in seen
                     if task.asks or is_new:
                         one.parts[name] = task.measure(one.pair, planned)
-                    seen.add(drives)
+                    seen.add(both)
             jobs |= planned.jobs
             notes |= planned.notes
             measured += found
