@@ -122,8 +122,9 @@ class Tally:
             event: name of the event.
             share: probability of the event in this draw.
             hit: whether the event happened.
-            things: number that is added to the objects at risk. It is 0 in the
-                further draws for the same objects.
+            things: number of objects that this draw adds to `exposure`, the
+                number of objects to which the event can happen. It is 0 if an
+                earlier draw has added these objects.
         """
         self.expected[event] += share
         self.exposure[event] += things

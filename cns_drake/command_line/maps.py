@@ -95,7 +95,7 @@ def list_drives(
     shows fewer columns; in a file or pipe, all columns are written.
 
     Args:
-        folders: Folders of your own maps, whose drives to list; by default the
+        folders: Map folders of your own, to list their drives; by default the
             shipped maps.
     """
     with uninterrupted():
@@ -188,9 +188,10 @@ def import_city(
             (first), only the last stage (last), or no stage (never).
         lod: Level of detail (LoD) in which to read the buildings of CityJSON,
             such as 1.2; by default the highest that each building has.
-        seed: Seed of the random draws: which buildings --grow removes or lowers
-            in the first stage, what is added to buildings and streets, and the
-            buildings of an OpenDRIVE file that has none.
+        seed: Seed of everything that is random: which buildings are missing or
+            lower in the first stage (--grow), what is added to buildings and
+            streets, and, for an OpenDRIVE file without buildings, all its
+            buildings.
         along: CSV file with the path of a drive of your own, x and y in the map
             [m]. It replaces the two proposed drives.
         within: Leave out structures that are farther than this from the drives

@@ -177,7 +177,8 @@ class TrafficMotion(LeafSystem):
       they are registered.
     - `frame_poses`: the same poses as a `KnownPoses`, one array for all limbs.
     - `body_spatial_velocities`: list of the velocities V_WL of all limbs,
-      expressed in W, from which a LiDAR computes the poses later in its turn.
+      expressed in W. A LiDAR computes from them where the limbs are at each
+      moment of a revolution.
     - `moving_instances`: (N,) instance ids of the vehicles and walkers that are
       faster than `MOVING_SPEED`.
     - `objects`: a `RecordedObjects`, for recorders.

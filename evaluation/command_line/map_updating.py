@@ -48,8 +48,8 @@ def map_update(
         labels_a: File with your labels of A's map: 0 unobserved, 1 kept, 2
             gone. It is a .npy file, or a .ply file with a property
             `prediction`. Needs --labels-b.
-        labels_b: File with your labels of B's map, in the same formats: 1 kept,
-            3 new, 4 newly seen. Needs --labels-a.
+        labels_b: File with your labels of B's map: 1 kept, 3 new, 4 newly seen.
+            The formats are those of --labels-a, which is needed as well.
         output: Folder for the labels that were scored, A.npy and B.npy.
     """
     from cns_drake.base.errors import InputError

@@ -72,9 +72,9 @@ Columns = Annotated[
 OwnMethods = Annotated[
     list[Path] | None,
     typer.Option(
-        help="Method to run in addition to the standard ones: map-closures, "
-        "probe, svt-net or dpa-net, or a Python file that registers your own. "
-        "May be repeated."
+        help="One more method to run, beside the standard methods. It is one of "
+        "map-closures, probe, svt-net and dpa-net, or a Python file that "
+        "registers your own. May be repeated."
     ),
 ]
 

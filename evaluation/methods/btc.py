@@ -96,10 +96,9 @@ class BtcConfig(MethodConfig):
         height_range: lowest and highest height above the ground of the points
             that are used [m]; [O] -1, 4.
         height_step: thickness of each layer of the image [m]; [O] 0.1.
-        num_layers: number of layers of the image; [P] 49, which a rounding
-            error in the authors' program makes one less than the range of
-            heights divided by the step. Points in the missing layer are
-            ignored.
+        num_layers: number of layers of the image; [P] 49. The range of heights
+            divided by the step is 50, but a rounding error in the authors'
+            program leaves out one layer. Points in this layer are ignored.
         min_heights: number of occupied layers that a keypoint needs; [O] 10.
         suppression_radius: radius within which only the keypoint with the most
             layers is used [m]; [O] 2.

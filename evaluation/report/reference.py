@@ -69,8 +69,8 @@ class Reference:
             and for which only those with a match; used only if there are
             published results.
         changes: (map, earlier stage, later stage) -> TCR_sym.
-        further: published changes without place recognition: label, stages and
-            TCR_sym.
+        further: (label, stages, TCR_sym) of pairs for which the source states
+            the change alone, and no results of place recognition.
         recognitions: (map, database, query, method, mode) -> numbers. The mode
             says which queries the source counted, see
             `PlaceRecognitionMetrics`; it is the same for all results of a
@@ -78,9 +78,10 @@ class Reference:
         protocols: method -> protocol by which the source ran it, including the
             number of scans per place.
         judge: function that returns verdicts on all claims that a report's
-            numbers can test. It takes a list of results on pairs of drives
-            (first those of the report's own protocol, then those of the
-            source's protocol), and the changes between stages.
+            numbers can test. It takes two lists. The first contains the results
+            on pairs of drives: those by the report's own protocol, followed by
+            those by the source's protocol. The second contains the changes
+            between stages.
     """
 
     title: str = ""
