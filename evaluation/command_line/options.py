@@ -72,8 +72,8 @@ Columns = Annotated[
 OwnMethods = Annotated[
     list[Path] | None,
     typer.Option(
-        help="One more method to run, beside the standard methods. It is one of "
-        "map-closures, probe, svt-net and dpa-net, or a Python file that "
+        help="One more method to run, beside the standard methods. It is one "
+        "of map-closures, probe, svt-net and dpa-net, or a Python file that "
         "registers your own. May be repeated."
     ),
 ]
