@@ -10,6 +10,7 @@ from typing import Any
 import jinja2
 from markupsafe import Markup
 from matplotlib.markers import MarkerStyle
+import numpy as np
 
 from cns_drake.base.csv_files import write_csv
 from cns_drake.base.errors import InputError
@@ -150,7 +151,7 @@ def _corners(marker: str) -> str:
     style = MarkerStyle(marker)
     path = style.get_path().transformed(style.get_transform())
     # 8 px wide, around the middle of its line; SVG's y points down.
-    corners = path.to_polygons()[0] * (8, -8) + (18, 6)
+    corners = np.array(path.to_polygons()[0]) * (8, -8) + (18, 6)
     return " ".join(f"{x:.1f},{y:.1f}" for x, y in corners)
 
 
