@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 import contextlib
 from pathlib import Path
+import sys
 from typing import TYPE_CHECKING, Literal
 
 from cns_drake.base import progress_bars, terminal
@@ -147,6 +148,7 @@ def run_script(name: str, description: str) -> None:
         output: options.Output = Path("recordings"),
         frames: options.Frames = None,
         lidar: options.LidarPreset = None,
+        traffic: options.Traffic = None,
         recording: options.Recording = None,
         graphviz: options.Graphviz = None,
         overwrite: options.Overwrite = False,
@@ -156,6 +158,7 @@ def run_script(name: str, description: str) -> None:
             output,
             frames=frames,
             lidar=lidar,
+            traffic=traffic,
             recording=recording,
             graphviz=graphviz,
             overwrite=overwrite,
@@ -168,4 +171,4 @@ def run_script(name: str, description: str) -> None:
         epilog=epilog,
         context_settings=terminal.WIDE_HELP,
     )(script)
-    terminal.run(app, "cns-drake")
+    terminal.run(app, Path(sys.argv[0]).name)

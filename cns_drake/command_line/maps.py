@@ -309,7 +309,7 @@ def _shortened(kinds: Sequence[str]) -> str:
 def city(
     folder: Annotated[Path, typer.Argument(metavar="FOLDER")],
     start: Annotated[bool, typer.Option("--start")] = False,
-    seed: Annotated[int, typer.Option(min=0, metavar="N")] = 0,
+    seed: Annotated[int | None, typer.Option(min=0, metavar="N")] = None,
     check: Annotated[bool, typer.Option("--check")] = False,
     repair_stages: Annotated[bool, typer.Option("--repair-stages")] = False,
 ) -> None:
@@ -323,8 +323,9 @@ def city(
             are written to it, and its table of drives is updated.
         start: First write the files that are missing in a folder with
             roads.yaml: a plan with a district for each block, two stages, and a
-            drive for each stage.
-        seed: Seed of the random plan that --start writes.
+            drive for each stage. Existing files are kept.
+        seed: Seed of the random plan and drives that --start writes; by default
+            0.
         check: Write nothing. List the files that would change, and exit with
             status 1 if there are any.
         repair_stages: Update the names of structures in stages.yaml. Use it
@@ -340,6 +341,12 @@ def city(
         from cns_drake.city.generation.starter import start_city
         from cns_drake.scenarios.drive_table import write_table
 
+    if seed is not None and not start:
+        raise InputError("--seed: has no effect without --start")
+    if start and check:
+        raise InputError(
+            "--start and --check exclude each other; give one of them"
+        )
     if check:
         changed = differing_files(folder, note, repair_stages=repair_stages)
         for path in changed:
@@ -348,7 +355,7 @@ def city(
             raise typer.Exit(1)
         return
     if start:
-        start_city(folder, seed, note)
+        start_city(folder, seed or 0, note)
     files = generate_city(folder, note, repair_stages=repair_stages)
     write_table(folder, note)
     note(f"{len(files)} files")

@@ -32,6 +32,16 @@ LIDAR_OPTION = typer.Option(
     " avia or mid-360.",
 )
 LidarPreset = Annotated[str | None, LIDAR_OPTION]
+Traffic = Annotated[
+    int | None,
+    typer.Option(
+        min=0,
+        max=2000,
+        metavar="N",
+        help="Number of moving vehicles. The same number of walkers is added. "
+        "By default as the scenario says.",
+    ),
+]
 Recording = Annotated[
     Path | None,
     typer.Option(

@@ -143,9 +143,7 @@ def simulate(
     fog: Fog = None,
     rain: Rain = 0.0,
     snowfall: Snowfall = 0.0,
-    traffic: Annotated[
-        int | None, typer.Option(min=0, max=2000, metavar="N")
-    ] = None,
+    traffic: options.Traffic = None,
     transient: Annotated[
         list[str] | None, typer.Option(metavar="SWITCH=VALUE,...")
     ] = None,
@@ -165,8 +163,6 @@ def simulate(
     Args:
         scenario: Name of a shipped drive, as cns-drake list shows it, or a
             scenario file of your own.
-        traffic: Number of moving vehicles. The same number of walkers is added.
-            By default as the scenario says.
         transient: Temporary changes to the city. For example,
             snow=0.25,leaves=0.15 means 0.25 m of snow, and that 15 % of the
             leaves are left. Other switches are parked_cars, scaffolds, works,
@@ -243,9 +239,7 @@ def film(
     ] = 20.0,
     size: Annotated[str, typer.Option(metavar="WxH")] = "640x360",
     start: Annotated[float | None, typer.Option(min=0.0, metavar="S")] = None,
-    traffic: Annotated[
-        int | None, typer.Option(min=0, max=2000, metavar="N")
-    ] = None,
+    traffic: options.Traffic = None,
 ) -> None:
     """Film the same stretch of a drive in each stage of its city.
 

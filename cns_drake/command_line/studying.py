@@ -8,7 +8,7 @@ import typer
 from cns_drake.base import commands
 from cns_drake.base.errors import InputError
 from cns_drake.base.interrupts import uninterrupted
-from cns_drake.base.terminal import next_command, note, resumable
+from cns_drake.base.terminal import note, resumable
 from cns_drake.command_line import options
 from evaluation.recognition.protocol import RetrievalProtocol
 from evaluation.recognition.protocol_options import with_protocol
@@ -42,6 +42,7 @@ def reproduce(
     with uninterrupted():
         from cns_drake.base.jobs.cluster import choose_cluster
         from cns_drake.studies import reproduction
+        from evaluation.results.comparing import suggest_comparison
 
     cluster = choose_cluster(jobs, scheduler)
     if quick and pages:
@@ -62,7 +63,7 @@ def reproduce(
             on_note=note,
         )
     typer.echo(report)
-    next_command("cns-eval", "compare", report.parent)
+    suggest_comparison(report.parent)
 
 
 def study(
@@ -141,6 +142,7 @@ def study(
     with uninterrupted():
         from cns_drake.base.jobs.cluster import choose_cluster
         from cns_drake.studies.study import run_study
+        from evaluation.results.comparing import suggest_comparison
 
     with resumable():
         page = run_study(
@@ -152,4 +154,4 @@ def study(
             on_note=note,
         )
     typer.echo(page)
-    next_command("cns-eval", "compare", output)
+    suggest_comparison(output)

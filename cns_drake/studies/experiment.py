@@ -331,7 +331,10 @@ def load_experiment(
             values |= {name: long_form(values[name])} if name in values else {}
     if quick:
         if not isinstance(values.get("quick"), dict):
-            raise InputError(f"{path}: quick: no fields of a smaller one")
+            raise InputError(
+                f"{path}: quick: missing, or no mapping; --quick needs this"
+                " section, with the fields to replace"
+            )
         values = _chosen_anew(values, values["quick"])
     for one in overrides:
         if isinstance(one, str):

@@ -348,6 +348,7 @@ def report(
     """
     from cns_drake.base.jobs.cluster import choose_cluster
     from evaluation.paper import reference_for
+    from evaluation.results.comparing import suggest_comparison
     from evaluation.study import plan
 
     cluster = choose_cluster(jobs, scheduler)
@@ -365,7 +366,7 @@ def report(
         columns=columns,
     )
     print(path)
-    terminal.next_command("cns-eval", "compare", path.parent)
+    suggest_comparison(path.parent)
 
 
 @app.command(cls=Command, epilog=example("cns-eval compare mine/results.csv"))

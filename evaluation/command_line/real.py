@@ -50,4 +50,3 @@ def real(
     measuring.queries().write_csv(output / QUERIES)
     measuring.results().write_csv(output / RESULTS)
     print(output / RESULTS)
-    terminal.next_command("cns-eval", "compare", output)

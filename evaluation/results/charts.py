@@ -299,6 +299,8 @@ def _dumbbell(chart: _Chart) -> tuple[str, Figure]:
             f"{both[1]:.2f} of {both[0]:.2f}",
         )
     best, worst = _ends(shares)
+    if best[1] == worst[1]:
+        return f"{words(chart.metric)} kept: {best[1]}", figure
     return (
         f"{best[0]} keeps most of its {words(chart.metric)} ({best[1]}),"
         f" {worst[0]} least ({worst[1]})",
@@ -352,9 +354,12 @@ def _lines(chart: _Chart) -> tuple[str, Figure]:
         n: (float(np.mean(v)), f"{np.mean(v):.2f}") for n, v in last.items()
     }
     best, worst = _ends(found)
+    message = f"At {at[-1]:g} {words(over)}, the {words(chart.metric)} is"
+    if best[1] == worst[1]:
+        return f"{message} {best[1]}", figure
     return (
-        f"At {at[-1]:g} {words(over)}, the {words(chart.metric)} is greatest"
-        f" with {best[0]} ({best[1]}) and least with {worst[0]} ({worst[1]})",
+        f"{message} greatest with {best[0]} ({best[1]}) and least with"
+        f" {worst[0]} ({worst[1]})",
         figure,
     )
 
@@ -480,9 +485,10 @@ def _scatter(chart: _Chart) -> tuple[str, Figure]:
     message = f"{words(y_name)} over {words(x_name)}"
     if not all(math.isnan(rho) for rho, _ in found.values()):
         best, worst = _ends(found)
+        span = f"from {worst[1]} ({worst[0]}) to {best[1]} ({best[0]})"
         message = (
-            f"Rank correlation of {words(y_name)} with {words(x_name)}: from"
-            f" {worst[1]} ({worst[0]}) to {best[1]} ({best[0]})"
+            f"Rank correlation of {words(y_name)} with {words(x_name)}:"
+            f" {best[1] if best[1] == worst[1] else span}"
         )
     return message, figure
 

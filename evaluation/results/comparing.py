@@ -1,6 +1,7 @@
 """Compares your tables of results with the shipped tables."""
 
 from collections.abc import Iterable, Mapping, Sequence
+import contextlib
 from dataclasses import dataclass, replace
 import itertools
 from pathlib import Path
@@ -13,6 +14,7 @@ from scipy.stats import kendalltau
 
 from cns_drake.base.errors import InputError
 from cns_drake.base.json_text import json_values
+from cns_drake.base.terminal import next_command
 from evaluation.recognition.metrics import (
     Difference,
     Interval,
@@ -272,6 +274,17 @@ def compare(
     return Comparison(
         metric, task, len(common), ranked, differences, alike, notes
     )
+
+
+def suggest_comparison(folder: Path) -> None:
+    """Prints the command that compares a folder's results with shipped ones.
+
+    Nothing is printed if that command would refuse the results, such as those
+    of an experiment for which no results are shipped.
+    """
+    with contextlib.suppress(InputError):
+        compare([folder])
+        next_command("cns-eval", "compare", folder)
 
 
 def _name(path: Path, paths: Iterable[Path]) -> str:

@@ -9,6 +9,8 @@ from typing import Any
 
 import jinja2
 from markupsafe import Markup
+from matplotlib.markers import MarkerStyle
+import numpy as np
 
 from cns_drake.base.csv_files import write_csv
 from cns_drake.base.errors import InputError
@@ -111,7 +113,7 @@ def write_page(
         trim_blocks=True,
         lstrip_blocks=True,
     )
-    environment.filters["shown"] = _shown
+    environment.filters.update(shown=_shown, corners=_corners)
     answers = queries.answers if queries else ()
     text = environment.get_template("page.html").render(
         title=title,
@@ -142,6 +144,15 @@ def _svg(drawn: drawing.Drawn, prefix: str) -> Markup:
         text = stem.with_suffix(".svg").read_text()
     text = text[text.index("<svg") :]
     return Markup(re.sub(r'(\bid="|href="#|url\(#)', rf"\g<1>{prefix}-", text))
+
+
+def _corners(marker: str) -> str:
+    """Returns the points of an SVG polygon that shows a marker of a chart."""
+    style = MarkerStyle(marker)
+    path = style.get_path().transformed(style.get_transform())
+    # 8 px wide, around the middle of its line; SVG's y points down.
+    corners = np.array(path.to_polygons()[0]) * (8, -8) + (18, 6)
+    return " ".join(f"{x:.1f},{y:.1f}" for x, y in corners)
 
 
 def _summary(results: Results, task: str) -> dict[str, Any]:

@@ -352,7 +352,9 @@ def correlations(
 
     For each method, the value is Spearman's rank correlation of `x` with
     1 - `metric`, over the conditions in which `x` and `metric` are known. Its
-    interval is by bootstrap over these conditions.
+    interval is by bootstrap over these conditions. Methods with fewer than
+    three such conditions are left out, as the correlation of two points is 1 or
+    -1 whatever they show.
 
     Args:
         results: the table of results, with rows either all with or all without
@@ -365,6 +367,8 @@ def correlations(
         points.setdefault(row.label, []).append((1.0 - row.value, at))
     found = []
     for method, rows in points.items():
+        if len(rows) < 3:
+            continue
         known = np.array(rows)
         rng = np.random.default_rng(0)
         draws = rng.integers(len(known), size=(_SAMPLES, len(known)))

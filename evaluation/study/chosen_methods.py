@@ -99,9 +99,9 @@ def choose_methods(
             defaults.
 
     Raises:
-        InputError: if a file registers no method or a method with a known name,
-            an optional method is not installed, or a setting is unknown or does
-            not fit.
+        InputError: if a name is unknown, or of a method that runs anyway, a
+            file registers no method or a method with a known name, an optional
+            method is not installed, or a setting is unknown or does not fit.
     """
     chosen = [MethodChoice(name) for name in shipped_methods()]
     stems = set()
@@ -110,6 +110,14 @@ def choose_methods(
             chosen.append(MethodChoice(str(file)))
             continue
         path = Path(file).absolute()
+        if str(file) in shipped_methods():
+            raise InputError(f"--method: {file} runs anyway; leave it out")
+        if not path.suffix and not path.is_file():
+            known = optional_methods()
+            raise InputError(
+                f"--method: {file}: neither a Python file nor one of"
+                f" {', '.join(known)}{did_you_mean(str(file), known)}"
+            )
         # Two modules with one name would replace each other.
         if path.stem in stems:
             raise InputError(f"--method: {path.name} is there twice")

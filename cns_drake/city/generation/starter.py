@@ -51,7 +51,7 @@ def start_city(
     `city.yaml` gets a district for each block between the roads. `stages.yaml`
     gets a stage 01 without the buildings and trees in the east, and a stage 02
     with everything. Each stage gets a drive on a random route. `progress` is
-    called with a line for each file that is written.
+    called with a line for each file that is written or kept.
 
     Returns:
         The files written; existing files stay as they are.
@@ -65,6 +65,7 @@ def start_city(
     def write(name: str, comment: str, values: Callable[[], dict]) -> None:
         path = world / name
         if path.exists():
+            progress(f"kept: {path}; delete it to have it written again")
             return
         progress(f"writing {path}")
         text = yaml.safe_dump(

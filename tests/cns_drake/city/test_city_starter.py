@@ -9,6 +9,7 @@ from shapely import Point
 from typer.testing import CliRunner
 import yaml
 
+from cns_drake.base.errors import InputError
 from cns_drake.city.generation.city_structures import make_city
 from cns_drake.city.generation.starter import start_city
 from cns_drake.city.plan.city_plan import load_plan
@@ -87,10 +88,26 @@ def test_existing_files_stay(tmp_path):
     assert [path.name for path in sorted(start_city(tmp_path))] == INPUTS
     before = {name: (tmp_path / name).read_bytes() for name in INPUTS}
     (tmp_path / "sequence_02.yaml").unlink()
-    (path,) = start_city(tmp_path)
+    told = []
+    (path,) = start_city(tmp_path, 1, told.append)
     assert path.name == "sequence_02.yaml"
-    after = {name: (tmp_path / name).read_bytes() for name in INPUTS}
+    begin = {f"kept: {tmp_path / n};" for n in INPUTS if n != path.name}
+    assert {line.partition(" delete")[0] for line in told} == {
+        *begin,
+        f"writing {path}",
+    }
+    del before[path.name]
+    after = {name: (tmp_path / name).read_bytes() for name in before}
     assert after == before
+
+
+@pytest.mark.parametrize(
+    "words", [("--seed", 5), ("--seed", 0), ("--start", "--check")]
+)
+def test_options_without_effect_are_refused(town, words):
+    done = run("city", town, *words)
+    assert isinstance(done.exception, InputError)
+    assert str(done.exception).startswith(words[0])
 
 
 def test_other_seeds_draw_other_towns(tmp_path, town):

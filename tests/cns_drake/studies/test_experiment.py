@@ -283,7 +283,7 @@ def test_a_smaller_experiment(read):
     found = read(text, quick=True)
     assert found.database == {"years": [0, 20], "rates": 2}
     assert found.protocol == {"base": "fair", "query_spacing": 30.0}
-    with pytest.raises(InputError, match=r"mine\.yaml: quick: no fields"):
+    with pytest.raises(InputError, match=r"mine\.yaml: quick: missing"):
         read("about: all of it\n", quick=True)
 
 

@@ -83,6 +83,21 @@ def test_it_is_run_only_where_it_is_named(method):
     assert NAME in {one.name for one in choose_methods([NAME])}
 
 
+@pytest.mark.parametrize(
+    ("name", "fault"),
+    [
+        ("solid", "solid runs anyway"),
+        ("map-closure", "did you mean map-closures?"),
+        ("solids", "neither a Python file nor one of dpa-net, map-closures"),
+        ("nowhere.py", "nowhere.py: no such file"),
+    ],
+)
+def test_other_names_are_refused(name, fault):
+    with pytest.raises(InputError, match=fault) as refusal:
+        choose_methods([name])
+    assert "\n" not in str(refusal.value)
+
+
 def test_without_its_package_one_line_names_the_command(monkeypatch):
     monkeypatch.setitem(sys.modules, PACKAGE, None)
     with pytest.raises(

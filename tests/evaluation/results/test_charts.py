@@ -11,6 +11,7 @@ import pytest
 
 from cns_drake.base.errors import InputError
 from evaluation.results import charts
+from evaluation.results import page as page_module
 from evaluation.results.page import write_page
 from evaluation.results.table import Results, Row
 
@@ -168,14 +169,13 @@ def test_a_scatter_of_points_on_a_line(number):
         line.get_ydata(), 0.9 - np.asarray(line.get_xdata())
     )
     assert bool(axes.collections) == (number == 8)
-    assert drawn.message == (
-        "Rank correlation of AUC with TCR_sym: from -1.00 (b) to -1.00 (a)"
-    )
+    assert drawn.message == "Rank correlation of AUC with TCR_sym: -1.00"
 
 
-def test_a_single_point_has_no_correlation():
+@pytest.mark.parametrize("number", [1, 2])
+def test_a_single_point_or_two_have_no_correlation(number):
     drawn = charts.draw(
-        {"kind": "scatter", "x": "tcr_sym", "y": "auc"}, scattered(1)
+        {"kind": "scatter", "x": "tcr_sym", "y": "auc"}, scattered(number)
     )
     assert drawn.message == "AUC over TCR_sym"
 
@@ -360,6 +360,47 @@ def test_a_picture_for_print_has_its_legend(tmp_path):
     figure = charts.draw(keys, aged(), alone=True).figure
     save(figure, tmp_path / "chart", ("pdf", "png"))
     assert figure.legends[0].get_visible()
+
+
+@pytest.mark.parametrize(
+    ("chart", "results", "message"),
+    [
+        (
+            {"kind": "lines", "over": YEARS, "metric": "auc"},
+            aged().where(method="solid", seed=0),
+            "At 30 years, the AUC is {last:.2f}",
+        ),
+        (
+            {"kind": "dumbbell", "over": YEARS, "metric": "auc"},
+            aged().where(method="solid", seed=0),
+            "AUC kept: {last:.2f} of {first:.2f}",
+        ),
+    ],
+)
+def test_one_method_is_not_both_best_and_worst(chart, results, message):
+    first = PARTS["solid"]
+    wanted = message.format(first=first, last=first - 0.3)
+    assert charts.draw(chart, results).message == wanted
+
+
+def test_a_page_shows_the_markers_of_its_charts():
+    """The legend of the page has the outlines of matplotlib's markers."""
+    names = ["btc", "scan-context++", "mine"]
+    styles = charts.styles(names)
+    corners = [
+        np.array(
+            [c.split(",") for c in page_module._corners(marker).split()], float
+        )
+        for _, _, marker in styles.values()
+    ]
+    square, triangle, cross = corners
+    # Closed polygons; the triangle points up.
+    np.testing.assert_allclose(np.ptp(square, axis=0), 8.0)
+    assert {*map(tuple, square.tolist())} == {
+        (x, y) for x in (14.0, 22.0) for y in (2.0, 10.0)
+    }
+    assert {*map(tuple, triangle.tolist())} == {(18, 2), (14, 10), (22, 10)}
+    assert len({*map(tuple, cross.tolist())}) == 12
 
 
 def test_a_page_stands_alone(tmp_path):

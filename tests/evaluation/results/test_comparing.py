@@ -9,7 +9,11 @@ import numpy as np
 import pytest
 
 from cns_drake.base.errors import InputError
-from evaluation.results.comparing import _BASELINES, compare
+from evaluation.results.comparing import (
+    _BASELINES,
+    compare,
+    suggest_comparison,
+)
 from evaluation.results.table import Answers, QueryRows, Results, Row
 
 
@@ -307,6 +311,24 @@ def test_the_command(tmp_path, capsys):
     assert found["conditions"] == 1
     assert [m["value"] for m in found["methods"]] == [0.75, 0.5, 0.5, 0.25]
     assert found["agreements"][0]["kendall_tau"] == pytest.approx(1.0)
+
+
+def test_a_comparison_is_suggested_if_it_can_be_made(tmp_path, capsys):
+    """Results of the shipped cities, of another city, of another metric."""
+    folder = tmp_path / "of shipped"
+    folder.mkdir()
+    table = folder / "results.csv"
+    Results.of(shipped(map="suburbia", method="solid")).write_csv(table)
+    suggest_comparison(folder)
+    suggested = f"next: cns-eval compare '{folder}'\n"
+    assert capsys.readouterr().err == suggested
+    Results.of(shipped(map="suburbia", metric="r1")).write_csv(table)
+    suggest_comparison(folder)
+    suggest_comparison(
+        write_table(tmp_path / "own", {"a": {"x": 0.5}}, experiment="stages")
+    )
+    suggest_comparison(tmp_path / "none")
+    assert capsys.readouterr().err == ""
 
 
 UNKNOWN = ["[undefined,", "undefined]"]
