@@ -239,7 +239,7 @@ def test_diagram_script_records_and_makes_a_page(files, tmp_path, capfd):
         (["study", "{files}"], "neither an experiment"),
         (["study", "{files}/file"], "file: not a mapping of an experiment"),
         (["study", "{files}/typo.yaml"], "typo.yaml: .*: Extra inputs"),
-        (["study", "levels", "--quick"], "levels.yaml: quick: no fields"),
+        (["study", "levels", "--quick"], "levels.yaml: quick: missing"),
         (["study", "ladder", "atlantis"], "unknown map 'atlantis'"),
         (["study", "ladder", "--task", "dance"], "ladder: tasks: no task 'dan"),
         (["study", "ladder", "--method", "bow"], "ladder: methods: no method"),

@@ -63,7 +63,7 @@ def test_an_import_after_a_killed_one_succeeds(tmp_path, line):
     process.communicate(timeout=60)
     assert process.returncode == -signal.SIGKILL
     left = {path.name for path in tmp_path.iterdir()}
-    assert left <= {"city.osm", "town.part"}
+    assert left <= {"city.osm", "town.part", "town.part.lock"}
     again = ["import", str(tmp_path / "city.osm"), "--output", str(output)]
     done = CliRunner().invoke(app, again)
     assert done.exit_code == 0, done.output
