@@ -172,9 +172,8 @@ def test_diagram_script_has_options():
     """Where the documents run one, `test_recipes` does."""
     shown = run("--help", script=DIAGRAMS / "metropolis_04.py")
     assert shown.returncode == 0
-    for option in (
-        *("frames", "output", "lidar", "traffic", "recording", "graphviz"),
-    ):
+    options = ("frames", "output", "lidar", "traffic", "recording", "graphviz")
+    for option in options:
         assert f"--{option}" in shown.stdout
     assert shown.stdout.startswith("Usage: metropolis_04.py [OPTIONS]")
 
