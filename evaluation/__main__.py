@@ -6,7 +6,7 @@ from cns_drake.base.start import start
 
 
 def main() -> None:
-    """Runs the command."""
+    """Runs the command `cns-eval`."""
     start("cns-eval", _load)
 
 

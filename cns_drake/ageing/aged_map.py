@@ -221,7 +221,14 @@ class _Writing:
     def stage(
         self, stage: str, year: int, standing: Mapping[str, Structure | None]
     ) -> None:
-        """Writes the stage of a year."""
+        """Writes the world of a stage: the aged city in a given year.
+
+        Args:
+            stage: name of the stage.
+            year: years since the original city; negative for years before.
+            standing: name -> structure, for all that stand in this year; None
+                for a structure that is as in the original city.
+        """
         world = self._world
         new = [one for one in standing.values() if one is not None]
         old = [

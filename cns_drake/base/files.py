@@ -357,11 +357,11 @@ def exclusive(path: Path, on_wait: Callable[[], None]) -> Iterator[None]:
 
 
 def sole_writer(folder: Path) -> contextlib.AbstractContextManager[None]:
-    """Returns a context in which no other process writes a new folder.
+    """Returns a context manager that locks a folder which is being written.
 
     Raises:
-        InputError: as the context begins, if another process is writing it, or
-            the lock cannot be written.
+        InputError: on entering the context, if another process is writing the
+            folder, or the lock cannot be written.
     """
 
     def refuse() -> None:

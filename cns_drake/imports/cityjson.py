@@ -81,7 +81,7 @@ class ReferenceSystem:
         return points @ self.matrix.T
 
     def exchanged(self) -> ReferenceSystem:
-        """Returns the system with its first two coordinates exchanged.
+        """Returns the reference system with its first two axes exchanged.
 
         Many programs write the coordinate east first although the definition of
         the system says north first, or the other way round.
@@ -563,11 +563,14 @@ class _Templates:
         self._system = system
 
     def place(self, instance: dict) -> tuple[Any, np.ndarray]:
-        """Returns the template of an instance, and its vertices (N, 3) [m].
+        """Returns an instance's template, and the vertices of the instance.
+
+        The vertices (N, 3) are those of the template, transformed to the place
+        of the instance [m].
 
         Args:
-            instance: geometry of the type `GeometryInstance`. It places the
-                template in the file's coordinates.
+            instance: geometry of the type `GeometryInstance`, which refers to a
+                template and a transformation.
 
         Raises:
             LookupError, TypeError, ValueError: if the instance is faulty.

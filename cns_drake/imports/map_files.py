@@ -61,7 +61,7 @@ def write_world(
             were.
 
     Returns:
-        Name of a stage -> numbers of its structures and of its triangles.
+        Name of a stage -> how many structures and how many triangles it has.
     """
     structures = [*bottom, *(one.structure for one in city.kept)]
     table = structure_table(structures)

@@ -75,7 +75,10 @@ class WheelMotion:
         return jet.speed - jet.turn * self._y, jet.turn * self._x
 
     def steering(self, moments: Moments) -> JointMotion:
-        """Returns the steering angle at N times, positive to the left."""
+        """Returns the wheel's steering angle at N times, with derivatives.
+
+        The angle [rad] is positive to the left.
+        """
         rate, acceleration, jet = moments[1:4]
         a, b, da, db, dda, ddb = self._ground_motion(jet)
         squared = a**2 + b**2
@@ -89,10 +92,10 @@ class WheelMotion:
         )
 
     def rolling(self, moments: Moments) -> JointMotion:
-        """Returns the wheel's rolling angle [rad] and its derivatives.
+        """Returns the wheel's rolling angle at N times, with derivatives.
 
-        There is one row for each of the N times. The angle is zero at the start
-        and grows when the vehicle drives forwards.
+        The angle [rad] is zero at the start and grows when the vehicle drives
+        forwards.
         """
         u, rate, acceleration, jet = moments[:4]
         a, b, da, db, _, _ = self._ground_motion(jet)

@@ -93,7 +93,7 @@ def read_parts(world: World) -> dict[str, list[Part]]:
 def compare_parts(
     own: Mapping[str, Sequence[Part]], other: Mapping[str, Sequence[Part]]
 ) -> StageDifference:
-    """Returns the difference between two stages.
+    """Returns which parts of structures exist in one stage, and which in both.
 
     A structure that was moved, or has another shape of the same height, counts
     as common to both stages.

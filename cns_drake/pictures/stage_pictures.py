@@ -50,9 +50,10 @@ def load_views(path: Path) -> dict[str, View]:
 
 
 def draw_stages(stages: dict[str, Path], view: View, path: Path) -> None:
-    """Draws stages side by side as seen in a view, with a scan of each below.
+    """Draws stages side by side as a camera sees them.
 
-    The LiDAR is below the camera; its points are drawn as the camera sees them,
+    Under the picture of each stage is a picture of a scan. The LiDAR stands on
+    the ground below the camera. Its points are drawn as seen from the camera,
     coloured by distance.
 
     Args:

@@ -84,9 +84,10 @@ class Hits(NamedTuple):
     Attributes:
         ranges: (N,) float32 ranges [m], inf for a miss.
         owner: (N,) int32 index of the geometry, -1 for a miss.
-        group: (N,) int32 row of the geometry's group, -1 for a miss.
-        normals: (N, 3) float32 normal of the surface, in the group's frame L
-            and of any length, zero for a miss; (N, 0) unless requested.
+        group: (N,) int32 number of the geometry's group, -1 for a miss. All
+            geometries of a group are fixed to the same frame L.
+        normals: (N, 3) float32 normal of the surface, expressed in L, of any
+            length; zero for a miss. (N, 0) unless normals were requested.
     """
 
     ranges: np.ndarray

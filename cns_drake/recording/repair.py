@@ -88,8 +88,8 @@ def repair_mcap(
     def read(before: int) -> Iterator[McapRecord | Fault]:
         """Yields the records of the file, and reports progress.
 
-        The file is read twice; `before` is 0 in the first pass, and the size of
-        the file in the second [bytes].
+        Args:
+            before: number of bytes that were read in an earlier pass.
         """
         with user_errors(path), open(path, "rb") as stream:
             for record in read_records(stream):

@@ -234,8 +234,8 @@ def check_files(scenario: Scenario, source: object = None) -> None:
 def describe_scenario(scenario: Scenario, folder: Path | None = None) -> dict:
     """Returns the scenario's fields that are set, ready for JSON.
 
-    The noise of an IMU is in a separate file of a fixed name next to the
-    scenario.
+    The field `imu.kalibr` becomes `imu.yaml`: a recording contains the noise of
+    its IMU in a file of this name.
 
     Args:
         folder: folder to which the paths of map, world, waypoints and SUMO

@@ -159,7 +159,11 @@ class PairOfDrives:
         self._loaded: set[tuple[Path, tuple[str, ...]]] = set()
 
     def build(self, condition: Condition, seed: int) -> Compared:
-        """Returns both drives, with the changes that a condition sets.
+        """Returns the database drive and the query drive under a condition.
+
+        Args:
+            condition: the changes to make to the two drives.
+            seed: seed of the random choices of these changes.
 
         Raises:
             MissingError: the map lacks what the condition needs.
@@ -570,17 +574,17 @@ def moved(
 
 
 def frozen_drives(table: str) -> dict[tuple[str, int], str]:
-    """Returns the fingerprints of drives that must not change.
+    """Reads a table of drives that must stay the same in all releases.
 
     Args:
-        table: name of a file in the folder of the shipped worlds.
+        table: name of a CSV file in the folder of the shipped worlds.
 
     Returns:
-        (map, level of the change) -> fingerprint, a hash of the compared
-        drives.
+        (map, level) -> fingerprint, a hash of the drives that are compared. The
+        level is the degree of difficulty, see `docs/levels.md`.
 
     Raises:
-        InputError: there is no such file, or a level is no number.
+        InputError: there is no such file, or a level is not a number.
     """
     path = worlds_folder() / table
     return {

@@ -160,8 +160,8 @@ class MadeMaps:
         """Requests that `make` generates a drive's city anew from a seed.
 
         Returns:
-            Map and stage of the drive as it is, because the new map does not
-            exist yet.
+            Folder of the drive's present map, and the present stage. `redrawn`
+            returns those of the new map, which `make` makes.
 
         Raises:
             InputError: the seed is out of range.

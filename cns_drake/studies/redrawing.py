@@ -91,7 +91,8 @@ def redraw_cities(
 class MakeMap(Step):
     """A job step that makes the folder of a map.
 
-    An older map that the step has made is replaced if its inputs have changed.
+    If the folder contains a map that this step made earlier, from other inputs,
+    the map is replaced.
     """
 
     folder: Path

@@ -171,10 +171,10 @@ def run_study(
 
 @dataclass
 class Study:
-    """An experiment that is being measured on maps.
+    """Measures an experiment on maps, and writes its results.
 
     Attributes:
-        experiment: the experiment.
+        experiment: description of the experiment.
         output: folder of the results.
         source: file of the experiment, for error messages.
         cluster: runs the jobs.

@@ -474,8 +474,8 @@ def write_weights(
     Args:
         path: the file.
         values: name -> weights, as `train` returns them.
-        seen: least and greatest share of a training scan's sectors that contain
-            a point.
+        seen: share of the sectors of a scan's polar image that contain points;
+            the least and the greatest value over all training scans.
         made_by: description of the training, ready for JSON.
     """
     arrays: dict[str, Any] = {

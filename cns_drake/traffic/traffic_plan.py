@@ -686,7 +686,10 @@ class Trial:
         return vehicles[: self._task.vehicles], walkers[: self._task.walkers]
 
     def left_out(self) -> int:
-        """Returns how many of the requested bodies must be left out."""
+        """Returns how many requested vehicles and walkers are left out.
+
+        Those that would overlap with another one are left out.
+        """
         vehicles, walkers = self._kept()
         wanted = self._task.vehicles + self._task.walkers
         return wanted - len(vehicles) - len(walkers)

@@ -444,12 +444,13 @@ _ROWS = {
 def fill_roadsides(around: Surroundings, share: float) -> None:
     """Adds objects to a share of the free places beside kerbs near a drive.
 
-    Except for parked cars, the objects and their places are the same for every
-    seed.
+    The objects are, for example, parked cars, hedges, trees and garages. The
+    seed of the temporary changes (`around.seed`) decides only where cars are
+    parked; all other objects are the same for every seed.
 
     Args:
-        around: surroundings of the drive, which are changed.
-        share: share of the free places, from 0 to 1.
+        around: surroundings of the drive, to which the objects are added.
+        share: share of the free places that get an object, from 0 to 1.
     """
     stretches = _stretches(around, "roadsides", _CELL, _SHORTEST)
     standing = around.obstacles(ignored=GROUND_CLASSES)

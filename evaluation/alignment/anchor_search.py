@@ -239,11 +239,12 @@ def find_candidates(
 
 
 def find_guesses(candidates: Candidates) -> list[Guess]:
-    """Returns the guesses with the most agreeing candidates, best first.
+    """Returns guesses of the pose of the source's world in the target's.
 
-    A guess is computed from two candidates, and refined with all candidates
-    that agree with it. Candidates that agree with a guess are not used for
-    further guesses.
+    A candidate is a pair of keyframes that look alike. Two candidates determine
+    a guess, which is then refined with all candidates that agree with it. The
+    guess with the most agreeing candidates comes first. Candidates that agree
+    with a guess do not count for later guesses.
     """
     trials = _trials(candidates)
     is_left = np.ones(len(candidates.turn), dtype=bool)

@@ -155,9 +155,10 @@ class DirectedChange:
 
     @property
     def ratio(self) -> float:
-        """Temporal change ratio (TCR), 1 - |O| / |H|; NaN if H is empty.
+        """Temporal change ratio (TCR) of the NSS benchmark, from 0 to 1.
 
-        It is the TCR of the NSS benchmark.
+        This is the share of changed points among the points in the hull; NaN if
+        no point is in the hull.
         """
         return _ratio(self.num_unchanged, self.num_in_hull)
 

@@ -40,14 +40,17 @@ def align_robustly(
     still: tuple[float, float],
     covariances: np.ndarray | None = None,
 ) -> tuple[np.ndarray, int]:
-    """Returns the pose of a scan on a map, registered with a robust kernel.
+    """Registers a scan to a map by ICP or GICP with a Geman-McClure kernel.
+
+    Several alignments follow one another. Each begins at the last result, and
+    pairs points over a shorter distance.
 
     Args:
         surface: the map.
         scan: (N, 3) in S [m].
         start: initial pose X_WS (4, 4).
-        widths: greatest distance of a pair, at the beginning and at the end
-            [m].
+        widths: greatest distance between a scan point and the map point with
+            which it is paired, in the first and in the last alignment [m].
         iterations: greatest number of steps of each alignment.
         still: translation and rotation below which a step ends an alignment [m,
             rad].

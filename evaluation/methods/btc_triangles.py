@@ -50,7 +50,8 @@ class Keypoints:
 
     Attributes:
         positions: (K, 3) on the plane [m].
-        heights: (K,) int64, bit k set if there are points in layer k.
+        heights: (K,) int64; bit k is set if the keypoint's cell has points in
+            layer k above the plane.
     """
 
     positions: np.ndarray
@@ -64,10 +65,10 @@ class HeightImage(NamedTuple):
     """A cloud seen along the normal of a plane.
 
     Attributes:
-        heights: (rows, columns) int64, bit k set if there are points in layer
-            k. The image exceeds the points by at least one cell up and to the
-            right. Its numbers of rows and columns are multiples of the side of
-            a segment, see `peaks`.
+        heights: (rows, columns) int64; bit k of a cell is set if it has points
+            in layer k above the plane. The last row and the last column are
+            always empty. The numbers of rows and columns are multiples of the
+            side of a segment, see `peaks`.
         means: (rows, columns, 2) mean position of the points of each cell,
             along rows and along columns [m]; NaN for a cell without points.
     """

@@ -66,16 +66,19 @@ class LayeredOverlapConfig(MethodConfig):
     """Settings of layered overlap.
 
     All values were chosen by trials on development worlds. The reported results
-    come from other worlds.
+    come from other worlds. The method finds the best place in four successive
+    searches, from coarse to fine maps.
 
     Attributes:
         cell: side of a cell of the finest maps [m]. These maps have 256 x 256
             cells.
         min_points: least number of points in an occupied cell.
-        poses: number of candidate poses (a place and a heading) that the second
-            search compares.
-        refined: number of candidate poses that the third search compares.
-        candidates: number of places that the last search compares cell by cell.
+        poses: number of candidate poses (a place and a heading) that the first
+            search passes to the second.
+        refined: number of candidate poses that the second search passes to the
+            third.
+        candidates: number of places that the third search passes to the last,
+            which compares maps cell by cell.
         weights: weights of a common cell in the score, by layer: low, middle
             and high points, poles, kerbs.
         least_cells: number that is added to the weighted number of filled cells

@@ -109,7 +109,10 @@ class ProbeDatabase:
 
 @register("probe")
 class ProbeMethod(Method[Probe, ProbeDatabase]):
-    """PROBE; the score is that of the paper's equation 16, from 0 to 1."""
+    """Place recognition by PROBE (Lee, Lee, Yoo: RA-L 2026).
+
+    The score is from 0 to 1, by equation 16 of this paper.
+    """
 
     Config = ProbeConfig
     skips_places = True

@@ -59,7 +59,10 @@ _MEAN_DIFFERENCE = 0.15
 
 
 def reference_for(map_names: Iterable[str]) -> Reference:
-    """Returns the paper's values if it uses one of the maps, else none."""
+    """Returns the values of the CNS paper for a report on some maps.
+
+    If none of the maps occurs in the paper, the result has no values.
+    """
     return NO_REFERENCE if paper().city_names.isdisjoint(map_names) else paper()
 
 

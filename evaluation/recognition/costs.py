@@ -25,8 +25,9 @@ class Cost:
         points: mean number of points in a cloud.
         describe_ms: time to describe a query's cloud [ms].
         query_ms: time to compare a query with all places [ms]. It includes the
-            method's second stage and the gate, if used, and the pose of the
-            best place.
+            method's second stage, the rejection of far places (the gate, see
+            `evaluation.recognition.scoring.gated`), if used, and the pose of
+            the best place.
         places: number of places.
         place_bytes: mean size of a place's pickled description.
     """
@@ -57,7 +58,8 @@ def measure_cost(
         scans_per_place: number of scans that are merged into each cloud.
         database: described drive with places.
         query: described drive with queries; C of them are measured.
-        gate_radius: radius of a match for the gate [m]; None without a gate.
+        gate_radius: radius of a match [m], with which far places are rejected
+            (see `evaluation.recognition.scoring.gated`); None to reject none.
     """
     describing = [cpu_ms(method.describe, cloud) for cloud in clouds]
     places = database.places
@@ -93,7 +95,8 @@ def query_ms(
         places: described places, all of them candidates.
         queries: described queries.
         number: number of queries to measure, two or more.
-        gate_radius: radius of a match for the gate [m]; None without a gate.
+        gate_radius: radius of a match [m], with which far places are rejected
+            (see `evaluation.recognition.scoring.gated`); None to reject none.
         with_pose: whether the pose of the best place is estimated, too.
     """
     indexed = method.build_database(places.descriptors)

@@ -254,9 +254,9 @@ def pose_numbers(
 
     Args:
         now: outcome of the method in a condition.
-        before: outcome of the method in the baseline. With it, the results
-            include `kept`, the success in the condition divided by that in the
-            baseline.
+        before: outcome of the method in the baseline. If it is given, the
+            results include the metric `kept`: the success rate in the condition
+            divided by the success rate in the baseline.
     """
     errors = now.pose_errors
     value = pose_success(errors, now.outcomes)

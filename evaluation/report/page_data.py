@@ -63,11 +63,12 @@ class Illustration:
 
 @dataclass(frozen=True)
 class CameraImages:
-    """Images of a camera at K frames of a drive.
+    """M camera images that are nearest in time to K LiDAR frames of a drive.
 
     Attributes:
-        stamps_ns: (K,) time stamps of the frames [ns].
-        times_ns: (M,) times of the images, increasing [ns].
+        stamps_ns: (K,) time stamps of the LiDAR frames [ns].
+        times_ns: (M,) times of the images, increasing [ns]. An image can be
+            the nearest one for several frames.
         files: the M images as JPEG.
     """
 

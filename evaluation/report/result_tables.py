@@ -498,7 +498,11 @@ def fault_table(
 def fault_numbers(
     results: Sequence[PlaceRecognition], evidence: Evidence
 ) -> Table:
-    """Returns the counts of wrong best places by reason, for `why.csv`."""
+    """Returns the table `why.csv`: why best places were wrong.
+
+    For each method on each pair of drives, it counts the queries with a wrong
+    best place, by reason.
+    """
     return Table.of(
         _count_faults(results, evidence),
         {
@@ -538,7 +542,7 @@ def _count_faults(
 
 
 def cost_table(costs: Sequence[Cost]) -> Table:
-    """Returns the costs for print, a row for each method."""
+    """Returns the table of the methods' costs, with a row for each method."""
     by_method = {cost.method: cost for cost in costs}
     return Table.of(
         map(by_method.__getitem__, in_table_order(by_method)),

@@ -101,7 +101,11 @@ def place_rows(
 def change_rows(
     pairs: Iterable[Controlled], changes: Iterable[ChangeResult]
 ) -> Iterator[Row]:
-    """Yields rows with the TCR_sym of each pair, and of its control."""
+    """Yields rows with the TCR_sym of each pair of drives and of its control.
+
+    TCR_sym is the symmetric temporal change ratio. A control measures the same
+    two routes in one stage, where nothing has changed.
+    """
     of_stages = {
         (one.map_name, *stages): one.report
         for one in changes

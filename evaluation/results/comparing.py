@@ -182,7 +182,7 @@ def compare(
     gate: bool = False,
     rankings: bool = False,
 ) -> Comparison:
-    """Returns a comparison of tables of results with the shipped tables.
+    """Compares tables of results with one another and the shipped tables.
 
     Args:
         paths: tables of results, or folders with a `results.csv`. If a
@@ -191,12 +191,13 @@ def compare(
         metric: the metric to compare. If several tasks have it, the results of
             `place` are compared.
         protocol: name of the protocol whose rows count. By default, rows of the
-            same protocol are compared. For rankings, the default is `fair` or,
-            in a table without it, the table's only protocol.
+            same protocol are compared. With `rankings`, the default is `fair`
+            or, in a table without this protocol, the table's only protocol.
         gate: whether to compare the rows with the gate (true) or without it
             (false).
-        rankings: whether to compare only the rankings, each over its own
-            conditions, such as those of simulated and of real drives.
+        rankings: whether to compare only the order of the methods in these
+            tables, without the shipped ones. The tables need no condition in
+            common; one can contain simulated drives and another real drives.
 
     Raises:
         InputError: a table cannot be read, has no such row, or the tables have

@@ -123,7 +123,8 @@ class Summary(NamedTuple):
 
         Args:
             what: name of the number.
-            key: key with the map, the task, the method and the gate.
+            key: names the map, the task and the method, and tells whether the
+                gate was used.
             value: the number itself.
             low, high: its interval or range.
         """

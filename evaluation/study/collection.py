@@ -97,9 +97,9 @@ class Run:
 
     @property
     def shares_places(self) -> bool:
-        """Whether the places are described by the study's own protocol.
+        """Whether this run uses the place descriptions of the study's own runs.
 
-        If not, they are described by the protocol of published numbers.
+        Otherwise the places are described by the protocol of published numbers.
         """
         return self.places == self.method.key
 

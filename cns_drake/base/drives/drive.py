@@ -287,7 +287,7 @@ class PlacedDrive:
 
     @classmethod
     def of(cls, drive: Drive) -> PlacedDrive:
-        """Returns a `PlacedDrive` with a drive's name, world frame and map."""
+        """Returns the name, the world frame and the map of a drive."""
         scenario = drive.scenario
         if scenario is not None:
             scenario = {k: v for k, v in scenario.items() if k == "map"}

@@ -138,7 +138,7 @@ class Site:
 
     @property
     def is_rectangle(self) -> bool:
-        """Whether the footprint is a rectangle along the axes of S."""
+        """Whether the footprint is a rectangle along the x and y axis."""
         box = self.footprint.envelope
         return bool(
             len(self.footprint.exterior.coords) == 5

@@ -180,7 +180,11 @@ def gable_wall(
 
 
 def gable_glass(holes: Sequence[Patch]) -> Mesh:
-    """Returns the panes of the windows `holes`, in wall coordinates."""
+    """Returns the mesh of the panes that close window openings in a gable.
+
+    Args:
+        holes: openings in the gable, in wall coordinates [m].
+    """
     faces = massing.Faces()
     for h in holes:
         low, high = (h.x0, -h.depth, h.z0), (h.x1, -h.depth, h.z1)

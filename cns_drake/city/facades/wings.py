@@ -485,11 +485,11 @@ class Openings:
                 ]
 
     def put(self, edge: int, x: float, width: float, bay: bays.Bay) -> None:
-        """Adds a bay to a wall; it replaces the openings that it touches.
+        """Adds a bay to a wall, in place of the openings that it touches.
 
         Args:
             edge: number of the wall.
-            x: middle of the bay along the wall [m].
+            x: distance from the start of the wall to the middle of the bay [m].
             width: width of the bay [m].
             bay: the bay.
         """

@@ -325,7 +325,7 @@ def part_mesh(part: Part, meshes: Mapping[str, Mesh]) -> Mesh:
     """Returns the mesh of a part, in the structure's frame S [m].
 
     Cylinders and spheres become slightly larger prisms. `meshes` maps names to
-    meshes.
+    meshes, and contains the mesh to which the part refers, if any.
     """
     shape = part.shape
     scale = np.ones(3)

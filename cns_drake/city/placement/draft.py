@@ -108,7 +108,7 @@ class Draft:
     def open_range(self) -> None:
         """Makes the numbers in new names begin after the next multiple of 50.
 
-        It is called before each task, such as placing a row of trees. If a task
+        Call it before each task, such as placing a row of trees. If a task
         places a few structures more or fewer, the names of structures in later
         tasks, to which `stages.yaml` refers, stay the same.
         """

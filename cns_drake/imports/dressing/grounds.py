@@ -52,7 +52,7 @@ _GRID = 0.001
 
 
 def is_dense(structures: Sequence[Imported]) -> bool:
-    """Returns whether buildings cover at least 12 % of the area around them."""
+    """Returns whether buildings cover at least 12 % of their convex hull."""
     outlines = [
         one.structure.model.footprint
         for one in structures
@@ -65,7 +65,7 @@ def is_dense(structures: Sequence[Imported]) -> bool:
 
 
 def paved(structure: Structure) -> Structure:
-    """Returns a ground structure with the colour of paving stones."""
+    """Returns a copy of a structure in the colour of paving stones."""
     model = structure.model
     parts = tuple(replace(part, rgb=_PAVED) for part in model.parts)
     return replace(structure, model=replace(model, parts=parts))

@@ -38,7 +38,10 @@ def _integral(
 
 @dataclass(frozen=True)
 class Arc:
-    """An arc in a road's course; a straight line if `curvature` is 0 [1/m]."""
+    """A circular arc in a road's reference line.
+
+    With a `curvature` of 0 [1/m] it is a straight line.
+    """
 
     curvature: float
 
@@ -238,10 +241,10 @@ class Cubics:
         return np.where(index < 0, 0.0, value)
 
     def bend(self, start: float, end: float) -> float:
-        """Returns the greatest absolute second derivative in a stretch.
+        """Returns the greatest absolute second derivative of the function.
 
-        `start` and `end` of the stretch, as distances along the road [m], must
-        lie within one cubic piece.
+        The result is for the stretch of road from `start` to `end` [m], which
+        must lie within one cubic piece.
         """
         middle = (start + end) / 2.0
         index = int(np.searchsorted(self.starts, middle, side="right")) - 1

@@ -342,7 +342,7 @@ class _Block:
     roof: float
 
     def replaced(self, polygon: Polygon, low: float, high: float) -> _Block:
-        """Returns this block with another shape, and with a flat roof."""
+        """Returns this solid with a new footprint, new heights, a flat roof."""
         plain = {k: v for k, v in self.tags.items() if k != "roof:shape"}
         return _Block(self.name, plain, polygon, low, high, 0.0)
 
@@ -388,7 +388,9 @@ def make_buildings(
         year_attribute: tag with the year of construction; None for the usual
             tags.
         faults: counts parts that were repaired or left out.
-        once: whether a building inside another one is joined with it.
+        once: whether an outline inside the outline of another building is
+            treated as a part of this building, and outlines that occur twice
+            are made once.
     """
     outlines: list[_Block] = []
     parts: list[_Block] = []

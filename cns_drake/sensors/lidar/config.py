@@ -145,7 +145,13 @@ class LidarSection(Mount):
         return self
 
     def with_preset(self, preset: str) -> LidarSection:
-        """Returns another unit with the same pose and measurement settings.
+        """Returns this LiDAR with another model in its place.
+
+        The name of the preset, the number of columns and the range limits are
+        those of the preset; all other fields stay.
+
+        Args:
+            preset: name of the other model.
 
         Raises:
             InputError: there is no such preset.

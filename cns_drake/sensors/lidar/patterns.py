@@ -609,7 +609,14 @@ class _TimedPattern(BeamPattern):
 
     @abstractmethod
     def directions(self, times: np.ndarray) -> np.ndarray:
-        """Returns the (num_firings, num_lines, 3) directions at times [s]."""
+        """Returns the directions of all beams at the times of firings.
+
+        Args:
+            times: (F,) times of the firings since the start of the drive [s].
+
+        Returns:
+            (F, num_lines, 3) unit vectors in the sensor's frame S.
+        """
 
 
 @lru_cache(maxsize=4)

@@ -211,10 +211,11 @@ def texture(
 
     Args:
         light: the light that smooth, uniform surfaces would return.
-        row: (B,) row of each beam in `d_Wset`.
-        p_WSset: (K, 3) positions of the sensor in the world [m]; the ray in row
-            i of `d_Wset` starts at position i mod K.
-        d_Wset: (B, 3) unit directions of the rays in the world.
+        row: (B,) row of each of the B beams in `d_Wset`, which has an order of
+            its own.
+        p_WSset: (K, 3) positions of the sensor in the world [m]. The beam in
+            row i of `d_Wset` starts at position i mod K.
+        d_Wset: (B, 3) unit directions of the beams in the world.
         materials: materials of the geometries.
         group_of, normal_matrices, p_WLset: the three arrays that
             `RayCastingScene.surface_frames` returns.

@@ -62,8 +62,8 @@ class Ways(NamedTuple):
         length: (N,) length of the path so far [m].
         energy: (N,) fraction of the beam's light that gets to the origin and
             back.
-        depth: (N,) leaf area that each ray can still pass before it hits a
-            leaf.
+        depth: (N,) optical depth of foliage that each ray can still pass before
+            it hits a leaf.
         inside: (N,) index of the geometry inside which each ray begins; -1 for
             none.
         reach: (N,) float32, the range beyond which a ray need not be followed
