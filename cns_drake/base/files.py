@@ -288,7 +288,7 @@ def complete_part(path: Path) -> None:
     An older file of that name is replaced.
 
     Raises:
-        InputError: if that fails.
+        InputError: the file cannot be written to the disk or renamed.
     """
     with user_errors(path):
         part = part_path(path)

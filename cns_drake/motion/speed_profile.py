@@ -86,10 +86,15 @@ def find_speed_profile(
 
 
 def drive_positions(profile: SpeedProfile) -> np.ndarray:
-    """Returns path parameters (N,) [m] of a drive, for `make_time_scaling`.
+    """Returns where the drive is on its path at evenly spaced times.
 
-    They are given at times that are `KNOT_PERIOD` apart. The first few and the
-    last few are equal: the drive rests there.
+    Args:
+        profile: speeds of the drive along the path.
+
+    Returns:
+        (N,) path parameters [m], as `make_time_scaling` takes them: one for
+        each `KNOT_PERIOD`. The first few and the last few are equal, because
+        the drive starts and ends at rest.
     """
     u, speed, _ = profile
     times = np.concatenate(

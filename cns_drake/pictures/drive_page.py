@@ -258,12 +258,13 @@ class Plot:
 
     @classmethod
     def of(cls, name: str, unit: str, values: np.ndarray) -> Plot:
-        """Returns the plot of values that were measured at even times.
+        """Returns the plot of values over the time of a drive.
 
         Args:
             name: title of the plot.
-            unit: unit of the values.
-            values: (F,) values, one per frame of the drive.
+            unit: unit of the values: `km/h`, `m/s²` or `deg/s`.
+            values: (F,) values, one for each of the drive's F frames, which are
+                evenly spaced in time.
         """
         count = min(len(values), _MAX_SAMPLES)
         frames = np.linspace(0, len(values) - 1, count).round().astype(int)

@@ -56,8 +56,9 @@ class Placed(NamedTuple):
     """P groups of a scene whose poses were updated.
 
     Attributes:
-        rows: (P,) rows of the groups.
-        X_OLs: (P, 3, 4) poses; see `cns_drake.ray_casting.ray_groups.RayGroup`.
+        rows: (P,) indices of these groups among all groups of the scene.
+        X_OLs: (P, 3, 4) maps from each group's local frame L to the scene's
+            frame O; see `cns_drake.ray_casting.ray_groups.RayGroup`.
         in_sight: (P,) bool, whether rays can meet each group.
         moves: (P,) bool, whether each group has a `motion`.
     """

@@ -111,7 +111,7 @@ class RayGroup:
     def place(
         self, p_WO: np.ndarray, calc_X_WF: Callable[[FrameId], RigidTransform]
     ) -> None:
-        """Sets `X_OL` from the pose of the group's frame.
+        """Sets `X_OL`, the group's placement in the scene, for current poses.
 
         Args:
             p_WO: (3,) origin of the scene's frame O in the world [m].

@@ -20,8 +20,9 @@ class Topic:
     """A topic of a recording.
 
     Attributes:
-        name: e.g. `/lidar/points`.
-        message_type: e.g. `sensor_msgs/msg/PointCloud2`.
+        name: name of the topic, such as `/lidar/points`.
+        message_type: type of its messages, such as
+            `sensor_msgs/msg/PointCloud2`.
         latched: whether late subscribers get the last message, as for
             `/tf_static` (QoS durability "transient local").
     """

@@ -463,7 +463,7 @@ class Scenario(Section):
 
     @property
     def further_sensors(self) -> dict[str, SensorConfig]:
-        """Field -> sensor, for sensors of user-defined kinds."""
+        """Name of a field -> its sensor, for sensors of user-defined kinds."""
         return {n: one for n, one in self if isinstance(one, SensorConfig)}
 
     def with_returns(
@@ -533,13 +533,13 @@ class Scenario(Section):
         return self.with_fields({"transient": changes}, self.source)
 
     def with_driver(self, driver: Literal["real", "none"]) -> Scenario:
-        """Returns the scenario with another driver, who has the same seed.
+        """Returns the scenario with another driver.
 
         Args:
             driver: `real` for a driver who wanders and changes lanes as in
                 published drives (along waypoints, which have no lanes, the
-                driver only wanders); `none` for a driver who stays in the
-                middle of the lane.
+                driver only wanders), with the scenario's seed of the driver;
+                `none` for a driver who stays in the middle of the lane.
         """
         if driver == "none":
             return self.replaced(driver=DriverConfig())

@@ -95,7 +95,10 @@ def shipped_drives() -> dict[str, Path]:
 
 
 def recordable_drives() -> dict[str, Path]:
-    """Returns name -> file of the shipped drives whose stage ships as well."""
+    """Returns name -> scenario file of shipped drives that can be recorded.
+
+    A drive can be recorded if its map has the stage through which it goes.
+    """
     return {
         drive_name(path): path
         for folder in shipped_maps().values()

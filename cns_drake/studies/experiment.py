@@ -124,7 +124,7 @@ class MadeMap(Section):
 
     Attributes:
         name: name of the new map.
-        age: name of the map to age. Give either this map or a file to
+        age: name of the map to age. Give either a map to age or a file to
             import.
         years: number of years by which to age the map.
         import_file: file of a real city to import, in the folder `files` of the
@@ -289,7 +289,7 @@ class Experiment(Section):
 
 
 def shipped_experiments() -> dict[str, Path]:
-    """Returns name -> file of the experiments that ship."""
+    """Returns name -> file of the experiments in this package."""
     return {path.stem: path for path in sorted(_FOLDER.glob("*.yaml"))}
 
 

@@ -121,8 +121,9 @@ class Survey:
     """A drive whose map is labelled, with the simulation of its world.
 
     Attributes:
-        drive: the drive whose scans make the map: a recording, or `simulated`.
-        simulated: the same drive, simulated, for rays cast in its world.
+        drive: the source of the scans that make the map: a recording of the
+            drive, or the object in `simulated`.
+        simulated: simulation of the drive, in whose world rays can be cast.
         scenario: the scenario of the drive.
     """
 

@@ -200,9 +200,10 @@ class RedrawCity(MakeMap):
         return redrawn_inputs(self.map_folder, self.stage, self.seed)
 
     def finish_inputs(self, draft: Path) -> None:
-        """Writes inputs that contain names of structures; by default none.
+        """Writes further input files, such as `stages.yaml`; by default none.
 
-        An example is `stages.yaml`. To find the names, call
+        Override this function for files that contain names of structures, which
+        are not known before. To find them, call
         `cns_drake.city.generation.city_structures.make_city` with `draft`.
 
         Args:
@@ -286,7 +287,7 @@ class Version:
 
 
 def fresh_versions() -> list[Version]:
-    """Returns all versions of shipped maps that can be drawn freshly."""
+    """Returns the fresh versions of shipped maps in `worlds/fresh.csv`."""
     rows = read_records(worlds_folder() / "fresh.csv", _COLUMNS)
     return [
         Version(

@@ -55,9 +55,9 @@ def make_signals(graph: LaneGraph, begin: np.ndarray) -> Signals:
 
     Args:
         graph: lane graph with P pieces and C crossings.
-        begin: (P + C, P + C) distances along each path [m] at which small
-            vehicles begin to meet other paths and crossings, see
-            `cns_drake.traffic.streets.find_conflicts`.
+        begin: (P + C, P + C) distances along piece a at which the front of a
+            small vehicle reaches piece or crossing b [m], with the indices a,
+            b; see `cns_drake.traffic.streets.find_conflicts`.
     """
     pieces = graph.pieces
     flow = _flows(graph)
@@ -462,14 +462,16 @@ def swept_hulls(
 ) -> tuple[np.ndarray, np.ndarray]:
     """Returns the areas that a vehicle sweeps on a piece, step by step.
 
+    The areas include a lateral clearance of 0.25 m on either side.
+
     Args:
-        piece: the piece.
+        piece: the piece of the lane graph along which the vehicle drives.
         size: length and width of the vehicle [m].
         axles: x of the rear and the front axle from the vehicle's middle [m].
 
     Returns:
         N + 1 distances of the front bumper along the piece [m]; the N areas
-        swept from each distance to the next.
+        swept from each distance to the next, as seen from above [m].
     """
     line = piece.points[:, :2]
     along = distances_along(line)

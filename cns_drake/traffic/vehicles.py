@@ -377,12 +377,13 @@ def find_ahead(
 ) -> tuple[float, float]:
     """Returns the gap to the next vehicle ahead [m], and its speed [m/s].
 
-    Only vehicles on the same piece count. If none is ahead there, the gap is
+    Only vehicles on the given piece count. If none is ahead there, the gap is
     infinite and the speed 0.
 
     Args:
-        traffic: the traffic.
-        piece: number of the piece.
+        traffic: the vehicles, listed by the pieces of the lane graph on which
+            they are.
+        piece: number of the piece of the lane graph.
         s: distance of the front bumper along the piece [m].
         who: number of the vehicle for which the gap is computed.
     """
@@ -456,7 +457,7 @@ def is_walked(traffic: Traffic, c: int, way: int, is_large: bool) -> bool:
 
 @compiled
 def lane_over(streets: Streets, car: Any, c: int) -> tuple[int, float, float]:
-    """Returns where a lane on a vehicle's path meets an unmarked crossing.
+    """Returns where a vehicle's path along lanes meets an unmarked crossing.
 
     Args:
         streets: arrays of all lanes.
@@ -465,8 +466,9 @@ def lane_over(streets: Streets, car: Any, c: int) -> tuple[int, float, float]:
 
     Returns:
         Number of the first lane on the vehicle's path that meets the crossing;
-        the distances to the places where the vehicle enters and leaves the
-        crossing [m]. Without such a lane, they are -1, inf and inf.
+        the distance that the vehicle drives until its front reaches the
+        crossing [m]; and the distance until its rear has left it [m]. Without
+        such a lane, the result is -1, inf and inf.
     """
     begin, number = -car.s, len(streets.pieces) + c
     for column in range(CURRENT, NUM_PIECES):

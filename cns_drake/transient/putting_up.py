@@ -187,7 +187,7 @@ class _Stretch:
         self.yaw = math.atan2(outward[1], outward[0]) - np.pi / 2
 
     def place(self, x: float, y: float) -> np.ndarray:
-        """Returns the place (2,) in W of a point x, y in the frame [m]."""
+        """Converts a point (x, y) from the stretch's frame to W, (2,) [m]."""
         c, s = math.cos(self.yaw), math.sin(self.yaw)
         return self.middle + np.array([c * x - s * y, s * x + c * y])
 

@@ -79,15 +79,16 @@ def close(
 def loop_errors(
     loops: list[Loop], X_WL: np.ndarray, X_WK: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Returns the errors of loops, given poses of the keyframes.
+    """Returns how far keyframe poses deviate from what loops measure.
 
     Args:
         loops: the M loops.
-        X_WL: poses (L, 4, 4) of the target's keyframes.
-        X_WK: poses (K, 4, 4) of the source's keyframes.
+        X_WL: (N, 4, 4) poses of all N keyframes L of the target.
+        X_WK: (P, 4, 4) poses of all P keyframes K of the source.
 
     Returns:
-        (M,) distances [m]; (M,) angles [rad].
+        For each loop, the deviation of the source keyframe's pose from the
+        pose that the loop implies: (M,) distances [m]; (M,) angles [rad].
     """
     expected = implied_poses(loops, X_WL)
     E = poses.inverse(expected) @ X_WK[[loop.source for loop in loops]]
@@ -128,10 +129,14 @@ class LoopSearch:
     num_attempts: int = 0
 
     def near(self, X_TK: np.ndarray) -> np.ndarray:
-        """Returns the source's keyframes (M,) that are near the target drive.
+        """Returns which keyframes of the source are near the target drive.
 
         Args:
-            X_TK: (K, 4, 4) guessed poses of all keyframes of the source.
+            X_TK: (N, 4, 4) guessed poses of all N keyframes K of the source in
+                the target's world frame T.
+
+        Returns:
+            (M,) numbers of these keyframes.
         """
         return np.flatnonzero([self._place(X) is not None for X in X_TK])
 
@@ -158,10 +163,10 @@ class LoopSearch:
         return True
 
     def grow(self, track: Track) -> None:
-        """Tries to register all keyframes, outwards from known loops.
+        """Tries to register all keyframes, starting next to known loops.
 
-        The guess for a keyframe follows from the nearest keyframe that has a
-        loop and the drive's own motion between the two.
+        The initial guess for a keyframe is computed from the nearest registered
+        keyframe and the drive's own motion between the two keyframes.
         """
         path = self.source.path
         away = np.full(len(path), np.inf)

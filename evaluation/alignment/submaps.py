@@ -79,12 +79,15 @@ class Submaps:
     def bend(self, X_VK: np.ndarray) -> np.ndarray:
         """Returns poses of all frames, given new poses of the keyframes.
 
+        Each keyframe is moved from its pose in the world W to a pose in a new
+        world V. Between two keyframes, frames are moved by an interpolation of
+        the two rigid motions.
+
         Args:
             X_VK: (K, 4, 4) new poses of the keyframes.
 
         Returns:
-            (N, 4, 4) poses; between two keyframes, their motions are blended
-            along the path.
+            (N, 4, 4) poses of the LiDAR in V at all frames of the drive.
         """
         moves = X_VK @ poses.inverse(self.X_WK)
         frames = np.arange(len(self.X_WS))

@@ -190,9 +190,10 @@ class TemporalChange:
 
     @property
     def num_in_hull(self) -> int:
-        """Number of points of both maps in the hull of the opposite map.
+        """Number of points of each map in the hull of the other, summed.
 
-        In the paper's notation, it is |H(S, T) u H(T, S)|.
+        In the paper, this is the size of the union of H(S, T) and H(T, S), for
+        the source S and the target T.
         """
         return (
             self.source_to_target.num_in_hull
@@ -201,7 +202,11 @@ class TemporalChange:
 
     @property
     def num_unchanged(self) -> int:
-        """Number of unchanged points of both maps: |O(S, T) u O(T, S)|."""
+        """Number of unchanged points of both maps, summed.
+
+        In the paper, this is the size of the union of O(S, T) and O(T, S), for
+        the source S and the target T.
+        """
         return (
             self.source_to_target.num_unchanged
             + self.target_to_source.num_unchanged

@@ -59,11 +59,15 @@ _LABEL = np.dtype([("label", "<u2"), ("instance", "<u2")])
 class KittiDrive(BinDrive):
     """A drive of KITTI odometry.
 
-    The files contain camera poses X_C0C. They become LiDAR poses
-    X_S0S = inverse(Tr) X_C0C Tr. The world frame W is S0, the frame of the
-    LiDAR at the first scan, whose z is up. With a file `first_pose.txt`, which
-    cns-drake exports, W is the world frame of the recording instead. With a
-    folder `labels`, points have the fields `label` and `instance`.
+    The files contain poses X_C0C of camera C, relative to the first one. They
+    are converted to poses of the LiDAR S, X_S0S = inverse(X_CS) X_C0C X_CS;
+    `calib.txt` contains X_CS under the name `Tr`. Without `calib.txt`, the
+    poses are taken as those of the LiDAR.
+
+    The world frame W is S0, the frame of the LiDAR at the first scan, whose z
+    is up. With a file `first_pose.txt`, which cns-drake exports, W is the world
+    frame of the recording instead. With a folder `labels`, points have the
+    fields `label` and `instance`.
     """
 
     def __init__(self, path: Path, columns: int | None = None):

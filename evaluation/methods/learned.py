@@ -150,8 +150,9 @@ class LearnedScan:
     """Descriptor of one scan.
 
     Attributes:
-        features: (TURNS, FEATURES) float32 of unit length; all zero if the scan
-            has no points within range.
+        features: (48, 128) float32, a feature vector for each of 48 sectors of
+            azimuth. The norm of the whole array is 1, or 0 if the scan has no
+            points within range.
     """
 
     features: np.ndarray
@@ -175,7 +176,8 @@ class LearnedDatabase:
 class Learned(Method[LearnedScan, LearnedDatabase]):
     """A learned descriptor: a small network on polar images of scans.
 
-    The score of two scans is the cosine of their features at the best heading.
+    The score of two scans is the cosine similarity of their features, maximised
+    over the relative heading.
     """
 
     Config = LearnedConfig

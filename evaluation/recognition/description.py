@@ -68,8 +68,7 @@ def joined_scans(
         every: scans of each drive, with a method's descriptions.
         worlds: number of the world of each drive. Different worlds are moved so
             far apart that their scans never match.
-        most: greatest number of scans that are returned, the first ones; None
-            for all.
+        most: number of scans to keep, from the start of the list; None for all.
     """
     poses = []
     for one, world in zip(every, worlds, strict=True):
@@ -184,16 +183,16 @@ class _Seen:
     def cloud(
         self, sensor: QuerySensor | None, kind: _Kind, max_range: float
     ) -> np.ndarray:
-        """Returns the frame's cloud (N, 3), as `gather` returns it.
+        """Returns the point cloud (N, 3) at the frame, in the sensor's frame.
 
-        With further fields, the cloud is a structured array (N,). A second call
-        with equal arguments returns the same array.
+        With fields in addition to x, y and z, the cloud is a structured array
+        (N,). A second call with equal arguments returns the same array.
 
         Args:
-            sensor: turn and hidden sector that are applied to the sensor; None
-                for the sensor as recorded.
-            kind: number of merged scans, how many of these come before the
-                frame, and names of the further fields.
+            sensor: sensor that replaces the recorded one in a query, turned or
+                with a hidden sector; None for the sensor as recorded.
+            kind: number of consecutive scans to merge, how many of these come
+                before the frame, and names of the additional fields.
             max_range: greatest absolute x, y and z of a point [m].
         """
         key = sensor, kind, max_range

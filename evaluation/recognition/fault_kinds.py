@@ -131,20 +131,23 @@ def mean_visible_change(overlaps: np.ndarray) -> tuple[float, int]:
 
 
 def fault_kinds(result: PlaceRecognition, evidence: PairEvidence) -> list[str]:
-    """Returns the reason why each query's best place is wrong.
+    """Returns, for each query, why its best place is wrong.
+
+    The best place is the one that the method ranks first. The right place is
+    the match whose scan shows most of the query's scan.
 
     Returns:
-        For each of Q queries, "" if the best place is right, and otherwise the
-        first of these reasons that applies:
+        For each of Q queries, "" if the best place is a match, and otherwise
+        the first of these reasons that applies:
 
         - `no_place`: the query has no match.
         - `no_candidate`: the method finds no place, or rejects all places.
-        - `too_far`: the distance to the best place is at most twice the radius
-          of the protocol, but the place is no match.
-        - `hidden`: the right place shows less than half of the query's scan,
-          and at least half of the rest is hidden from the place's sensor.
-        - `no_overlap`: the right place shows less than half of the query's
-          scan, for another reason.
+        - `too_far`: the best place is just beyond the radius of a match: at
+          most twice that radius away.
+        - `hidden`: the right place's scan shows less than half of the query's
+          scan, and at least half of the rest is hidden from its sensor.
+        - `no_overlap`: the right place's scan shows less than half of the
+          query's scan, for another reason.
         - `changed`: at least a quarter of the surroundings is new or gone.
         - `twin`: the best place fits the query as well as the right place does.
         - `elsewhere`: no other reason applies.

@@ -139,7 +139,9 @@ def faults(
     distances: np.ndarray,
     radius: float,
 ) -> np.ndarray:
-    """Returns the reason for each query's wrong best place.
+    """Returns, for each query, why its best place is wrong.
+
+    The best place is the one that the method ranks first.
 
     Args:
         outcomes: outcomes of Q queries.
@@ -148,11 +150,11 @@ def faults(
         radius: radius of a match [m].
 
     Returns:
-        (Q,) the first reason that applies: "" if the best place is right;
-        `no_place` if the query has no match; `no_candidate` if the method finds
-        no place, or rejects all places; `other_city` if the best place is in
-        another city; `too_far` if the best place is no match, but at most twice
-        the radius away; otherwise `elsewhere`.
+        (Q,) "" if the best place is a match, and otherwise the first reason
+        that applies: `no_place` if the query has no match; `no_candidate` if
+        the method finds no place, or rejects all places; `other_city` if the
+        best place is in another city; `too_far` if the best place is at most
+        twice the radius away; `elsewhere` if no other reason applies.
     """
     wrong = [
         ~outcomes.has_match,

@@ -52,7 +52,7 @@ class QueryOutcomes:
 
     @property
     def own_blocks(self) -> np.ndarray:
-        """(Q,) block of each query; without `blocks`, one for each query."""
+        """(Q,) block of each query: `blocks`, or a block of its own."""
         return np.arange(len(self)) if self.blocks is None else self.blocks
 
     @property

@@ -38,12 +38,15 @@ _UNKNOWN, _SHOWN, _BEHIND = range(3)
 
 
 class Shares(NamedTuple):
-    """Which shares of given points a scan shows and hides; NaN without points.
+    """Shares of given points that a scan shows and hides; NaN without points.
+
+    A point can be neither shown nor hidden, for example in front of all
+    surfaces.
 
     Attributes:
-        shown: share of points on surfaces that this scan shows.
-        hidden: share of points that lie behind all returns of this scan around
-            their direction.
+        shown: share of points on surfaces that the scan shows.
+        hidden: share of points that the scan's sensor cannot see: the returns
+            in neighbouring directions are all nearer than the point.
     """
 
     shown: float

@@ -90,7 +90,8 @@ class Report:
         recognitions: place recognition of all pairs without their controls, and
             of drives compared with themselves.
         differences: AUC differences between methods.
-        evidence: (database, query) -> evidence on why best places are wrong.
+        evidence: (database, query) -> evidence on why the best-scoring place
+            of a query is wrong.
         tracks: drive -> time stamps and poses, also for the controls.
         drives: drive -> what the page shows of it.
         illustrations: figures, in the order of the page.

@@ -142,7 +142,11 @@ class Reference:
         return result.pair[0] in self.city_names and self._ran(result)
 
     def mode(self, method: str) -> Mode:
-        """Returns in which mode the source counted a method's queries."""
+        """Returns which queries count in the published numbers of a method.
+
+        The mode is `all`, or `filtered` for only the queries with a match. It
+        is `all` for a method without published numbers.
+        """
         modes = (key[4] for key in self.recognitions if key[3] == method)
         return next(modes, "all")
 

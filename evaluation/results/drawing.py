@@ -38,7 +38,7 @@ _WEBP_QUALITY = 82
 
 
 def unit(rgb: tuple[int, int, int]) -> tuple[float, float, float]:
-    """Returns a colour scaled to 0 to 1, as matplotlib needs it."""
+    """Scales a colour from 0 to 255 to 0 to 1, as matplotlib needs it."""
     red, green, blue = rgb
     return red / 255.0, green / 255.0, blue / 255.0
 

@@ -358,8 +358,9 @@ def correlations(
     -1 whatever they show.
 
     Args:
-        results: the table of results, with rows either all with or all without
-            the gate.
+        results: the table of results. Its rows must be either all measured with
+            the gate, which rejects places by the method's own pose estimate, or
+            all without it.
         x: name of the factor or metric.
         metric: name of a metric of place recognition.
     """

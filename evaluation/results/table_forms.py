@@ -250,14 +250,14 @@ def keyed(
 
 
 def protocol_columns(path: str) -> Columns[Any]:
-    """Returns columns of `Table.of` that show the protocol of each item.
+    """Returns table columns with the protocol of each item, for `Table.of`.
 
     There is a column for each option of the protocol; the last column contains
     the name of the protocol.
 
     Args:
-        path: attribute of an item that contains its protocol, such as
-            `result.protocol`.
+        path: where an item holds its protocol: attribute names joined by dots,
+            such as `result.protocol`.
     """
     columns = keyed(
         {name: name for name in PROTOCOL_COLUMNS},

@@ -99,9 +99,10 @@ def choose_methods(
             defaults.
 
     Raises:
-        InputError: if a name is unknown, or of a method that runs anyway, a
-            file registers no method or a method with a known name, an optional
-            method is not installed, or a setting is unknown or does not fit.
+        InputError: `files` contains an unknown name, a shipped method, the same
+            file twice, or a file that registers no method or one whose name is
+            taken; an optional method is not installed; or a setting is unknown
+            or its value is not valid.
     """
     chosen = [MethodChoice(name) for name in shipped_methods()]
     stems = set()

@@ -32,14 +32,15 @@ class RecordingInfo:
 
     Attributes:
         name: name of the recording.
-        path: file or folder from which it is read.
+        path: file or folder of the recording.
         map_name: name of the map.
         stage: name of the stage; a map's stages, sorted by name, are in the
             order of time.
         way: fields of the scenario that determine the path of the drive; None
             if unknown.
         needs: names of the jobs that make the recording; empty if it exists.
-        made_by: function that opens the drive instead of `path`, if any.
+        made_by: function that opens the drive; None to open the recording at
+            `path` with its default options.
         lidar_field: number of rings and field of view of the LiDAR; None if
             unknown.
     """
@@ -132,11 +133,11 @@ class City:
         return [(recording, last) for recording in earlier]
 
     def recognition_pairs(self, *, with_itself: bool = False) -> list[Pair]:
-        """Returns pairs of database and query.
+        """Returns the pairs (database, query) for place recognition.
 
-        Every earlier stage is a database for queries from the last stage. If
-        there are published numbers for the reversed pair, the last stage is
-        also a database for queries from this earlier stage.
+        Each earlier stage is paired with the last stage as the query. If the
+        reference also has numbers for the reversed pair, in which the last
+        stage is the database, that pair is added.
 
         Args:
             with_itself: whether to add a pair of each stage with itself, for

@@ -44,7 +44,7 @@ def explain_faults(
     results: tuple[Part, ...],
     protocol: RetrievalProtocol,
 ) -> PairEvidence | None:
-    """Returns evidence on why the best places of queries are wrong.
+    """Returns evidence on why methods rank wrong places first for queries.
 
     The result is None if a drive is compared with itself and never passes a
     place twice.
@@ -196,7 +196,7 @@ class _Shown:
 
     @cached_property
     def tree(self) -> cKDTree:
-        """Search tree of the upright points."""
+        """Search tree of the points on upright objects (`standing`)."""
         return cKDTree(self.standing, balanced_tree=False, compact_nodes=False)
 
     def coinciding(self, points: np.ndarray) -> float:

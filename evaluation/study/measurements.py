@@ -262,14 +262,15 @@ def crowded(
     there are fewer.
 
     Args:
-        database: the drive.
-        distractors: described drives through other cities, each with one file
-            per method.
-        method: index of the method whose files are read.
+        database: a drive, with a method's descriptions of its places.
+        distractors: for each drive through another city, one file per method
+            with the descriptions of its places.
+        method: index of the method in these files.
         num_others: number of places to append.
 
     Returns:
-        The drive with all places, and the name of each place's own drive.
+        The database with all places; and for each place, the name of the drive
+        from which it comes.
     """
     known = [database]
     for parts in distractors:

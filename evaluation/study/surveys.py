@@ -248,14 +248,14 @@ class RecordingSurvey:
 
 
 def described_key(method: str, protocol: RetrievalProtocol) -> str:
-    """Returns the key of descriptions by another protocol than the study's.
+    """Returns the key in `RecordingSurvey.described` for a second protocol.
 
-    It is a key of `RecordingSurvey.described`. Descriptions by the study's own
-    protocol have the key of their method.
+    A method's descriptions by the study's own protocol have the key of the
+    method. Use this function for its descriptions by any other protocol.
 
     Args:
         method: key of the method.
-        protocol: the other protocol, such as that of published results.
+        protocol: the second protocol, such as that of published results.
     """
     return f"{method},{protocol.name}"
 

@@ -224,7 +224,10 @@ class Assembly:
     def uniform(
         self, low: float, high: float, digits: int | None = None
     ) -> float:
-        """Returns a random number, rounded to `digits` decimals if given."""
+        """Returns a random number, uniform from `low` to below `high`.
+
+        If `digits` is given, the number is rounded to that many decimals.
+        """
         value = float(self.rng.uniform(low, high))
         return value if digits is None else round(value, digits)
 
@@ -261,9 +264,10 @@ class Assembly:
             self.place(part, shape, (0.0, 0.0, z), rgb=rgb)
 
     def paint(self, **colours: Rgb) -> None:
-        """Declares the building's materials and their colours, by keyword.
+        """Declares the building's materials: name=colour, as keywords.
 
-        `add_to` accepts only these materials.
+        Call it before `add_to`, which adds meshes to the part of a declared
+        material.
         """
         self._colours = colours
         self._pieces = {material: [] for material in colours}

@@ -113,15 +113,17 @@ class WallCells:
         bands: Sequence[Band],
         reliefs: Sequence[Relief],
     ) -> WallCells:
-        """Returns the cells of a wall with its bands, openings and arches.
+        """Divides a wall into cells of one depth each.
 
         Args:
             length: length of the wall [m].
             zs: increasing heights that divide the wall into R rows [m].
-            groups: (R,) number of the group of each row; a face can span
-                several rows only if they are in the same group.
-            bands: strips along the whole wall.
-            reliefs: openings and arches; later ones cover earlier ones.
+            groups: (R,) number of the group of each row. Faces of the wall's
+                mesh can span several rows of one group, but not rows of
+                different groups.
+            bands: strips along the whole wall, each with its depth.
+            reliefs: rectangles and arches on the wall, each with its depth;
+                later ones cover earlier ones.
 
         Raises:
             ValueError: a relief extends beyond the wall, or an arch lies on
@@ -360,7 +362,7 @@ class Facade:
     plain: frozenset[int] = frozenset()
 
     def stacked(self, count: int) -> Facade:
-        """Returns the facade of `count` storeys, one above another."""
+        """Returns a facade that repeats this one `count` times upwards."""
         bands = tuple(lifted(b, k * self.height) for k in range(count)
                       for b in self.bands)  # fmt: skip
 
@@ -393,11 +395,11 @@ def facade_mesh(points: ArrayLike, facade: Facade, z0: float = 0.0) -> Mesh:
 
     Args:
         points: (N, 2) corners of the outline, counter-clockwise [m].
-        facade: the walls.
+        facade: description of the walls.
         z0: height of the foot of the walls [m].
 
     Raises:
-        ValueError: a patch extends beyond its wall.
+        ValueError: a window, door or other relief extends beyond its wall.
     """
     return _quads_mesh(points, facade, z0, wall_quads)
 

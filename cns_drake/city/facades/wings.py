@@ -577,10 +577,10 @@ class Openings:
         """Adds the walls, their panes and the roof to the building.
 
         Args:
-            glass: depths of the openings with panes [m].
-            bands: strips around the wing.
-            material: material of walls and gables; that of the panes is
-                `glass`.
+            glass: depths behind the wall at which openings have panes [m].
+            bands: strips of the walls that run around the wing.
+            material: name of the material of walls and gables. The panes have
+                the material named "glass".
             attic: function that returns the windows of a gable, such as
                 `attic_window` makes; None for no windows.
         """

@@ -338,7 +338,11 @@ def _number(value: float, decimals: int) -> str:
 
 
 def structure_table(structures: Iterable[Structure]) -> str:
-    """Returns the CSV table of instance ids, names and classes."""
+    """Returns the text of `structures.csv`, with a row for each structure.
+
+    The columns are instance id (from 1), name, class, label (number of the
+    class), position in W [m], yaw [rad] and tags.
+    """
     names = "instance", "name", "class", "label", "x", "y", "z", "yaw", "tags"
     rows = (
         [

@@ -117,7 +117,11 @@ def parking_bays(area: BaseGeometry) -> Covering:
 
 
 def street_structures(network: RoadNetwork) -> list[Structure]:
-    """Returns the ground of all streets, at the heights of the roads."""
+    """Returns the ground of a road network's streets, as structures.
+
+    These are the carriageway, parking bays, kerbs, sidewalks and medians, at
+    the heights of the roads.
+    """
     bays = unary_union(list(network.areas.parking_bays.values()))
     return street_surfaces(
         network.areas,

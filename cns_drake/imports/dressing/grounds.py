@@ -214,7 +214,7 @@ def guessed_streets(
     drives: Sequence[WaypointDrive],
     ground: Ground,
 ) -> Iterator[Imported]:
-    """Yields a carriageway and sidewalks along drives, on the ground.
+    """Yields structures for a carriageway and sidewalks along drives.
 
     Use it for a city whose file has no roads: its drives are assumed to be in
     the middle of the streets.

@@ -567,11 +567,12 @@ def simplified_drive(
     space: FreeSpace,
     tolerances: Sequence[float] = _SIMPLIFICATIONS,
 ) -> WaypointDrive | Obstacle:
-    """Returns a drive with few waypoints along a line, or where it fails.
+    """Returns a drive with few waypoints along a line, if one is possible.
 
-    The tolerances are tried one after the other, until a drive fits into the
-    free space. If none fits, the result is the place (2,) where the last one
-    fails [m]; see `steerable_drive`.
+    The tolerances are tried one after the other, until a drive stays in the
+    free space and has no bend that is too tight for the car. If there is no
+    such drive, the result is the place (2,) of the obstacle or bend in the
+    last attempt [m]; see `steerable_drive`.
 
     Args:
         xy: (N, 2) places on the line, about 1 m apart [m].

@@ -151,8 +151,8 @@ class ImportedStreets:
     ground, and all of these over sidewalks.
 
     Attributes:
-        areas: the carriageway (everything at road level), the lanes of class
-            road in it, sidewalks and medians.
+        areas: carriageway, sidewalks and medians. The carriageway is everything
+            at road level; `lane_area` contains only the lanes for driving.
         junctions: the area of all junctions.
         coverings: parts of the carriageway that are not road, such as parking
             bays.

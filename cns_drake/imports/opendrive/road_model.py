@@ -426,7 +426,8 @@ class ImportedRoad:
         Args:
             s: (N,) distances along the road [m].
             inside: (N,) distances that select the piece of the road, usually
-                equal to `s` (see `Cubics.at`).
+                equal to `s`. At a joint between two pieces, a distance slightly
+                before or after `s` selects one of them.
         """
         starts = np.array([piece.s for piece in self.pieces])
         index = np.searchsorted(starts, inside, side="right") - 1

@@ -103,9 +103,12 @@ def add_imu(
         name: the systems are named `<name>_accelerometer`, `<name>_gyroscope`
             and `<name>_noise`.
 
+    Returns:
+        The systems of the IMU; unpack them as in the example.
+
     Raises:
         RuntimeError: the plant is not finalized.
-        TypeError: the body is of another type.
+        TypeError: `body` is neither a body nor a frame.
         ValueError: there is noise without a rate, or the rate is not positive.
 
     Example:

@@ -28,11 +28,13 @@ _NEIGHBOURS = 10.0
 
 
 class Sides(NamedTuple):
-    """P additional rays, in the halves of beams that are next to an edge.
+    """P additional rays, cast where an edge lies between neighbouring beams.
+
+    Each ray represents the part of a beam that is towards the neighbour.
 
     Attributes:
-        row: (P,) row of the beam.
-        neighbour: (P,) row of the beam beyond the edge.
+        row: (P,) index of the beam among the beams of the turn.
+        neighbour: (P,) index of the neighbouring beam beyond the edge.
         share: (P,) fraction of its beam's light that the ray represents.
         d_Wset: (P, 3) unit directions in the world.
         reach: (P,) float32 length to cast, just beyond the nearer surface [m].

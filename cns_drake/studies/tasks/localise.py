@@ -142,10 +142,10 @@ def measure_localisation(
         spacing: distance between two queries [m].
 
     Returns:
-        An array for each entry of `starts` with the first method, then with the
-        second, and so on. Each contains one record of
-        `evaluation.localisation.localise.QUERY` per query. If no query is near
-        the map, there are no arrays.
+        An array for each pair of a method and an entry of `starts`: first those
+        of the first method, in the order of `starts`. Each array contains one
+        record of `evaluation.localisation.localise.QUERY` per query. If no
+        query is near the map, the list is empty.
     """
     mapped, asked = database(), query()
     maps: dict[tuple[float, int], estimators.LocalisationMap] = {}

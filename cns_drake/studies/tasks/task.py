@@ -162,7 +162,9 @@ class Jobs:
     def elsewhere(
         self, pair: Pair, needs: list[str]
     ) -> tuple[tuple[Part, ...], ...]:
-        """Returns the described drives through other cities that a pair needs.
+        """Returns descriptions of drives through other cities, for a pair.
+
+        Places of these drives are distractors: they enlarge the database.
 
         Args:
             pair: the pair; without distractors, the result is empty.
@@ -170,7 +172,8 @@ class Jobs:
                 describe these drives.
 
         Returns:
-            For each drive, one file for each method.
+            For each drive through another city, one file per method with the
+            descriptions of its places.
         """
         if not pair.distractors:
             return ()
