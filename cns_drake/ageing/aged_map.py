@@ -285,6 +285,9 @@ class _Writing:
         order in which they are built, and last those of the past. If more years
         after today are added, the instance ids of structures built before stay
         the same.
+
+        Raises:
+            InputError: there are more structures than instance ids.
         """
         world = self._world
         rows: list[Mapping[str, object]] = [*world.rows.values()]

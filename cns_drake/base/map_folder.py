@@ -69,7 +69,7 @@ class MapFolder:
         return found
 
     def stage(self, stage: str) -> Path:
-        """Returns the path of a stage's SDF file (for example, `01`'s)."""
+        """Returns the path of the SDF file of a stage, such as `01`."""
         return self.path / stage_name(stage)
 
     def stages(self) -> dict[str, Path]:

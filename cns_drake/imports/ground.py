@@ -172,10 +172,10 @@ def ground_of(
 def bottom_of(
     structures: Sequence[Imported], ground: Ground
 ) -> list[Structure]:
-    """Returns the guessed ground of a city without a terrain, as a structure.
+    """Returns the guessed ground of a city, as a list of one structure.
 
-    If the imported file has a terrain, it is among `structures`, and the result
-    is empty.
+    The list is empty if the imported file contains a terrain, which then is one
+    of `structures`.
 
     Args:
         structures: structures of the city.

@@ -128,18 +128,17 @@ def city_facts(
 ) -> dict:
     """Returns facts about an imported map, as a mapping.
 
-    They are the reference system, the origin, the level of detail and the years
-    of the stages. With `changes` or `dressing`, they also count what was drawn
-    at random.
+    The facts are the reference system, the origin, the level of detail and the
+    years of the stages. If given, `changes` and `dressing` add their own facts.
 
     Args:
         city: the city as in its file.
         options: options of the import.
         stages: names of the stages.
-        changes: changes in an additional first stage drawn at random; None if
-            there is no such stage.
-        dressing: details that were added to buildings and streets; None if none
-            were.
+        changes: facts about the random changes in an additional first stage;
+            None if there is no such stage.
+        dressing: details that were added to buildings and streets; None if
+            there are none.
     """
     facts: dict[str, object] = {
         "reference_system": city.reference_system or "unknown",

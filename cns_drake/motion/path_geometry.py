@@ -134,7 +134,11 @@ class SmoothPath:
         self._knot_yaw = np.unwrap(arctan2(tangents[:, 1], tangents[:, 0]))
 
     def evaluate(self, u: ArrayLike) -> PathJet:
-        """Returns the path and its derivatives at parameters u (N,)."""
+        """Returns the path, and its derivatives with respect to u.
+
+        Args:
+            u: (N,) path parameters, from 0 to `end` [m].
+        """
         u = np.atleast_1d(np.asarray(u, dtype=float))
         p, d1, d2, d3, d4 = self._spline.evaluate(u)
         (x1, y1, z1), (x2, y2, z2) = d1.T, d2.T

@@ -61,7 +61,7 @@ class StageDifference:
 
 
 def read_parts(world: World) -> dict[str, list[Part]]:
-    """Returns name -> parts, for all structures of a world that never move."""
+    """Returns name -> parts, for the structures of a world that cannot move."""
     plant = world.plant
     context = plant.CreateDefaultContext()
     geometries = read_perception_geometry(

@@ -80,7 +80,7 @@ class Placed(NamedTuple):
         )
 
     def below(self, row: int) -> Placed:
-        """Returns only the groups whose entry in `rows` is less than `row`."""
+        """Returns only the groups with row numbers less than `row`."""
         kept = self.rows < row
         return Placed(*(one[kept] for one in self))
 

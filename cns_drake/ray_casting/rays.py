@@ -15,9 +15,10 @@ from cns_drake.base.compiled import compiled
 class Rays(NamedTuple):
     """N rays, cast from one or several poses of a sensor S.
 
-    O is the frame of the scene: the axes are those of the world, the origin is
-    nearby. Ray i has direction i. In all other arrays, of any length n, entry i
-    mod n belongs to ray i.
+    O is the frame of the scene: its axes are those of the world, and its origin
+    is so near to the sensor that float32 is precise. Ray i has direction i. In
+    all other arrays, entry i mod n belongs to ray i, where n is the length of
+    the array.
 
     Attributes:
         p_OSset: (K, 3) float32 origins [m].
@@ -35,7 +36,7 @@ class Rays(NamedTuple):
     times: np.ndarray
 
     def select(self, rows: np.ndarray, max_ranges: np.ndarray) -> Rays:
-        """Returns the rays in the given rows, with new maximum ranges."""
+        """Returns some of the rays, given by index, with new maximum ranges."""
         return Rays(
             self.p_OSset[rows % len(self.p_OSset)],
             self.R_OSset[rows % len(self.R_OSset)],

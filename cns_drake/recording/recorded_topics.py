@@ -95,11 +95,12 @@ def image_topic(camera_name: str, kind: str) -> Topic:
 
 
 def camera_topic(camera_name: str, kind: str) -> Topic:
-    """Returns one of the topics of a camera.
+    """Returns the name and message type of a camera's topic.
 
     Args:
         camera_name: name of the camera.
-        kind: kind of messages: `image`, `depth`, `label` or `camera_info`.
+        kind: what the topic carries: `image`, `depth`, `label` or
+            `camera_info`.
     """
     message_type = {
         "image": ros_types.COMPRESSED_IMAGE,

@@ -21,7 +21,7 @@ class SurfaceHeights(Protocol):
         """Whether the surface is at z = 0 everywhere."""
 
     def heights(self, xy: ArrayLike) -> np.ndarray:
-        """Returns the heights (N,) at places (N, 2) [m]."""
+        """Returns the heights (N,) of the surface at places (N, 2) in W [m]."""
 
 
 # Distance between the places on centrelines that are searched first [m].

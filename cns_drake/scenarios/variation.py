@@ -172,10 +172,13 @@ def vary(
         base: the drive that all members are made from.
         family: what varies among the members.
         source: file of the family, for error messages.
-        redraw: see `load_family`.
+        redraw: function that generates cities along the streets of a map, see
+            `load_family`. Only a family with `city_seeds` needs it.
 
     Raises:
-        InputError: see `load_family`.
+        InputError: a file that the family names cannot be used, the base has no
+            map, or a stage, class or LiDAR of the family does not exist.
+        ValueError: the family has `city_seeds`, but `redraw` is None.
     """
     if base.map is None:
         raise InputError(

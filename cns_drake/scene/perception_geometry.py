@@ -95,7 +95,7 @@ def check_shape(name: str, shape: Shape) -> None:
 
 
 def anchored_frames(plant: MultibodyPlant) -> frozenset[FrameId]:
-    """Returns the geometry frames of a plant that can never move."""
+    """Returns those geometry frames of a plant that are fixed to the world."""
     bodies = plant.GetBodiesWeldedTo(plant.world_body())
     frames = (plant.GetBodyFrameIdIfExists(body.index()) for body in bodies)
     return frozenset(frame for frame in frames if frame is not None)

@@ -393,9 +393,9 @@ def train(
             first: running means of the gradients.
             second: running means of the squared gradients.
             step: number of the step, from 0.
-            images: images of the scans of a batch.
-            weights: targets, see `Batch.weights`.
-            counts: see `Batch.counts`.
+            images, weights, counts: fields of a `Batch`: its polar images, the
+                weights of the right places, and which places take part in the
+                softmax.
 
         Returns:
             The new `values`, `first` and `second`; the loss of the batch before

@@ -108,8 +108,9 @@ class Walkway:
         half_width: greatest distance of a walker from the middle [m].
         start, end: numbers of the places at the ends of the strip.
         crossing: number of the crossing on which the walkway lies; -1 for none.
-        free: (N, 2) for each point, the least and greatest offset to the right
-            between which no objects stand [m]; None if the whole width is free.
+        free: (N, 2) for each point, the two ends of the part of the width that
+            is free of objects [m]: distances from the middle of the strip,
+            positive to the right. None if the whole width is free.
         narrow: (N,) for each point, whether walkers fit only if they face along
             the walkway; None if they always fit.
     """
@@ -124,7 +125,10 @@ class Walkway:
 
     @property
     def limits(self) -> np.ndarray:
-        """Least and greatest offset of walkers to the right, (N, 2) [m]."""
+        """(N, 2) least and greatest distance of walkers from the middle [m].
+
+        Distances are positive to the right of the middle of the strip.
+        """
         if self.free is not None:
             return self.free
         sides = self.half_width * np.array([-1, 1])

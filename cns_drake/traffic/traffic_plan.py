@@ -624,7 +624,11 @@ class Trial:
         self._overlaps = np.zeros((len(self._half_sizes),) * 2, bool)
 
     def run(self, steps: range) -> None:
-        """Moves all bodies by the given time steps, and records overlaps."""
+        """Simulates the given time steps.
+
+        The motion of vehicles and walkers is stored, and also which pairs of
+        bodies overlap, the ego car included.
+        """
         traffic, crowd = self._traffic, self._crowd
         cars = traffic.cars
         past_cars = np.empty((len(steps), len(self._kinds)), cars.dtype)

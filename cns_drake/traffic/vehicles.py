@@ -260,7 +260,7 @@ def vehicle_poses(streets: Streets, cars: np.ndarray) -> np.ndarray:
     [m], yaw and pitch [rad].
 
     Args:
-        streets: arrays of all lanes.
+        streets: the lanes on which the vehicles are.
         cars: (...) records of dtype `VEHICLE`.
     """
     half = 0.5 * cars["length"]

@@ -92,7 +92,10 @@ class Registration:
 
 
 def covariances(cloud: small_gicp.PointCloud) -> np.ndarray:
-    """Returns the covariances (N, 3, 3) that small_gicp has estimated."""
+    """Returns the covariance of each point of a cloud, (N, 3, 3).
+
+    The covariances are those that small_gicp has estimated for the cloud.
+    """
     return np.reshape(cloud.covs(), (-1, 4, 4))[:, :3, :3]
 
 

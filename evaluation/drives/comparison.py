@@ -143,7 +143,10 @@ class _Way:
     tangent: np.ndarray
 
     def stops(self) -> np.ndarray:
-        """Returns the indices of samples that are `STOP_SPACING` apart."""
+        """Returns the indices of the samples at the stops.
+
+        Stops are points of the path at every `STOP_SPACING` metres.
+        """
         return np.arange(0, len(self.p_WS), round(STOP_SPACING / _PATH_SPACING))
 
 

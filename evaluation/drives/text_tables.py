@@ -391,8 +391,8 @@ def pose_matrices(path: Path, values: np.ndarray) -> np.ndarray:
         values: (N, 12) numbers.
 
     Returns:
-        (N, 4, 4) poses. The rotations are as in the text, and exact only to its
-        digits.
+        (N, 4, 4) poses. The rotation matrices contain the given numbers, and
+        are orthogonal only as far as the rounding of these numbers permits.
 
     Raises:
         InputError: if a number is not finite or a matrix is no rotation.

@@ -152,7 +152,7 @@ def track_drive(
 
 
 def losses(tracked: np.ndarray) -> list[tuple[float, bool]]:
-    """Returns how far the track was lost, each time that it was lost.
+    """Returns over which length of path the track was lost, for each loss.
 
     The track is lost while the position is off by more than `LOST`.
 
@@ -160,8 +160,8 @@ def losses(tracked: np.ndarray) -> list[tuple[float, bool]]:
         tracked: records of `TRACKED`.
 
     Returns:
-        For each loss, the length of path [m] until the track was found again,
-        and true; or the length until the end of the mapped section, and false.
+        For each loss, the length [m], and whether the track was found again. If
+        it was not, the length ends at the end of the mapped section.
     """
     found = []
     for stretch in np.unique(tracked["stretch"]):

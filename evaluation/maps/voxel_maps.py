@@ -83,9 +83,10 @@ def move(
 
     Args:
         table: (S,) slots of type `SLOT`.
-        sampled: (S, B) uint8, B bytes of bits for each slot; see `enter`.
+        sampled: (S, B) uint8, for each slot one bit per cell: whether the cell
+            has a sample, see `enter`.
         larger: (L,) empty slots, to which the voxels are copied.
-        larger_sampled: (L, B) uint8, to which the voxels' bits are copied.
+        larger_sampled: (L, B) uint8, to which `sampled` is copied.
     """
     for i in range(len(table)):
         if table[i].count != 0:

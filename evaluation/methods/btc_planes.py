@@ -37,7 +37,8 @@ class Planes:
     Attributes:
         centers: (P, 3) mean of each patch's points [m].
         normals: (P, 3) unit vectors of either sign.
-        covariances: (P, 3, 3) of the points, divided by their number [m^2].
+        covariances: (P, 3, 3) covariance matrix of each patch's points,
+            divided by their number N and not by N - 1 [m^2].
         counts: (P,) int64 number of points.
     """
 

@@ -408,10 +408,10 @@ class NetworkConfig(MethodConfig):
     @computed_field  # type: ignore[prop-decorator]
     @property
     def digest(self) -> str:
-        """Digest of the file of weights.
+        """Digest of the contents of the file `weights`: 16 hexadecimal digits.
 
-        Results depend on it, because the file's name alone does not identify
-        the weights.
+        Two files with the same name can contain different weights; their
+        digests differ.
         """
         content = read_bytes(self.weights, MOST_BYTES)
         return hashlib.sha256(content).hexdigest()[:16]

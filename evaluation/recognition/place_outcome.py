@@ -65,12 +65,12 @@ class PlaceOutcome:
         overlaps: np.ndarray,
         radius: float,
     ) -> PlaceOutcome:
-        """Returns the outcome of each query from the scores of all pairs.
+        """Returns the outcomes of a method's queries in a retrieval.
 
         Args:
-            method: method that made the scores.
-            is_gated: whether the scores are those after the gate.
-            retrieval: retrieval of Q queries and D places.
+            method: name of the method.
+            is_gated: whether the gate has changed the scores.
+            retrieval: scores and truth of Q queries and D places.
             query: time stamps (Q,) [ns] and positions (Q, 3) [m] of the
                 queries.
             drives: name of each place's drive (D names). The first name is

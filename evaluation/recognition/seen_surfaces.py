@@ -132,9 +132,9 @@ class SeenSurfaces:
         - Three or more returns with similar ranges: the distance is
           perpendicular to a plane through three of these returns.
         - Fewer returns, or returns from two surfaces at an edge: the distance
-          is along the line of sight. A point nearer than all these returns has
-          its distance from the nearest one, and a point farther than all of
-          them that from the farthest one. A point between them gets NaN.
+          is along the line of sight. For a point nearer than all these returns,
+          it is measured to the nearest return; for a point farther than all
+          returns, to the farthest. For a point between returns, it is NaN.
         - No return: the result is infinite.
 
         Args:

@@ -38,8 +38,8 @@ def along_the_way(
         is_known: (Q, D) bool, places that are allowed as answers.
         p_WQs: (Q, 3) positions of the queries, in the order of the drive [m].
         p_WPs: (D, 3) positions of the places in the world [m].
-        length: greatest distance of an earlier query that counts, along its
-            path [m].
+        length: earlier queries count up to this distance before the query,
+            along the path of the queries [m].
     """
     of_query, of_place = travelled(p_WQs), travelled(p_WPs)
     between = (of_place[1:] + of_place[:-1]) / 2.0

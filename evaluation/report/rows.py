@@ -271,7 +271,11 @@ def interval_text(kept: Row) -> str:
 
 
 def survival_numbers(survivals: Sequence[Survival]) -> tables.Table:
-    """Returns the shares of results that methods keep, for `survival.csv`."""
+    """Returns the table `survival.csv`.
+
+    For each method, it contains results without and with change of the city,
+    and the quotient of the two: the share that the method keeps.
+    """
     numbers: dict[str | tuple[str, str], tuple[str, ...]] = {
         "auc_unchanged": ("before", "auc"),
         "auc_changed": ("after", "auc"),

@@ -635,7 +635,14 @@ class _Cells:
         needed: Iterable[str],
         known: Iterable[str] = (),
     ) -> _Cells:
-        """Reads a file or, in a folder, the file with the usual name."""
+        """Reads the lines of a table of results.
+
+        Args:
+            path: the file, or a folder that contains it.
+            usual: name of the file in a folder.
+            needed: names of columns that the file must have.
+            known: names of further columns that are not factors.
+        """
         path = Path(path)
         file = path / usual if path.is_dir() else path
         try:

@@ -114,9 +114,8 @@ class City:
         stages: stage -> the drive through this stage.
         others: further drives, such as controls, which follow the route of one
             stage through another stage.
-        reference: published numbers for comparison. If there are published
-            numbers for a further pair of drives or by another protocol, a study
-            measures these, too.
+        reference: published numbers for comparison. They can add pairs of
+            drives, or a second protocol, to what a study measures.
     """
 
     name: str

@@ -220,7 +220,7 @@ class _Shown:
         return None if self.instances is None else sampled(self.instances)
 
     def seen_from(self, other: _Shown) -> np.ndarray:
-        """Returns the points `some` in the frame of another scan's sensor."""
+        """Returns the sample `some` in the frame of another scan's sensor."""
         X_OS = inverse(other.X_WS) @ self.X_WS
         return transform(X_OS, self.some)
 

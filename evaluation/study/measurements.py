@@ -96,7 +96,8 @@ def measure_costs(
     Args:
         reporter: reports progress.
         source: opens the query drive.
-        surveyed: file with the survey of the query drive, which has its poses.
+        surveyed: file with the `SurveyedDrive` of the query drive, from which
+            the drive's poses are read.
         methods: the methods.
         described: files with each method's descriptions of a database and of
             the query.

@@ -492,8 +492,8 @@ class SurveyFiles:
         The file contains a `PlacedDrive` and a `DescribedDrive`.
 
         Args:
-            key: key of the method. For descriptions by a second protocol, the
-                result of `evaluation.study.surveys.described_key`.
+            key: `MethodChoice.key` of the method. For descriptions by a second
+                protocol, what `evaluation.study.surveys.described_key` returns.
         """
         return Part(self.folder / f"described_{file_name(key)}.data")
 

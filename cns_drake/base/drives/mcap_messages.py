@@ -113,7 +113,7 @@ def xyz(v: Any) -> tuple[float, float, float]:
 
 
 def xyzw(q: Any) -> tuple[float, float, float, float]:
-    """Returns the components of a quaternion message."""
+    """Returns the components of a quaternion message, with w last."""
     return q.x, q.y, q.z, q.w
 
 

@@ -305,10 +305,11 @@ def plain(edge: int, length: float) -> list[Relief]:
 def rhythm(pitch: float, bays: Sequence[Bay], margin: float = 0.5) -> Layout:
     """Returns a layout that repeats a sequence of bays along each wall.
 
+    The layout of a wall is symmetric about its middle.
+
     Args:
         pitch: approximate width of a bay [m].
-        bays: the bays, which alternate from both ends of the wall towards the
-            middle.
+        bays: the sequence of bays, from an end of the wall to its middle.
         margin: distance of the outermost bays from the ends of the wall [m].
     """
 

@@ -97,11 +97,11 @@ def canopy(x0: float, x1: float, reach: float, z: float) -> Mesh:
 def front_canopy(
     outline: ArrayLike, half: float, reach: float, z: float
 ) -> Mesh:
-    """Returns a canopy in the middle of the front wall, above a door [m].
+    """Returns a canopy above a door in the middle of the front wall.
 
     The mesh is in the building's frame. `outline` contains the corners of the
-    walls; `half` is half the canopy's width, `reach` how far it extends out of
-    the wall, and `z` its height.
+    walls, `half` is half the canopy's width, `reach` is how far it extends out
+    of the wall, and `z` is its height [m].
     """
     front = WallFrame(outline, 0)
     middle = front.length / 2

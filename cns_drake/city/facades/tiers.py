@@ -184,12 +184,12 @@ def add_grooved(
 
 
 def block(outline: ArrayLike, facade: Facade, z0: float) -> Mesh:
-    """Returns walls with their glass and a flat lid, as one mesh.
+    """Returns one mesh of walls, their glass and a flat lid.
 
     Args:
         outline: (N, 2) corners of the walls, counter-clockwise [m].
-        facade: the walls.
-        z0: height of their foot [m].
+        facade: height, bands and openings of the walls.
+        z0: height of the foot of the walls [m].
     """
     pieces = [
         facade_mesh(outline, facade, z0),
@@ -246,7 +246,7 @@ def add_crown(
         facade: the topmost walls.
         z0: height of the foot of these walls [m].
         parapet: height of the walls above the roof [m].
-        part: name of the part.
+        part: name of the building's part that gets these walls and the roof.
         thickness: thickness of the parapet [m].
         items: names of the equipment on the roof, the most important first (see
             `cns_drake.city.facades.roofs.equip_roof`).

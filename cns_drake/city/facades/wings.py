@@ -140,7 +140,7 @@ class Wing:
         return massing.rectangle(self.x0, self.y0, self.x1, self.y1)
 
     def wall(self, edge: int) -> details.WallFrame:
-        """Returns the frame of the wall at an edge."""
+        """Returns the `WallFrame` of the wall at an edge."""
         return details.WallFrame(self.outline, edge)
 
     @property

@@ -33,14 +33,18 @@ class District(NamedTuple):
 def share_out(
     plan: CityPlan, streets: BaseGeometry, source: str
 ) -> list[District]:
-    """Returns the districts with their ground, in the order of the plan.
+    """Divides the ground of a city among its districts.
 
     `streets` is the area of carriageways, sidewalks and medians in W [m].
     `source` is the plan's file, named in error messages.
 
+    Returns:
+        The districts, in the order of the plan.
+
     Raises:
-        InputError: if a block or area is outside the city or on ground that is
-            taken, or if some ground belongs to no district.
+        InputError: if a district has no ground, because its ground is outside
+            the city, below streets or part of a district before; or if some
+            ground belongs to no district.
     """
     free = snap(box(*plan.bounds)).difference(streets)
     districts = []

@@ -175,7 +175,7 @@ class ScatterPlan(_Model):
             [m].
         ground: kinds of ground on which the objects can stand.
         kind: first part of the objects' names in the tables; by default the
-            object.
+            object's name or a common word, such as `tree` for `lime_tree`.
     """
 
     objects: Weights = Field(min_length=1)
@@ -200,7 +200,7 @@ class LinePlan(_Model):
         yaw_deg: angle by which each object is turned from its usual heading
             along the line [deg].
         kind: first part of the objects' names in the tables; by default the
-            object.
+            object's name or a common word, such as `tree` for `lime_tree`.
         parameters: settings of the objects, such as `{height: 1.1}` for a
             `garden_wall`.
     """
@@ -220,8 +220,8 @@ class ObjectPlan(_Model):
         object: name of the object to place.
         at: `[x, y]` of its position [m].
         yaw_deg: heading of the object [deg].
-        kind: first part of the object's name in the tables; by default
-            `object`.
+        kind: first part of the object's name in the tables; by default the
+            object's name or a common word, such as `tree` for `lime_tree`.
         parameters: settings of the object, such as `{height: 1.1}` for a
             `garden_wall`.
     """

@@ -166,11 +166,12 @@ class _Names:
     def of(self, field: str, patterns: Iterable[str]) -> list[str]:
         """Returns the names of the structures that patterns match.
 
-        They are in the order of the patterns and, for one pattern, in the order
-        of the city's structures. A pattern can be a name.
+        Names are in the order of the patterns and, for one pattern, in the
+        order of the city's structures. A pattern can be a name. `field` is the
+        field of `stages.yaml` with the patterns, for error messages.
 
         Raises:
-            InputError: a pattern matches nothing; the error names `field`.
+            InputError: a pattern matches nothing.
         """
         found: list[str] = []
         for pattern in patterns:

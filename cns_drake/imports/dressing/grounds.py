@@ -287,10 +287,11 @@ _SQUARE = 50.0
 def paved_gaps(
     structures: Sequence[Imported], drives: Sequence[WaypointDrive]
 ) -> Iterator[Imported]:
-    """Yields sidewalks that fill the gaps beside sidewalks near drives.
+    """Yields additional sidewalks, which fill gaps beside existing ones.
 
-    A gap is at most 3 m wide, such as between a sidewalk and a building. The
-    ground must be level.
+    A gap is unpaved ground at most 3 m wide, such as the strip between a
+    sidewalk and a building. Only gaps near the drives are filled. The ground
+    must be level.
     """
     near = near_drives(
         [one for one in structures if one.kind != "Tree"], drives

@@ -219,14 +219,17 @@ class Cubics:
     def at(
         self, s: np.ndarray, inside: np.ndarray, is_slope: bool = False
     ) -> np.ndarray:
-        """Returns the values (N,), or the slopes, at distances (N,) [m].
+        """Returns the function's values (N,), or its first derivatives.
+
+        Both are 0 before the first piece.
 
         Args:
-            s: distances along the road [m].
-            inside: distances that select the cubic piece, usually equal to `s`.
-                Where `s` is at a joint between two pieces, `inside` lies
-                slightly before or after the joint, within the wanted piece.
-            is_slope: whether to return slopes.
+            s: (N,) distances along the road [m] at which the function is
+                evaluated.
+            inside: (N,) for each distance, any point of the cubic piece that is
+                used [m]. It is usually `s` itself, and differs from `s` only at
+                a joint, where it selects the piece before or after the joint.
+            is_slope: whether to return the derivatives.
         """
         if not self:
             return np.zeros(len(s))

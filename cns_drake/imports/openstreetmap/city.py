@@ -350,7 +350,7 @@ class _Block:
 def standing_buildings(
     areas: Iterable[OsmArea], faults: ImportFaults, with_gone: bool = False
 ) -> Iterator[OsmArea]:
-    """Yields buildings and building parts that stand, or once stood.
+    """Yields buildings that stand, or that were demolished at a known date.
 
     All other buildings, such as those below the ground, are left out.
 

@@ -32,10 +32,10 @@ _CHUNK = 1 << 24
 
 
 def number_in_file(number: int) -> int:
-    """Returns an object's id in the user's file, given that in the sorted file.
+    """Returns the id that an object has in the user's file.
 
-    Editors give negative ids to new objects. When a file is sorted, these ids
-    are replaced by positive ones.
+    Editors give negative ids to new objects. The sorted copy of the file has
+    positive ids instead. `number` is the id in the sorted copy.
     """
     return _FIRST_NEW - number if number > _FIRST_NEW else number
 

@@ -108,12 +108,12 @@ class Lidar(LeafSystem):
     pose of S at the time of the output, which follows from the pose of P in the
     SceneGraph (a deskewed scan).
 
-    If the port `sweep` is connected, poses of P from a `Sweep` replace this
-    pose: one pose for the whole turn or, with motion distortion, one for each
-    column at its firing time. With motion distortion, a point is expressed in S
-    at its firing time t, as a real unit reports it: X_WS(start of the turn + t)
-    transforms it to the world. During the turn, all other moving geometry stays
-    where it is at the time of the output.
+    If the port `sweep` is connected, the poses of P come from a `Sweep` and not
+    from the SceneGraph: one pose for the whole turn or, with motion distortion,
+    one for each column at its firing time. With motion distortion, a point is
+    expressed in S at its firing time t, as a real unit reports it: X_WS(start
+    of the turn + t) transforms it to the world. During the turn, all other
+    moving geometry stays where it is at the time of the output.
 
     If the LiDAR was made with the argument `moving_bodies`, P and all other
     bodies of a plant move during the turn, with the velocities that they have

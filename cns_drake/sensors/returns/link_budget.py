@@ -52,7 +52,7 @@ class SheetRow:
 
     @property
     def snr(self) -> float:
-        """SNR at which the stated detection probability holds."""
+        """SNR at which a target is detected with this row's `probability`."""
         # `detection_probability`, solved for the root of the SNR.
         z = NormalDist().inv_cdf(self.probability)
         root = (z + math.sqrt(z * z + 4.0 * THRESHOLD_SNR)) / 2.0

@@ -84,15 +84,16 @@ def find_materials(
 ) -> Materials:
     """Returns the materials of geometries.
 
-    A geometry with the perception property ("lidar", "reflectivity") is a
-    smooth Lambertian reflector of this reflectivity. So is a geometry whose
-    structure has a value in the column `reflectivity` of `structures`; the
-    property takes precedence. For all others, class and colour count.
+    The reflectivity of a geometry is its perception property ("lidar",
+    "reflectivity") or, without this property, the value for its structure in
+    the column `reflectivity` of `structures`. In both cases, the geometry is a
+    smooth Lambertian reflector. Without either value, the material follows from
+    the class and the colour, and from words in the names.
 
     Args:
         geometries: the geometries.
-        structures: table of structures. A structure that is missing there has
-            no class.
+        structures: table of structures. A structure that is not in the table
+            has no class.
         is_wet: whether the ground is wet.
     """
     names = [geometry.structure for geometry in geometries]

@@ -25,7 +25,10 @@ Outcomes = Sequence[PlaceOutcome]
 
 
 class PoseTask(Task):
-    """Measures the errors of the poses of queries at their best places."""
+    """Measures the errors of pose estimates.
+
+    A method estimates the pose of each query relative to its best place.
+    """
 
     name = "pose"
     asks = True

@@ -55,10 +55,10 @@ class Pair:
         protocol: protocol of place recognition.
         distractors: number of places of other cities that are added to the
             database.
-        is_as_before: whether the condition differs from others in more than
-            the drives: it turns, tilts or partly hides the queries, or adds
-            distractors. If so, a task whose results depend only on the drives
-            skips the pair if it has measured the same drives already.
+        is_as_before: whether the pair can repeat drives of another pair,
+            because its condition changes the queries (turned, tilted or partly
+            hidden) or adds distractors. A task whose results depend only on the
+            drives then skips the pair if it has measured these drives before.
     """
 
     name: str
@@ -200,9 +200,9 @@ class Jobs:
 
         Args:
             part: the file.
-            function: function whose result is written. It takes a `Reporter`
-                and the arguments.
-            arguments: the arguments that follow.
+            function: function whose result is written. Its first argument is a
+                `Reporter`.
+            arguments: further arguments of the function.
             needs: names of jobs that must be finished before.
             cost: approximate cost of the job [s].
         """
