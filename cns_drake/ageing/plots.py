@@ -227,7 +227,7 @@ def _blind_edges(footprint: Polygon, near: Sequence[BaseGeometry]) -> set[int]:
 
 
 def building_plot(building: Structure) -> Plot:
-    """Returns a plot with a building's footprint, place and heading."""
+    """Returns the plot of land that a building's footprint covers."""
     area = building.footprint_W
     return Plot(area, building.xyz[:2], building.yaw, building.xyz[2])
 
@@ -489,7 +489,7 @@ def last(segments: np.ndarray, x: float) -> float:
 
     Args:
         segments: (N, 2, 2) segments; each row is x and y of an end [m].
-        x: the line [m].
+        x: x of all points of the line [m].
 
     Returns:
         The coordinate y [m]; NaN if no segment crosses the line.

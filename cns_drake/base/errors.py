@@ -90,7 +90,7 @@ def value_errors(place: object) -> Iterator[None]:
 
 @contextlib.contextmanager
 def errors_at(place: object, instead_of: str = "") -> Iterator[None]:
-    """Puts a place in front of the message of an InputError of the block.
+    """Puts a place before the message of an InputError in a `with` block.
 
     Args:
         place: file, field or other place, in words.

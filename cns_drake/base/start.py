@@ -13,7 +13,11 @@ from cns_drake.base.process import look_seldom
 
 
 def start(program: str, load: Callable[[], Callable[[], None]]) -> None:
-    """Imports and runs a program; an interrupt meanwhile is not an error.
+    """Imports and runs a program; reports errors and interrupts in one line.
+
+    After an `InputError`, the process exits with the status of the error. After
+    an interrupt (Ctrl-C or SIGTERM), it ends without a traceback. An interrupt
+    during the import takes effect when the import is complete.
 
     Args:
         program: name of the program.

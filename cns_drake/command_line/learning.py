@@ -65,9 +65,11 @@ def train(
         steps: Number of training steps; by default it follows from --minutes.
         seed: Seed of all random draws. Another seed gives other cities and
             other weights.
-        without: Kind of variation to leave out of the training: change between
-            drives, calibrated returns, or the driver's wandering. Use it to
-            measure what each kind contributes. May be repeated.
+        without: Kind of variation to leave out of the training: changes of the
+            city between drives (change); weather, and LiDAR returns with the
+            losses and errors of a data sheet (returns); or wandering in the
+            lane and lane changes (driver). Use it to measure what each kind
+            contributes. May be repeated.
         drawn_streets: Draw the streets at random as well, instead of using
             those of the shipped maps. Use it to test the weights on shipped
             maps without having trained on their streets.

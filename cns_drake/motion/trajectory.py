@@ -243,7 +243,7 @@ class Trajectory:
         return drive
 
     def with_ride(self, ride: BodyRide) -> Trajectory:
-        """Returns the same drive with a body that moves on its springs."""
+        """Returns the trajectory with heave, roll and pitch of the vehicle."""
         riding = copy.copy(self)
         riding._ride = ride
         return riding

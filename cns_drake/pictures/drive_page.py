@@ -81,16 +81,18 @@ class DriveRecord:
     Attributes:
         period: time between frames [s].
         X_WBs: poses of the vehicle.
-        X_WFs: geometry frame that moves -> its pose at each frame of the drive.
+        X_WFs: id of a geometry frame that moves -> its poses.
         scans: the scans to show: index of the frame, and positions (N, 3) of
             the points in W [m].
         speeds: forward speed of the vehicle [m/s].
         specific_forces_I: specific force in the IMU's frame I [m/s^2].
         angular_velocities_I: angular velocity w_WI_I [rad/s].
         num_points: number of points in each scan as measured.
-        limbs: for each moving object other than the vehicle: its first frame
-            -> its frames, each with its constant pose in the first frame.
-        names: first frame of an object -> name of the object in the page.
+        limbs: for each moving object other than the vehicle: id of its leading
+            geometry frame -> ids of all its geometry frames, each with its
+            constant pose in the leading one.
+        names: id of an object's leading geometry frame -> name of the object in
+            the page.
         images: name of a camera -> the images to show: index of the frame, and
             JPEG.
     """

@@ -288,7 +288,7 @@ def _meet_capsule(
     nearest = np.full(len(d), np.inf)
 
     def take(distance: np.ndarray, end: float) -> None:
-        """Updates `nearest` with hits on one part of the capsule.
+        """Updates the ranges `nearest` with hits on one part of the capsule.
 
         Args:
             distance: (N,) ranges to the sphere or cylinder of this part [m].

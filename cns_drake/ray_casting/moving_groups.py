@@ -33,11 +33,11 @@ class KnownPoses(NamedTuple):
     def find(
         self, frame: FrameId, calc_X_WF: Callable[[FrameId], RigidTransform]
     ) -> RigidTransform:
-        """Returns the pose X_WF of a frame F.
+        """Returns the pose X_WF of a frame F, computed if it is not known.
 
         Args:
             frame: the frame F.
-            calc_X_WF: function that computes the pose if F is not in `rows`.
+            calc_X_WF: function that computes X_WF from `frame`.
         """
         row = self.rows.get(frame)
         if row is None:

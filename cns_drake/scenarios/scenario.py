@@ -184,8 +184,8 @@ class TrafficConfig(Section):
         fcd: file of a SUMO trace (floating-car data) to replay instead of
             planned traffic; `vehicles` and `walkers` must then be 0.
         queues: whether vehicles stand in queues in all lanes, as in a rush
-            hour, except where the car itself drives. No other traffic is then
-            possible.
+            hour, except where the recording vehicle is. No other traffic is
+            then possible.
     """
 
     vehicles: int = Field(default=0, ge=0, le=_MOST_TRAFFIC)
@@ -448,7 +448,7 @@ class Scenario(Section):
 
     @property
     def files(self) -> tuple[Path, ...]:
-        """Files from which the scenario was read: its own and its bases'."""
+        """The scenario's own file, and those that it builds on (`base`)."""
         return self._files
 
     @property

@@ -78,7 +78,7 @@ def plan_pictures(folder: Path, pictures: Path) -> list[Job]:
 def picture_drives(
     reporter: Reporter, drives: tuple[_ShownDrive, ...], picture: Path
 ) -> None:
-    """Draws the drives of a map from above."""
+    """Draws the drives of a map from above, and writes the image file."""
     scenarios = [one.scenario for one in drives]
     stage_pictures.draw_drives(
         {s.name.replace("_", " "): s for s in scenarios}, picture

@@ -117,7 +117,7 @@ class Batch:
         images: (Q + P, RINGS, SECTORS, CHANNELS) uint8 polar images, queries
             first.
         weights: (Q, P) weights of right places, with sum 1 in each row.
-        counts: (Q, P) whether a place takes part in the softmax.
+        counts: (Q, P) whether a place takes part in the softmax of the loss.
     """
 
     images: np.ndarray

@@ -67,7 +67,8 @@ class DrawnCity:
         number: number of the city in the training.
         num_drives: number of drives along one route.
         change: whether drives see different stages and temporary changes.
-        returns: whether some drives have calibrated returns and weather.
+        returns: whether some drives have weather, and LiDAR returns with the
+            losses and errors of a data sheet.
         driver: whether drivers wander and change lanes.
         graded: whether the overlap of each scan with the places of the other
             scans is computed.

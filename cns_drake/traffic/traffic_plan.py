@@ -79,8 +79,8 @@ def find_runs(graph: LaneGraph, points: np.ndarray) -> list[_Run]:
         points: (N, 2) points of the car's path, 1 m apart.
 
     Returns:
-        The parts of the path in driving order, each with the number of its
-        piece, or -1 where the path is on no lane.
+        The parts of the path in driving order, each with the number of the lane
+        or junction path in `graph.pieces`, or -1 where the car follows none.
     """
     lines = [shapely.LineString(piece.points[:, :2]) for piece in graph.pieces]
     tree = shapely.STRtree(lines)
@@ -744,7 +744,7 @@ def _at_half_steps(values: np.ndarray) -> np.ndarray:
 
 
 def whom_to_leave_out(overlaps: np.ndarray, kept: int) -> list[int]:
-    """Returns the bodies to remove until none overlap, as sorted indices.
+    """Returns the bodies to remove so that none overlap, as sorted indices.
 
     Bodies with the most overlaps are removed first.
 

@@ -194,10 +194,10 @@ class _Stretch:
     def rectangle(
         self, x: float, length: float, y0: float, y1: float
     ) -> shapely.Polygon:
-        """Returns a rectangle beside the kerb, in W; all lengths in [m].
+        """Returns a rectangle of the stretch's frame, as a polygon in W [m].
 
-        It has the given length along the kerb, with its middle at `x`, and
-        extends from y0 to y1 across the kerb.
+        It is `length` long along the kerb, with its middle at `x`. Across the
+        kerb, it extends from `y0` to `y1`.
         """
         x0, x1 = x - length / 2, x + length / 2
         return shapely.Polygon(

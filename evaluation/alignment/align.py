@@ -198,6 +198,9 @@ def align(
         hold_first: whether the first drive must stay unchanged in any case,
             because other drives are already aligned to it.
 
+    Returns:
+        Both drives in one world, and a report.
+
     Raises:
         InputError: if the drives have too little in common, or a scan cannot be
             read.

@@ -357,9 +357,10 @@ class ChangeResult:
 def symmetric_changes(
     changes: Iterable[ChangeResult],
 ) -> dict[tuple[str, str, str], float]:
-    """Returns (map, stage, other stage) -> TCR_sym.
+    """Returns the symmetric temporal change ratio of pairs of stages.
 
-    Each pair of stages is contained in both orders.
+    The result maps (map, stage, other stage) to the ratio; each pair of stages
+    is contained in both orders.
     """
     values = {}
     for result in changes:

@@ -394,7 +394,7 @@ class _Element(NamedTuple):
     properties: list[tuple[str, str]]
 
     def dtype(self, order: str) -> np.dtype:
-        """Returns the type of a record with a given byte order."""
+        """Returns the NumPy type of one element, in a given byte order."""
         for name, kind in self.properties:
             if kind not in _PLY_TYPES:
                 raise ValueError(

@@ -83,7 +83,7 @@ class MovedDrive(DriveView):
 
 
 class CountedDrive(MovedDrive):
-    """Another drive, with a count of the points that are not finite.
+    """A view of a drive that counts the points that are not finite.
 
     Attributes:
         num_ignored: number of such points in the scans that were read.

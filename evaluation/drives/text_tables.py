@@ -63,11 +63,13 @@ def read_numbers(
 
     Args:
         path: the file.
-        columns: NumPy type of a row, or of every number.
+        columns: NumPy type of a row, with named fields; or the type of a
+            number, if all columns have the same type.
         separator: text between columns; None for white space.
 
     Returns:
-        (N,) records, or (N, width) numbers; N >= 1.
+        (N,) records if `columns` has fields, otherwise (N, width) numbers. N is
+        at least 1.
 
     Raises:
         InputError: if there is no such table, it is empty, or a row has another

@@ -449,7 +449,7 @@ def summary(rows: np.ndarray) -> dict[str, float | int | None]:
 
 
 def numbers(rows: np.ndarray, method: str) -> Iterator[Number]:
-    """Yields the numbers of a method's results that go into `results.csv`.
+    """Yields a method's results for `results.csv`, a `Number` for each metric.
 
     Args:
         rows: (K,) results, records of `QUERY`.

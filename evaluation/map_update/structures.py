@@ -50,13 +50,15 @@ class StructureChange:
 def verdicts(
     instances: np.ndarray, labels: np.ndarray, side: str
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Returns a verdict on each structure of a map: kept, gone or new.
+    """Returns a verdict on each structure of a map, such as kept, gone or new.
+
+    A structure is gone or new if more than half of its observed points are.
 
     Args:
         instances: (N,) number of the structure of each point; 0 for none.
         labels: (N,) label of each point, see
             `evaluation.map_update.sessions.Label`.
-        side: A or B.
+        side: `A` if the map is the older one, `B` if it is the newer one.
 
     Returns:
         (S,) numbers of the structures; (S, 3) number of their points, of

@@ -373,7 +373,7 @@ def plane_overlap(
 ) -> float:
     """Returns the share of a query's patches that match a patch of a place.
 
-    Each patch is compared with the patch whose center is nearest to its own.
+    Each patch is compared with the patch whose centre is nearest to its own.
 
     Args:
         query: patches of the query, at least one.
@@ -381,7 +381,7 @@ def plane_overlap(
         X_PQ: (4, 4) the query's frame in that of the place.
         normal_limit: upper limit of the length of the difference of the two
             unit normals; either sign of a normal will do.
-        distance_limit: upper limit of a center's distance from the plane of the
+        distance_limit: upper limit of a centre's distance from the plane of the
             other patch [m].
     """
     centers = poses.transform(X_PQ, query.centers)

@@ -312,7 +312,7 @@ _DPA_NET = {
 
 
 def dpa_net(weights: Weights, cloud: np.ndarray) -> np.ndarray:
-    """Returns DPA-Net's descriptor (256,) of a prepared cloud."""
+    """Returns DPA-Net's descriptor (256,) of a cloud from `prepare`."""
     cells, x = _occupied(cloud)
     for name in ("spconv0", "spconv1"):
         x = convolve(cells, x, weights[f"{name}.conv.kernel"])
@@ -443,7 +443,7 @@ class _Network(Method[np.ndarray, np.ndarray]):
     @staticmethod
     @abc.abstractmethod
     def infer(weights: Weights, cloud: np.ndarray) -> np.ndarray:
-        """Returns the descriptor of a prepared cloud."""
+        """Returns the descriptor (256,) of a cloud that `prepare` returned."""
 
     def build_database(self, places: Sequence[np.ndarray]) -> np.ndarray:
         return np.stack(places)

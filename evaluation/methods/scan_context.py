@@ -101,7 +101,8 @@ class Contexts:
 
     Attributes:
         images: (K, rows, columns) heights above the ground [m], 0 where empty;
-            K is 1 except for augmented places.
+            K is 1, except for a place of an augmented `variant`, which has
+            further contexts.
     """
 
     images: np.ndarray

@@ -172,9 +172,10 @@ class _Seen:
         self._clouds: dict[tuple, np.ndarray] = {}
 
     def sensor(self, protocol: RetrievalProtocol) -> QuerySensor | None:
-        """Returns the query's sensor; None if the protocol does not change it.
+        """Returns how a protocol changes the sensor of a query at this frame.
 
-        The protocol can turn, tilt and partly hide the sensor.
+        The sensor can be turned, tilted and partly hidden. The result is None
+        if it stays as recorded.
         """
         if protocol not in self._sensors:
             self._sensors[protocol] = protocol.query_sensor(self.frame)

@@ -266,11 +266,11 @@ def resampled_metrics(
 def own_samples(
     outcomes: QueryOutcomes, seed: int = 0
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Returns AUC, R@1 and strict AUC of bootstrap samples, each (B,).
+    """Returns AUC, R@1 and strict AUC of B bootstrap samples, each (B,).
 
-    The samples draw whole blocks of the queries' route, see
-    `resampled_weights`. They are cached, so that several comparisons use the
-    same samples.
+    Strict AUC is defined at `PrCurve.strict_auc`. The samples draw whole blocks
+    of the queries' route, see `resampled_weights`. They are cached, so that
+    several comparisons use the same samples.
 
     Args:
         outcomes: outcomes of the queries.
@@ -294,7 +294,7 @@ def paired_samples(
         other: outcomes of as many queries with another method or condition.
 
     Returns:
-        AUC, R@1 and strict AUC of the samples of `outcomes`, each (B,).
+        AUC, R@1 and strict AUC of the B samples of `outcomes`, each (B,).
     """
     if np.array_equal(outcomes.own_blocks, other.own_blocks):
         return own_samples(outcomes)
@@ -482,7 +482,7 @@ class PlaceRecognitionMetrics:
 
     @property
     def recall_at_1(self) -> float:
-        """R@1: share of queries with a match whose best place is a match."""
+        """R@1: share of right best places among the queries with a match."""
         return float(self.recall_at_n[0])
 
 

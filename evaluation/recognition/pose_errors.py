@@ -143,7 +143,7 @@ def pose_metrics(
 
 
 def pose_success(errors: PoseErrors, outcomes: QueryOutcomes) -> float:
-    """Returns the share of the queries with a match whose pose is right.
+    """Returns, of the queries with a match, the share with a right pose.
 
     A pose is right within 2 m and 5 deg of the truth; see
     `PoseMetrics.success`.

@@ -206,10 +206,10 @@ class RetrievalProtocol:
         )
 
     def asked_like(self, other: RetrievalProtocol) -> RetrievalProtocol:
-        """Returns the protocol with the queries of another protocol.
+        """Returns the protocol with some options of another protocol.
 
-        The choice of the scan that stands for a place is also taken from
-        `other`.
+        These are the options that turn, tilt or partly hide queries, their
+        `seed`, and the choice of the scan that stands for a place (`place`).
         """
         return replace(self, place=other.place, **other._asked)
 

@@ -118,9 +118,11 @@ class Reference:
     def further_changes(
         self, map_names: Iterable[str]
     ) -> Sequence[tuple[str, str, float]]:
-        """Returns published TCR_sym of pairs without published recognition.
+        """Returns published changes of pairs without other published results.
 
-        The result is empty if the publication has none of the maps.
+        Each item is the label of the pair, its stages, and the symmetric
+        temporal change ratio TCR_sym. The result is empty if the publication
+        has none of the maps.
         """
         return () if self.city_names.isdisjoint(map_names) else self.further
 

@@ -649,13 +649,16 @@ def query_table(
     tracks: Mapping[str, DriveTrack],
     evidence: Evidence,
 ) -> Table:
-    """Returns a table with a row for each query of each result, in order.
+    """Returns a table with a row for each query of each result.
+
+    Rows are in the order of `results`.
 
     Args:
         results: results of methods on pairs of drives.
         tracks: drive -> its frames, for all drives in the results.
-        evidence: (database, query) -> evidence on why best places are wrong.
-            The columns with reasons are empty for a pair without evidence.
+        evidence: names of database and query drive -> evidence on why best
+            places are wrong. The columns with reasons are empty for a pair
+            without evidence.
     """
 
     def queries(one: PlaceRecognition) -> _Queries:

@@ -134,10 +134,11 @@ def change_rows(
 
 
 def ranked_methods(results: Results) -> tuple[list[Ranked], str]:
-    """Returns the methods ranked by mean AUC under change, and a headline.
+    """Returns the methods ranked by mean AUC, and a sentence on the ranking.
 
-    The means are over the pairs of drives with results of all methods. If there
-    is no such pair, no method is returned, and the headline says so.
+    The means are over the pairs of drives with results of all methods, without
+    the controls, in which the city does not change. If there is no such pair,
+    no method is returned, and the sentence says so.
     """
     rows = results.where({STAGE: OWN}, task="place", metric="auc").rows
     ranked, samples = ranking(rows)

@@ -412,7 +412,7 @@ def check_same_queries(one: Answers, other: Answers) -> None:
 
 
 class Ranked(NamedTuple):
-    """A method's mean over conditions, with its 95 % interval."""
+    """A method's mean of a metric over conditions, with a 95 % interval."""
 
     method: str
     value: float

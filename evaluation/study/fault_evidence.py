@@ -216,7 +216,7 @@ class _Shown:
 
     @cached_property
     def some_instances(self) -> np.ndarray | None:
-        """(M,) number of the structure of each point in `some`."""
+        """(M,) number of the structure on which each point of `some` lies."""
         return None if self.instances is None else sampled(self.instances)
 
     def seen_from(self, other: _Shown) -> np.ndarray:

@@ -160,10 +160,11 @@ def measure_places(
 
     Args:
         reporter: reports progress.
-        database: described drive of the places.
-        query: described drive in the same world whose scans are the queries.
-        distractors: described drives through other cities, each with one file
-            for each method.
+        database: the drive of the places: its source, or the files with its
+            scans and with each method's descriptions.
+        query: the drive of the queries, in the same world, like `database`.
+        distractors: drives through other cities: for each drive, a file with
+            the descriptions by each method.
         num_distractors: number of places of these drives that are added to the
             database.
         methods: the methods.

@@ -314,7 +314,7 @@ class Part:
             stream.write(data)
 
     def is_current(self, inputs: Mapping) -> bool:
-        """Returns whether the file is complete and made from these inputs."""
+        """Returns whether the file is complete and made from `inputs`."""
         try:
             return self.identity() == fingerprint(inputs)
         except InputError:
@@ -514,7 +514,7 @@ class StudyFiles:
         return self.output / "figures"
 
     def survey(self, recording: str) -> SurveyFiles:
-        """Returns the files with the survey of a recording."""
+        """Returns the files with a recording's map and descriptions."""
         folder = self.output / "parts" / "surveys"
         return SurveyFiles(folder / file_name(recording))
 

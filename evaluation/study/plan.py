@@ -65,7 +65,7 @@ class Study:
 
     @cached_property
     def cities(self) -> list[City]:
-        """The cities of the recordings.
+        """The recordings of the study, grouped by map.
 
         Raises:
             InputError: two recordings have the same map and stage.

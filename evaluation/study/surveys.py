@@ -375,13 +375,13 @@ class Survey(Step):
     Attributes:
         source: opens the drive.
         roles: whether the drive has places, queries, both or neither.
-        methods: methods that describe them.
-        protocol: protocol by which they are chosen.
+        methods: methods that describe the places and queries.
+        protocol: protocol by which places and queries are chosen.
         files: the files to write.
         with_scans: whether to keep the scans of places and queries.
         with_map: whether to make a map; otherwise only the scans of places and
             queries are read.
-        further: descriptions by a second protocol, if any.
+        further: methods with descriptions by a second protocol, if any.
     """
 
     source: DriveSource

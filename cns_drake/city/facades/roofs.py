@@ -94,7 +94,10 @@ def with_eaves(line: Line, low: float, high: float) -> list[bays.Span]:
 
 
 def line_height(line: Line, across: float) -> float:
-    """Returns the height of a roof line at a place across the roof [m]."""
+    """Returns the height of a roof line at a place across the roof [m].
+
+    `line` contains the points (across, height), and `across` is the place.
+    """
     us, zs = np.transpose(line)
     return float(np.interp(across, us, zs))
 

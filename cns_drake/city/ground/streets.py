@@ -112,7 +112,7 @@ class Covering(NamedTuple):
 
 
 def parking_bays(area: BaseGeometry) -> Covering:
-    """Returns the covering of parking bays, from their area in W [m]."""
+    """Returns the surface of parking bays that cover an area in W [m]."""
     return Covering("parking_bays", "parking", snap(area), _BAY_RGB)
 
 

@@ -107,7 +107,7 @@ class FacadePlan:
 
     @property
     def on_street(self) -> list[Opening]:
-        """Openings of the ground floor; none if the wall begins higher."""
+        """Openings at ground level; none if the wall starts above it."""
         on_ground = self.stands_on_ground
         return [o for o in self.openings if o.row == 0 and on_ground]
 
@@ -121,10 +121,11 @@ class FacadePlan:
         return is_low and self.to_drive < reach + _BESIDE
 
     def probes(self) -> np.ndarray:
-        """Returns points (N + 1, 3) before N openings and the wall's top [m].
+        """Returns a point in front of each opening and of the wall's top.
 
-        The points are in W, just in front of the wall. An opening, or the top,
-        is hidden if the point in front of it cannot be seen.
+        These are (N + 1, 3) points in W, for N openings [m]; the last one
+        belongs to the top. An opening, or the top, is hidden if the point in
+        front of it cannot be seen.
         """
         panel = self.panel
         at = [((o.x0 + o.x1) / 2, (o.z0 + o.z1) / 2) for o in self.openings]
@@ -224,7 +225,7 @@ def with_shops(plan: FacadePlan, paving: upper_sides.UpperSides) -> FacadePlan:
 
 
 def with_doors(plan: FacadePlan, paving: upper_sides.UpperSides) -> FacadePlan:
-    """Returns the plan with doors in place of some ground-floor windows.
+    """Returns a wall's plan with doors in place of some ground-floor windows.
 
     `paving` is the paving in front of the wall.
     """

@@ -72,7 +72,8 @@ def is_raised(kind: str, height: float) -> bool:
 
     Args:
         kind: type of the lane.
-        height: height of the lane's inner edge above the road in the file [m].
+        height: height of the lane's inner edge above the road, as the file
+            states it [m].
     """
     has_kerb = height >= _LEAST_KERB
     return kind in _RAISED or (
@@ -282,7 +283,7 @@ def _stations(
 def split_levels(
     bands: Sequence[LaneBand],
 ) -> tuple[list[LaneBand], list[LaneBand]]:
-    """Splits lanes into those on the ground and those on bridges.
+    """Returns the lanes on the ground, and those on bridges, as two lists.
 
     A lane that leads onto a bridge is cut at the bridge's end.
     """

@@ -213,7 +213,7 @@ class Cubics:
 
     @property
     def starts(self) -> np.ndarray:
-        """Distances at which the pieces begin [m]."""
+        """Distances along the road at which the cubic pieces begin [m]."""
         return self._table[:, 0]
 
     def at(

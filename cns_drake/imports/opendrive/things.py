@@ -41,7 +41,8 @@ def read_things(
     counted in `faults`.
 
     Raises:
-        ValueError: a text is not a number; the error names its line.
+        ValueError: there is text in place of a number; the error names the
+            line.
     """
     for k, one in enumerate(road.all("signals", "signal")):
         yield Thing(

@@ -57,7 +57,7 @@ class Response:
 
     @cached_property
     def table(self) -> np.ndarray:
-        """Intensities of diffuse targets at 4097 energies.
+        """Intensities of diffuse targets, at 4097 energies of the echo.
 
         The square roots of the energies are evenly spaced from 0 to 1.
         Intensities in between are interpolated.

@@ -127,11 +127,11 @@ def _extinction(number: np.ndarray) -> float:
 
 
 class Scattering(NamedTuple):
-    """Statistics of the echoes of drops and fog that a unit detects.
+    """Statistics of the echoes of drops and fog that a LiDAR detects.
 
     The energy of an echo is the reflectivity of the Lambertian target that
     would return an equally strong echo from the same distance, if it filled the
-    beam and faced the unit.
+    beam and faced the LiDAR.
 
     Attributes:
         distances: (R,) increasing distances [m].
@@ -163,7 +163,7 @@ def tabulate_scattering(
     resolution: float,
     min_range: float,
 ) -> Scattering:
-    """Returns statistics of the weather's echoes that a unit detects.
+    """Returns statistics of the weather's echoes that a LiDAR detects.
 
     Drops are a Poisson process in distance and diameter. Each drop is detected
     with a probability that follows from its SNR. The detected drops are
@@ -171,11 +171,11 @@ def tabulate_scattering(
 
     Args:
         weather: fog, rain and snowfall.
-        budget: link budget of the unit: SNR by distance and reflectivity.
+        budget: link budget of the LiDAR: SNR by distance and reflectivity.
         divergence: half angle of a beam [rad].
         resolution: distance below which two echoes merge: half the length of a
             pulse [m].
-        min_range: least range of the unit [m].
+        min_range: least range of the LiDAR [m].
     """
     distances = _DISTANCES[min_range < _DISTANCES]
     distances = np.concatenate([[min_range], distances])

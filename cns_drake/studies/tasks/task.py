@@ -290,7 +290,7 @@ class Task(abc.ABC):
 
     @abc.abstractmethod
     def numbers(self, found: Any, before: Any | None) -> Iterable[Number]:
-        """Yields the results of a pair, one number each.
+        """Yields the results of a pair of drives, a `Number` for each metric.
 
         Args:
             found: the task's result for the pair.
@@ -331,7 +331,7 @@ def positive(value: Any, where: str) -> None:
     """Checks that a setting is a positive number.
 
     Args:
-        value: its value.
+        value: value of the setting.
         where: file and field of the setting, for error messages.
 
     Raises:
