@@ -35,7 +35,11 @@ class ImportFaults:
         self._examples.setdefault(kind, _printable(example))
 
     def take_back(self, kind: str) -> None:
-        """Lowers the count of a kind of fault by one."""
+        """Removes one fault of a kind from the counts.
+
+        Use it for a fault that was counted but turns out not to matter, such as
+        an object that was left out at first and is placed later.
+        """
         kind = _printable(kind)
         self._counts[kind] -= 1
         if not self._counts[kind]:

@@ -35,7 +35,11 @@ class FrameMotion(NamedTuple):
     a: np.ndarray
 
     def acceleration_at(self, p_FQ: np.ndarray) -> np.ndarray:
-        """Returns accelerations (N, 3) in E of a point Q fixed in F [m/s^2]."""
+        """Returns the accelerations (N, 3) of a point Q of frame F [m/s^2].
+
+        Q is fixed in F, at the position `p_FQ` (3,) [m]. The accelerations are
+        relative to frame E and expressed in E.
+        """
         r = rotated(self.R, p_FQ[None])
         return self.a + cross(self.alpha, r) + cross(self.w, cross(self.w, r))
 

@@ -74,11 +74,11 @@ class Primitives(NamedTuple):
 
 
 def merge_first(group: RayGroup) -> Iterator[Primitives]:
-    """Yields the geometry of a group in the first hierarchy of a scene.
+    """Yields what a group adds to the first of a scene's two hierarchies.
 
-    All rays are cast on the first hierarchy. It contains the triangles of every
-    group. It contains curved shapes themselves only if their group can move,
-    and otherwise polyhedra around them.
+    Every group adds its triangles. A group that can move also adds its curved
+    shapes; any other group adds a polyhedron around each curved shape instead.
+    All rays are cast on the first hierarchy.
     """
     members = _numbered(group)
     flat = [
@@ -101,11 +101,11 @@ def merge_first(group: RayGroup) -> Iterator[Primitives]:
 
 
 def merge_second(group: RayGroup) -> Iterator[Primitives]:
-    """Yields the curved shapes of a group that cannot move.
+    """Yields what a group adds to the second of a scene's two hierarchies.
 
-    They are in a second hierarchy: only rays that hit a polyhedron around these
-    shapes, or start in one, are cast on them. A group that can move yields
-    nothing.
+    A group that cannot move adds its curved shapes; any other group adds
+    nothing. A ray is cast on the second hierarchy only if it hits one of the
+    polyhedra around curved shapes, or starts in one (see `merge_first`).
     """
     if group.frame_id is None:
         yield from merge_curved(_numbered(group))

@@ -249,9 +249,9 @@ def _turn_round(
     def lanes_at(travelled: float) -> tuple[np.ndarray, float]:
         """Returns the pose of the lane, and the distance to the opposite lane.
 
-        The pose, x, y [m] and heading [rad], (3,), is that at the distance
-        `travelled` from the entry of the road [m]. The opposite lane is on the
-        left.
+        The pose (3,) contains x and y [m] and the heading [rad] of the lane's
+        middle, `travelled` [m] after the entry of the road. The opposite lane
+        is on the left; its distance is that between both middles [m].
         """
         offsets = [
             _moved_right(

@@ -132,11 +132,11 @@ class Family(Section):
 
 
 def load_family(path: Path, redraw: Redraw | None = None) -> list[Scenario]:
-    """Reads a family's file and returns its members.
+    """Reads the file of a family of drives, and returns the members.
 
-    The name of a member consists of the name of the base, the city's seed if it
-    varies, the missing share in per mille, the seed, and the route and LiDAR if
-    they vary.
+    The name of a member consists of the name of the base drive; the seed of its
+    city, if the family has `city_seeds`; its value of `missing` in per mille;
+    its value of `seeds`; and its route and LiDAR, if they vary.
 
     Args:
         redraw: function that generates cities along the streets of a map. Its

@@ -26,7 +26,8 @@ def body_and_pose(
         X_PS: pose of the sensor S in P.
 
     Returns:
-        The body B that P is, or that P is fixed on; the pose X_BS.
+        The body B: `place` itself, or the body on which the frame is fixed; and
+        the pose X_BS of the sensor.
 
     Raises:
         RuntimeError: the plant is not finalized.

@@ -268,9 +268,11 @@ class Experiment(Section):
 
     @property
     def fresh(self) -> list[int]:
-        """Numbers of the freshly drawn versions of the maps to use, if any.
+        """Numbers of the fresh versions of maps on which the experiment runs.
 
-        They come from the field `both.fresh`.
+        A fresh version of a shipped map has other buildings along the same
+        streets. The numbers come from the field `both.fresh`; without it, the
+        list is empty.
         """
         found = self.both.get("fresh", [])
         return found if isinstance(found, list) else [found]

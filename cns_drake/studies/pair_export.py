@@ -192,7 +192,7 @@ def export_run(
 
     Args:
         reporter: reports progress.
-        simulation: the drive.
+        simulation: object that simulates the drive when it is called.
         folder: folder for the files.
         options: format and spacing of the clouds.
 

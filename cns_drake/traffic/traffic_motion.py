@@ -118,7 +118,8 @@ class LimbTable:
     def poses(self, states: BodyStates) -> np.ndarray:
         """Returns the poses X_WL (M, 4, 4) of all limbs in the world.
 
-        Limbs of bodies that do not exist are far below the ground.
+        The limbs of a body that has not arrived yet, or has left, are far below
+        the ground.
         """
         body, p = self.body, self._joint.T
         # A forward swing is a rotation about -y.

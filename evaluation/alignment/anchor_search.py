@@ -76,10 +76,12 @@ class Ties:
     is_doubtful: bool
 
     def errors(self, V: np.ndarray) -> np.ndarray:
-        """Returns the errors (M, 6) of the measured relative poses [rad, m].
+        """Returns the residuals inverse(V_i) V_j inverse(Z), (M, 6).
+
+        Each residual is a rotation vector [rad], then a translation [m].
 
         Args:
-            V: (N, 4, 4) poses to which `i` and `j` refer.
+            V: (N, 4, 4) the poses V, of which `i` and `j` are indices.
         """
         E = poses.inverse(V[self.i]) @ V[self.j] @ poses.inverse(self.Z)
         turn = Rotation.from_matrix(E[:, :3, :3]).as_rotvec()
@@ -186,11 +188,12 @@ class Candidates:
 
 @dataclass(frozen=True)
 class Guess:
-    """A pose of the source's world in the target's.
+    """A guess of the pose of the source's world S in the target's world T.
 
     Attributes:
-        X_TS: (4, 4) pose, whose z axis is vertical.
-        pairs: (A,) indices of the candidates that agree.
+        X_TS: (4, 4) pose: a rotation about the vertical, and a translation.
+        pairs: (A,) indices of the pairs in `Candidates` that agree with this
+            pose.
     """
 
     X_TS: np.ndarray
@@ -416,13 +419,14 @@ def agreeing(
 ) -> np.ndarray:
     """Returns which loops agree with given poses of the keyframes, (M,) bool.
 
-    A loop agrees if its measured pose X_LK differs from the one that the given
-    poses imply by less than 1 m and 2 degrees.
+    A loop measures the pose X_LK of the source's keyframe K in the target's
+    keyframe L. It agrees if this pose differs by less than 1 m and 2 degrees
+    from the one that follows from the given poses of K and L.
 
     Args:
         loops: the M loops.
-        X_TL: (L, 4, 4) poses of the target's keyframes in its world T.
-        X_TK: (K, 4, 4) poses of the source's keyframes in T.
+        X_TL: (A, 4, 4) poses of the target's keyframes in its world T.
+        X_TK: (B, 4, 4) poses of the source's keyframes in T.
     """
     distances, angles = loop_errors(loops, X_TL, X_TK)
     return (distances < AGREEMENT[0]) & (angles < AGREEMENT[1])

@@ -99,7 +99,8 @@ def loop_errors(
 def implied_poses(loops: list[Loop], X_WL: np.ndarray) -> np.ndarray:
     """Returns the pose X_WK of each loop's source keyframe K, (M, 4, 4).
 
-    Each pose is X_WL X_LK, where X_LK is the loop's measurement.
+    Each pose is X_WL X_LK: the pose of the loop's target keyframe L, and the
+    measured pose of K in L.
 
     Args:
         loops: the M loops.
@@ -227,10 +228,11 @@ class LoopSearch:
 def find_self_loops(drive: Submaps, most: int, track: Track) -> list[Loop]:
     """Returns the loops between keyframes of the same drive.
 
-    Each keyframe is paired with an earlier keyframe at the same place, if there
-    is one at least 50 m of path before it; if there are several, with the
-    nearest. At most `most` pairs, evenly spread over the drive, are registered.
-    A pair that cannot be registered makes no loop.
+    A loop connects a keyframe with an earlier one that is at most 10 m away,
+    seen from above, although at least 50 m of path lie between them. If there
+    are several such earlier keyframes, the closest one is used. At
+    most `most` pairs of keyframes, evenly spread over the drive, are
+    registered. A pair that cannot be registered makes no loop.
     """
     pairs = []
     for k in range(len(drive)):

@@ -98,7 +98,7 @@ class TrajectoryErrors:
         }
 
     def to_rows(self) -> Iterator[tuple[str, str]]:
-        """Yields names and values, to be printed."""
+        """Yields the lines of a printed summary, as pairs (name, text)."""
         values = self.to_json()
         yield (
             "compared",

@@ -38,7 +38,8 @@ def localise(
 
     Each scan of QUERY is aligned to MAP from an initial guess of its pose: the
     true pose, moved by --start in a random direction and turned by --start-turn
-    about a random axis. The results are pose errors and success rates.
+    about a random axis. With --track, the estimated pose of the previous scan
+    is used instead. The results are pose errors and success rates.
 
     MAP and QUERY are drives (MCAP, MulRan, HeLiPR, NCLT, Boreas, KITTI
     odometry, CNS) or point clouds (.pcd .ply .npy .bin). If MAP is a drive, its

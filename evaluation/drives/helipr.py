@@ -72,9 +72,11 @@ _LONGEST_GAP_NS = 1_000_000_000
 class HeliprDrive(FileDrive):
     """The scans of one LiDAR of HeLiPR on a drive.
 
-    If there is a `global_*_gt.txt`, W is the UTM grid with a nearer origin (see
-    `evaluation.drives.scan_files.to_world`). Otherwise W is the frame of the
-    drive's own `*_gt.txt`. Points without a return are left out.
+    If there is a file `LiDAR_GT/global_<lidar>_gt.txt`, the poses come from it,
+    and W has the axes of the UTM grid but an origin near the drives (see
+    `evaluation.drives.scan_files.to_world`). Otherwise the poses come from
+    `LiDAR_GT/<lidar>_gt.txt`, and W is the frame of this file. Points without a
+    return are left out.
     """
 
     def __init__(self, path: Path, lidar: str | None = None):

@@ -27,12 +27,13 @@ _LEAST_SPACING = 1e-6
 class QuerySensor:
     """A turned sensor Q that replaces the recorded sensor S in a query.
 
-    Both are at the same position.
+    Q and S are at the same position. A sector of azimuths can be hidden from Q:
+    the points in this sector are removed from the scan.
 
     Attributes:
         X_SQ: (4, 4) a rotation; None if Q is not turned.
         hidden_from: azimuth in S at which the hidden sector begins [rad].
-        hidden: angle of that sector [rad].
+        hidden: angle of the hidden sector [rad]; 0 for none.
     """
 
     X_SQ: np.ndarray | None = None

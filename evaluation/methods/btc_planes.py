@@ -87,15 +87,15 @@ def base_plane(
 ) -> tuple[np.ndarray, np.ndarray] | None:
     """Returns the largest plane that the patches form; outdoors, the ground.
 
-    Similar patches are merged, and patches without a similar one are dropped.
-    The merged patches are then merged once more, beginning with the largest.
+    Similar patches are merged into larger planes, and patches without a similar
+    one are dropped. Then similar planes are merged with each other.
 
     Args:
-        planes: patches of the voxels.
-        normal_limit: greatest length of the difference of the unit normals of
-            similar patches; either sign of a normal will do.
-        distance_limit: greatest distance of each center from the plane of the
-            other patch [m].
+        planes: patches, one for each voxel.
+        normal_limit: greatest length of the difference between the unit normals
+            of two similar patches. The sign of a normal does not matter.
+        distance_limit: greatest distance between the center of a patch and the
+            plane of a similar one [m].
 
     Returns:
         Center (3,) and normal (3,) of the plane, pointing up; None if no

@@ -154,8 +154,9 @@ class LayeredOverlap(Method[LayeredScan, LayeredDatabase]):
     """Layered overlap, in four searches from coarse to fine.
 
     The first three searches compare coarse maps. For each place, they find the
-    pose with the most common filled cells. They rank the places by how many
-    standard deviations the number of common cells lies above chance. The last
+    pose at which the greatest number of cells is filled in both scans. They
+    rank the places by how many standard deviations this number of common cells
+    lies above the number that is expected by chance. The last
     search improves the poses of the best places by hill climbing on fine maps.
 
     The score is the weighted number of common cells on the fine maps, divided

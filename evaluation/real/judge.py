@@ -410,7 +410,7 @@ def judge_draws(
 
     Args:
         real, simulated: scans by place, see `places_of`.
-        draws: number of draws.
+        draws: number of random draws of patches.
         track: reports progress.
     """
     results = []

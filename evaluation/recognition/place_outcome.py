@@ -200,11 +200,13 @@ def place_numbers(
     Args:
         now: outcome of the method in the condition.
         before: outcome of the method in the baseline; None to leave out the
-            results that compare with it. These are `kept` and its variants
-            (result in the condition / result in the baseline); `lost`, the
-            number of queries that are right in the baseline only; `found`, the
-            number that are right in the condition only; and
-            `visible_change_added`.
+            results that compare the condition with the baseline. `kept`,
+            `kept_r1` and `kept_strict` are AUC, R@1 and strict AUC in the
+            condition, divided by those in the baseline. `lost` is the number of
+            queries that are right in the baseline only, and `found` the number
+            of those that are right in the condition only. For
+            `visible_change_added`, see the function in
+            `evaluation.recognition.fault_kinds`.
     """
     outcomes = now.outcomes
     values = _areas(outcomes)

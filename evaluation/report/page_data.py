@@ -204,7 +204,7 @@ def browser_data(
 ) -> dict:
     """Returns the data of the query browser, ready for JSON.
 
-    The maps from above are not included; the browser takes them from the
+    Top views of the maps are not included: the browser uses those in the
     pictures that `evaluation.report.page.route_picture` makes.
 
     Args:

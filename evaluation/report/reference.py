@@ -102,10 +102,10 @@ class Reference:
         return {key[0] for key in self.recognitions}
 
     def compares_back(self, map_name: str, earlier: str, last: str) -> bool:
-        """Returns whether a pair of stages was also published in reverse.
+        """Returns whether the publication has results of a reverse pair.
 
-        In the reverse pair, the last stage is the database and the earlier
-        stage the query.
+        In a reverse pair, the database is the drive through the last stage, and
+        the query is the drive through an earlier stage.
         """
         pair = (map_name, last, earlier)
         return any(key[:3] == pair for key in self.recognitions)
@@ -136,10 +136,10 @@ class Reference:
         return self.protocols[method]
 
     def covers(self, result: PlaceRecognition) -> bool:
-        """Returns whether there are published numbers to compare with a result.
+        """Returns whether a result can be compared with published results.
 
-        The map must be in the source, and the method must have been run by the
-        same protocol.
+        The publication must have results on the same map, and of the same
+        method by the same protocol.
         """
         return result.pair[0] in self.city_names and self._ran(result)
 

@@ -180,10 +180,10 @@ def recognition_table(
     reference: Reference = NO_REFERENCE,
     evidence: Evidence = MappingProxyType({}),
 ) -> Table:
-    """Returns Table II: a row for each pair, some columns for each method.
+    """Returns the table of place recognition, like Table II of the paper.
 
-    The columns of a method are AUC, strict AUC and R@1, and F1 if `mode` is
-    None.
+    It has a row for each pair of drives, and the columns AUC, strict AUC and
+    R@1 for each method. If `mode` is None, each method also has a column F1.
 
     Args:
         results: results of one protocol.
@@ -560,7 +560,7 @@ def cost_table(costs: Sequence[Cost]) -> Table:
 
 
 def cost_numbers(costs: Sequence[Cost]) -> Table:
-    """Returns the costs of all methods, for `costs.csv`."""
+    """Returns `costs.csv`: the fields of `Cost`, a row for each method."""
     return Table.of(costs, {f.name: attrgetter(f.name) for f in fields(Cost)})
 
 

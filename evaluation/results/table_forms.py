@@ -277,11 +277,11 @@ def _rows(values: Sequence[object]) -> list[tuple[object, ...]]:
 def ranked(
     values: Sequence[float | None], printed: Sequence[float | None]
 ) -> list[Cell]:
-    """Returns the cells of a row, with ranks 1 and 2 of the best numbers.
+    """Returns the cells of a row; the two best numbers have ranks 1 and 2.
 
     Greater numbers are better. Only our numbers are ranked, not those of the
-    paper. Numbers that are equal to four decimals share a rank. A single number
-    has no rank.
+    paper. Numbers that are equal to four decimals share a rank. A number that
+    is alone in its row has no rank.
 
     Args:
         values: our numbers; None or NaN where one is missing.

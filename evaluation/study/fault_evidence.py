@@ -191,7 +191,7 @@ class _Shown:
 
     @cached_property
     def standing(self) -> np.ndarray:
-        """(M, 3) points on upright objects, one for each cell."""
+        """(M, 3) centroids of the points on upright objects, per voxel [m]."""
         return thin(self.points[self.points[:, 2] > _standing()], _CELL)
 
     @cached_property

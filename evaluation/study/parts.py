@@ -457,9 +457,10 @@ def _identity(argument: Any) -> object:
 
 @dataclass(frozen=True)
 class SurveyFiles:
-    """The files (`Part`) with the survey of a recording.
+    """The files (`Part`) with all that a study needs of a recording.
 
-    Each method's descriptions are in a file of their own.
+    These are the drive's poses and map, its scans at places and queries, and,
+    in one file for each method, the descriptions of these scans.
 
     Attributes:
         folder: folder of the files.

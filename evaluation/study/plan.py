@@ -43,8 +43,9 @@ _RECOGNITION_COST = 2.0
 class Study:
     """A comparison of recordings, with a report; recordings need not exist yet.
 
-    A drive on the route of one stage through another stage serves as a control:
-    it shows what the route changes while the city stays the same.
+    A recording can serve as a control: its drive goes through one stage of a
+    map, on the route of the drive through another stage. Its comparison with
+    the usual drive through the same stage shows the effect of the route alone.
 
     Attributes:
         recordings: the recordings. A recording that does not exist yet is made

@@ -147,8 +147,9 @@ def awnings(
         shape: four lengths of an awning [m]: how much narrower it is than its
             shop on each side; how far it reaches out of the wall; height of its
             lower edge; height of its upper edge.
-        door: a shop whose middle is closer than this to the wall's middle,
-            where the door is, gets no awning [m].
+        door: half the width of a stretch in the middle of the wall, where the
+            door is [m]. Shops that reach into this stretch get no awning. By
+            default there is no such stretch.
     """
     narrower, reach, z0, z1 = shape
     middle, pieces = wall.length / 2, []

@@ -83,7 +83,7 @@ def inset(points: ArrayLike, distance: ArrayLike) -> np.ndarray:
 
 
 def inset_limit(points: ArrayLike) -> float:
-    """Returns the inset at which an edge first loses 70 % of its length [m].
+    """Returns the smallest inset at which an edge loses 70 % of its length [m].
 
     `points` contains the corners (N, 2) of an outline [m].
     """

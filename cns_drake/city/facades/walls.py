@@ -189,7 +189,11 @@ def glass_quads(grid: WallCells, glass: tuple[float, ...]) -> Quads:
 
 
 def breaks(end: float, values: Sequence[float]) -> list[float]:
-    """Returns 0, `end` and the distinct values between them, sorted [m]."""
+    """Returns the boundaries of a wall's cells along one axis, sorted [m].
+
+    They are 0, `end`, and those of the given `values` that lie between 0 and
+    `end`, each only once and rounded to millimetres.
+    """
     inner = {round(float(v), 3) for v in values}
     return [0.0, *sorted(v for v in inner if 1e-4 < v < end - 1e-4), end]
 

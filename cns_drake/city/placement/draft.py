@@ -98,9 +98,9 @@ class Draft:
     def task(self, *words: str | int) -> np.random.Generator:
         """Starts a task, such as placing trees; returns its random generator.
 
-        `words` are the name of the task; `rng` returns the same generator for
-        them. The numbers in the names of the task's structures begin in a new
-        range, see `open_range`.
+        `words` are the name of the task, on which the generator depends. The
+        numbers in the names of the structures that the task places begin in a
+        new range, see `open_range`.
         """
         self.open_range()
         return self.rng(*words)

@@ -465,8 +465,9 @@ def dress_city(
 ) -> Dressing:
     """Returns a city with details on its buildings and along its streets.
 
-    Small objects of the file count as left out in `city.faults`; those that get
-    a place here are taken off this count.
+    Before the call, all small objects of the file count as left out in
+    `city.faults`. The function removes the objects that it places from this
+    count.
 
     Args:
         staged: the structures of each stage.

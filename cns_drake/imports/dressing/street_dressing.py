@@ -225,8 +225,8 @@ class StreetRoom:
     def has_tree_pit(self, xy: np.ndarray) -> bool:
         """Returns whether a tree could stand at a place.
 
-        The trunk must be off roads, buildings and drives. `xy` (2,) is the
-        place in W [m].
+        There is no room for a trunk on a road, in a structure, or close to the
+        path of one of the map's drives. `xy` (2,) is the place in W [m].
         """
         pit = Point(xy).buffer(_TRUNK, 2)
         around = shapely.get_coordinates(pit)
@@ -448,16 +448,17 @@ def dress_streets(
     """Places small objects along the streets of a city, and returns them.
 
     Objects from the imported file are placed first, and then random ones.
-    Drives are kept free of objects. Without drives nothing is placed.
+    Objects are placed near the paths of the drives, but not on them. Without
+    drives nothing is placed.
 
     Args:
         structures: structures that already exist.
         things: small objects from the imported file.
         streets: the streets along which objects are added.
-        drives: the drives, which are kept free.
+        drives: the drives of the map.
         ground: heights of the ground on which objects stand.
-        bottom: structures of the guessed ground; empty if the imported file has
-            a terrain.
+        bottom: ground that was made for a file without a terrain, as
+            structures; empty if the file has a terrain.
         seed: seed of all random draws.
     """
     found = StreetThings()

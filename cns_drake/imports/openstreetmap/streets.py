@@ -273,7 +273,10 @@ def drivable_streets(
 
 
 def street_places(features: reading.OsmFeatures, local: Local) -> StreetPlaces:
-    """Returns crossings, traffic signals and ways for people."""
+    """Returns the crossings, traffic signals and footpaths of a file.
+
+    `local` converts longitudes and latitudes to coordinates in metres.
+    """
     signals = [
         place
         for _, tags, place in features.nodes

@@ -538,7 +538,11 @@ class BeamCoverage:
         self._is_covered = (near & field).astype(bool)
 
     def covers(self, d_Sset: np.ndarray) -> np.ndarray:
-        """Returns (N,) bool: whether directions (N, 3) in S are covered."""
+        """Returns which directions the beams of the turn cover, (N,) bool.
+
+        Args:
+            d_Sset: (N, 3) unit directions, expressed in S.
+        """
         return self._is_covered[_cells(d_Sset)]
 
 
@@ -600,7 +604,7 @@ class _TimedPattern(BeamPattern):
 
     @property
     def num_firings(self) -> int:
-        """Number of times in a frame at which all lines fire."""
+        """Number of firings in a frame; all lines fire in each of them."""
         points = self.points_per_second * self.period
         return max(round(points / self.num_lines), 1)
 

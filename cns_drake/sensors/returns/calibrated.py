@@ -70,15 +70,15 @@ class CalibratedReturns:
         sensor_name: str = "",
         unit_seed: int = 0,
     ) -> CalibratedReturns:
-        """Returns the calibrated returns of a preset's LiDAR.
+        """Returns a model that follows the data sheet of a preset's LiDAR.
 
         Args:
             preset: a key of `LIDAR_PRESETS`.
             echoes: which echoes of a beam are reported.
             weather: fog, rain and snowfall.
-            seed: seed of random numbers.
+            seed: seed of the noise, which differs from frame to frame.
             sensor_name: the name of the LiDAR.
-            unit_seed: seed of the errors of the unit.
+            unit_seed: seed of the errors that are constant for a laser.
 
         Raises:
             KeyError: there is no such preset.
@@ -235,7 +235,10 @@ class CalibratedReturns:
         return report_echoes(light, receiver, key, turn.range_error, turn.gain)
 
     def turn(self, beams: Beams) -> CalibratedTurn:
-        """Returns the beams of a turn with the errors of the individual unit.
+        """Returns the beams of a turn, with the errors of this LiDAR's lasers.
+
+        The errors are those of direction, range and gain. They are the same in
+        all turns.
 
         Args:
             beams: the nominal beams, from `BeamPattern.beams`.

@@ -162,11 +162,12 @@ def _share(
 
 @compiled
 def meet_sides(sides: Sides, side_hits: BeamHits, hits: BeamHits) -> np.ndarray:
-    """Completes the hits of additional rays, and divides the beams' light.
+    """Corrects the hits of additional rays; returns the light of the axes.
 
-    At an edge, the axis of a beam hits one surface, and the axis of its
-    neighbour another. An additional ray of the beam is cast only to just beyond
-    the nearer of the two surfaces. There are two corrections:
+    At an edge, the axis of a beam hits one surface, and the axis of a
+    neighbouring beam hits another. The beam then has an additional ray (see
+    `find_sides`), which is cast only to just beyond the nearer of these two
+    surfaces. Its hit is corrected in two cases:
 
     - If the ray hits the same surface as the axis of its own beam, the hit is
       removed.
@@ -175,7 +176,7 @@ def meet_sides(sides: Sides, side_hits: BeamHits, hits: BeamHits) -> np.ndarray:
 
     Args:
         sides: the additional rays.
-        side_hits: hits of the additional rays; completed in place.
+        side_hits: hits of the additional rays; corrected in place.
         hits: hits of the N beams' axes.
 
     Returns:

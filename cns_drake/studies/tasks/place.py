@@ -111,11 +111,12 @@ def measure_costs(
 
     Args:
         reporter: reports progress.
-        database, query: described drives, one file (`Part`) for each method.
-        distractors: described drives through other cities, each with one file
-            for each method.
-        num_distractors: number of the distractors' places that are added to the
-            database.
+        database, query: files with the descriptions of places and of queries,
+            one file for each method.
+        distractors: for each drive through another city, files with the
+            descriptions of its places, one file for each method.
+        num_distractors: number of places of the drives through other cities
+            that are added to the database.
         methods: methods to measure.
 
     Returns:
