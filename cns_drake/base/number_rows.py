@@ -80,9 +80,9 @@ def _fault(
 
 
 def other_separator(line: str, expected: str | None) -> str:
-    """Returns an error if a line has another separator, or else "".
+    """Returns an error message if a line has a wrong separator, or else "".
 
-    `expected` is the right separator; None is white space.
+    `expected` is the right separator; None stands for white space.
     """
     for sign in ";\t,":
         is_text = sign == "\t" and (expected is None or expected in line)

@@ -393,7 +393,7 @@ def _spiral() -> np.ndarray:
 def is_there(points: np.ndarray, scene: RayCastingScene) -> np.ndarray:
     """Returns which points (N, 3) in W [m] lie on a surface, (N,) bool.
 
-    A point lies on a surface of the scene if it is at most `NEAR` away from it.
+    A point lies on a surface of the scene if it is at most `NEAR` [m] away.
     """
     result = np.zeros(len(points), bool)
     left = np.arange(len(points))

@@ -172,8 +172,9 @@ def scan_city(
 
     Args:
         reporter: reports progress.
-        drawn: the city.
-        folder: folder in which the map of the city is written.
+        drawn: the random city.
+        folder: folder to which the map of the city is written; it is removed at
+            the end.
 
     Returns:
         `images` (N, RINGS, SECTORS, CHANNELS) uint8 polar images of the scans,

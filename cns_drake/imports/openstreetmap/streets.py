@@ -181,7 +181,10 @@ def _made(
 def parapets(
     ways: Iterable[OsmWay], bridges: Bridges, local: Local
 ) -> Iterator[Imported]:
-    """Yields parapets on both sides of bridges for cars at ground level."""
+    """Yields parapets along both sides of road bridges.
+
+    Only bridges at the height of the surrounding ground get parapets.
+    """
     for name, tags, line, _ in ways:
         width = street_width(tags)
         if width is None or name not in bridges.level:
