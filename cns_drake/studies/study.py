@@ -419,7 +419,7 @@ class Study:
                 seen: set[tuple[str, str]] = set()
                 for one in found:
                     both = one.pair.database.name, one.pair.query.name
-                    is_new = not one.pair.is_as_before or both not in seen
+                    is_new = not one.pair.may_repeat or both not in seen
                     if task.asks or is_new:
                         one.parts[name] = task.measure(one.pair, planned)
                     seen.add(both)

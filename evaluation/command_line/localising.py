@@ -25,7 +25,7 @@ def localise(
     seed: int = 0,
     parameter: options.Parameters = None,
     query_spacing: float = 10.0,
-    follow: Annotated[bool, typer.Option("--track")] = False,
+    track: Annotated[bool, typer.Option("--track")] = False,
     odometry_drift: Annotated[float, typer.Option(metavar="PART")] = 0.01,
     align: options.Align = "auto",
     lidar: options.LidarName = None,
@@ -59,7 +59,7 @@ def localise(
         seed: Seed of the random directions in which the initial guesses are
             moved and turned.
         query_spacing: Distance that the car drives between two queries [m].
-        follow: Track the whole drive instead of localising single scans: the
+        track: Track the whole drive instead of localising single scans: the
             initial guess of each scan is the estimated pose of the previous
             scan, moved by the odometry.
         odometry_drift: Drift of the simulated odometry that --track uses, as a
@@ -117,7 +117,7 @@ def localise(
         "start_turn_deg": start_turn,
         "seed": seed,
     }
-    if follow:
+    if track:
         rows = tracking.track_drive(
             localiser, drive, is_mapped, starts, odometry_drift, terminal.track
         )

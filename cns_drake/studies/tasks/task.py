@@ -55,7 +55,7 @@ class Pair:
         protocol: protocol of place recognition.
         distractors: number of places of other cities that are added to the
             database.
-        is_as_before: whether the pair can repeat drives of another pair,
+        may_repeat: whether the pair can repeat drives of another pair,
             because its condition changes the queries (turned, tilted or partly
             hidden) or adds distractors. A task whose results depend only on the
             drives then skips the pair if it has measured these drives before.
@@ -67,7 +67,7 @@ class Pair:
     way: NamedDrive
     protocol: RetrievalProtocol
     distractors: int = 0
-    is_as_before: bool = False
+    may_repeat: bool = False
 
     @property
     def roles(self) -> tuple[tuple[NamedDrive, Role], ...]:
