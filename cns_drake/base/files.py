@@ -51,22 +51,24 @@ def completing(path: Path) -> Iterator[Path]:
     """Yields a temporary path to write; it becomes the file `path`.
 
     When the block ends normally, the temporary file is flushed to the disk and
-    renamed to `path`. On an exception it is removed.
+    renamed to `path`. On an exception it is removed. If another process is
+    writing the same file, the block waits until that file is complete.
 
     Raises:
         InputError: if the file cannot be written, or `path` is a folder, a
             link, a device or a pipe.
     """
     part = _new_part(path)
-    try:
-        with user_errors(path):
+    with contextlib.ExitStack() as stack, user_errors(path):
+        _lock(part, stack, lambda: None)
+        try:
             # A pipe or link of that name must not be written to.
             part.unlink(missing_ok=True)
             yield part
             complete_part(path)
-    finally:
-        with contextlib.suppress(OSError):
-            part.unlink(missing_ok=True)
+        finally:
+            with contextlib.suppress(OSError):
+                part.unlink(missing_ok=True)
 
 
 @contextlib.contextmanager
@@ -347,12 +349,10 @@ def exclusive(path: Path, on_wait: Callable[[], None]) -> Iterator[None]:
     Raises:
         InputError: if the lock cannot be written.
     """
-    lock = path.with_name(f"{path.name}.lock")
     make_folder(path.parent)
     with contextlib.ExitStack() as stack:
-        with user_errors(lock):
-            while not _lock(lock, stack, on_wait):
-                pass
+        with user_errors(path.with_name(f"{path.name}.lock")):
+            _lock(path, stack, on_wait)
         yield
 
 
@@ -375,11 +375,10 @@ def remove_lock(path: Path) -> None:
 
     A lock that a running process holds stays.
     """
-    lock = path.with_name(f"{path.name}.lock")
-    if lock.is_file():
+    if path.with_name(f"{path.name}.lock").is_file():
         # A file that cannot be locked is in use, or is not one of our locks.
         with contextlib.suppress(OSError), contextlib.ExitStack() as stack:
-            _lock(lock, stack, _refuse_to_wait)
+            _lock(path, stack, _refuse_to_wait)
 
 
 def _refuse_to_wait() -> None:
@@ -387,23 +386,23 @@ def _refuse_to_wait() -> None:
 
 
 def _lock(
-    lock: Path, stack: contextlib.ExitStack, on_wait: Callable[[], None]
-) -> bool:
-    """Locks a file; returns whether the name still belongs to it afterwards."""
-    descriptor = open_plain(lock, os.O_WRONLY)
-    stream = stack.enter_context(os.fdopen(descriptor, "w"))
-    try:
-        fcntl.flock(stream, fcntl.LOCK_EX | fcntl.LOCK_NB)
-    except BlockingIOError:
-        on_wait()
-        fcntl.flock(stream, fcntl.LOCK_EX)
-    except OSError:
-        pass  # Some network file systems have no locks.
-    # Its former owner may have removed it, and another process made a new one.
-    try:
-        if not os.path.samestat(os.stat(lock), os.fstat(stream.fileno())):
-            return False
-    except FileNotFoundError:
-        return False
-    stack.callback(lock.unlink, missing_ok=True)
-    return True
+    path: Path, stack: contextlib.ExitStack, on_wait: Callable[[], None]
+) -> None:
+    """Locks `<path>.lock` until `stack` is closed."""
+    lock = path.with_name(f"{path.name}.lock")
+    while True:
+        descriptor = open_plain(lock, os.O_WRONLY)
+        stream = stack.enter_context(os.fdopen(descriptor, "w"))
+        try:
+            fcntl.flock(stream, fcntl.LOCK_EX | fcntl.LOCK_NB)
+        except BlockingIOError:
+            on_wait()
+            fcntl.flock(stream, fcntl.LOCK_EX)
+        except OSError:
+            pass  # Some network file systems have no locks.
+        # Its former owner may have removed it, and another process made a new
+        # one.
+        with contextlib.suppress(FileNotFoundError):
+            if os.path.samestat(os.stat(lock), os.fstat(stream.fileno())):
+                stack.callback(lock.unlink, missing_ok=True)
+                return

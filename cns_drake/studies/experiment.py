@@ -661,7 +661,7 @@ def base_protocol(
 
     Args:
         fields: field -> value. The field `base` names a protocol, by default
-            `fair`, that provides the values of all other fields.
+            `fair`, from which fields that are not given take their values.
         source: file of the experiment, for error messages.
         place: name of the section with these fields, for error messages.
 

@@ -136,7 +136,7 @@ class Walkway:
 
     @property
     def is_narrow(self) -> np.ndarray:
-        """(N,) bool: whether walkers fit only if facing along the walkway."""
+        """(N,) bool: points where the walkway is too narrow to turn around."""
         if self.narrow is not None:
             return self.narrow
         return np.zeros(len(self.points), bool)

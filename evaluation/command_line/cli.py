@@ -275,8 +275,8 @@ def scores(
 
     Use this command for scans without poses, in .bin, .pcd, .npy or .ply files.
     Every query is compared with every place, even if the method usually
-    compares only some places to save time. An empty score means that the method
-    does not consider the place a candidate.
+    skips some places to save time. The score is empty where the method rejects
+    the place.
 
     Args:
         database: Folder with the scans of the places, one file per scan.

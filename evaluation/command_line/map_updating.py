@@ -50,7 +50,7 @@ def map_update(
             `prediction`. Needs --labels-b.
         labels_b: File with your labels of B's map: 1 kept, 3 new, 4 newly seen.
             The formats are those of --labels-a, which is needed as well.
-        output: Folder for the labels that were scored, A.npy and B.npy.
+        output: Folder for the detector's labels of both maps, A.npy and B.npy.
     """
     from cns_drake.base.errors import InputError
     from cns_drake.base.files import make_folder

@@ -112,8 +112,8 @@ class Site:
 
         Edges between two units are blind. The left edge of the first unit, and
         the right edge of the last one, are blind if the same edge of the site
-        is blind. The result contains 3 if the unit's left edge is blind, and 1
-        if its right edge is.
+        is blind. The result is a set of edge numbers: 3 is the left edge, and 1
+        the right edge.
 
         Args:
             number: number of the unit, counted from 0 on the left.

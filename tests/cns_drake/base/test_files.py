@@ -1,7 +1,9 @@
+import fcntl
 import os
 from pathlib import Path
 import re
 import stat
+from threading import Thread
 
 import pytest
 
@@ -9,6 +11,7 @@ from cns_drake.base.errors import InputError
 from cns_drake.base.files import (
     check_writable,
     complete_part,
+    completing,
     draft_folder,
     exclusive,
     is_there,
@@ -198,6 +201,31 @@ def test_two_writers_of_one_folder(tmp_path):
         assert (draft / "a").exists()
     assert [path.name for path in tmp_path.iterdir()] == ["folder"]
     assert (folder / "a").exists()
+
+
+def test_two_writers_of_one_file(tmp_path):
+    path = tmp_path / "page.html"
+    order = []
+
+    def write() -> None:
+        with completing(path) as part:
+            order.append("second")
+            part.write_text("second")
+
+    with completing(path) as part:
+        part.write_text("first")
+        other = Thread(target=write)
+        other.start()
+        with (
+            open(tmp_path / "page.html.part.lock") as lock,
+            pytest.raises(BlockingIOError),
+        ):
+            fcntl.flock(lock, fcntl.LOCK_EX | fcntl.LOCK_NB)
+        order.append("first")
+    other.join()
+    assert order == ["first", "second"]
+    assert path.read_text() == "second"
+    assert [path.name for path in tmp_path.iterdir()] == ["page.html"]
 
 
 def test_a_file_that_may_be_missing(tmp_path):
