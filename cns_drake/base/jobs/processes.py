@@ -136,6 +136,9 @@ def _environment_of_jobs() -> Iterator[None]:
         **{k: os.environ.get(k, v) for k, v in _ONE_CORE.items()},
         **ALLOCATION,
         _MODULES_VARIABLE: " ".join(modules),
+        # Another package of a name that is imported, such as another version
+        # of this one, may lie in the current folder. (Python 3.11 or later.)
+        "PYTHONSAFEPATH": "1",
     }
     before = {name: os.environ.get(name) for name in changed}
     os.environ.update(changed)

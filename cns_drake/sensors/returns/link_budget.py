@@ -63,8 +63,9 @@ class LinkBudget(NamedTuple):
     """The parameters of a unit's SNR and range noise.
 
     The echo of a target at the range r [m] has an SNR of
-    `S e exp(-2 (alpha + alpha_0) r) / r^2`. Here e is the target's reflectivity times the cosine of
-    incidence, and alpha the extinction coefficient of the weather [1/m].
+    `S e exp(-2 (alpha + alpha_0) r) / r^2`. Here e is the target's
+    reflectivity times the cosine of incidence, and alpha the extinction
+    coefficient of the weather [1/m].
 
     Attributes:
         scale: S in this equation [m^2].

@@ -395,6 +395,29 @@ def test_freed_memory_is_kept_whatever_dask_has_its_workers_do(tmp_path):
         assert output.read_text() == repr(expected)
 
 
+@pytest.mark.skipif(sys.version_info < (3, 11), reason="needs Python 3.11")
+def test_jobs_import_nothing_from_the_current_folder(tmp_path):
+    script, here = tmp_path / "script.py", tmp_path / "here"
+    script.write_text(
+        "import pickle\n"
+        "from pathlib import Path\n"
+        "from helpers import job_functions\n"
+        "from cns_drake.base.jobs.processes import run_process\n"
+        "step = job_functions.Call(job_functions.note_ports, (Path('done'),))\n"
+        "run_process(pickle.dumps(step), print, lambda: True)\n"
+    )
+    here.mkdir()
+    for name in ("cns_drake", "evaluation", "selectors", "yaml"):
+        (here / f"{name}.py").write_text("raise SystemExit('not this one')\n")
+    subprocess.run(
+        [sys.executable, script],
+        env={**os.environ, "PYTHONPATH": os.pathsep.join(sys.path)},
+        cwd=here,
+        check=True,
+    )
+    assert (here / "done").exists()
+
+
 def test_two_never_work_on_the_same(tmp_path):
     output, pipe = tmp_path / "new" / "output", tmp_path / "pipe"
     os.mkfifo(pipe)
