@@ -595,7 +595,7 @@ RECIPES = {
         makes=("family/scenarios/town_01_m600_s0.yaml",),
     ),
     "family trend": Recipe(
-        ".venv/bin/cns-drake study trend",
+        ".venv/bin/cns-drake study trend --output",
         changes=(
             (
                 "study trend",
@@ -995,6 +995,8 @@ NOT_RUN = {
     "cns-drake study ladder suburbia": "the same command",
     ".venv/bin/cns-drake study map-pairs": "ages and surveys a whole city, for "
     "minutes; the recipe map truth has a small one",
+    ".venv/bin/cns-drake study trend --set": "measures 58 versions of a "
+    "shipped city; the recipe family trend has two of a small one",
     ".venv/bin/cns-drake study size": "describes shipped drives, for many "
     "minutes",
     ".venv/bin/cns-drake study fresh": "draws shipped cities and drives "
