@@ -667,12 +667,17 @@ class SeenGeometry:
 
         if self.scene is None or revision is None or revision != self._revision:
             self._read(inspector)
-        if self.scene is None or not (
-            self._is_built(calc_X_WF) and self.scene.serves(p_WS)
-        ):
-            self._build(inspector.world_frame_id(), calc_X_WF, p_WS)
-        assert self.scene is not None
-        self.scene.set_frame_poses(calc_X_WF, motions, known, seen)
+        try:
+            if self.scene is None or not (
+                self._is_built(calc_X_WF) and self.scene.serves(p_WS)
+            ):
+                self._build(inspector.world_frame_id(), calc_X_WF, p_WS)
+            assert self.scene is not None
+            self.scene.set_frame_poses(calc_X_WF, motions, known, seen)
+        except BaseException:
+            # Some of its geometry may have moved already.
+            self.scene = None
+            raise
         self._revision = revision
 
     def labels(self, moving: np.ndarray) -> np.ndarray:

@@ -459,6 +459,26 @@ def test_a_frame_that_a_context_moves_stays_for_the_lidar():
     assert X_WS.translation().tolist() == [1.0, 0.0, 0.0]
 
 
+def test_an_error_leaves_no_pose_behind():
+    """The pose of one body changes in the turn in which another is too fast."""
+    field = Field()
+    wheel = field.add("wheel", Box(1, 1, 1))
+    crate = field.add("crate", Box(1, 1, 1))
+    beam = DirectionPattern(
+        [[1, 0, 0]], min_range=0.1, max_range=50.0, period=0.1
+    )
+    field.finish(beam, RigidTransform(), motion_distortion=True)
+    field.move(field.car, RigidTransform())
+    for x, w in ((8.0, 0.0), (4.0, 1e5), (4.0, 0.0)):
+        field.move(wheel, RigidTransform([0.0, 0.0, 9.0]), w=(0, 0, w))
+        field.move(crate, RigidTransform([x, 0.0, 0.0]))
+        if w:
+            with pytest.raises(ValueError, match="a body turns 10000 rad"):
+                field.eval()
+        else:
+            assert field.eval()["x"] == pytest.approx([x - 0.5])
+
+
 def test_lidars_of_many_diagrams_share_their_beams():
     """A dropped Diagram may stay in memory: little of it may be large."""
     turns = set()
