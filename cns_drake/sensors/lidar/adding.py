@@ -44,7 +44,7 @@ def add_lidar(
     pattern: BeamPattern | str,
     *,
     name: str = "lidar",
-    unseen: Collection[RigidBody | FrameId | GeometryId] | None = None,
+    unseen: Collection[RigidBody | Frame | FrameId | GeometryId] | None = None,
     motion_distortion: bool = False,
     motion: System | None = None,
     range_noise: float = 0.0,
@@ -70,7 +70,7 @@ def add_lidar(
         name: name of the system.
         unseen: bodies, frames and geometries that the LiDAR does not see; by
             default its body and all bodies that are welded to it, except the
-            world.
+            world. A frame on a body stands for the whole body.
         motion_distortion: whether the LiDAR and all other bodies of the plant
             keep moving during a turn (see `Lidar`).
         motion: source of the bodies' velocities for motion distortion; by
@@ -192,11 +192,12 @@ def add_lidar(
                 "velocity; a frame of another source does not"
             )
     if unseen is not None:
+        bodies = [p.body() if isinstance(p, Frame) else p for p in unseen]
         options["unseen"] = [
             place.GetParentPlant().GetBodyFrameIdOrThrow(place.index())
             if isinstance(place, RigidBody)
             else place
-            for place in unseen
+            for place in bodies
         ]
     lidar = builder.AddNamedSystem(
         name, Lidar(frame_id, X_PS, pattern, **options)

@@ -194,7 +194,8 @@ class Lidar(LeafSystem):
                 output; by default the turn starts at that time.
 
         Raises:
-            TypeError: the role is no role of geometry.
+            TypeError: the role is no role of geometry, or `unseen` has an
+                element of another type.
             ValueError: limits or period of the pattern are impossible.
         """
         super().__init__()
@@ -213,6 +214,12 @@ class Lidar(LeafSystem):
         self._returns = returns
         self.role = role
         self.unseen = None if unseen is None else frozenset(unseen)
+        for place in self.unseen or ():
+            if not isinstance(place, FrameId | GeometryId):
+                raise TypeError(
+                    f"unseen: {place!r} is not a FrameId or GeometryId; "
+                    "add_lidar also takes a RigidBody or Frame"
+                )
         self.structures = structures
         self.anchored_frames = frozenset(anchored_frames)
         self.num_threads = num_threads

@@ -115,9 +115,13 @@ def test_the_world_sees_everything():
 def test_hidden_bodies_can_be_chosen():
     yard = Yard()
     near, far = yard.add("near", 5.0), yard.add("far", 10.0)
+    farther = yard.add("farther", 15.0)
+    mast = yard.plant.AddFrame(
+        FixedOffsetFrame("mast", farther, RigidTransform([0, 0, 9.0]))
+    )
     yard.add("last", 20.0)
     frame = yard.plant.GetBodyFrameIdOrThrow(far.index())
-    unseen = [yard.robot, near, frame]
+    unseen = [yard.robot, near.body_frame(), frame, mast]
     assert yard.ahead(unseen=unseen) == pytest.approx(19.5)
 
 

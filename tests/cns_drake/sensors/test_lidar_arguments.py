@@ -89,6 +89,8 @@ class Site:
             "measurement: give either it or range_noise",
         ),
         ({"noise": 0.1}, TypeError, "noise"),
+        ({"unseen": ["wall"]}, TypeError, "^unseen: 'wall' is not a FrameId"),
+        ({"unseen": "wall"}, TypeError, "^unseen: '.' is not a FrameId"),
         ({"role": "visual"}, TypeError, "^role: 'visual' is not a role .*"),
         ({"role": Role.kUnassigned}, TypeError, "^role: .* is not a role .*"),
     ],
