@@ -466,6 +466,8 @@ class Lidar(LeafSystem):
         assemble_points(
             scan, turn.table, returns, met, labels, seen.instance, step
         )
+        # Other ports and methods are computed from it.
+        scan.flags.writeable = False
         output.set_value(_Measured(scan, met, seen.built))
 
     def _measure(

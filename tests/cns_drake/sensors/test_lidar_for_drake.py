@@ -94,6 +94,8 @@ def test_each_point_has_its_geometry_body_and_model():
         places[body.index()] = p = np.array([4 * np.cos(2 * k), 4 * k - 4, 0.2])
         field.move(body, RigidTransform(p))
     scan, ids = field.eval(), field.lidar.EvalGeometryIds(field.own)
+    with pytest.raises(ValueError, match="read-only"):
+        scan["x"][:] = 3.0
     inspector = field.scene_graph.model_inspector()
     assert len(ids) == len(scan) > 50
     p_W = field.eval("point_cloud_W").xyzs().T
