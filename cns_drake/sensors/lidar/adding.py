@@ -24,7 +24,7 @@ from cns_drake.sensors.lidar.config import (
     make_returns,
 )
 from cns_drake.sensors.lidar.lidar import Lidar
-from cns_drake.sensors.lidar.measurement import MeasurementModel
+from cns_drake.sensors.lidar.measurement import IDEAL, MeasurementModel
 from cns_drake.sensors.lidar.patterns import BeamPattern
 from cns_drake.sensors.lidar.presets import make_beam_pattern
 
@@ -78,8 +78,8 @@ def add_lidar(
         range_noise: standard deviation of the Gaussian errors of ranges [m]; 0
             for calibrated returns, which have their own.
         dropout: probability that a return is lost; 0 for calibrated returns.
-        seed: seed of noise, dropout and calibrated returns. Random numbers
-            depend on the seed, the name and the number of the frame.
+        seed: seed of noise, dropout and returns that are `calibrated`. Random
+            numbers depend on the seed, the name and the number of the frame.
         returns: `ideal`, `calibrated` by the data sheet of a preset, or a
             `CalibratedReturns`.
         options: further arguments of `Lidar`, such as `causal`; also
@@ -138,6 +138,10 @@ def add_lidar(
             returns = CalibratedReturns.of_preset(
                 preset, seed=seed, sensor_name=name
             )
+        elif seed and isinstance(returns, CalibratedReturns):
+            raise ValueError(
+                "seed: CalibratedReturns has its own; leave it out"
+            )
         if not isinstance(returns, CalibratedReturns):
             raise ValueError(
                 f"returns: {returns!r}: give 'ideal', 'calibrated' with the "
@@ -145,10 +149,14 @@ def add_lidar(
             )
         if preset is not None:
             pattern = returns.sheet.aimed(pattern)
-        if range_noise or dropout:
+        if (
+            range_noise
+            or dropout
+            or options.get("measurement", IDEAL).is_random
+        ):
             raise ValueError(
-                "range_noise, dropout: calibrated returns have their own; "
-                "leave these out"
+                "range_noise, dropout, measurement: calibrated returns have "
+                "noise of their own; leave these out"
             )
         options["returns"] = returns
     elif range_noise or dropout or seed:

@@ -22,6 +22,7 @@ import pytest
 
 from cns_drake.sensors.lidar.adding import add_lidar
 from cns_drake.sensors.lidar.config import LidarSection, make_pattern
+from cns_drake.sensors.lidar.measurement import MeasurementModel
 from cns_drake.sensors.lidar.presets import make_beam_pattern
 from cns_drake.sensors.returns.calibrated import CalibratedReturns
 from cns_drake.sensors.returns.unit_sheets import UNIT_SHEETS
@@ -235,8 +236,21 @@ def test_it_is_added_to_a_body_or_a_frame():
     ("pattern", "options", "fault"),
     [
         (make_beam_pattern("vlp-16"), {"returns": "calibrated"}, "of a preset"),
-        ("vlp-16", {"returns": "real"}, "'real': give 'ideal'"),
-        ("vlp-16", {"returns": "calibrated", "dropout": 0.1}, "their own"),
+        ("vlp-16", {"returns": "real", "seed": 1}, "'real': give 'ideal'"),
+        ("vlp-16", {"returns": "calibrated", "dropout": 0.1}, "of their own"),
+        (
+            "vlp-16",
+            {
+                "returns": "calibrated",
+                "measurement": MeasurementModel(faint_dropout=0.1),
+            },
+            "of their own",
+        ),
+        (
+            "vlp-16",
+            {"returns": CalibratedReturns.of_preset("vlp-16"), "seed": 1},
+            "^seed: CalibratedReturns has its own",
+        ),
     ],
 )
 def test_returns_that_cannot_be(pattern, options, fault):
