@@ -207,7 +207,7 @@ class Lidar(LeafSystem):
             )
         pattern.check()
         self.parent_frame_id = parent_frame_id
-        self.X_PS = X_PS
+        self.X_PS = RigidTransform(X_PS)
         self.pattern = pattern
         self.causal = bool(causal)
         self._measurement = measurement

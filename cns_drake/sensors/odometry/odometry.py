@@ -61,7 +61,7 @@ class OdometrySensor(LeafSystem):
         """
         super().__init__()
         self._body = body.index()
-        self._X_PB = X_PB
+        self._X_PB = None if X_PB is None else RigidTransform(X_PB)
         plant = body.GetParentPlant()
         self.frame_id = plant.GetBodyFrameIdIfExists(body.index())
         self._body_poses = self.DeclareAbstractInputPort(

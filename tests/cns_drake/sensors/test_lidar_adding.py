@@ -229,6 +229,9 @@ def test_it_is_added_to_a_body_or_a_frame():
     x = [float(scan["x"].item()) for scan in scans[:2]]
     assert x == pytest.approx([6.5, 5.5], abs=1e-6)
     assert lidars[2].pattern == make_beam_pattern("vlp-16", 0.05)
+    # The LiDAR keeps the pose of the call.
+    X_PS.set_translation([9.0, 0.0, 0.0])
+    assert [one.X_PS.translation()[0] for one in lidars] == [0.5, 1.5, 0.5]
     np.testing.assert_allclose(scans[2]["x"], 6.5, rtol=1e-6)
 
 
