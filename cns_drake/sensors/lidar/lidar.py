@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Collection, Mapping, Sequence
 from functools import lru_cache
+import numbers
 from operator import is_
 from typing import TYPE_CHECKING, Any, NamedTuple, Protocol
 
@@ -196,7 +197,8 @@ class Lidar(LeafSystem):
         Raises:
             TypeError: the role is no role of geometry, or `unseen` has an
                 element of another type.
-            ValueError: limits or period of the pattern are impossible.
+            ValueError: limits or period of the pattern, or the number of
+                threads, are impossible.
         """
         super().__init__()
         if not isinstance(role, Role) or role == Role.kUnassigned:
@@ -204,6 +206,10 @@ class Lidar(LeafSystem):
                 f"role: {role!r} is not a role of geometry; give "
                 "Role.kPerception, Role.kIllustration or Role.kProximity of "
                 "pydrake.geometry"
+            )
+        if not isinstance(num_threads, numbers.Integral) or num_threads < 1:
+            raise ValueError(
+                f"num_threads: {num_threads!r} is not an integer from 1 on"
             )
         pattern.check()
         self.parent_frame_id = parent_frame_id

@@ -89,6 +89,8 @@ class Site:
             "measurement: give either it or range_noise",
         ),
         ({"noise": 0.1}, TypeError, "noise"),
+        ({"num_threads": 0}, ValueError, "^num_threads: 0 is not an integer"),
+        ({"num_threads": 1.5}, ValueError, "^num_threads: 1.5 is not an"),
         ({"unseen": ["wall"]}, TypeError, "^unseen: 'wall' is not a FrameId"),
         ({"unseen": "wall"}, TypeError, "^unseen: '.' is not a FrameId"),
         ({"role": "visual"}, TypeError, "^role: 'visual' is not a role .*"),
