@@ -36,6 +36,7 @@ from cns_drake.scene.labels import MAX_INSTANCE, Labels, number_structures
 from cns_drake.scene.perception_geometry import (
     GeometryReader,
     PerceptionGeometry,
+    structure_name,
 )
 from cns_drake.sensors.lidar.measurement import IDEAL, MeasurementModel, Returns
 from cns_drake.sensors.lidar.patterns import POINT_DTYPE, BeamPattern, Beams
@@ -744,8 +745,11 @@ class SeenGeometry:
         calc_X_WF: Callable[[FrameId], RigidTransform],
         p_WS: np.ndarray,
     ) -> None:
-        names = [geometry.structure for geometry in self._geometries]
         structures, self._materials = self._lidar.structures, None
+        names = [
+            structure_name(geometry.name, is_scoped=structures is None)
+            for geometry in self._geometries
+        ]
         self.label, self.moving_label, self.instance = (
             number_structures(names)
             if structures is None

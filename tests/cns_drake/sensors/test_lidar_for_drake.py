@@ -124,6 +124,21 @@ def test_each_point_has_its_geometry_body_and_model():
     assert set(ids) <= {one for some in instances.values() for one in some}
 
 
+def test_namesakes_in_other_scopes_are_models_of_their_own():
+    field = Field()
+    for scope, x in (("left", 5.0), ("right", -5.0)):
+        model = f"{scope}::gripper"
+        body = field.add("hand", Box(1, 1, 1), Box(1, 1, 1), model=model)
+        X_WB = RigidTransform([x, 0.0, 0.0])
+        field.plant.SetDefaultFloatingBaseBodyPose(body, X_WB)
+    both = DirectionPattern(
+        [[1, 0, 0], [-1, 0, 0]], min_range=0.1, max_range=50.0, period=0.1
+    )
+    scan = field.finish(both, RigidTransform()).eval()
+    assert scan["x"] == pytest.approx([4.5, -4.5])
+    assert scan["instance"].tolist() == [1, 2]
+
+
 def test_labels_of_a_table_and_without_one():
     table = StructureTable([StructureEntry(7, "robot_1", "building")])
     for structures, expected in ((None, (0, 1)), (table, (50, 7))):
