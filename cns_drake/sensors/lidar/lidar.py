@@ -67,6 +67,13 @@ class RayHits(NamedTuple):
         geometry_ids: N `GeometryId`, None for a miss.
         normals_W: (N, 3) float32 unit normals in the world that face the
             origins of the rays, zero for a miss.
+
+    Example:
+        from cns_drake import Lidar, RayHits
+
+        def nearest(lidar: Lidar, context, p_WR, d_W) -> float:
+            hits: RayHits = lidar.CastRays(context, p_WR, d_W)
+            return hits.ranges.min()
     """
 
     ranges: np.ndarray
