@@ -328,6 +328,7 @@ def geometry_revision_port(scene_graph: SceneGraph) -> OutputPort:
         _PORT,
         lambda: Value(object()),
         lambda context, output: output.set_value(next(_revisions)),
-        # A SceneGraph has only this parameter.
+        # The first parameter is the geometry. The second, the configuration,
+        # concerns only proximity.
         {scene_graph.abstract_parameter_ticket(AbstractParameterIndex(0))},
     )

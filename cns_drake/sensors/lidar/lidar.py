@@ -408,7 +408,10 @@ class Lidar(LeafSystem):
 
     def _eval_seen(self, context: Context) -> SeenGeometry:
         seen = self._seen.Eval(context)
-        if seen.scene is None:  # In a cloned Context.
+        if seen.scene is None:
+            # In a cloned Context, whose entry Drake holds to be up to date. It
+            # is filled here, although outside of its calc, with what that would
+            # have computed.
             self._update(context, seen)
         return seen
 
