@@ -311,7 +311,7 @@ def add_lidar_view(
     )
     view.set_default_rgba(color)
     view.set_point_size(point_size)
-    builder.Connect(lidar.GetOutputPort("positions_W"), view.cloud_input_port())
+    builder.Connect(lidar.positions_W_output_port(), view.cloud_input_port())
     return view
 
 
@@ -320,7 +320,7 @@ def connect_lidar(
 ) -> None:
     """Connects a LiDAR's inputs to a SceneGraph."""
     query = scene_graph.get_query_output_port()
-    builder.Connect(query, lidar.GetInputPort("geometry_query"))
+    builder.Connect(query, lidar.query_object_input_port())
     revision = geometry_revision_port(scene_graph)
     builder.Connect(revision, lidar.GetInputPort("geometry_revision"))
 

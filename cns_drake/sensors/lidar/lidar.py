@@ -24,6 +24,7 @@ from pydrake.systems.framework import (
     Context,
     InputPort,
     LeafSystem,
+    OutputPort,
     ValueProducer,
 )
 
@@ -316,6 +317,30 @@ class Lidar(LeafSystem):
             calc=self._calc_X_WS,
             prerequisites_of_calc=inputs,
         )
+
+    def query_object_input_port(self) -> InputPort:
+        """Returns the port `geometry_query`, to connect to a SceneGraph."""
+        return self._geometry_query
+
+    def scan_output_port(self) -> OutputPort:
+        """Returns the port `scan`."""
+        return self.GetOutputPort("scan")
+
+    def point_cloud_S_output_port(self) -> OutputPort:
+        """Returns the port `point_cloud_S`."""
+        return self.GetOutputPort("point_cloud_S")
+
+    def point_cloud_W_output_port(self) -> OutputPort:
+        """Returns the port `point_cloud_W`."""
+        return self.GetOutputPort("point_cloud_W")
+
+    def positions_W_output_port(self) -> OutputPort:
+        """Returns the port `positions_W`."""
+        return self.GetOutputPort("positions_W")
+
+    def X_WS_output_port(self) -> OutputPort:
+        """Returns the port `X_WS`."""
+        return self.GetOutputPort("X_WS")
 
     def EvalScene(self, context: Context) -> RayCastingScene:
         """Returns the scene of all geometry that the LiDAR sees in a Context.

@@ -124,6 +124,19 @@ def test_each_point_has_its_geometry_body_and_model():
     assert set(ids) <= {one for some in instances.values() for one in some}
 
 
+def test_ports_have_methods_as_those_of_drakes_cameras():
+    field = Field()
+    field.add("ball", Sphere(1.0))
+    lidar, names = field.finish().lidar, set()
+    for k in range(lidar.num_output_ports()):
+        port = lidar.get_output_port(k)
+        names.add(port.get_name())
+        assert getattr(lidar, f"{port.get_name()}_output_port")() is port
+    assert {"scan", "point_cloud_S", "point_cloud_W", "X_WS"} < names
+    query = lidar.query_object_input_port()
+    assert query.get_name() == "geometry_query"
+
+
 def test_namesakes_in_other_scopes_are_models_of_their_own():
     field = Field()
     for scope, x in (("left", 5.0), ("right", -5.0)):
