@@ -4,8 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Collection, Mapping, Sequence
 from functools import lru_cache
-import numbers
-from operator import is_
+import operator
 from typing import TYPE_CHECKING, Any, NamedTuple, Protocol
 
 import numpy as np
@@ -204,10 +203,10 @@ class Lidar(LeafSystem):
                 output; by default the turn starts at that time.
 
         Raises:
-            TypeError: the role is no role of geometry, or `unseen` has an
-                element of another type.
-            ValueError: limits or period of the pattern, or the number of
-                threads, are impossible.
+            TypeError: the role is no role of geometry, `unseen` has an element
+                of another type, or the number of threads is no integer.
+            ValueError: limits or period of the pattern are impossible, or there
+                is no thread.
         """
         super().__init__()
         if not isinstance(role, Role) or role == Role.kUnassigned:
@@ -216,10 +215,8 @@ class Lidar(LeafSystem):
                 "Role.kPerception, Role.kIllustration or Role.kProximity of "
                 "pydrake.geometry"
             )
-        if not isinstance(num_threads, numbers.Integral) or num_threads < 1:
-            raise ValueError(
-                f"num_threads: {num_threads!r} is not an integer from 1 on"
-            )
+        if operator.index(num_threads) < 1:
+            raise ValueError(f"num_threads: {num_threads} is less than 1")
         pattern.check()
         self.parent_frame_id = parent_frame_id
         self.X_PS = RigidTransform(X_PS)
@@ -766,7 +763,7 @@ class SeenGeometry:
         """Returns whether the scene is up to date."""
         if self.built is not self._geometries and (
             len(self.built) != len(self._geometries)
-            or not all(map(is_, self.built, self._geometries))
+            or not all(map(operator.is_, self.built, self._geometries))
         ):
             return False
         return all(
