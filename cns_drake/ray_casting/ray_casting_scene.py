@@ -25,7 +25,7 @@ _AT_ONCE = np.zeros(1, np.float32)
 
 
 @dataclass(frozen=True)
-class RayHits:
+class SceneHits:
     """The first hits of N rays.
 
     Attributes:
@@ -159,7 +159,7 @@ class RayCastingScene:
         R_WSset: np.ndarray = _IDENTITY,
         times: np.ndarray = _AT_ONCE,
         with_normals: bool = False,
-    ) -> RayHits:
+    ) -> SceneHits:
         """Returns the first hits of N rays from one or several poses of S.
 
         S is a sensor, such as a LiDAR, which may move during its turn. Ray i
@@ -205,7 +205,7 @@ class RayCastingScene:
         if with_normals:
             matrices = self._calc_normal_matrices()
             is_outside = _face_origins(hits, matrices, rays.d_Oset())
-        return RayHits(hits.ranges, hits.owner, hits.normals, is_outside)
+        return SceneHits(hits.ranges, hits.owner, hits.normals, is_outside)
 
     def _cast_on_planes(self, rays: Rays, with_normals: bool) -> Hits:
         """Casts rays on half spaces first, and then on all other geometry.

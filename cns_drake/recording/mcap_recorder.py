@@ -188,13 +188,19 @@ class McapRecorder(LeafSystem):
         self._schedule = schedule
         self._bag = bag
         self._start_ns = start_ns
-        self._X_BI = X_BI
+        self._X_BI = None if X_BI is None else RigidTransform(X_BI)
         self._imu_variances = imu_variances
         # Frame of a sensor with a fixed place -> its pose on the vehicle.
-        self._X_BCs = {name: X for name, X in X_BSs.items() if X is not None}
-        if X_BI is not None:
-            self._X_BCs[messages.IMU_FRAME] = X_BI
-        self._X_BCs |= {s.frame or n: s.X_BC for n, s in further.items()}
+        X_BCs = {
+            **X_BSs,
+            **({} if X_BI is None else {messages.IMU_FRAME: X_BI}),
+            **{s.frame or n: s.X_BC for n, s in further.items()},
+        }
+        self._X_BCs = {
+            name: RigidTransform(X)
+            for name, X in X_BCs.items()
+            if X is not None
+        }
         # Child frame of the map -> the port of a frame's pose, and the child's
         # pose in that frame.
         self._poses: dict[str, tuple[InputPort, RigidTransform]] = {}

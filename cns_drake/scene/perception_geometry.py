@@ -67,17 +67,23 @@ class PerceptionGeometry:
         return structure_name(self.name)
 
 
-def structure_name(geometry_name: str) -> str:
+def structure_name(geometry_name: str, *, is_scoped: bool = False) -> str:
     """Returns the name of the structure to which a geometry belongs.
 
     A visual named `tower_017/storey_03` belongs to `tower_017`; a visual
     without a slash belongs to its model.
+
+    Args:
+        geometry_name: scoped name of the geometry, such as
+            `left::gripper::finger`.
+        is_scoped: whether a model has its whole name, such as `left::gripper`.
+            By default it is `gripper`, as in structure tables.
     """
     model, _, visual = geometry_name.rpartition("::")
     structure, slash, _ = visual.partition("/")
     if slash:
         return structure
-    return model.rpartition("::")[2] or visual
+    return (model if is_scoped else model.rpartition("::")[2]) or visual
 
 
 def check_shape(name: str, shape: Shape) -> None:
@@ -322,6 +328,7 @@ def geometry_revision_port(scene_graph: SceneGraph) -> OutputPort:
         _PORT,
         lambda: Value(object()),
         lambda context, output: output.set_value(next(_revisions)),
-        # A SceneGraph has only this parameter.
+        # The first parameter is the geometry. The second, the configuration,
+        # concerns only proximity.
         {scene_graph.abstract_parameter_ticket(AbstractParameterIndex(0))},
     )

@@ -283,7 +283,7 @@ class VehicleImu(LeafSystem):
         """
         super().__init__()
         self._trajectory = trajectory
-        self._X_BI = X_BI
+        self._X_BI = RigidTransform(X_BI)
         self._gravity_W = np.array(gravity_W)
         self._rate = rate
         self._add_errors = measure or (lambda first, exact: exact)

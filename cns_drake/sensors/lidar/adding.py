@@ -24,7 +24,7 @@ from cns_drake.sensors.lidar.config import (
     make_returns,
 )
 from cns_drake.sensors.lidar.lidar import Lidar
-from cns_drake.sensors.lidar.measurement import MeasurementModel
+from cns_drake.sensors.lidar.measurement import IDEAL, MeasurementModel
 from cns_drake.sensors.lidar.patterns import BeamPattern
 from cns_drake.sensors.lidar.presets import make_beam_pattern
 
@@ -44,7 +44,7 @@ def add_lidar(
     pattern: BeamPattern | str,
     *,
     name: str = "lidar",
-    unseen: Collection[RigidBody | FrameId | GeometryId] | None = None,
+    unseen: Collection[RigidBody | Frame | FrameId | GeometryId] | None = None,
     motion_distortion: bool = False,
     motion: System | None = None,
     range_noise: float = 0.0,
@@ -70,7 +70,7 @@ def add_lidar(
         name: name of the system.
         unseen: bodies, frames and geometries that the LiDAR does not see; by
             default its body and all bodies that are welded to it, except the
-            world.
+            world. A frame on a body stands for the whole body.
         motion_distortion: whether the LiDAR and all other bodies of the plant
             keep moving during a turn (see `Lidar`).
         motion: source of the bodies' velocities for motion distortion; by
@@ -78,8 +78,8 @@ def add_lidar(
         range_noise: standard deviation of the Gaussian errors of ranges [m]; 0
             for calibrated returns, which have their own.
         dropout: probability that a return is lost; 0 for calibrated returns.
-        seed: seed of noise, dropout and calibrated returns. Random numbers
-            depend on the seed, the name and the number of the frame.
+        seed: seed of noise, dropout and returns that are `calibrated`. Random
+            numbers depend on the seed, the name and the number of the frame.
         returns: `ideal`, `calibrated` by the data sheet of a preset, or a
             `CalibratedReturns`.
         options: further arguments of `Lidar`, such as `causal`; also
@@ -138,6 +138,10 @@ def add_lidar(
             returns = CalibratedReturns.of_preset(
                 preset, seed=seed, sensor_name=name
             )
+        elif seed and isinstance(returns, CalibratedReturns):
+            raise ValueError(
+                "seed: CalibratedReturns has its own; leave it out"
+            )
         if not isinstance(returns, CalibratedReturns):
             raise ValueError(
                 f"returns: {returns!r}: give 'ideal', 'calibrated' with the "
@@ -145,10 +149,14 @@ def add_lidar(
             )
         if preset is not None:
             pattern = returns.sheet.aimed(pattern)
-        if range_noise or dropout:
+        if (
+            range_noise
+            or dropout
+            or options.get("measurement", IDEAL).is_random
+        ):
             raise ValueError(
-                "range_noise, dropout: calibrated returns have their own; "
-                "leave these out"
+                "range_noise, dropout, measurement: calibrated returns have "
+                "noise of their own; leave these out"
             )
         options["returns"] = returns
     elif range_noise or dropout or seed:
@@ -192,11 +200,12 @@ def add_lidar(
                 "velocity; a frame of another source does not"
             )
     if unseen is not None:
+        bodies = [p.body() if isinstance(p, Frame) else p for p in unseen]
         options["unseen"] = [
             place.GetParentPlant().GetBodyFrameIdOrThrow(place.index())
             if isinstance(place, RigidBody)
             else place
-            for place in unseen
+            for place in bodies
         ]
     lidar = builder.AddNamedSystem(
         name, Lidar(frame_id, X_PS, pattern, **options)
@@ -302,7 +311,7 @@ def add_lidar_view(
     )
     view.set_default_rgba(color)
     view.set_point_size(point_size)
-    builder.Connect(lidar.GetOutputPort("positions_W"), view.cloud_input_port())
+    builder.Connect(lidar.positions_W_output_port(), view.cloud_input_port())
     return view
 
 
@@ -311,7 +320,7 @@ def connect_lidar(
 ) -> None:
     """Connects a LiDAR's inputs to a SceneGraph."""
     query = scene_graph.get_query_output_port()
-    builder.Connect(query, lidar.GetInputPort("geometry_query"))
+    builder.Connect(query, lidar.query_object_input_port())
     revision = geometry_revision_port(scene_graph)
     builder.Connect(revision, lidar.GetInputPort("geometry_revision"))
 

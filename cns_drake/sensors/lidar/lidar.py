@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Collection, Mapping, Sequence
 from functools import lru_cache
-from operator import is_
+import operator
 from typing import TYPE_CHECKING, Any, NamedTuple, Protocol
 
 import numpy as np
@@ -23,6 +23,7 @@ from pydrake.systems.framework import (
     Context,
     InputPort,
     LeafSystem,
+    OutputPort,
     ValueProducer,
 )
 
@@ -35,6 +36,7 @@ from cns_drake.scene.labels import MAX_INSTANCE, Labels, number_structures
 from cns_drake.scene.perception_geometry import (
     GeometryReader,
     PerceptionGeometry,
+    structure_name,
 )
 from cns_drake.sensors.lidar.measurement import IDEAL, MeasurementModel, Returns
 from cns_drake.sensors.lidar.patterns import POINT_DTYPE, BeamPattern, Beams
@@ -65,6 +67,13 @@ class RayHits(NamedTuple):
         geometry_ids: N `GeometryId`, None for a miss.
         normals_W: (N, 3) float32 unit normals in the world that face the
             origins of the rays, zero for a miss.
+
+    Example:
+        from cns_drake import Lidar, RayHits
+
+        def nearest(lidar: Lidar, context, p_WR, d_W) -> float:
+            hits: RayHits = lidar.CastRays(context, p_WR, d_W)
+            return hits.ranges.min()
     """
 
     ranges: np.ndarray
@@ -194,8 +203,10 @@ class Lidar(LeafSystem):
                 output; by default the turn starts at that time.
 
         Raises:
-            TypeError: the role is no role of geometry.
-            ValueError: limits or period of the pattern are impossible.
+            TypeError: the role is no role of geometry, `unseen` has an element
+                of another type, or the number of threads is no integer.
+            ValueError: limits or period of the pattern are impossible, or there
+                is no thread.
         """
         super().__init__()
         if not isinstance(role, Role) or role == Role.kUnassigned:
@@ -204,15 +215,23 @@ class Lidar(LeafSystem):
                 "Role.kPerception, Role.kIllustration or Role.kProximity of "
                 "pydrake.geometry"
             )
+        if operator.index(num_threads) < 1:
+            raise ValueError(f"num_threads: {num_threads} is less than 1")
         pattern.check()
         self.parent_frame_id = parent_frame_id
-        self.X_PS = X_PS
+        self.X_PS = RigidTransform(X_PS)
         self.pattern = pattern
         self.causal = bool(causal)
         self._measurement = measurement
         self._returns = returns
         self.role = role
         self.unseen = None if unseen is None else frozenset(unseen)
+        for place in self.unseen or ():
+            if not isinstance(place, FrameId | GeometryId):
+                raise TypeError(
+                    f"unseen: {place!r} is not a FrameId or GeometryId; "
+                    "add_lidar also takes a RigidBody or Frame"
+                )
         self.structures = structures
         self.anchored_frames = frozenset(anchored_frames)
         self.num_threads = num_threads
@@ -295,6 +314,30 @@ class Lidar(LeafSystem):
             calc=self._calc_X_WS,
             prerequisites_of_calc=inputs,
         )
+
+    def query_object_input_port(self) -> InputPort:
+        """Returns the port `geometry_query`, to connect to a SceneGraph."""
+        return self._geometry_query
+
+    def scan_output_port(self) -> OutputPort:
+        """Returns the port `scan`."""
+        return self.GetOutputPort("scan")
+
+    def point_cloud_S_output_port(self) -> OutputPort:
+        """Returns the port `point_cloud_S`."""
+        return self.GetOutputPort("point_cloud_S")
+
+    def point_cloud_W_output_port(self) -> OutputPort:
+        """Returns the port `point_cloud_W`."""
+        return self.GetOutputPort("point_cloud_W")
+
+    def positions_W_output_port(self) -> OutputPort:
+        """Returns the port `positions_W`."""
+        return self.GetOutputPort("positions_W")
+
+    def X_WS_output_port(self) -> OutputPort:
+        """Returns the port `X_WS`."""
+        return self.GetOutputPort("X_WS")
 
     def EvalScene(self, context: Context) -> RayCastingScene:
         """Returns the scene of all geometry that the LiDAR sees in a Context.
@@ -387,7 +430,10 @@ class Lidar(LeafSystem):
 
     def _eval_seen(self, context: Context) -> SeenGeometry:
         seen = self._seen.Eval(context)
-        if seen.scene is None:  # In a cloned Context.
+        if seen.scene is None:
+            # In a cloned Context, whose entry Drake holds to be up to date. It
+            # is filled here, although outside of its calc, with what that would
+            # have computed.
             self._update(context, seen)
         return seen
 
@@ -459,6 +505,8 @@ class Lidar(LeafSystem):
         assemble_points(
             scan, turn.table, returns, met, labels, seen.instance, step
         )
+        # Other ports and methods are computed from it.
+        scan.flags.writeable = False
         output.set_value(_Measured(scan, met, seen.built))
 
     def _measure(
@@ -667,12 +715,17 @@ class SeenGeometry:
 
         if self.scene is None or revision is None or revision != self._revision:
             self._read(inspector)
-        if self.scene is None or not (
-            self._is_built(calc_X_WF) and self.scene.serves(p_WS)
-        ):
-            self._build(inspector.world_frame_id(), calc_X_WF, p_WS)
-        assert self.scene is not None
-        self.scene.set_frame_poses(calc_X_WF, motions, known, seen)
+        try:
+            if self.scene is None or not (
+                self._is_built(calc_X_WF) and self.scene.serves(p_WS)
+            ):
+                self._build(inspector.world_frame_id(), calc_X_WF, p_WS)
+            assert self.scene is not None
+            self.scene.set_frame_poses(calc_X_WF, motions, known, seen)
+        except BaseException:
+            # Some of its geometry may have moved already.
+            self.scene = None
+            raise
         self._revision = revision
 
     def labels(self, moving: np.ndarray) -> np.ndarray:
@@ -710,7 +763,7 @@ class SeenGeometry:
         """Returns whether the scene is up to date."""
         if self.built is not self._geometries and (
             len(self.built) != len(self._geometries)
-            or not all(map(is_, self.built, self._geometries))
+            or not all(map(operator.is_, self.built, self._geometries))
         ):
             return False
         return all(
@@ -724,8 +777,11 @@ class SeenGeometry:
         calc_X_WF: Callable[[FrameId], RigidTransform],
         p_WS: np.ndarray,
     ) -> None:
-        names = [geometry.structure for geometry in self._geometries]
         structures, self._materials = self._lidar.structures, None
+        names = [
+            structure_name(geometry.name, is_scoped=structures is None)
+            for geometry in self._geometries
+        ]
         self.label, self.moving_label, self.instance = (
             number_structures(names)
             if structures is None

@@ -50,6 +50,14 @@ class OdometrySensor(LeafSystem):
     Each input is a list with one entry per body P of a plant: the pose X_WP, or
     the spatial velocity V_WP, expressed in the world. The output is the
     `Odometry` of the observed body or frame B.
+
+    Example:
+        from cns_drake import OdometrySensor
+
+        sensor = builder.AddSystem(OdometrySensor(body))
+        for name in ("body_poses", "body_spatial_velocities"):
+            port = plant.GetOutputPort(name)
+            builder.Connect(port, sensor.GetInputPort(name))
     """
 
     def __init__(self, body: RigidBody, X_PB: RigidTransform | None = None):
@@ -61,7 +69,7 @@ class OdometrySensor(LeafSystem):
         """
         super().__init__()
         self._body = body.index()
-        self._X_PB = X_PB
+        self._X_PB = None if X_PB is None else RigidTransform(X_PB)
         plant = body.GetParentPlant()
         self.frame_id = plant.GetBodyFrameIdIfExists(body.index())
         self._body_poses = self.DeclareAbstractInputPort(
@@ -79,6 +87,7 @@ class OdometrySensor(LeafSystem):
 
     @property
     def X_PB(self) -> RigidTransform:
+        """Pose of the observed frame B in the body P."""
         return RigidTransform() if self._X_PB is None else self._X_PB
 
     def place_of(

@@ -9,7 +9,7 @@ from itertools import pairwise
 import numpy as np
 
 from cns_drake.base.elementary import cos, sin
-from cns_drake.ray_casting.ray_casting_scene import RayCastingScene, RayHits
+from cns_drake.ray_casting.ray_casting_scene import RayCastingScene, SceneHits
 from cns_drake.ray_casting.rays import rotate
 from cns_drake.scene.perception_geometry import PerceptionGeometry
 from cns_drake.scene.structure_table import StructureTable
@@ -186,7 +186,7 @@ class CalibratedReturns:
         joined = found[0]
         if len(found) > 1:
             fields = zip(*(vars(hits).values() for hits in found), strict=True)
-            joined = RayHits(*map(np.concatenate, fields))
+            joined = SceneHits(*map(np.concatenate, fields))
         met = BeamHits.of(rotate(R_WSset, turn.d_Sset), joined)
         if turn.height.any():
             every = np.arange(len(turn.height))
@@ -198,7 +198,7 @@ class CalibratedReturns:
             d_Wset: np.ndarray,
             when: np.ndarray,
             reaches: np.ndarray,
-        ) -> RayHits:
+        ) -> SceneHits:
             return scene.cast_rays(
                 p_Wset, d_Wset, reaches, times=when, with_normals=True
             )

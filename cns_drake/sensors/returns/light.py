@@ -8,7 +8,7 @@ from typing import Any, NamedTuple, TypeVar
 import numpy as np
 
 from cns_drake.base.compiled import compiled
-from cns_drake.ray_casting.ray_casting_scene import RayHits
+from cns_drake.ray_casting.ray_casting_scene import SceneHits
 from cns_drake.sensors.returns.materials import BEADS, RETRO, Materials
 
 # The retro-reflective sheeting of signs and plates works up to this angle.
@@ -57,7 +57,7 @@ class BeamHits(NamedTuple):
     cosine: np.ndarray
 
     @classmethod
-    def of(cls, d_Wset: np.ndarray, hits: RayHits) -> BeamHits:
+    def of(cls, d_Wset: np.ndarray, hits: SceneHits) -> BeamHits:
         """Returns the hits of N rays, with the cosines of their incidence.
 
         Args:
@@ -100,7 +100,7 @@ class Shots(NamedTuple):
     divergence: float
     max_range: float
     materials: Materials
-    cast: Callable[[np.ndarray, np.ndarray, np.ndarray, np.ndarray], RayHits]
+    cast: Callable[[np.ndarray, np.ndarray, np.ndarray, np.ndarray], SceneHits]
 
 
 class Light(NamedTuple):

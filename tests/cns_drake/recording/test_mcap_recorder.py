@@ -99,12 +99,17 @@ class _Car(LeafSystem):
 def make_diagram(bag, **kwargs):
     builder = DiagramBuilder()
     car = builder.AddNamedSystem("car", _Car(**kwargs))
+    given = {name: RigidTransform(X) for name, X in X_BSs.items()}
+    X_BI_given = RigidTransform(X_BI)
     recorder = builder.AddNamedSystem(
         "recorder",
         McapRecorder(
-            bag, X_BSs=X_BSs, X_BI=X_BI, period=PERIOD, start_ns=START_NS
+            bag, X_BSs=given, X_BI=X_BI_given, period=PERIOD, start_ns=START_NS
         ),
     )
+    # The recorder keeps the poses of the call.
+    for X in (*given.values(), X_BI_given):
+        X.SetIdentity()
     for i in range(recorder.num_input_ports()):
         port = recorder.get_input_port(i)
         builder.Connect(car.GetOutputPort(port.get_name()), port)

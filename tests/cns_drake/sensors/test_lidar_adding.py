@@ -22,6 +22,7 @@ import pytest
 
 from cns_drake.sensors.lidar.adding import add_lidar
 from cns_drake.sensors.lidar.config import LidarSection, make_pattern
+from cns_drake.sensors.lidar.measurement import MeasurementModel
 from cns_drake.sensors.lidar.presets import make_beam_pattern
 from cns_drake.sensors.returns.calibrated import CalibratedReturns
 from cns_drake.sensors.returns.unit_sheets import UNIT_SHEETS
@@ -115,9 +116,13 @@ def test_the_world_sees_everything():
 def test_hidden_bodies_can_be_chosen():
     yard = Yard()
     near, far = yard.add("near", 5.0), yard.add("far", 10.0)
+    farther = yard.add("farther", 15.0)
+    mast = yard.plant.AddFrame(
+        FixedOffsetFrame("mast", farther, RigidTransform([0, 0, 9.0]))
+    )
     yard.add("last", 20.0)
     frame = yard.plant.GetBodyFrameIdOrThrow(far.index())
-    unseen = [yard.robot, near, frame]
+    unseen = [yard.robot, near.body_frame(), frame, mast]
     assert yard.ahead(unseen=unseen) == pytest.approx(19.5)
 
 
@@ -224,6 +229,9 @@ def test_it_is_added_to_a_body_or_a_frame():
     x = [float(scan["x"].item()) for scan in scans[:2]]
     assert x == pytest.approx([6.5, 5.5], abs=1e-6)
     assert lidars[2].pattern == make_beam_pattern("vlp-16", 0.05)
+    # The LiDAR keeps the pose of the call.
+    X_PS.set_translation([9.0, 0.0, 0.0])
+    assert [one.X_PS.translation()[0] for one in lidars] == [0.5, 1.5, 0.5]
     np.testing.assert_allclose(scans[2]["x"], 6.5, rtol=1e-6)
 
 
@@ -231,8 +239,21 @@ def test_it_is_added_to_a_body_or_a_frame():
     ("pattern", "options", "fault"),
     [
         (make_beam_pattern("vlp-16"), {"returns": "calibrated"}, "of a preset"),
-        ("vlp-16", {"returns": "real"}, "'real': give 'ideal'"),
-        ("vlp-16", {"returns": "calibrated", "dropout": 0.1}, "their own"),
+        ("vlp-16", {"returns": "real", "seed": 1}, "'real': give 'ideal'"),
+        ("vlp-16", {"returns": "calibrated", "dropout": 0.1}, "of their own"),
+        (
+            "vlp-16",
+            {
+                "returns": "calibrated",
+                "measurement": MeasurementModel(faint_dropout=0.1),
+            },
+            "of their own",
+        ),
+        (
+            "vlp-16",
+            {"returns": CalibratedReturns.of_preset("vlp-16"), "seed": 1},
+            "^seed: CalibratedReturns has its own",
+        ),
     ],
 )
 def test_returns_that_cannot_be(pattern, options, fault):

@@ -89,6 +89,10 @@ class Site:
             "measurement: give either it or range_noise",
         ),
         ({"noise": 0.1}, TypeError, "noise"),
+        ({"num_threads": 0}, ValueError, "^num_threads: 0 is less than 1"),
+        ({"num_threads": 1.5}, TypeError, "'float' .* as an integer"),
+        ({"unseen": ["wall"]}, TypeError, "^unseen: 'wall' is not a FrameId"),
+        ({"unseen": "wall"}, TypeError, "^unseen: '.' is not a FrameId"),
         ({"role": "visual"}, TypeError, "^role: 'visual' is not a role .*"),
         ({"role": Role.kUnassigned}, TypeError, "^role: .* is not a role .*"),
     ],
@@ -123,6 +127,13 @@ def test_sensors_need_a_finalized_plant(place):
     add_imu(site.builder, body, X_PS)
     add_odometry(site.builder, body)
     site.builder.Build()
+
+
+def test_odometry_keeps_the_pose_of_the_call():
+    site, X_PB = Site(), RigidTransform([0.0, 0.0, 1.0])
+    odometry = add_odometry(site.builder, site.world, X_PB=X_PB)
+    X_PB.SetIdentity()
+    assert odometry.X_PB.translation().tolist() == [0.0, 0.0, 1.0]
 
 
 def test_a_carrier_of_imu_or_odometry_is_a_body():

@@ -94,6 +94,8 @@ def test_each_point_has_its_geometry_body_and_model():
         places[body.index()] = p = np.array([4 * np.cos(2 * k), 4 * k - 4, 0.2])
         field.move(body, RigidTransform(p))
     scan, ids = field.eval(), field.lidar.EvalGeometryIds(field.own)
+    with pytest.raises(ValueError, match="read-only"):
+        scan["x"][:] = 3.0
     inspector = field.scene_graph.model_inspector()
     assert len(ids) == len(scan) > 50
     p_W = field.eval("point_cloud_W").xyzs().T
@@ -120,6 +122,34 @@ def test_each_point_has_its_geometry_body_and_model():
         assert bodies_of == {bodies[instance - 1].index()}
         assert len(of_instance) == 2
     assert set(ids) <= {one for some in instances.values() for one in some}
+
+
+def test_ports_have_methods_as_those_of_drakes_cameras():
+    field = Field()
+    field.add("ball", Sphere(1.0))
+    lidar, names = field.finish().lidar, set()
+    for k in range(lidar.num_output_ports()):
+        port = lidar.get_output_port(k)
+        names.add(port.get_name())
+        assert getattr(lidar, f"{port.get_name()}_output_port")() is port
+    assert {"scan", "point_cloud_S", "point_cloud_W", "X_WS"} < names
+    query = lidar.query_object_input_port()
+    assert query.get_name() == "geometry_query"
+
+
+def test_namesakes_in_other_scopes_are_models_of_their_own():
+    field = Field()
+    for scope, x in (("left", 5.0), ("right", -5.0)):
+        model = f"{scope}::gripper"
+        body = field.add("hand", Box(1, 1, 1), Box(1, 1, 1), model=model)
+        X_WB = RigidTransform([x, 0.0, 0.0])
+        field.plant.SetDefaultFloatingBaseBodyPose(body, X_WB)
+    both = DirectionPattern(
+        [[1, 0, 0], [-1, 0, 0]], min_range=0.1, max_range=50.0, period=0.1
+    )
+    scan = field.finish(both, RigidTransform()).eval()
+    assert scan["x"] == pytest.approx([4.5, -4.5])
+    assert scan["instance"].tolist() == [1, 2]
 
 
 def test_labels_of_a_table_and_without_one():
@@ -457,6 +487,26 @@ def test_a_frame_that_a_context_moves_stays_for_the_lidar():
         lidar.GetMyContextFromRoot(field.context)
     )
     assert X_WS.translation().tolist() == [1.0, 0.0, 0.0]
+
+
+def test_an_error_leaves_no_pose_behind():
+    """The pose of one body changes in the turn in which another is too fast."""
+    field = Field()
+    wheel = field.add("wheel", Box(1, 1, 1))
+    crate = field.add("crate", Box(1, 1, 1))
+    beam = DirectionPattern(
+        [[1, 0, 0]], min_range=0.1, max_range=50.0, period=0.1
+    )
+    field.finish(beam, RigidTransform(), motion_distortion=True)
+    field.move(field.car, RigidTransform())
+    for x, w in ((8.0, 0.0), (4.0, 1e5), (4.0, 0.0)):
+        field.move(wheel, RigidTransform([0.0, 0.0, 9.0]), w=(0, 0, w))
+        field.move(crate, RigidTransform([x, 0.0, 0.0]))
+        if w:
+            with pytest.raises(ValueError, match="a body turns 10000 rad"):
+                field.eval()
+        else:
+            assert field.eval()["x"] == pytest.approx([x - 0.5])
 
 
 def test_lidars_of_many_diagrams_share_their_beams():

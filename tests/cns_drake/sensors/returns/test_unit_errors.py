@@ -8,7 +8,7 @@ from pydrake.geometry import HalfSpace
 from pydrake.math import RigidTransform, RollPitchYaw
 import pytest
 
-from cns_drake.ray_casting.ray_casting_scene import RayHits
+from cns_drake.ray_casting.ray_casting_scene import SceneHits
 from cns_drake.scene.structure_table import StructureEntry, StructureTable
 from cns_drake.sensors.lidar.config import (
     describe_unit,
@@ -170,7 +170,7 @@ class Wall:
         ranges = (8.0 - p_WSset[:, 0]) / d_Sset[:, 0]
         normals = np.tile(np.float32([-1.0, 0.0, 0.0]), (len(ranges), 1))
         is_met = (ranges > 0.0) & (ranges < 30.0)
-        return RayHits(
+        return SceneHits(
             np.where(is_met, ranges, np.inf).astype(np.float32),
             np.where(is_met, 0, -1).astype(np.int32),
             normals * is_met[:, None],
