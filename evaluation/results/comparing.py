@@ -8,6 +8,7 @@ from pathlib import Path
 import re
 from typing import Any, NamedTuple
 import warnings
+import zlib
 
 import numpy as np
 from scipy.stats import kendalltau
@@ -21,7 +22,7 @@ from evaluation.recognition.metrics import (
     compared_by_auc,
     percentile_interval,
     resampled_metrics,
-    resampled_weights,
+    weights_by_drive,
 )
 from evaluation.recognition.protocol import PROTOCOL_NAMES
 from evaluation.results.summaries import (
@@ -409,7 +410,8 @@ def _differences(
         for other in others:
             check_same_queries(one, other)
     compared = compared_by_auc(
-        {name: [a.outcomes for a in some] for name, some in asked.items()}
+        {name: [a.outcomes for a in some] for name, some in asked.items()},
+        [_drive(a) for a in next(iter(asked.values()), ())],
     )
     return [Compared(*two, *found) for two, found in compared.items()]
 
@@ -465,20 +467,30 @@ def _values(
         (method, one) not in table.answers for one, method in places
     ):
         return means, samples[:, order]
-    of_condition = []
-    for k, one in enumerate(table.conditions):
-        asked = [table.answers[method, one] for method in methods]
-        for answers in asked:
-            check_same_queries(asked[0], answers)
-        outcomes = asked[0].outcomes
-        weights = resampled_weights(len(outcomes), k, outcomes.blocks)
-        of_condition.append(
-            [
-                resampled_metrics(answers.outcomes, weights)[_RESAMPLED[metric]]
-                for answers in asked
-            ]
-        )
+    asked = [
+        [table.answers[method, one] for method in methods]
+        for one in table.conditions
+    ]
+    for some in asked:
+        for answers in some:
+            check_same_queries(some[0], answers)
+    drawn = weights_by_drive(
+        [some[0].outcomes.own_blocks for some in asked],
+        [_drive(some[0]) for some in asked],
+    )
+    of_condition = [
+        [
+            resampled_metrics(answers.outcomes, weights)[_RESAMPLED[metric]]
+            for answers in some
+        ]
+        for some, (_, weights) in zip(asked, drawn, strict=True)
+    ]
     return means, np.mean(of_condition, axis=0).T
+
+
+def _drive(queries: Answers) -> int:
+    """Returns a number of the drive of queries, equal in all tables."""
+    return zlib.crc32(f"{queries.map} {queries.query}".encode())
 
 
 def _tau(first: np.ndarray, second: np.ndarray) -> float:

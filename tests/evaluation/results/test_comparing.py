@@ -207,6 +207,44 @@ def test_differences_of_answers(tmp_path):
         compare([one, fewer])
 
 
+def written_times(folder, number, parts):
+    """Writes the same answers for one drive under several conditions."""
+    tables = [
+        write_table(
+            folder / str(k), {"a": parts}, queries=True, factors={"cause": k}
+        )
+        for k in range(number)
+    ]
+    for name, reader, items in (
+        ("results.csv", Results, "rows"),
+        ("queries.csv", QueryRows, "answers"),
+    ):
+        read = [getattr(reader.read(one / name), items) for one in tables]
+        reader.of(itertools.chain(*read)).write_csv(folder / name)
+    return folder
+
+
+def test_conditions_of_a_drive_are_not_independent(tmp_path):
+    """The same answers under four conditions are no stronger evidence."""
+    found = []
+    for number in (1, 4):
+        pair = []
+        for name, parts in (
+            ("one", {"x": 0.6, "y": 0.5}),
+            ("two", {"x": 0.5, "y": 0.55}),
+        ):
+            folder = tmp_path / f"{name} {number}"
+            folder.mkdir()
+            pair.append(written_times(folder, number, parts))
+        found.append(compare(pair))
+    once, again = found
+    assert (once.conditions, again.conditions) == (1, 4)
+    assert len(once.differences) == 6
+    for one, other in zip(once.differences, again.differences, strict=True):
+        assert other.p_value == pytest.approx(one.p_value)
+    assert once.agreements[0].interval == again.agreements[0].interval
+
+
 def counted_tau(first, second):
     """Pairs in the same order less those in the opposite, over all pairs."""
     signs = [
