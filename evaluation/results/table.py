@@ -488,7 +488,7 @@ def _answered(
 
 
 @cache
-def _range(metric: str) -> tuple[float, float]:
+def metric_range(metric: str) -> tuple[float, float]:
     """Returns the least and the greatest value of a metric."""
     for pattern, *ends in _RANGES:
         if re.fullmatch(pattern, metric):
@@ -504,7 +504,7 @@ def _measured(one: _Line) -> dict[str, Any]:
     )
     if math.isnan(value) and metric in _ALWAYS_KNOWN:
         raise one.fault("value", f"{metric} needs a number")
-    least, greatest = _range(metric)
+    least, greatest = metric_range(metric)
     if value < least or value > greatest:
         limits = f"from {least:g} to {greatest:g}"
         if math.isinf(greatest):
