@@ -32,9 +32,11 @@ from evaluation.results.summaries import (
 )
 from evaluation.results.table import (
     KEYS,
+    LAST,
     QUERIES,
     RESULTS,
     SETTINGS,
+    STAGE,
     Answers,
     QueryRows,
     Results,
@@ -230,20 +232,27 @@ def compare(
         own.append(
             _Table(_name(path, paths), _by_place(chosen_rows), _by_place(asked))
         )
-    pairs = itertools.combinations(own, 2)
     less = bool(_LESS.fullmatch(metric))
     if rankings:
         if len(own) < 2:
             raise InputError("--rankings: two tables are needed")
+        notes = []
+        for k, table in enumerate(own):
+            changed, left = _without_controls(table.conditions)
+            own[k] = _on(table, changed)
+            notes += [f"{table.name}: {one}" for one in left]
+        pairs = itertools.combinations(own, 2)
         found = [_agreement(*pair, metric) for pair in pairs]
         each = [
             one._replace(method=f"{one.method} ({table.name})")
             for table in own
             for one in ranking(table.rows.values(), least_first=less)[0]
         ]
-        return Comparison(metric, task, 0, each, (), found, ())
+        return Comparison(metric, task, 0, each, (), found, notes)
     shipped = _shipped(wanted)
     common, notes = _common(own, shipped, paths)
+    common, left_out = _without_controls(common)
+    notes += left_out
     tables = [_on(table, common) for table in (shipped, *own)]
     entries: dict[str, tuple[_Table, str]] = {}
     for table in tables:
@@ -369,6 +378,23 @@ def _common(
     raise InputError(
         f"{names}: no condition in common{beside} ({_apart(own[0], others[0])})"
     )
+
+
+def _without_controls(
+    conditions: Sequence[tuple[object, ...]],
+) -> tuple[Sequence[tuple[object, ...]], list[str]]:
+    """Leaves out conditions without a change; returns the others, and a note.
+
+    If there is no change in any condition, all of them are returned.
+    """
+    changed = [one for one in conditions if (STAGE, LAST) not in one]
+    left = len(conditions) - len(changed)
+    if not left or not changed:
+        return conditions, []
+    return changed, [
+        f"left out, as nothing changes in them ({STAGE} {LAST}): {left}"
+        " conditions"
+    ]
 
 
 def _apart(one: _Table, other: _Table) -> str:

@@ -14,7 +14,15 @@ from evaluation.results.comparing import (
     compare,
     suggest_comparison,
 )
-from evaluation.results.table import Answers, QueryRows, Results, Row
+from evaluation.results.table import (
+    LAST,
+    OWN,
+    STAGE,
+    Answers,
+    QueryRows,
+    Results,
+    Row,
+)
 
 
 def key(method, town="town", **changes):
@@ -123,7 +131,8 @@ def test_the_shipped_tables_hold_the_published_numbers():
 def test_an_entrant_stands_among_the_shipped(tmp_path):
     """Each value is just above the best shipped method's, or below it."""
     best = {}
-    for row in shipped(map="suburbia", metric="auc", gate=False):
+    changed = {"map": "suburbia", STAGE: OWN, "metric": "auc", "gate": False}
+    for row in shipped(**changed):
         condition = row.but("method")
         if condition not in best or best[condition].value < row.value:
             best[condition] = row
@@ -135,7 +144,7 @@ def test_an_entrant_stands_among_the_shipped(tmp_path):
     path = tmp_path / "entrant.csv"
     Results.of(rows).write_csv(path)
     found = compare([path])
-    assert found.conditions == 4
+    assert found.conditions == 2
     names = [one.method for one in found.ranked]
     assert names[0] == "mine"
     assert {"solid", "solid (entrant)"} < set(names)
@@ -143,17 +152,33 @@ def test_an_entrant_stands_among_the_shipped(tmp_path):
     expected = np.mean([row.value for row in best.values()])
     assert value["mine"] == pytest.approx(expected + 0.001)
     assert value["solid (entrant)"] == pytest.approx(expected - 0.01)
-    mean = np.mean(
-        [
-            row.value
-            for row in shipped(
-                map="suburbia", metric="auc", gate=False, method="ring++"
-            )
-        ]
-    )
+    mean = np.mean([row.value for row in shipped(**changed, method="ring++")])
     assert value["ring++"] == pytest.approx(mean)
     assert found.notes == []
     assert found.agreements == []
+
+
+def test_controls_are_not_ranked(tmp_path):
+    """Nothing changes in them; they count only if there is nothing else."""
+    plain = {"x": 0.5, "y": 0.4}
+    own, last, both = tmp_path / "own", tmp_path / "last", tmp_path / "both"
+    write_table(own, {"a": plain}, factors={STAGE: OWN})
+    write_table(last, {"a": {"x": 0.9, "y": 1.0}}, factors={STAGE: LAST})
+    both.mkdir()
+    rows = [Results.read(one).rows for one in (own, last)]
+    Results.of(itertools.chain(*rows)).write_csv(both / "results.csv")
+    left = (
+        "left out, as nothing changes in them (both.stage last): 1 conditions"
+    )
+    found = compare([both, both / "results.csv"])
+    assert [one.value for one in found.ranked] == [0.5, 0.5, 0.4, 0.4]
+    assert left in found.notes
+    found = compare([both, own], rankings=True)
+    assert [one.value for one in found.ranked] == [0.5, 0.4, 0.5, 0.4]
+    assert found.agreements[0].tau == pytest.approx(1.0)
+    assert found.notes == [f"both: {left}"]
+    found = compare([last, both])
+    assert [one.value for one in found.ranked] == [1.0, 1.0, 0.9, 0.9]
 
 
 def test_what_lacks_conditions_is_left_out_and_named(tmp_path):
