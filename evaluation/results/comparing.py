@@ -215,7 +215,8 @@ def compare(
     wanted: dict[str, object] = {"metric": metric, "task": task, "gate": gate}
     if protocol is not None:
         wanted["protocol"] = protocol
-    own = []
+    own: list[_Table] = []
+    notes: list[str] = []
     for path, results in zip(paths, read, strict=True):
         chosen_rows = results.where(wanted).rows
         if not chosen_rows:
@@ -227,8 +228,16 @@ def compare(
             )
         if rankings and protocol is None:
             chosen_rows = _by_one_protocol(chosen_rows, path)
-        answers = _answers((path if path.is_dir() else path.parent) / QUERIES)
+        queries = (path if path.is_dir() else path.parent) / QUERIES
+        answers = QueryRows.read(queries).answers if queries.is_file() else ()
         asked = [a for a in answers if (a.task, a.gate) == (task, gate)]
+        if metric in _RESAMPLED and any(
+            a.outcomes.blocks is None for a in asked
+        ):
+            notes.append(
+                f"{queries}: without blocks of the route (column block),"
+                " intervals are too narrow"
+            )
         own.append(
             _Table(_name(path, paths), _by_place(chosen_rows), _by_place(asked))
         )
@@ -236,7 +245,6 @@ def compare(
     if rankings:
         if len(own) < 2:
             raise InputError("--rankings: two tables are needed")
-        notes = []
         for k, table in enumerate(own):
             changed, left = _without_controls(table.conditions)
             own[k] = _on(table, changed)
@@ -250,9 +258,9 @@ def compare(
         ]
         return Comparison(metric, task, 0, each, (), found, notes)
     shipped = _shipped(wanted)
-    common, notes = _common(own, shipped, paths)
+    common, apart = _common(own, shipped, paths)
     common, left_out = _without_controls(common)
-    notes += left_out
+    notes += [*apart, *left_out]
     tables = [_on(table, common) for table in (shipped, *own)]
     entries: dict[str, tuple[_Table, str]] = {}
     for table in tables:
@@ -322,19 +330,6 @@ def _by_one_protocol(rows: Sequence[Row], path: Path) -> tuple[Row, ...]:
     return tuple(row for row in rows if row.protocol == chosen)
 
 
-def _answers(path: Path) -> Sequence[Answers]:
-    """Returns the answers in a table of queries; none if there is no file.
-
-    The table of queries of `cns-eval report` has other columns and is ignored.
-    """
-    if not path.is_file():
-        return ()
-    with path.open("rb") as stream:
-        if stream.readline(80).startswith(b"map,db,"):
-            return ()
-    return QueryRows.read(path).answers
-
-
 def _by_place(keys: Iterable[Any]) -> dict[_Place, Any]:
     """Returns (method with settings, condition) -> row or answers."""
     found = {}
@@ -381,8 +376,8 @@ def _common(
 
 
 def _without_controls(
-    conditions: Sequence[tuple[object, ...]],
-) -> tuple[Sequence[tuple[object, ...]], list[str]]:
+    conditions: list[tuple[object, ...]],
+) -> tuple[list[tuple[object, ...]], list[str]]:
     """Leaves out conditions without a change; returns the others, and a note.
 
     If there is no change in any condition, all of them are returned.

@@ -412,13 +412,50 @@ def test_faults_are_one_line(tmp_path, capsys):
     assert_refused(capsys, ["ranking", one, other], "cns-eval compare")
 
 
-def test_the_queries_of_a_report_do_not_count(tmp_path):
-    """A report has a table of queries with other columns beside its results."""
+def as_a_report_writes(path, *, blocks=True):
+    """Renames the columns of a table of queries to those of a report."""
+    with path.open(newline="") as file:
+        lines = list(csv.DictReader(file))
+    with path.open("w", newline="") as file:
+        names = ["map", "db", "query", "method", "correct", "has_match"]
+        names += ["score", "first_right_rank", "places", "query_drive"]
+        names += ["query_frame", "match_drive", "radius", "gate", "protocol"]
+        writer = csv.DictWriter(file, names + ["block"] * blocks, "", "ignore")
+        writer.writeheader()
+        for line in lines:
+            line |= {"query_drive": line["query"], "query": "02", "db": "01"}
+            line |= {"match_drive": line["database"], "radius": "7.5"}
+            writer.writerow(line)
+
+
+def test_the_queries_of_a_report_count(tmp_path):
+    """They have columns of other names."""
     pair = [
-        write_table(tmp_path / name, {"town": {name: part}})
+        write_table(
+            tmp_path / name,
+            {"town": {name: part}},
+            queries=True,
+            experiment="stages",
+            factors={STAGE: OWN},
+        )
         for name, part in (("one", 0.9), ("other", 0.5))
     ]
     found = compare(pair).to_json()
-    for folder in pair:
-        (folder / "queries.csv").write_text("map,db,query,method,correct\n")
+    assert len(found["differences"]) == 1
+    files = [folder / "queries.csv" for folder in pair]
+    written = [file.read_text() for file in files]
+    for file in files:
+        as_a_report_writes(file)
     assert compare(pair).to_json() == found
+    # Reports of earlier versions have no blocks.
+    for file, text in zip(files, written, strict=True):
+        file.write_text(text)
+        as_a_report_writes(file, blocks=False)
+    less = compare(pair)
+    assert [note.split(": ")[0] for note in less.notes[:2]] == list(
+        map(str, files)
+    )
+    assert "column block" in less.notes[0]
+    files[0].write_text(files[0].read_text() + "town,01\n")
+    with pytest.raises(InputError, match=f"{files[0]}: line 42: 2 cells .* 15"):
+        compare(pair)
