@@ -459,7 +459,7 @@ def ranking(
     values = np.array([[some[n].value for n in names] for some in common])
     of_map = [some[names[0]].map for some in common]
     units = of_map if len(set(of_map)) > 1 else list(range(len(common)))
-    numbered = _numbered(units)
+    _, numbered = np.unique(units, return_inverse=True)
     weights = resampled_weights(len(common), blocks=numbered)
     with np.errstate(invalid="ignore"):
         samples = weights @ values / weights.sum(axis=1, keepdims=True)
@@ -486,11 +486,6 @@ def ranking(
         range(len(names)), key=lambda k: (sign * found[k].value, names[k])
     )
     return [found[k] for k in order], samples[:, order]
-
-
-def _numbered(units: Sequence[object]) -> np.ndarray:
-    known = list(dict.fromkeys(units))
-    return np.array([known.index(one) for one in units])
 
 
 def summarised(
