@@ -383,12 +383,12 @@ def compare(
     """Rank the methods in tables of results.
 
     RESULTS are files like results.csv, or folders that contain one. The command
-    ranks the methods in these tables and in the shipped tables by their means,
-    with 95 % intervals. The means are over the conditions that all tables
-    share. For AUC, if a queries.csv lies next to each table, the command also
-    prints the AUC difference of any two methods, with a p-value that is
-    corrected by Holm's method for the number of differences. Kendall's tau says
-    how similarly two tables rank the methods.
+    ranks the methods in these tables and in the shipped tables by their means
+    over the conditions that all tables share, with 95 % t intervals over maps
+    (over conditions if there is only one map). For AUC, if a queries.csv lies
+    next to each table, the command also prints the AUC difference of any two
+    methods, with a p-value that is corrected by Holm's method for the number of
+    differences. Kendall's tau says how similarly two tables rank the methods.
 
     Args:
         tables: Tables of results to compare, or folders with a results.csv.

@@ -23,7 +23,7 @@ In both modes, R@N is the share of the queries with a match that have a match
 among their N best places.
 """
 
-from collections.abc import Hashable, Mapping, Sequence
+from collections.abc import Hashable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from functools import lru_cache
 import itertools
@@ -232,11 +232,46 @@ def resampled_weights(
         number = len(known)
         if number == 1:
             return resampled_weights(num_queries, seed)
+    return _drawn(number, seed)[:, of_query]
+
+
+def _drawn(number: int, seed: int) -> np.ndarray:
+    """Returns how often each of `number` blocks is in each sample, float64."""
     rng = np.random.default_rng([seed, number])
     draws = rng.integers(number, size=(_SAMPLES, number))
     return np.stack(
-        [np.bincount(draw, minlength=number)[of_query] for draw in draws]
+        [np.bincount(draw, minlength=number) for draw in draws]
     ).astype(np.float64)
+
+
+def weights_by_drive(
+    blocks: Sequence[np.ndarray], drives: Sequence[int]
+) -> Iterator[tuple[int, np.ndarray]]:
+    """Yields how often queries are in bootstrap samples, for sets of queries.
+
+    Sets of queries of one drive are not independent: where the streets suit a
+    method, it tends to be right under all conditions. Therefore the sets of one
+    drive draw the same blocks. Different drives draw independently.
+
+    Args:
+        blocks: for each set, the block (Q,) of the route of each query.
+        drives: for each set, a number that identifies the drive, and seeds its
+            draws.
+
+    Yields:
+        For each set, the number of different blocks in all sets of its drive,
+        and the counts (B, Q), as of `resampled_weights`.
+    """
+    known: dict[int, np.ndarray] = {}
+    for drive, some in zip(drives, blocks, strict=True):
+        known[drive] = np.union1d(known.get(drive, some), some)
+    for drive, some in zip(drives, blocks, strict=True):
+        number = len(known[drive])
+        if number == 1:
+            yield 1, resampled_weights(len(some), drive)
+        else:
+            of_query = np.searchsorted(known[drive], some)
+            yield number, _drawn(number, drive)[:, of_query]
 
 
 def resampled_metrics(
@@ -362,42 +397,6 @@ class Difference:
     p_value: float
 
 
-def mean_auc_difference(
-    pairs: Sequence[tuple[QueryOutcomes, QueryOutcomes]],
-) -> Difference:
-    """Returns the mean AUC difference of two methods, with its p-value.
-
-    The mean is over one or more sets of queries. All queries count, with or
-    without a match. The p-value is that of a t test. For a set with n blocks of
-    the route, the test has n - 1 degrees of freedom. The standard error is the
-    standard deviation over bootstrap samples, which draw the same blocks for
-    both methods, times the root of n / (n - 1). Sets of queries are
-    independent, so that variances and degrees of freedom of the sets add up.
-
-    Args:
-        pairs: for each set, the outcomes of both methods.
-    """
-    value, variance, freedom = 0.0, 0.0, 0
-    for first, second in pairs:
-        value += (pr_curve(first).auc - pr_curve(second).auc) / len(pairs)
-        number = len(np.unique(first.own_blocks))
-        if number < 2:
-            variance = math.nan
-            continue
-        samples = own_samples(first)[0] - paired_samples(second, first)[0]
-        spread = float(samples.std()) * math.sqrt(number / (number - 1))
-        variance += spread**2
-        freedom += number - 1
-    if math.isnan(variance):
-        return Difference(value, UNKNOWN, math.nan)
-    spread = math.sqrt(variance) / len(pairs)
-    margin = float(stdtrit(freedom, 0.975)) * spread
-    p_value = 1.0
-    if spread > 0.0:
-        p_value = 2.0 * float(stdtr(freedom, -abs(value) / spread))
-    return Difference(value, Interval(value - margin, value + margin), p_value)
-
-
 def holm(p_values: np.ndarray) -> np.ndarray:
     """Returns p-values (N,) corrected for multiple tests, by Holm's method.
 
@@ -413,26 +412,62 @@ def holm(p_values: np.ndarray) -> np.ndarray:
 
 def compared_by_auc(
     answers: Mapping[Hashable, Sequence[QueryOutcomes]],
+    drives: Sequence[int] | None = None,
 ) -> dict[tuple[Any, Any], tuple[Difference, float]]:
-    """Returns the AUC difference between any two of several methods.
+    """Returns the difference of the mean AUC between any two methods.
+
+    The mean is over one or more sets of queries. All queries count, with or
+    without a match. The p-value is that of a t test. The variance of the sum of
+    all sets of one drive is that over bootstrap samples, which draw the same
+    blocks of the route for both methods and for all these sets, times n / (n -
+    1) for n blocks. Drives are independent, so that their variances add up, and
+    so do their n - 1 degrees of freedom.
 
     Args:
         answers: method -> its outcomes on each set of queries. The queries must
             be the same for all methods, and so must their blocks of the route,
             see `QueryOutcomes.blocks`.
+        drives: for each set of queries, a number that identifies the drive. By
+            default, each set is of a drive of its own.
 
     Returns:
         (first method, second method) -> AUC of the first minus that of the
-        second, see `mean_auc_difference`; and the p-value, corrected by Holm's
-        method for the number of differences.
+        second; and the p-value, corrected by Holm's method for the number of
+        differences.
     """
-    pairs = list(itertools.combinations(answers, 2))
-    found = [
-        mean_auc_difference(list(zip(answers[a], answers[b], strict=True)))
-        for a, b in pairs
-    ]
+    sets = list(zip(*answers.values(), strict=True))
+    drives = range(len(sets)) if drives is None else drives
+    blocks = [one[0].own_blocks for one in sets]
+    of_drive: dict[int, int] = {}
+    sums: dict[int, Any] = {}
+    drawn = weights_by_drive(blocks, drives)
+    for drive, some, (number, weights) in zip(drives, sets, drawn, strict=True):
+        samples = [resampled_metrics(one, weights)[0] for one in some]
+        sums[drive] = sums.get(drive, 0.0) + np.array(samples)
+        of_drive[drive] = number
+    numbers = np.array(list(of_drive.values()))
+    areas = [[pr_curve(one).auc for one in some] for some in sets]
+
+    def difference(first: int, second: int) -> Difference:
+        value = float(np.mean([some[first] - some[second] for some in areas]))
+        if (numbers < 2).any():
+            return Difference(value, UNKNOWN, math.nan)
+        samples = [some[first] - some[second] for some in sums.values()]
+        variances = np.var(samples, axis=1) * numbers / (numbers - 1)
+        spread = math.sqrt(variances.sum()) / len(sets)
+        freedom = (numbers - 1).sum()
+        margin = float(stdtrit(freedom, 0.975)) * spread
+        p_value = 1.0
+        if spread > 0.0:
+            p_value = 2.0 * float(stdtr(freedom, -abs(value) / spread))
+        interval = Interval(value - margin, value + margin)
+        return Difference(value, interval, p_value)
+
+    pairs = list(itertools.combinations(range(len(answers)), 2))
+    found = [difference(*pair) for pair in pairs]
     corrected = holm(np.array([one.p_value for one in found])).tolist()
-    return dict(zip(pairs, zip(found, corrected, strict=True), strict=True))
+    names = itertools.combinations(answers, 2)
+    return dict(zip(names, zip(found, corrected, strict=True), strict=True))
 
 
 @dataclass(frozen=True)

@@ -621,6 +621,7 @@ _QUERY_COLUMNS: Columns[_Queries] = {
     "score": lambda q: q.result.outcomes.best_scores,
     "first_right_rank": lambda q: q.result.outcomes.known_ranks,
     "places": lambda q: q.result.outcomes.num_places,
+    "block": lambda q: q.result.outcomes.own_blocks,
     "query_drive": lambda q: q.result.query,
     **_moment_columns("query"),
     "match_drive": lambda q: q.result.database,

@@ -141,12 +141,12 @@ def ranked_methods(results: Results) -> tuple[list[Ranked], str]:
     no method is returned, and the sentence says so.
     """
     rows = results.where({STAGE: OWN}, task="place", metric="auc").rows
-    ranked, samples = ranking(rows)
+    ranked, _ = ranking(rows)
     measured = Counter(
         row.but("method") for row in rows if not math.isnan(row.value)
     )
     num_pairs = sum(n == len(ranked) for n in measured.values())
-    return ranked, _headline(ranked, samples, num_pairs)
+    return ranked, _headline(ranked, num_pairs)
 
 
 def beside(results: Results) -> dict[str, dict[str, float]]:
@@ -169,9 +169,7 @@ def beside(results: Results) -> dict[str, dict[str, float]]:
     return {"R@1": r1, "only too far": far, "right pose": pose}
 
 
-def _headline(
-    ranked: Sequence[Ranked], samples: np.ndarray, num_pairs: int
-) -> str:
+def _headline(ranked: Sequence[Ranked], num_pairs: int) -> str:
     if not ranked:
         return "No pair of drives has an AUC of every method to rank."
     over = f"{num_pairs} pairs of drives" if num_pairs > 1 else "one pair"
@@ -186,16 +184,10 @@ def _headline(
         return (
             f"{names} and {ties[-1]} tie at a mean AUC of {best[1]} ({over})."
         )
-    text = (
+    return (
         f"{best[0]} ranks first of {len(ranked)} methods, with a mean AUC of"
         f" {best[1]} over {over}; {others[0][0]} follows with {others[0][1]}."
     )
-    if num_pairs == 1:
-        return text
-    lead = np.percentile(samples[:, 0] - samples[:, 1], 2.5)
-    if lead > 0.0:
-        return f"{text} The difference is significant (95 %)."
-    return f"{text} The difference is not significant (95 %)."
 
 
 class Survival(NamedTuple):

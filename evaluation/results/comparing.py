@@ -8,6 +8,7 @@ from pathlib import Path
 import re
 from typing import Any, NamedTuple
 import warnings
+import zlib
 
 import numpy as np
 from scipy.stats import kendalltau
@@ -21,7 +22,7 @@ from evaluation.recognition.metrics import (
     compared_by_auc,
     percentile_interval,
     resampled_metrics,
-    resampled_weights,
+    weights_by_drive,
 )
 from evaluation.recognition.protocol import PROTOCOL_NAMES
 from evaluation.results.summaries import (
@@ -31,9 +32,11 @@ from evaluation.results.summaries import (
 )
 from evaluation.results.table import (
     KEYS,
+    LAST,
     QUERIES,
     RESULTS,
     SETTINGS,
+    STAGE,
     Answers,
     QueryRows,
     Results,
@@ -212,7 +215,8 @@ def compare(
     wanted: dict[str, object] = {"metric": metric, "task": task, "gate": gate}
     if protocol is not None:
         wanted["protocol"] = protocol
-    own = []
+    own: list[_Table] = []
+    notes: list[str] = []
     for path, results in zip(paths, read, strict=True):
         chosen_rows = results.where(wanted).rows
         if not chosen_rows:
@@ -224,25 +228,39 @@ def compare(
             )
         if rankings and protocol is None:
             chosen_rows = _by_one_protocol(chosen_rows, path)
-        answers = _answers((path if path.is_dir() else path.parent) / QUERIES)
+        queries = (path if path.is_dir() else path.parent) / QUERIES
+        answers = QueryRows.read(queries).answers if queries.is_file() else ()
         asked = [a for a in answers if (a.task, a.gate) == (task, gate)]
+        if metric in _RESAMPLED and any(
+            a.outcomes.blocks is None for a in asked
+        ):
+            notes.append(
+                f"{queries}: without blocks of the route (column block),"
+                " intervals are too narrow"
+            )
         own.append(
             _Table(_name(path, paths), _by_place(chosen_rows), _by_place(asked))
         )
-    pairs = itertools.combinations(own, 2)
     less = bool(_LESS.fullmatch(metric))
     if rankings:
         if len(own) < 2:
             raise InputError("--rankings: two tables are needed")
+        for k, table in enumerate(own):
+            changed, left = _without_controls(table.conditions)
+            own[k] = _on(table, changed)
+            notes += [f"{table.name}: {one}" for one in left]
+        pairs = itertools.combinations(own, 2)
         found = [_agreement(*pair, metric) for pair in pairs]
         each = [
             one._replace(method=f"{one.method} ({table.name})")
             for table in own
             for one in ranking(table.rows.values(), least_first=less)[0]
         ]
-        return Comparison(metric, task, 0, each, (), found, ())
+        return Comparison(metric, task, 0, each, (), found, notes)
     shipped = _shipped(wanted)
-    common, notes = _common(own, shipped, paths)
+    common, apart = _common(own, shipped, paths)
+    common, left_out = _without_controls(common)
+    notes += [*apart, *left_out]
     tables = [_on(table, common) for table in (shipped, *own)]
     entries: dict[str, tuple[_Table, str]] = {}
     for table in tables:
@@ -312,19 +330,6 @@ def _by_one_protocol(rows: Sequence[Row], path: Path) -> tuple[Row, ...]:
     return tuple(row for row in rows if row.protocol == chosen)
 
 
-def _answers(path: Path) -> Sequence[Answers]:
-    """Returns the answers in a table of queries; none if there is no file.
-
-    The table of queries of `cns-eval report` has other columns and is ignored.
-    """
-    if not path.is_file():
-        return ()
-    with path.open("rb") as stream:
-        if stream.readline(80).startswith(b"map,db,"):
-            return ()
-    return QueryRows.read(path).answers
-
-
 def _by_place(keys: Iterable[Any]) -> dict[_Place, Any]:
     """Returns (method with settings, condition) -> row or answers."""
     found = {}
@@ -370,6 +375,23 @@ def _common(
     )
 
 
+def _without_controls(
+    conditions: list[tuple[object, ...]],
+) -> tuple[list[tuple[object, ...]], list[str]]:
+    """Leaves out conditions without a change; returns the others, and a note.
+
+    If there is no change in any condition, all of them are returned.
+    """
+    changed = [one for one in conditions if (STAGE, LAST) not in one]
+    left = len(conditions) - len(changed)
+    if not left or not changed:
+        return conditions, []
+    return changed, [
+        f"left out, as nothing changes in them ({STAGE} {LAST}): {left}"
+        " conditions"
+    ]
+
+
 def _apart(one: _Table, other: _Table) -> str:
     """Returns as text why two tables have no condition in common."""
     rows = [list(table.rows.values()) for table in (one, other)]
@@ -409,7 +431,8 @@ def _differences(
         for other in others:
             check_same_queries(one, other)
     compared = compared_by_auc(
-        {name: [a.outcomes for a in some] for name, some in asked.items()}
+        {name: [a.outcomes for a in some] for name, some in asked.items()},
+        [_drive(a) for a in next(iter(asked.values()), ())],
     )
     return [Compared(*two, *found) for two, found in compared.items()]
 
@@ -465,20 +488,30 @@ def _values(
         (method, one) not in table.answers for one, method in places
     ):
         return means, samples[:, order]
-    of_condition = []
-    for k, one in enumerate(table.conditions):
-        asked = [table.answers[method, one] for method in methods]
-        for answers in asked:
-            check_same_queries(asked[0], answers)
-        outcomes = asked[0].outcomes
-        weights = resampled_weights(len(outcomes), k, outcomes.blocks)
-        of_condition.append(
-            [
-                resampled_metrics(answers.outcomes, weights)[_RESAMPLED[metric]]
-                for answers in asked
-            ]
-        )
+    asked = [
+        [table.answers[method, one] for method in methods]
+        for one in table.conditions
+    ]
+    for some in asked:
+        for answers in some:
+            check_same_queries(some[0], answers)
+    drawn = weights_by_drive(
+        [some[0].outcomes.own_blocks for some in asked],
+        [_drive(some[0]) for some in asked],
+    )
+    of_condition = [
+        [
+            resampled_metrics(answers.outcomes, weights)[_RESAMPLED[metric]]
+            for answers in some
+        ]
+        for some, (_, weights) in zip(asked, drawn, strict=True)
+    ]
     return means, np.mean(of_condition, axis=0).T
+
+
+def _drive(queries: Answers) -> int:
+    """Returns a number of the drive of queries, equal in all tables."""
+    return zlib.crc32(f"{queries.map} {queries.query}".encode())
 
 
 def _tau(first: np.ndarray, second: np.ndarray) -> float:

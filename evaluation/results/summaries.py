@@ -2,8 +2,8 @@
 
 Intervals of shares, of excesses and of AUC differences are by bootstrap over
 blocks of the route; the same blocks are drawn for both results that are
-compared. Intervals of means and of rank correlations are by bootstrap over
-conditions.
+compared. Intervals of means are t intervals over maps or conditions, and those
+of rank correlations are by bootstrap over conditions.
 """
 
 from __future__ import annotations
@@ -16,6 +16,7 @@ from operator import itemgetter
 from typing import Any, NamedTuple
 
 import numpy as np
+from scipy.special import stdtrit
 from scipy.stats import rankdata
 
 from cns_drake.base.errors import InputError
@@ -28,7 +29,14 @@ from evaluation.recognition.metrics import (
     resampled_weights,
 )
 from evaluation.recognition.place_outcome import kept_share
-from evaluation.results.table import Answers, Key, QueryRows, Results, Row
+from evaluation.results.table import (
+    Answers,
+    Key,
+    QueryRows,
+    Results,
+    Row,
+    metric_range,
+)
 
 CAUSE, LEVEL, NO_CAUSE = "cause", "level", "none"
 # Joins the names of causes that come together.
@@ -425,9 +433,10 @@ def ranking(
     """Returns methods ranked by their means over conditions.
 
     Only conditions count that were measured with all methods. The intervals of
-    the means come from a bootstrap, whose samples are the same for all methods.
-    It draws maps if there are several, and conditions otherwise. For a single
-    condition, the intervals are those in the rows.
+    the means are t intervals with maps as independent units if there are
+    several, and conditions otherwise. They stay within the metric's range. The
+    samples are those of a bootstrap that draws these units, the same for all
+    methods. For a single condition, the intervals are those in the rows.
 
     Args:
         rows: rows of one metric.
@@ -450,25 +459,33 @@ def ranking(
     values = np.array([[some[n].value for n in names] for some in common])
     of_map = [some[names[0]].map for some in common]
     units = of_map if len(set(of_map)) > 1 else list(range(len(common)))
-    weights = resampled_weights(len(common), blocks=_numbered(units))
+    _, numbered = np.unique(units, return_inverse=True)
+    weights = resampled_weights(len(common), blocks=numbered)
     with np.errstate(invalid="ignore"):
         samples = weights @ values / weights.sum(axis=1, keepdims=True)
-    found = []
-    for k, name in enumerate(names):
-        interval = percentile_interval(samples[:, k])
-        if len(common) == 1:
-            interval = Interval(common[0][name].low, common[0][name].high)
-        found.append(Ranked(name, float(values[:, k].mean()), interval))
+    means = values.mean(axis=0)
+    first = common[0]
+    intervals = [Interval(first[n].low, first[n].high) for n in names]
+    number = int(numbered.max()) + 1
+    if number > 1:
+        is_in = numbered == np.arange(number)[:, None]
+        squares = ((is_in @ (values - means)) ** 2).sum(axis=0)
+        spreads = np.sqrt(number / (number - 1) * squares) / len(common)
+        margins = stdtrit(number - 1, 0.975) * spreads
+        ends = np.clip(
+            [means - margins, means + margins],
+            *metric_range(first[names[0]].metric),
+        )
+        intervals = [Interval(*pair) for pair in ends.T.tolist()]
+    found = [
+        Ranked(*one)
+        for one in zip(names, means.tolist(), intervals, strict=True)
+    ]
     sign = 1.0 if least_first else -1.0
     order = sorted(
         range(len(names)), key=lambda k: (sign * found[k].value, names[k])
     )
     return [found[k] for k in order], samples[:, order]
-
-
-def _numbered(units: Sequence[object]) -> np.ndarray:
-    known = list(dict.fromkeys(units))
-    return np.array([known.index(one) for one in units])
 
 
 def summarised(

@@ -62,6 +62,19 @@ _ANSWERS = {
     "overlap": float,
     "visible_change": float,
 }
+# Columns of the table of queries that `cns-eval report` writes -> the same ones
+# here; and the values of those that it lacks.
+_OF_REPORT = {
+    "query": "query_stage",
+    "query_drive": "query",
+    "match_drive": "database",
+}
+_SAME_IN_REPORT = {
+    "experiment": "stages",
+    "seed": "1",
+    STAGE: OWN,
+    "task": "place",
+}
 _NEEDED_ANSWERS = ("query_frame", "correct", "has_match", "score")
 # Type -> value that stands for an empty cell.
 _EMPTY: dict[type, object] = {int: -1, float: math.nan, str: ""}
@@ -383,7 +396,8 @@ class QueryRows:
 
         `path` is this file or the folder that contains it. All columns of a
         query except `query_frame`, `correct`, `has_match` and `score` may be
-        missing.
+        missing. The table can also be that of a report by `cns-eval report`,
+        whose columns have other names.
 
         Raises:
             InputError: as `Results.read`.
@@ -488,7 +502,7 @@ def _answered(
 
 
 @cache
-def _range(metric: str) -> tuple[float, float]:
+def metric_range(metric: str) -> tuple[float, float]:
     """Returns the least and the greatest value of a metric."""
     for pattern, *ends in _RANGES:
         if re.fullmatch(pattern, metric):
@@ -504,7 +518,7 @@ def _measured(one: _Line) -> dict[str, Any]:
     )
     if math.isnan(value) and metric in _ALWAYS_KNOWN:
         raise one.fault("value", f"{metric} needs a number")
-    least, greatest = _range(metric)
+    least, greatest = metric_range(metric)
     if value < least or value > greatest:
         limits = f"from {least:g} to {greatest:g}"
         if math.isinf(greatest):
@@ -670,6 +684,11 @@ class _Cells:
                     " character"
                 )
         needed = tuple(needed)
+        width = len(names)
+        same: Mapping[str, str] = {}
+        if file.name == QUERIES and {"db", *_OF_REPORT} <= {*names}:
+            same = _SAME_IN_REPORT
+            names = [*(_OF_REPORT.get(name, name) for name in names), *same]
         missing = [name for name in needed if name not in names]
         for former, command in _FORMER:
             if missing and former <= set(names):
@@ -684,6 +703,8 @@ class _Cells:
                 fault = "is there twice" if name else "has no name"
                 raise InputError(f"{file}: line 1: column '{name}' {fault}")
         factors = [n for n in names if n not in {*needed, *known}]
+        if same:
+            factors = [STAGE]
         for name in factors:
             if name in _NAMED:
                 raise InputError(f"{file}: line 1: '{name}' names no factor")
@@ -691,6 +712,13 @@ class _Cells:
         rows = [one for one in rows if any(one[1])]
         if not rows:
             raise InputError(f"{file}: no rows")
+        for number, row in rows:
+            if len(row) != width:
+                raise InputError(
+                    f"{file}: line {number}: {len(row)} cells instead of"
+                    f" {width}"
+                )
+            row += same.values()
         return cls(file, columns, tuple(factors), rows)
 
     def keyed(
@@ -703,16 +731,11 @@ class _Cells:
             the `Key` as a tuple, by which lines can be grouped.
 
         Raises:
-            InputError: a line has too few or too many cells, or a wrong key.
+            InputError: a line has a wrong key.
         """
         names = (*_BEFORE, *self.factors, *_BEHIND)
         known: dict[tuple[str, ...], tuple[dict, tuple[object, ...]]] = {}
         for number, cells in self.rows:
-            if len(cells) != len(self.columns):
-                raise InputError(
-                    f"{self.file}: line {number}: {len(cells)} cells instead"
-                    f" of {len(self.columns)}"
-                )
             one = _Line(self.file, number, self.columns, cells)
             spelled = one.cells_of(names)
             if spelled not in known:

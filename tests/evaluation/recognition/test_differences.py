@@ -5,20 +5,24 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
+import scipy.stats
 
 from evaluation.recognition.metrics import (
     bootstrap_intervals,
+    compared_by_auc,
     holm,
-    mean_auc_difference,
     resampled_weights,
     route_blocks,
+    weights_by_drive,
 )
 from evaluation.recognition.query_outcomes import judge
 from evaluation.report.result_tables import method_differences
 
 
-def auc_difference(first, second):
-    return mean_auc_difference([(first, second)])
+def auc_difference(first, second, times=1, drives=None):
+    answers = {"first": [first] * times, "second": [second] * times}
+    ((difference, _),) = compared_by_auc(answers, drives).values()
+    return difference
 
 
 def outcomes_of(scores, is_right, blocks=None):
@@ -98,6 +102,37 @@ def test_a_difference_has_a_sign_and_an_interval():
     assert (same.value, same.p_value) == (0.0, 1.0)
     alone = [replace(one, blocks=0 * blocks) for one in (good, poor)]
     assert np.isnan(auc_difference(*alone).p_value)
+
+
+def test_answers_that_are_repeated_say_nothing_new():
+    """Conditions of one drive are not independent; those of others are."""
+    rng = np.random.default_rng(2)
+    pair = equal_methods(rng, 15)
+    once = auc_difference(*pair)
+    again = auc_difference(*pair, 12, [0] * 12)
+    assert again.value == pytest.approx(once.value)
+    assert again.p_value == pytest.approx(once.p_value)
+    assert again.interval.low == pytest.approx(once.interval.low)
+    # The standard error of a mean over independent drives.
+    apart = auc_difference(*pair, 12)
+    margins = [one.interval.high - one.value for one in (apart, once)]
+    quantiles = [scipy.stats.t.ppf(0.975, n) for n in (12 * 14, 14)]
+    expected = quantiles[0] / quantiles[1] / np.sqrt(12)
+    # Each drive has its own samples.
+    assert margins[0] / margins[1] == pytest.approx(expected, rel=0.03)
+
+
+def test_conditions_of_a_drive_draw_the_same_blocks():
+    blocks = [np.repeat(np.arange(n), 3) for n in (9, 10, 9, 1, 1)]
+    drawn = list(weights_by_drive(blocks, [5, 5, 6, 7, 7]))
+    assert [number for number, _ in drawn] == [10, 10, 9, 1, 1]
+    weights = [some for _, some in drawn]
+    np.testing.assert_array_equal(weights[0], weights[1][:, :27])
+    assert (weights[1].sum(axis=1) == 30).all()
+    assert (weights[2] != weights[0]).any()
+    # A single block is drawn query by query.
+    assert weights[3].std(axis=1).any()
+    np.testing.assert_array_equal(weights[3], weights[4])
 
 
 def test_intervals_by_blocks():

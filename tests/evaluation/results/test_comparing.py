@@ -14,7 +14,15 @@ from evaluation.results.comparing import (
     compare,
     suggest_comparison,
 )
-from evaluation.results.table import Answers, QueryRows, Results, Row
+from evaluation.results.table import (
+    LAST,
+    OWN,
+    STAGE,
+    Answers,
+    QueryRows,
+    Results,
+    Row,
+)
 
 
 def key(method, town="town", **changes):
@@ -123,7 +131,8 @@ def test_the_shipped_tables_hold_the_published_numbers():
 def test_an_entrant_stands_among_the_shipped(tmp_path):
     """Each value is just above the best shipped method's, or below it."""
     best = {}
-    for row in shipped(map="suburbia", metric="auc", gate=False):
+    changed = {"map": "suburbia", STAGE: OWN, "metric": "auc", "gate": False}
+    for row in shipped(**changed):
         condition = row.but("method")
         if condition not in best or best[condition].value < row.value:
             best[condition] = row
@@ -135,7 +144,7 @@ def test_an_entrant_stands_among_the_shipped(tmp_path):
     path = tmp_path / "entrant.csv"
     Results.of(rows).write_csv(path)
     found = compare([path])
-    assert found.conditions == 4
+    assert found.conditions == 2
     names = [one.method for one in found.ranked]
     assert names[0] == "mine"
     assert {"solid", "solid (entrant)"} < set(names)
@@ -143,17 +152,33 @@ def test_an_entrant_stands_among_the_shipped(tmp_path):
     expected = np.mean([row.value for row in best.values()])
     assert value["mine"] == pytest.approx(expected + 0.001)
     assert value["solid (entrant)"] == pytest.approx(expected - 0.01)
-    mean = np.mean(
-        [
-            row.value
-            for row in shipped(
-                map="suburbia", metric="auc", gate=False, method="ring++"
-            )
-        ]
-    )
+    mean = np.mean([row.value for row in shipped(**changed, method="ring++")])
     assert value["ring++"] == pytest.approx(mean)
     assert found.notes == []
     assert found.agreements == []
+
+
+def test_controls_are_not_ranked(tmp_path):
+    """Nothing changes in them; they count only if there is nothing else."""
+    plain = {"x": 0.5, "y": 0.4}
+    own, last, both = tmp_path / "own", tmp_path / "last", tmp_path / "both"
+    write_table(own, {"a": plain}, factors={STAGE: OWN})
+    write_table(last, {"a": {"x": 0.9, "y": 1.0}}, factors={STAGE: LAST})
+    both.mkdir()
+    rows = [Results.read(one).rows for one in (own, last)]
+    Results.of(itertools.chain(*rows)).write_csv(both / "results.csv")
+    left = (
+        "left out, as nothing changes in them (both.stage last): 1 conditions"
+    )
+    found = compare([both, both / "results.csv"])
+    assert [one.value for one in found.ranked] == [0.5, 0.5, 0.4, 0.4]
+    assert left in found.notes
+    found = compare([both, own], rankings=True)
+    assert [one.value for one in found.ranked] == [0.5, 0.4, 0.5, 0.4]
+    assert found.agreements[0].tau == pytest.approx(1.0)
+    assert found.notes == [f"both: {left}"]
+    found = compare([last, both])
+    assert [one.value for one in found.ranked] == [1.0, 1.0, 0.9, 0.9]
 
 
 def test_what_lacks_conditions_is_left_out_and_named(tmp_path):
@@ -205,6 +230,44 @@ def test_differences_of_answers(tmp_path):
     )
     with pytest.raises(InputError, match="different queries"):
         compare([one, fewer])
+
+
+def written_times(folder, number, parts):
+    """Writes the same answers for one drive under several conditions."""
+    tables = [
+        write_table(
+            folder / str(k), {"a": parts}, queries=True, factors={"cause": k}
+        )
+        for k in range(number)
+    ]
+    for name, reader, items in (
+        ("results.csv", Results, "rows"),
+        ("queries.csv", QueryRows, "answers"),
+    ):
+        read = [getattr(reader.read(one / name), items) for one in tables]
+        reader.of(itertools.chain(*read)).write_csv(folder / name)
+    return folder
+
+
+def test_conditions_of_a_drive_are_not_independent(tmp_path):
+    """The same answers under four conditions are no stronger evidence."""
+    found = []
+    for number in (1, 4):
+        pair = []
+        for name, parts in (
+            ("one", {"x": 0.6, "y": 0.5}),
+            ("two", {"x": 0.5, "y": 0.55}),
+        ):
+            folder = tmp_path / f"{name} {number}"
+            folder.mkdir()
+            pair.append(written_times(folder, number, parts))
+        found.append(compare(pair))
+    once, again = found
+    assert (once.conditions, again.conditions) == (1, 4)
+    assert len(once.differences) == 6
+    for one, other in zip(once.differences, again.differences, strict=True):
+        assert other.p_value == pytest.approx(one.p_value)
+    assert once.agreements[0].interval == again.agreements[0].interval
 
 
 def counted_tau(first, second):
@@ -349,13 +412,50 @@ def test_faults_are_one_line(tmp_path, capsys):
     assert_refused(capsys, ["ranking", one, other], "cns-eval compare")
 
 
-def test_the_queries_of_a_report_do_not_count(tmp_path):
-    """A report has a table of queries with other columns beside its results."""
+def as_a_report_writes(path, *, blocks=True):
+    """Renames the columns of a table of queries to those of a report."""
+    with path.open(newline="") as file:
+        lines = list(csv.DictReader(file))
+    with path.open("w", newline="") as file:
+        names = ["map", "db", "query", "method", "correct", "has_match"]
+        names += ["score", "first_right_rank", "places", "query_drive"]
+        names += ["query_frame", "match_drive", "radius", "gate", "protocol"]
+        writer = csv.DictWriter(file, names + ["block"] * blocks, "", "ignore")
+        writer.writeheader()
+        for line in lines:
+            line |= {"query_drive": line["query"], "query": "02", "db": "01"}
+            line |= {"match_drive": line["database"], "radius": "7.5"}
+            writer.writerow(line)
+
+
+def test_the_queries_of_a_report_count(tmp_path):
+    """They have columns of other names."""
     pair = [
-        write_table(tmp_path / name, {"town": {name: part}})
+        write_table(
+            tmp_path / name,
+            {"town": {name: part}},
+            queries=True,
+            experiment="stages",
+            factors={STAGE: OWN},
+        )
         for name, part in (("one", 0.9), ("other", 0.5))
     ]
     found = compare(pair).to_json()
-    for folder in pair:
-        (folder / "queries.csv").write_text("map,db,query,method,correct\n")
+    assert len(found["differences"]) == 1
+    files = [folder / "queries.csv" for folder in pair]
+    written = [file.read_text() for file in files]
+    for file in files:
+        as_a_report_writes(file)
     assert compare(pair).to_json() == found
+    # Reports of earlier versions have no blocks.
+    for file, text in zip(files, written, strict=True):
+        file.write_text(text)
+        as_a_report_writes(file, blocks=False)
+    less = compare(pair)
+    assert [note.split(": ")[0] for note in less.notes[:2]] == list(
+        map(str, files)
+    )
+    assert "column block" in less.notes[0]
+    files[0].write_text(files[0].read_text() + "town,01\n")
+    with pytest.raises(InputError, match=f"{files[0]}: line 42: 2 cells .* 15"):
+        compare(pair)

@@ -4,6 +4,7 @@ import math
 
 import numpy as np
 import pytest
+import scipy.stats
 from scipy.stats import spearmanr
 
 from evaluation.recognition.metrics import Interval
@@ -217,8 +218,32 @@ def test_a_ranking_counts_what_all_methods_have():
     assert [one.value for one in found] == pytest.approx([0.6, 0.5])
     # Maps are drawn: both, or one of them twice.
     assert set(np.round(samples[:, 0], 9)) == {0.2, 0.6, 0.8}
-    assert found[0].interval == Interval(0.2, 0.8)
+    # Two maps say next to nothing, except that an AUC is from 0 to 1.
+    assert found[0].interval == Interval(0.0, 1.0)
     assert found[1].interval == Interval(0.5, 0.5)
+
+
+@pytest.mark.parametrize("metric", ["auc", "query_ms"])
+def test_the_interval_of_a_mean_over_maps(metric):
+    """SciPy's t interval; maps with more conditions count more often."""
+    means = {"x": 0.5, "y": 0.7, "z": 0.8, "w": 0.6}
+    rows = [
+        Row(**key({SNOW: snow}, town=town), metric=metric, value=value + more)
+        for snow, more in ((0, -0.1), (1, 0.1))
+        for town, value in means.items()
+    ]
+    (found,), _ = summaries.ranking(rows)
+    values = list(means.values())
+    expected = scipy.stats.t.interval(
+        0.95, 3, np.mean(values), scipy.stats.sem(values)
+    )
+    assert (found.interval.low, found.interval.high) == pytest.approx(expected)
+    # Only conditions, if there is one map.
+    (found,), _ = summaries.ranking(rows[::4])
+    high = 0.5 + scipy.stats.t.ppf(0.975, 1) * 0.1
+    assert found.interval.high == pytest.approx(
+        1.0 if metric == "auc" else high
+    )
 
 
 def test_a_ranking_of_one_condition_has_its_intervals():

@@ -9,7 +9,10 @@ from helpers.small_towns import drive
 import numpy as np
 import pytest
 
+from evaluation import QueryRows, Results
 from evaluation.methods import shipped_methods
+from evaluation.recognition.metrics import pr_curve, route_blocks
+from evaluation.results.table import OWN, STAGE
 
 pytestmark = pytest.mark.slow
 
@@ -239,3 +242,20 @@ def test_where_and_when(report):
         frames = int(row["match_frame"]) - frame
         assert span == frames * 50_000_000
     assert found > 20
+
+
+def test_a_report_is_read_as_a_study(report):
+    """The answers have the keys of the results, and give the same AUC."""
+    rows = Results.read(report).where({STAGE: OWN}, metric="auc").rows
+    results = {row.but(): row.value for row in rows}
+    found = {
+        one.but(): one for one in QueryRows.read(report / "queries.csv").answers
+    }
+    assert set(results) <= set(found)
+    for key, value in results.items():
+        assert pr_curve(found[key].outcomes).auc == pytest.approx(value)
+        columns = found[key].columns
+        places = np.stack([columns[f"query_{axis}"] for axis in "xyz"], axis=1)
+        # The drives begin at their first query, and do not turn.
+        expected = route_blocks(places, np.arange(len(places)))
+        np.testing.assert_array_equal(columns["block"], expected)
