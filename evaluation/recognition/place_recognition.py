@@ -219,7 +219,7 @@ def judge_retrieval(
         retrieval=retrieval,
         outcomes=outcomes,
         by_mode=by_mode,
-        pose=pose_metrics(retrieval.pose_errors, outcomes, by_mode["all"]),
+        pose=pose_metrics(retrieval.pose_errors, outcomes),
         protocol=protocol.of(method),
         mode=mode,
         pair=pair,
