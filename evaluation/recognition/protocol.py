@@ -32,7 +32,8 @@ class RetrievalProtocol:
     the choice of the merged scan that stands for a place.
 
     Attributes:
-        radius: greatest distance between a query and its match [m].
+        radius: greatest distance between a query and its match, in three
+            dimensions [m].
         query_spacing: distance driven between two queries [m].
         place_spacing: distance driven between two places of the database [m].
         max_range: largest x, y or z of a point in the sensor's frame [m];
