@@ -279,7 +279,7 @@ GATE_TEXT = (
     " query, and places beyond the radius are rejected."
 )
 
-DEFAULT_PROTOCOL = RetrievalProtocol()
+RECORDED_PROTOCOL = RetrievalProtocol()
 
 # The paper's protocol: queries are as recorded, and the first of the merged
 # scans gives the pose. It serves only to compare with the paper's tables.
@@ -293,7 +293,7 @@ FAIR_PROTOCOL = RetrievalProtocol(turn_queries=True, tilt_queries=1.5, seed=0)
 PROTOCOLS = {
     "fair": FAIR_PROTOCOL,
     "paper": PAPER_PROTOCOL,
-    "recorded": DEFAULT_PROTOCOL,
+    "recorded": RECORDED_PROTOCOL,
 }
 PROTOCOL_NAMES = (*PROTOCOLS, "own")
 _ASKED = (*_QUERY_CHANGES, "seed")
