@@ -21,7 +21,7 @@ from evaluation.command_line.localising import localise
 from evaluation.command_line.map_updating import map_sessions, map_update
 from evaluation.command_line.real import real
 from evaluation.command_line.trajectories import drives, trajectory
-from evaluation.recognition.protocol import DEFAULT_PROTOCOL, RetrievalProtocol
+from evaluation.recognition.protocol import RECORDED_PROTOCOL, RetrievalProtocol
 from evaluation.recognition.protocol_options import with_protocol
 
 if TYPE_CHECKING:
@@ -268,7 +268,7 @@ def scores(
     parameter: options.Parameters = None,
     sensor_height: options.SensorHeight = 1.6,
     gate: Annotated[bool, typer.Option("--gate")] = False,
-    radius: float = DEFAULT_PROTOCOL.radius,
+    radius: float = RECORDED_PROTOCOL.radius,
     columns: options.Columns = None,
 ) -> None:
     """Score every pair of scans from two folders.

@@ -45,6 +45,36 @@ def open_drive(
         for scan in open_drive("recordings/downtown_01"):
             print(len(scan))
     """
+    path = Path(path)
+    if not path.exists():
+        raise InputError(f"{path}: no such file or folder")
+    fitting = find_readers(path)
+    from cns_drake.base.drives.mcap_drive import McapDrive
+    from evaluation.drives.helipr import HeliprDrive
+
+    if len(fitting) > 1:
+        names = ", ".join(reader.__name__ for reader in fitting)
+        raise InputError(f"{path}: files of several formats ({names})")
+    if fitting and fitting[0] in (McapDrive, HeliprDrive):
+        return fitting[0](path, lidar)
+    if fitting and lidar is not None:
+        raise InputError(f"{path}: has one LiDAR, not a '{lidar}'")
+    if fitting:
+        return fitting[0](path, columns)
+    if path.is_dir() and any(path.glob("*.mcap.part")):
+        raise InputError(
+            f"{path}: the recording was not finished (cns-drake repair saves"
+            " what is whole)"
+        )
+    raise InputError(
+        f"{path}: not a recorded drive (a folder with an .mcap file, or"
+        " one, or a drive of MulRan, HeLiPR, NCLT, Boreas, KITTI odometry or"
+        " CNS)"
+    )
+
+
+def find_readers(path: Path) -> list[Any]:
+    """Returns the classes of drives whose format a file or folder has."""
     # Imported here: the readers' libraries are slow to load, and a map file
     # needs none of them.
     from cns_drake.base.drives import mcap_drive
@@ -66,29 +96,7 @@ def open_drive(
         (kitti.holds_kitti, kitti.KittiDrive),
         (cns_folder.holds_cns, cns_folder.CnsFolderDrive),
     )
-    path = Path(path)
-    if not path.exists():
-        raise InputError(f"{path}: no such file or folder")
-    fitting: list[Any] = [reader for holds, reader in readers if holds(path)]
-    if len(fitting) > 1:
-        names = ", ".join(reader.__name__ for reader in fitting)
-        raise InputError(f"{path}: files of several formats ({names})")
-    if fitting and fitting[0] in (mcap_drive.McapDrive, helipr.HeliprDrive):
-        return fitting[0](path, lidar)
-    if fitting and lidar is not None:
-        raise InputError(f"{path}: has one LiDAR, not a '{lidar}'")
-    if fitting:
-        return fitting[0](path, columns)
-    if path.is_dir() and any(path.glob("*.mcap.part")):
-        raise InputError(
-            f"{path}: the recording was not finished (cns-drake repair saves"
-            " what is whole)"
-        )
-    raise InputError(
-        f"{path}: not a recorded drive (a folder with an .mcap file, or"
-        " one, or a drive of MulRan, HeLiPR, NCLT, Boreas, KITTI odometry or"
-        " CNS)"
-    )
+    return [reader for holds, reader in readers if holds(path)]
 
 
 # For `from evaluation import drives; drives.open(path)`.

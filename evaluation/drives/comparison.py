@@ -13,7 +13,7 @@ from scipy.spatial import cKDTree
 from cns_drake.base.drives.drive import Drive, check_same_world
 from cns_drake.base.errors import InputError
 from cns_drake.base.json_text import json_values
-from evaluation.drives.sampling import travelled
+from evaluation.drives.sampling import corners, travelled
 
 # Distance between the stations at which two drives are compared [m]; the code
 # calls the stations stops.
@@ -209,12 +209,9 @@ def compare_drives(first: Drive, second: Drive) -> DriveComparison:
 
 def _way(drive: Drive) -> _Way:
     p_WS = drive.X_WS[:, :3, 3]
-    kept = [0]
-    for frame, p in enumerate(p_WS):
-        if math.dist(p, p_WS[kept[-1]]) >= _LEAST_STEP:
-            kept.append(frame)
-    corners = p_WS[kept]
-    passed = travelled(corners)
+    kept = corners(p_WS, _LEAST_STEP)
+    p_WC = p_WS[kept]
+    passed = travelled(p_WC)
     length = float(passed[-1])
     if length < STOP_SPACING:
         raise InputError(
@@ -224,7 +221,7 @@ def _way(drive: Drive) -> _Way:
     s = np.arange(0.0, length, _PATH_SPACING)
 
     def at(s: np.ndarray) -> np.ndarray:
-        columns = [np.interp(s, passed, column) for column in corners.T]
+        columns = [np.interp(s, passed, column) for column in p_WC.T]
         return np.stack(columns, axis=1)
 
     ahead = at(s + _DIRECTION_REACH) - at(s - _DIRECTION_REACH)

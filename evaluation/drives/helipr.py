@@ -99,10 +99,10 @@ class HeliprDrive(FileDrive):
         kept, notes = keep_spanned(files, spanned, trajectory.path)
         if in_utm:
             X_WS = to_world(X_WS, trajectory.path)
-        drive_name = drive.resolve().name
+        drive = drive.resolve()
         super().__init__(
-            name=f"{drive_name}_{lidar}",
-            world_frame=f"helipr/{DATUM if in_utm else drive_name}",
+            name=f"{drive.name}_{lidar}",
+            world_frame=f"helipr{f'/{DATUM}' if in_utm else drive}",
             files=kept,
             stamps_ns=stamps_ns[spanned],
             X_WS=X_WS,

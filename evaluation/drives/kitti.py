@@ -117,7 +117,8 @@ class KittiDrive(BinDrive):
             )
         X_WS = poses.inverse(X_CS) @ X_C0C @ X_CS
         name = path.resolve().name
-        world_frame = f"kitti/{name}"
+        # Drives of one name in two folders have two world frames.
+        world_frame = f"kitti{path.resolve()}"
         first_pose = path / _FIRST_POSE
         if is_there(first_pose):
             X_WS = _read_first_pose(first_pose) @ X_WS

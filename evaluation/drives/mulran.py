@@ -82,7 +82,7 @@ class MulranDrive(BinDrive):
         super().__init__(
             columns,
             name=name,
-            world_frame=f"mulran/{name if local else DATUM}",
+            world_frame=f"mulran{path.resolve() if local else f'/{DATUM}'}",
             files=kept,
             stamps_ns=stamps_ns[spanned],
             X_WS=X_UB @ X_BS,

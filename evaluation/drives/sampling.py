@@ -21,6 +21,11 @@ from cns_drake.base.errors import InputError
 
 # Frames closer than this are at the same place [m].
 _LEAST_SPACING = 1e-6
+# A standing receiver jitters by less than this [m].
+_LEAST_MOVE = 0.5
+# Within such a distance, no road makes a path longer than its chord by this
+# factor.
+_MOST_BENT = 1.1
 
 
 @dataclass(frozen=True, eq=False)
@@ -81,9 +86,36 @@ class QuerySensor:
         return scan[~(turned < self.hidden)]
 
 
+def corners(positions: np.ndarray, apart: float) -> list[int]:
+    """Returns indices of positions that follow each other at a distance.
+
+    The first is 0; each further one is the next position that is at least
+    `apart` metres from the one before.
+    """
+    points = positions.tolist()
+    kept = [0]
+    for index, point in enumerate(points):
+        if math.dist(point, points[kept[-1]]) >= apart:
+            kept.append(index)
+    return kept
+
+
 def travelled(positions: np.ndarray) -> np.ndarray:
-    """Returns the path length (N,) up to each position (N, 3) [m]."""
+    """Returns the path length (N,) up to each position (N, 3) [m].
+
+    The jitter of a receiver that stands or creeps does not lengthen the path:
+    the path is divided where it is 0.5 m from the division before, and a part
+    that is much longer than its chord counts as its chord.
+    """
     steps = np.linalg.norm(np.diff(positions, axis=0), axis=1)
+    ends = corners(positions, _LEAST_MOVE)
+    if ends[-1] < len(steps):
+        ends.append(len(steps))
+    parts = np.add.reduceat(steps, ends[:-1]) if len(steps) else steps
+    chords = np.linalg.norm(np.diff(positions[ends], axis=0), axis=1)
+    is_jitter = parts > _MOST_BENT * chords
+    scale = np.where(is_jitter, chords / np.where(is_jitter, parts, 1.0), 1.0)
+    steps *= np.repeat(scale, np.diff(ends))
     return np.concatenate([[0.0], np.cumsum(steps)])
 
 

@@ -12,7 +12,7 @@ from cns_drake.base.progress import Track, silent
 from evaluation.drives.sampling import QuerySensor, gather, sample_frames
 from evaluation.methods.method import Method, check_number
 from evaluation.recognition.metrics import route_blocks
-from evaluation.recognition.protocol import DEFAULT_PROTOCOL, RetrievalProtocol
+from evaluation.recognition.protocol import RECORDED_PROTOCOL, RetrievalProtocol
 
 # What a drive's scans are used for: places of the database, or queries.
 Role = Literal["places", "queries"]
@@ -103,7 +103,7 @@ def describe_drive(
     drive: Drive,
     methods: Iterable[Method],
     roles: Set[Role],
-    protocol: RetrievalProtocol = DEFAULT_PROTOCOL,
+    protocol: RetrievalProtocol = RECORDED_PROTOCOL,
     track: Track = silent,
     visit: Callable[[int, np.ndarray], None] | None = None,
     further: Iterable[Request] = (),

@@ -22,7 +22,11 @@ from evaluation.recognition.metrics import (
     percentile_interval,
     pr_curve,
 )
-from evaluation.recognition.pose_errors import PoseErrors, pose_success
+from evaluation.recognition.pose_errors import (
+    PoseErrors,
+    is_accepted,
+    pose_success,
+)
 from evaluation.recognition.query_outcomes import QueryOutcomes, judge
 from evaluation.recognition.retrieval import Retrieval
 
@@ -271,13 +275,14 @@ def pose_numbers(
     if before is not None:
         then = pose_success(before.pose_errors, before.outcomes)
         yield now.number("kept", float(kept_share(value, then)), n=number)
-    known = ~np.isnan(errors.translation)
+    # The same queries as in the report's table of poses.
+    known = is_accepted(now.outcomes) & ~np.isnan(errors.translation)
     for name, some in (
         ("translation_median", errors.translation[known]),
         ("rotation_median_deg", errors.rotation_deg[known]),
     ):
         if len(some):
-            yield now.number(name, float(np.median(some)), n=number)
+            yield now.number(name, float(np.median(some)), n=len(some))
 
 
 def kept_share(

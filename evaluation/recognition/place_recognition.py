@@ -19,7 +19,7 @@ from evaluation.recognition.metrics import (
     pr_curve,
 )
 from evaluation.recognition.pose_errors import PoseMetrics, pose_metrics
-from evaluation.recognition.protocol import DEFAULT_PROTOCOL, RetrievalProtocol
+from evaluation.recognition.protocol import RECORDED_PROTOCOL, RetrievalProtocol
 from evaluation.recognition.query_outcomes import QueryOutcomes, judge
 from evaluation.recognition.retrieval import Retrieval, retrieve
 
@@ -98,7 +98,7 @@ class PlaceRecognition:
             "auc_strict": metrics.auc_strict,
             "auc_interval_95": metrics.auc_interval.to_json(),
             "recall_at_1": metrics.recall_at_1,
-            "r1": metrics.recall_at_1,
+            "r1": metrics.recall_at_1,  # Its name in tables of results.
             "recall_at_1_interval_95": metrics.recall_at_1_interval.to_json(),
             "recall_at_n": metrics.recall_at_n.tolist(),
             "recall_at_1_percent": metrics.recall_at_1_percent,
@@ -128,7 +128,7 @@ def run(
     query: Drive,
     method: Method,
     mode: Mode = "all",
-    protocol: RetrievalProtocol = DEFAULT_PROTOCOL,
+    protocol: RetrievalProtocol = RECORDED_PROTOCOL,
     track: Track = silent,
     *,
     across_maps: bool = False,
@@ -219,7 +219,7 @@ def judge_retrieval(
         retrieval=retrieval,
         outcomes=outcomes,
         by_mode=by_mode,
-        pose=pose_metrics(retrieval.pose_errors, outcomes, by_mode["all"]),
+        pose=pose_metrics(retrieval.pose_errors, outcomes),
         protocol=protocol.of(method),
         mode=mode,
         pair=pair,

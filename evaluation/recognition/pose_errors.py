@@ -10,7 +10,7 @@ import numpy as np
 from cns_drake.base import poses
 from cns_drake.base.errors import InputError
 from evaluation.methods.method import Method
-from evaluation.recognition.metrics import PlaceRecognitionMetrics
+from evaluation.recognition.metrics import pr_curve
 from evaluation.recognition.query_outcomes import QueryOutcomes
 
 # Greatest errors of a localised query's pose.
@@ -42,9 +42,7 @@ class PoseErrors:
 class PoseMetrics:
     """Quality of the poses of one method on one pair of drives.
 
-    Medians and quantiles are over the accepted matches: queries whose best
-    place is a match, and whose score reaches the threshold with the greatest
-    F1. This F1 counts all queries, also those without a match.
+    Medians and quantiles are over the accepted matches, see `is_accepted`.
 
     Attributes:
         num_accepted: number of accepted matches.
@@ -111,24 +109,29 @@ def checked_pose(method: Method, X_PQ: object) -> np.ndarray | None:
     return pose
 
 
-def pose_metrics(
-    errors: PoseErrors,
-    outcomes: QueryOutcomes,
-    metrics: PlaceRecognitionMetrics,
-) -> PoseMetrics:
+def is_accepted(outcomes: QueryOutcomes) -> np.ndarray:
+    """Returns which queries are accepted matches, (Q,) bool.
+
+    These are the queries whose best place is a match, and whose score reaches
+    the threshold with the greatest F1. This F1 counts all queries, also those
+    without a match.
+    """
+    curve = pr_curve(outcomes)
+    if not len(curve.thresholds):
+        return np.zeros(len(outcomes), dtype=bool)
+    # A comparison with NaN is false.
+    least = curve.thresholds[curve.f1.argmax()]
+    return outcomes.is_right & (outcomes.best_scores >= least)
+
+
+def pose_metrics(errors: PoseErrors, outcomes: QueryOutcomes) -> PoseMetrics:
     """Returns a summary of the pose errors of a method on a pair of drives.
 
     Args:
         errors: errors of the poses of Q queries.
         outcomes: outcomes of the same queries.
-        metrics: place recognition metrics of the same queries, of the mode
-            `all`.
     """
-    accepted = np.zeros(len(outcomes), dtype=bool)
-    if metrics.f1_max_index is not None:
-        least = metrics.curve.thresholds[metrics.f1_max_index]
-        # A comparison with NaN is false: such a pose is no success.
-        accepted = outcomes.is_right & (outcomes.best_scores >= least)
+    accepted = is_accepted(outcomes)
     known = ~np.isnan(errors.translation)
     translation = errors.translation[accepted & known]
     rotation_deg = errors.rotation_deg[accepted & known]

@@ -32,7 +32,8 @@ class RetrievalProtocol:
     the choice of the merged scan that stands for a place.
 
     Attributes:
-        radius: greatest distance between a query and its match [m].
+        radius: greatest distance between a query and its match, in three
+            dimensions [m].
         query_spacing: distance driven between two queries [m].
         place_spacing: distance driven between two places of the database [m].
         max_range: largest x, y or z of a point in the sensor's frame [m];
@@ -278,7 +279,7 @@ GATE_TEXT = (
     " query, and places beyond the radius are rejected."
 )
 
-DEFAULT_PROTOCOL = RetrievalProtocol()
+RECORDED_PROTOCOL = RetrievalProtocol()
 
 # The paper's protocol: queries are as recorded, and the first of the merged
 # scans gives the pose. It serves only to compare with the paper's tables.
@@ -292,7 +293,7 @@ FAIR_PROTOCOL = RetrievalProtocol(turn_queries=True, tilt_queries=1.5, seed=0)
 PROTOCOLS = {
     "fair": FAIR_PROTOCOL,
     "paper": PAPER_PROTOCOL,
-    "recorded": DEFAULT_PROTOCOL,
+    "recorded": RECORDED_PROTOCOL,
 }
 PROTOCOL_NAMES = (*PROTOCOLS, "own")
 _ASKED = (*_QUERY_CHANGES, "seed")

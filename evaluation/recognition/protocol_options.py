@@ -7,8 +7,8 @@ import typer
 
 from cns_drake.base.commands import Options, with_options
 from evaluation.recognition.protocol import (
-    DEFAULT_PROTOCOL,
     PROTOCOLS,
+    RECORDED_PROTOCOL,
     RetrievalProtocol,
 )
 
@@ -33,7 +33,7 @@ _FIELDS: Options = {
         (
             "radius",
             float,
-            DEFAULT_PROTOCOL.radius,
+            RECORDED_PROTOCOL.radius,
             "Greatest distance at which a place counts as a match of a query "
             "[m].",
             None,
@@ -41,14 +41,14 @@ _FIELDS: Options = {
         (
             "query_spacing",
             float,
-            DEFAULT_PROTOCOL.query_spacing,
+            RECORDED_PROTOCOL.query_spacing,
             "Distance that the car drives between two queries [m].",
             None,
         ),
         (
             "place_spacing",
             float,
-            DEFAULT_PROTOCOL.place_spacing,
+            RECORDED_PROTOCOL.place_spacing,
             "Distance that the car drives between two places of the database "
             "[m].",
             None,
@@ -56,7 +56,7 @@ _FIELDS: Options = {
         (
             "max_range",
             float,
-            DEFAULT_PROTOCOL.max_range,
+            RECORDED_PROTOCOL.max_range,
             "Leave out points that are farther than this along x, y or z in "
             "the LiDAR's frame [m].",
             None,
@@ -76,7 +76,9 @@ _FIELDS: Options = {
             None,
             "Turn on loop closure: each drive is also compared with itself. A "
             "query is then compared only with places that the car passed at "
-            "least this long before [s], such as 30.",
+            "least this long before [s], such as 30. Methods that otherwise "
+            "search for a few candidates, such as scan-context++, then score "
+            "all of these places.",
             "S",
         ),
     )

@@ -19,7 +19,7 @@ from evaluation.recognition.pose_errors import (
     checked_pose,
     pose_error,
 )
-from evaluation.recognition.protocol import DEFAULT_PROTOCOL, RetrievalProtocol
+from evaluation.recognition.protocol import RECORDED_PROTOCOL, RetrievalProtocol
 from evaluation.recognition.scoring import gated, ranking, score_places
 from evaluation.recognition.sequences import along_the_way
 
@@ -92,7 +92,7 @@ def retrieve(
     database: Drive,
     query: Drive,
     method: Method,
-    protocol: RetrievalProtocol = DEFAULT_PROTOCOL,
+    protocol: RetrievalProtocol = RECORDED_PROTOCOL,
     track: Track = silent,
     *,
     across_maps: bool = False,
@@ -133,7 +133,7 @@ def compare(
     method: Method,
     database: DescribedDrive,
     query: DescribedDrive,
-    protocol: RetrievalProtocol = DEFAULT_PROTOCOL,
+    protocol: RetrievalProtocol = RECORDED_PROTOCOL,
     track: Track = silent,
     overlaps: np.ndarray | None = None,
 ) -> Retrieval:

@@ -10,17 +10,19 @@ import re
 from cns_drake.base.drives.drive import driven_way
 from cns_drake.base.drives.lidar_fields import LidarField
 from cns_drake.base.errors import InputError, one_line
-from evaluation.drives import open_drive
-from evaluation.drives.helipr import holds_helipr
-from evaluation.drives.mulran import holds_mulran
+from evaluation.drives import find_readers, open_drive
+from evaluation.drives.cns_folder import holds_cns
+from evaluation.drives.kitti import holds_kitti
 from evaluation.recognition.protocol import RetrievalProtocol
 from evaluation.report.reference import NO_REFERENCE, Reference
 from evaluation.study.chosen_methods import MethodChoice
 from evaluation.study.surveys import DriveSource, RecordedDrive, described_key
 
-# The names of drives that state map and stage, the latter ones as MulRan's.
+# The names of drives that state map and stage, the second ones as those of NCLT
+# and Boreas, the last ones as MulRan's.
 _NAMES = (
     re.compile(r"(?P<map>.+)_(?P<stage>[^_]+)"),
+    re.compile(r"(?P<map>.*?)-?(?P<stage>\d{4}-\d\d-\d\d.*)"),
     re.compile(r"(?P<map>.*\D)(?P<stage>\d+)"),
 )
 _UNPLACED = "map and stage are unknown: no scenario, and no name <map>_<stage>"
@@ -228,14 +230,14 @@ def find_recordings(
 ) -> list[RecordingInfo]:
     """Returns all recordings in a folder and its direct subfolders.
 
-    They can be MCAP files or have the layout of a data set, such as MulRan or
-    HeLiPR. Drives in the layout of CNS, and drives in the layout of KITTI that
-    contain a `scenario.yaml`, are found up to three levels down, where exports
-    put them.
+    They can have any format that `evaluation.drives.open_drive` reads. Drives
+    in the layout of CNS and KITTI are found up to three levels down, where
+    exports put them. Those in the layout of KITTI need a `scenario.yaml`.
 
     A recording states its map and stage in its scenario. Without a scenario,
-    they are taken from its name: `<map>_<stage>`, or without `_` as in KAIST01.
-    A recording without map and stage is left out, with a note.
+    they are taken from its name: `<map>_<stage>`, or without `_` as in KAIST01,
+    or `<map>-<date>`. If the name is only a date, as in NCLT, the world frame
+    is the map. A recording without map and stage is left out, with a note.
 
     Args:
         folder: the folder.
@@ -308,25 +310,22 @@ def _find_drives(folder: Path) -> list[Path]:
     """Returns the paths of the drives in a folder, in order."""
     paths = []
     for child in sorted(folder.iterdir()):
-        if (
-            child.suffix == ".mcap"
-            or (child.is_dir() and any(child.glob("*.mcap")))
-            or holds_mulran(child)
-            or holds_helipr(child)
-        ):
+        if _is_drive(child):
             paths.append(child)
         elif child.is_dir():
             below = [*child.glob("*"), *child.glob("*/*")]
-            paths.extend(sorted(filter(_is_exported_drive, below)))
+            paths += [
+                path
+                for path in sorted(below)
+                if _is_drive(path) and (holds_cns(path) or holds_kitti(path))
+            ]
     return paths
 
 
-def _is_exported_drive(path: Path) -> bool:
-    if path.suffix == ".part":
+def _is_drive(path: Path) -> bool:
+    if path.suffix == ".part" or not find_readers(path):
         return False
-    return (path / "gt.csv").is_file() or (
-        (path / "velodyne").is_dir() and (path / "scenario.yaml").is_file()
-    )
+    return not holds_kitti(path) or (path / "scenario.yaml").is_file()
 
 
 def _place(
@@ -349,7 +348,8 @@ def _place(
         match = next(filter(None, matches), None)
         if match is None:
             return None
-        map_name, stage = match["map"], match["stage"]
+        map_name = match["map"] or drive.world_frame.partition("/")[0]
+        stage = match["stage"]
     source = None
     if (lidar, columns) != (None, None):
         source = RecordedDrive(path.absolute(), lidar, columns)

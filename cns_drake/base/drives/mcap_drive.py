@@ -26,6 +26,8 @@ _ODOMETRY_TOPIC = "/odometry"
 _IMU_TOPIC = "/imu/data"
 _TF_STATIC_TOPIC = "/tf_static"
 _KALIBR = "imu.yaml"
+# By REP 105 of ROS, other frames, such as `odom`, may start anew in each drive.
+_SHARED_FRAME = "map"
 # If log times in a file step back by more than this, the messages are not late:
 # the clock was set back [s].
 _LATEST = 1.0
@@ -145,6 +147,12 @@ class McapDrive(Drive):
                     f"{self._path}: {topic}: the clock goes back by {back:.3g}"
                     " s; messages are read in the order of their log times"
                 )
+        if self.world_frame != _SHARED_FRAME:
+            notes.append(
+                f"{self._path}: {_ODOMETRY_TOPIC}: all drives with poses in a"
+                f" frame {self.world_frame!r} count as drives in one world"
+                " (--align always aligns them nevertheless)"
+            )
         return (*notes, *filter(None, [self.distortion_note]))
 
     @property

@@ -549,7 +549,7 @@ class TestReadingKittiExports:
         shutil.rmtree(folder / "labels")
         drive = drives.open(folder)
         assert drive.name == "07"
-        assert drive.world_frame == "kitti/07"
+        assert drive.world_frame == f"kitti{folder.resolve()}"
         assert drive.scenario is None
         assert drive.instances is None
         assert drive.scan(0).dtype.names == XYZI

@@ -8,6 +8,7 @@ import pytest
 
 from cns_drake.base.errors import InputError
 from evaluation.drives import open_drive
+from evaluation.study.collection import find_recordings
 
 T0_US = 1_628_184_886_518_266
 HEADER = (
@@ -89,3 +90,10 @@ def test_faults_are_named(tmp_path):
     scan.rename(scan.with_name("first.bin"))
     with pytest.raises(InputError, match=r"named \*.bin: 'first' is no time"):
         open_drive(folder)
+
+
+def test_a_report_finds_drives_by_their_dates(tmp_path):
+    folder = write_drive(tmp_path)
+    (found,) = find_recordings(tmp_path)
+    assert found.path == folder
+    assert (found.map_name, found.stage) == ("boreas", "2021-08-05-13-34")

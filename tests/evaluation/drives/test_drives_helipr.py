@@ -23,7 +23,7 @@ import pytest
 
 from cns_drake.base.drives.mulran_frames import ORIGIN
 from cns_drake.base.errors import InputError
-from evaluation.drives import open_drive
+from evaluation.drives import check_same_world, open_drive
 from evaluation.drives.helipr import HeliprDrive
 
 FIELDS = {
@@ -97,8 +97,10 @@ def test_local_poses_where_there_are_no_global_ones(tmp_path):
     )
     drive = open_drive(tmp_path / "Town01")
     np.testing.assert_allclose(drive.X_WS, X_LS, atol=1e-12)
-    # Each drive has a frame of its own.
-    assert drive.world_frame == "helipr/Town01"
+    # Each drive has a frame of its own, also if two have the same name.
+    write_drive(tmp_path / "2/Town01", ("Ouster",), ground_truth=("local",))
+    with pytest.raises(InputError, match="poses in frame"):
+        check_same_world(drive, open_drive(tmp_path / "2/Town01"))
     assert drive.datum is None
 
 

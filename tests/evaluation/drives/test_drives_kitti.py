@@ -52,7 +52,7 @@ def test_reads_what_was_written(tmp_path, beside):
     folder, X_0S = write_drive(tmp_path, beside=beside)
     drive = open_drive(folder)
     assert drive.name == "07"
-    assert drive.world_frame == "kitti/07"
+    assert drive.world_frame == f"kitti{folder.resolve()}"
     assert len(drive) == NUM_SCANS
     # Tr has six digits only: it is no exact rotation.
     np.testing.assert_allclose(drive.X_WS, X_0S, atol=1e-5)
@@ -182,11 +182,14 @@ def test_numbers_that_contradict_the_files(tmp_path):
 
 def test_drives_in_frames_of_their_own(tmp_path):
     one, other = (
-        open_drive(write_drive(tmp_path / name, name=name)[0])
-        for name in ("00", "05")
+        open_drive(write_drive(tmp_path / day, name="00")[0])
+        for day in ("day1", "day2")
     )
-    with pytest.raises(InputError, match=r"'kitti/05'.*first_pose\.txt"):
+    with pytest.raises(InputError, match=r"'kitti/.*/day2/.*first_pose\.txt"):
         check_same_world(one, other)
+    # However its path is written, a drive is in one world with itself.
+    same = open_drive(tmp_path / "day2/../day1/sequences/00")
+    check_same_world(one, same)
 
 
 def test_a_drive_without_poses(tmp_path):

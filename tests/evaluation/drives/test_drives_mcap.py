@@ -427,6 +427,8 @@ def test_drives_of_different_worlds_are_refused(tmp_path):
     other_frame = drive("odd", world_frame="utm")
     with pytest.raises(InputError, match=r"'utm'.*'map'"):
         check_same_world(plain, other_frame)
+    assert not plain.notes
+    assert "'utm' count as drives in one world" in other_frame.notes[0]
     cities = [
         drive(name, attachments={"scenario.json": {"map": city}})
         for name, city in (

@@ -75,7 +75,9 @@ def test_local_coordinates(tmp_path):
     drive = open_drive(tmp_path / "local")
     wanted[:, :3, 3] -= UTM - ORIGIN
     np.testing.assert_allclose(drive.X_WS, wanted, atol=1e-8)
-    assert drive.world_frame == "mulran/local"
+    write_drive(tmp_path / "day2/local", table=(stamps_ns, X_UB))
+    with pytest.raises(InputError, match="poses in frame"):
+        check_same_world(drive, open_drive(tmp_path / "day2/local"))
     assert drive.datum is None
     assert "no UTM coordinates" in drive.notes[-1]
 

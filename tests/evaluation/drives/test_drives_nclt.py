@@ -8,6 +8,7 @@ import pytest
 
 from cns_drake.base.errors import InputError
 from evaluation.drives import open_drive
+from evaluation.study.collection import find_recordings
 
 T0_US = 1_326_030_975_726_043
 STEP_US = 200_000
@@ -131,3 +132,9 @@ def test_faults_are_named(tmp_path):
     write_bytes(packets / "velodyne_hits.bin", b"")
     with pytest.raises(InputError, match="velodyne_sync"):
         open_drive(packets)
+
+
+def test_a_report_finds_sessions_by_their_dates(tmp_path):
+    write_session(tmp_path, place="../ground_truth")
+    (found,) = find_recordings(tmp_path)
+    assert (found.name, found.map_name, found.stage) == (DATE, "nclt", DATE)

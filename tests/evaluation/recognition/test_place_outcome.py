@@ -10,6 +10,7 @@ from evaluation.recognition.place_outcome import (
     PlaceOutcome,
     faults,
     place_numbers,
+    pose_numbers,
 )
 from evaluation.recognition.pose_errors import PoseErrors
 from evaluation.recognition.query_outcomes import QueryOutcomes
@@ -105,6 +106,28 @@ def test_without_a_baseline_nothing_is_kept():
     assert not {"kept", "kept_strict", "lost", "found"} & values.keys()
     assert values["with_match"] == 10.0
     assert values["places"] == 9.0
+
+
+def test_median_errors_are_those_of_right_answers():
+    """Thirty queries without a match, and one wrong place, do not count."""
+    right = part(41, 10)
+    outcomes = QueryOutcomes(
+        np.linspace(1.0, 0.5, 41),
+        right,
+        part(41, 11),
+        np.where(right, 1.0, np.inf),
+        9,
+    )
+    far = np.where(right, 0.1, 50.0)
+    far[0] = np.nan
+    now = PlaceOutcome(
+        "btc", False, outcomes, {}, PoseErrors(far, 2.0 * far), 7.5
+    )
+    assert {n.metric: (n.value, n.n) for n in pose_numbers(now, None)} == {
+        "pose_success": (9 / 11, 11),
+        "translation_median": (0.1, 9),
+        "rotation_median_deg": (0.2, 9),
+    }
 
 
 def test_without_anything_to_keep():

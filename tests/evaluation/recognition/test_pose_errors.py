@@ -59,7 +59,7 @@ def test_metrics_of_hand_made_queries():
         np.array([2.0, 2.0 + 1e-9, 9.0, 1.0, 0.5, np.nan]),
         np.array([5.0, 1.0, 90.0, 5.0 + 1e-9, 1.0, np.nan]),
     )
-    found = pose_metrics(errors, outcomes, metrics)
+    found = pose_metrics(errors, outcomes)
     assert found.num_accepted == 3
     assert found.translation_median == pytest.approx(2.0)
     assert found.translation_90 == pytest.approx(2.0)
@@ -74,9 +74,7 @@ def test_quantiles_of_accepted_poses():
     right = np.ones(11, dtype=bool)
     outcomes = make_outcomes(np.arange(11.0), right, right)
     values = np.random.default_rng(0).permutation(11) + 0.0
-    found = pose_metrics(
-        PoseErrors(values, 3.0 * values), outcomes, evaluate(outcomes)
-    )
+    found = pose_metrics(PoseErrors(values, 3.0 * values), outcomes)
     assert (found.translation_median, found.translation_90) == (5.0, 9.0)
     assert (found.rotation_median_deg, found.rotation_90_deg) == (15.0, 27.0)
 
@@ -90,7 +88,7 @@ def test_full_precision_that_is_never_reached():
 
 def test_a_method_without_poses():
     outcomes = make_outcomes([0.9], [True], [True])
-    found = pose_metrics(PoseErrors.unknown(1), outcomes, evaluate(outcomes))
+    found = pose_metrics(PoseErrors.unknown(1), outcomes)
     assert found.num_accepted == 1
     assert np.isnan([found.translation_median, found.success]).all()
 

@@ -54,6 +54,19 @@ def test_standing_and_jumping():
     assert sample_frames(positions[:1], 10.0).tolist() == [0]
 
 
+@pytest.mark.parametrize("noise", [0.0, 0.02, 0.05])
+def test_jitter_is_no_travel(noise):
+    """A car at 5 m/s stands for a minute, creeps, and goes on, at 10 Hz."""
+    speeds = np.repeat([5.0, 0.0, 0.5, 5.0], [80, 600, 200, 90])
+    x = np.cumsum(0.1 * speeds)
+    rng = np.random.default_rng(3)
+    positions = line(x) + rng.normal(0.0, noise, (len(x), 3))
+    frames = sample_frames(positions, 10.0)
+    # The first frame is at 0.5 m; a step is 0.5 m.
+    wanted = np.arange(0.5, 95.0, 10.0)
+    np.testing.assert_allclose(x[frames], wanted, atol=0.5 + 20.0 * noise)
+
+
 def test_crop_is_a_box_with_its_faces():
     points = np.array(
         [

@@ -140,7 +140,10 @@ def test_columns_are_the_users_and_what_is_assumed_is_said(tmp_path):
             file = path / "velodyne" / f"{k:06d}.bin"
             file.parent.mkdir(exist_ok=True)
             np.ones(60, "<f4").tofile(file)
+    # Other sequences of the benchmark, without a map, are passed over.
+    (folder / "sequences/11/velodyne").mkdir(parents=True)
     found = find_recordings(folder, columns=5)
+    assert len(find_recordings(folder / "sequences", columns=5)) == 2
     assert [len(one.source().scan(0)) for one in found] == [12, 12]
     others = find_recordings(folder, columns=4)
     assert [len(one.source().scan(0)) for one in others] == [15, 15]
