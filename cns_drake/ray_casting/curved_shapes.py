@@ -11,13 +11,14 @@ rays that start in line with a capsule can run along its axis.
 
 from collections.abc import Sequence
 from functools import lru_cache
+import math
 from typing import NamedTuple
 
 import numpy as np
 
 from cns_drake.base.compiled import compiled
-from cns_drake.ray_casting.moving_groups import Placed
-from cns_drake.ray_casting.ray_groups import RayGroup
+from cns_drake.base.elementary import product, rotated
+from cns_drake.ray_casting.ray_groups import Motion, RayGroup
 from cns_drake.ray_casting.rays import Hits, Rays
 from cns_drake.scene.surfaces import (
     CapsuleSurface,
@@ -174,150 +175,111 @@ class CapsuleAxes:
     """Casts rays along the axes of capsules, where Embree is not exact."""
 
     def __init__(self, groups: Sequence[RayGroup]):
-        """Collects the capsules of groups.
+        """Collects the capsules C of groups.
 
         Args:
-            groups: the groups, already placed (see `RayGroup.place`).
+            groups: the groups, already placed (see `RayGroup.place`). Each cast
+                takes their current poses and motions.
         """
-        found = [
-            (row, index, X_LG, surface)
+        self._found = [
+            (row, group, index, X_LC.GetAsMatrix4(), (c.length / 2, c.radius))
             for row, group in enumerate(groups)
-            for index, X_LG, surface in group.members
-            if isinstance(surface, CapsuleSurface)
+            for index, X_LC, c in group.members
+            if isinstance(c, CapsuleSurface)
         ]
-        self._groups = np.array([row for row, *_ in found], np.int32)
-        self._owners = np.array([index for _, index, *_ in found], np.int32)
-        self._p_LCs = np.reshape(
-            [X.translation() for *_, X, _ in found], (-1, 3)
-        )
-        self._axes = np.reshape(
-            [X.rotation().matrix()[:, 2] for *_, X, _ in found], (-1, 3)
-        )
-        self._halves = np.array([one.length / 2.0 for *_, one in found])
-        self._radii = np.array([one.radius for *_, one in found])
-        self._X_OLs = np.reshape([group.X_OL for group in groups], (-1, 3, 4))
-        self._is_still = np.array(
-            [group.in_sight and group.motion is None for group in groups], bool
-        )
-
-    def place(self, placed: Placed) -> None:
-        """Moves the capsules with their groups to the current poses."""
-        self._X_OLs[placed.rows] = placed.X_OLs
-        self._is_still[placed.rows] = placed.in_sight & ~placed.moves
 
     def cast(self, rays: Rays, hits: Hits) -> None:
         """Corrects the hits of rays that run along the axis of a capsule.
-
-        Capsules that move during the turn are left out.
 
         Args:
             rays: N rays.
             hits: their hits as Embree found them, changed in place.
         """
-        capsules = np.flatnonzero(self._is_still[self._groups])
-        if not (len(capsules) and len(rays.d_Sset)):
+        seen = [one for one in self._found if one[1].in_sight]
+        if not (seen and len(rays.d_Sset)):
             return
-        X_OLs = self._X_OLs[self._groups[capsules]]
-        p_OCs = _map(X_OLs[:, :, :3], self._p_LCs[capsules]) + X_OLs[:, :, 3]
-        axes = _map(X_OLs[:, :, :3], self._axes[capsules])
-        # Rays along an axis start in a cone about it.
+        _, groups, _, matrices, sizes = zip(*seen, strict=True)
+        X_LCs, (half, radius) = np.array(matrices), np.transpose(sizes)
+        X_OCs = product(np.array([group.X_OL for group in groups]), X_LCs)
+        angle, way = np.transpose([_bound(group.motion) for group in groups])
+        # Rays along an axis start in a cone about it, which is wider if the
+        # capsule moves.
         columns = np.ascontiguousarray(rays.p_OSset.T)
         low, high = columns.min(axis=1), columns.max(axis=1)
-        spread = np.linalg.norm((high - low) / 2.0)
-        away = (low + high) / 2.0 - p_OCs
+        way += np.linalg.norm((high - low) / 2.0)
+        way += angle * np.linalg.norm(X_LCs[:, :3, 3], axis=1)
+        away = (low + high) / 2.0 - X_OCs[:, :, 3]
         distance = np.linalg.norm(away, axis=1)
-        along = (away * axes).sum(axis=1)
-        reach = distance + spread + self._halves[capsules]
-        reach = self._radii[capsules] + spread + 2.0 * _ALONG * reach
-        near = np.flatnonzero(distance**2 - along**2 <= reach**2)
-        if not len(near):
-            return
-        p_Oset, d_Oset = rays.p_Oset(), rays.d_Oset()
-        x, y, z = np.ascontiguousarray(d_Oset.T)
-        for k in near:
-            # A sum over the last axis takes eight times as long.
-            d_along = x * axes[k, 0] + y * axes[k, 1] + z * axes[k, 2]
-            ray = np.flatnonzero(1.0 - d_along**2 <= _ALONG**2)
-            if not len(ray):
-                continue
-            capsule = capsules[k]
-            ranges, normals = _meet_capsule(
-                p_Oset[ray] - p_OCs[k],
-                d_Oset[ray],
-                axes[k],
-                self._halves[capsule],
-                self._radii[capsule],
+        along = (away * X_OCs[:, :, 2]).sum(axis=1)
+        reach = (2.0 * _ALONG + angle) * (distance + way + half)
+        reach += radius + way
+        R_SOset = rays.R_OSset.swapaxes(1, 2)
+        for k in np.flatnonzero(distance**2 - along**2 <= reach**2):
+            row, group, index, X_LC, size = seen[k]
+            times = rays.times if group.motion else rays.times[:1]
+            axes = product(group.X_OL_at(times), X_LC)[:, :, 2]
+            turn = np.arange(np.lcm(len(axes), len(R_SOset)))
+            axes_S = rotated(
+                R_SOset[turn % len(R_SOset)], axes[turn % len(axes)]
             )
-            is_nearer = ranges <= rays.max_ranges_of(ray)
+            d_Sset = rays.d_Sset.reshape(-1, len(turn), 3)
+            # A sum over the last axis takes twenty times as long.
+            d_along = sum(d_Sset[:, :, n] * axes_S[:, n] for n in range(3))
+            ray = np.flatnonzero(d_along**2 >= 1.0 - _ALONG**2)
+            some = rays.select(ray, rays.max_ranges_of(ray))
+            X_OC = product(group.X_OL_at(some.times), X_LC)
+            R_CO = X_OC[:, :, :3].swapaxes(1, 2)
+            ranges, normals_C = _meet_capsule(
+                rotated(R_CO, some.p_OSset - X_OC[:, :, 3]),
+                rotated(R_CO, some.d_Oset()),
+                *size,
+            )
+            is_nearer = ranges <= some.max_ranges
             is_nearer &= ranges < hits.ranges[ray] - _SAME
             ray = ray[is_nearer]
             hits.ranges[ray] = ranges[is_nearer]
-            hits.owner[ray] = self._owners[capsule]
-            hits.group[ray] = self._groups[capsule]
+            hits.owner[ray], hits.group[ray] = index, row
             if hits.normals.shape[1]:
-                R_LO = X_OLs[k, :, :3].T
-                hits.normals[ray] = _map(R_LO, normals[is_nearer])
+                normals_L = rotated(X_LC[:3, :3], normals_C[is_nearer])
+                hits.normals[ray] = normals_L
 
 
-def _map(matrices: np.ndarray, vectors: np.ndarray) -> np.ndarray:
-    """Returns products of (N, 3, 3) or (3, 3) matrices and (N, 3) vectors.
-
-    Terms are added in a fixed order: the result of a matrix library depends on
-    the processor.
-    """
-    return (matrices * vectors[:, None, :]).sum(axis=2)
+def _bound(motion: Motion | None) -> tuple[float, float]:
+    """Returns how far a frame turns [rad] and moves [m] at most."""
+    if motion is None:
+        return 0.0, 0.0
+    time = motion.duration + abs(motion.start)
+    return math.hypot(*motion.w) * time, math.hypot(*motion.v) * time
 
 
 def _meet_capsule(
-    away: np.ndarray,
-    d: np.ndarray,
-    axis: np.ndarray,
-    half: float,
-    radius: float,
+    p: np.ndarray, d: np.ndarray, half: float, radius: float
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Returns the hits of N rays on a capsule, in closed form.
+    """Returns the hits of N rays on a capsule along z, in closed form.
 
-    Origins are relative to its middle [m]. `half` is half the length of its
-    straight part [m].
+    Args:
+        p: (N, 3) origins, relative to its middle [m].
+        d: (N, 3) unit directions.
+        half: half the length of its straight part [m].
+        radius: its radius [m].
 
     Returns:
         (N,) ranges, inf for a miss [m]; and (N, 3) normals of any length.
     """
-    along, d_along = (away * axis).sum(axis=1), (d * axis).sum(axis=1)
-    square, toward = (away**2).sum(axis=1), (away * d).sum(axis=1)
     nearest = np.full(len(d), np.inf)
-
-    def take(distance: np.ndarray, end: float) -> None:
-        """Updates the ranges `nearest` with hits on one part of the capsule.
-
-        Args:
-            distance: (N,) ranges to the sphere or cylinder of this part [m].
-            end: -1 or 1 for the hemisphere at that end of the axis, 0 for the
-                straight part.
-        """
-        place = along + distance * d_along
-        fits = np.abs(place) <= half
-        if end:
-            fits = (np.abs(place) >= half) & (place * end >= 0.0)
-        fits &= (distance >= 0.0) & (distance < nearest)
-        nearest[fits] = distance[fits]
-
     # NaN, which stands for no root, fails every comparison.
     with np.errstate(invalid="ignore", divide="ignore"):
-        for end in (-1.0, 1.0):
-            b = toward - end * half * d_along
-            c = square - 2.0 * along * end * half + half**2 - radius**2
-            root = np.sqrt(b * b - c)
-            take(-b - root, end)
-            take(-b + root, end)
-        side, turn = (
-            v - np.outer(v_along, axis)
-            for v, v_along in ((away, along), (d, d_along))
-        )
-        across, slant = (side * turn).sum(axis=1), (turn**2).sum(axis=1)
-        root = np.sqrt(across**2 - slant * (square - along**2 - radius**2))
-        take((-across - root) / slant, 0.0)
-        take((-across + root) / slant, 0.0)
-        reached = away + nearest[:, None] * d
-        place = np.clip(along + nearest * d_along, -half, half)
-        return nearest, reached - np.outer(place, axis)
+        # The straight part, where z counts for nothing, and the half spheres.
+        for end in (0.0, -1.0, 1.0):
+            shown = (1.0, 1.0, abs(end))
+            q, e = (p - (0.0, 0.0, end * half)) * shown, d * shown
+            a, b = (e * e).sum(axis=1), (q * e).sum(axis=1)
+            root = np.sqrt(b * b - a * ((q * q).sum(axis=1) - radius**2))
+            for distance in ((-b - root) / a, (-b + root) / a):
+                z = p[:, 2] + distance * d[:, 2]
+                fits = np.where(np.abs(z) < half, 0.0, np.sign(z)) == end
+                fits &= (distance >= 0.0) & (distance < nearest)
+                nearest[fits] = distance[fits]
+        normals = p + nearest[:, None] * d
+    normals[:, 2] -= np.clip(normals[:, 2], -half, half)
+    return nearest, normals

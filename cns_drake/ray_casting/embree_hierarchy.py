@@ -508,7 +508,6 @@ class EmbreeScene:
     def place(self, placed: Placed) -> None:
         """Moves all groups to their current poses."""
         self._first.place(placed)
-        self._axes.place(placed)
 
     def cast_rays(self, rays: Rays, with_normals: bool) -> Hits:
         """Casts rays on the scene; returns the hits."""

@@ -49,11 +49,6 @@ class Rays(NamedTuple):
         """Returns the maximum ranges of the rays in the given rows."""
         return self.max_ranges[rows % len(self.max_ranges)]
 
-    def p_Oset(self) -> np.ndarray:
-        """Returns the (N, 3) float32 origin of each ray."""
-        rows = np.arange(len(self.d_Sset)) % len(self.p_OSset)
-        return self.p_OSset[rows]
-
     def d_Oset(self) -> np.ndarray:
         """Returns the (N, 3) float64 direction of each ray in O."""
         return rotate(self.R_OSset, self.d_Sset)

@@ -9,7 +9,6 @@ only on time, so that a frame of a given number always has the same directions.
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
-from collections.abc import Callable
 from dataclasses import KW_ONLY, dataclass, field
 from functools import cached_property, lru_cache
 import math
@@ -527,14 +526,16 @@ class BeamCoverage:
         """Takes the directions of the beams, (N, 3) unit vectors in S."""
         # Imported here: the rest of the module needs no library that is slow
         # to load.
-        from scipy.ndimage import maximum_filter1d, minimum_filter1d
+        from scipy.ndimage import maximum_filter, minimum_filter
 
         hit = np.zeros((_ROWS, _COLUMNS), np.uint8)
         hit[_cells(d_Sset)] = 1
-        field = _grown(hit, _GAP_CELLS, maximum_filter1d, beyond=0)
+        # Azimuths go round, elevations do not.
+        modes = ("constant", "wrap")
+        field = maximum_filter(hit, 2 * _GAP_CELLS + 1, mode=modes)
         # One cell less: those beside the beams stay.
-        field = _grown(field, _GAP_CELLS - 1, minimum_filter1d, beyond=1)
-        near = _grown(hit, _NEAR_CELLS, maximum_filter1d, beyond=0)
+        field = minimum_filter(field, 2 * _GAP_CELLS - 1, mode=modes, cval=1)
+        near = maximum_filter(hit, 2 * _NEAR_CELLS + 1, mode=modes)
         self._is_covered = (near & field).astype(bool)
 
     def covers(self, d_Sset: np.ndarray) -> np.ndarray:
@@ -544,15 +545,6 @@ class BeamCoverage:
             d_Sset: (N, 3) unit directions, expressed in S.
         """
         return self._is_covered[_cells(d_Sset)]
-
-
-def _grown(
-    cells: np.ndarray, reach: int, grow: Callable, beyond: int
-) -> np.ndarray:
-    """Returns cells after a filter over `reach` neighbours on each side."""
-    size = 2 * reach + 1
-    rows = grow(cells, size, axis=0, mode="constant", cval=beyond)
-    return grow(rows, size, axis=1, mode="wrap")
 
 
 def _cells(d_Sset: np.ndarray) -> tuple[np.ndarray, np.ndarray]:

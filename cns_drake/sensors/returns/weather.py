@@ -177,6 +177,9 @@ def tabulate_scattering(
             pulse [m].
         min_range: least range of the LiDAR [m].
     """
+    # Slow to import, and most drives have clear air.
+    from scipy.integrate import cumulative_trapezoid
+
     distances = _DISTANCES[min_range < _DISTANCES]
     distances = np.concatenate([[min_range], distances])
     radius = _APERTURE + divergence * distances
@@ -202,19 +205,14 @@ def tabulate_scattering(
         # A Lambertian target of reflectivity 1 has a coefficient of 1 / pi.
         fog_energies = np.pi * 0.046 / weather.visibility * resolution * overlap
         fog_rate = overlap * exp(-2.0 * alpha * distances) / distances**2
-    fog_counts = _integral(distances, fog_rate)
+    fog_counts = cumulative_trapezoid(fog_rate, distances, initial=0.0)
     return Scattering(
         distances,
-        _integral(distances, rate),
+        cumulative_trapezoid(rate, distances, initial=0.0),
         _quantiles(energies, weights),
         fog_energies,
         fog_counts / max(fog_counts[-1], 1e-300),
     )
-
-
-def _integral(x: np.ndarray, y: np.ndarray) -> np.ndarray:
-    steps = 0.5 * (y[1:] + y[:-1]) * np.diff(x)
-    return np.concatenate([[0.0], np.cumsum(steps)])
 
 
 def _quantiles(values: np.ndarray, weights: np.ndarray) -> np.ndarray:
