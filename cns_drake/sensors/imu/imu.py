@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, replace
+from functools import lru_cache
 import math
 
 import numpy as np
@@ -287,8 +288,8 @@ class VehicleImu(LeafSystem):
         self._gravity_W = np.array(gravity_W)
         self._rate = rate
         self._add_errors = measure or (lambda first, exact: exact)
-        # Number of a block -> its samples; the last two are kept.
-        self._blocks: dict[int, ImuSamples] = {}
+        # Threads may share the system.
+        self._block = lru_cache(maxsize=4)(self._calc_block)
         for name in ("specific_force", "angular_velocity"):
             self.DeclareVectorOutputPort(
                 name,
@@ -328,14 +329,13 @@ class VehicleImu(LeafSystem):
         parts = []
         for number in range(first // _BLOCK, (end - 1) // _BLOCK + 1):
             start = number * _BLOCK
-            if number not in self._blocks:
-                times = (start + np.arange(_BLOCK)) / self._rate
-                self._blocks[number] = self._measure(start, times)
-                if len(self._blocks) > 2:
-                    del self._blocks[next(iter(self._blocks))]
             rows = slice(max(first - start, 0), end - start)
-            parts.append([one[rows] for one in self._blocks[number][1:]])
+            parts.append([one[rows] for one in self._block(number)[1:]])
         return ImuSamples(first, *map(np.concatenate, zip(*parts, strict=True)))
+
+    def _calc_block(self, number: int) -> ImuSamples:
+        start = number * _BLOCK
+        return self._measure(start, (start + np.arange(_BLOCK)) / self._rate)
 
     def _measure(self, first: int, times: np.ndarray) -> ImuSamples:
         """Returns samples number `first` onwards, taken at (N,) times [s]."""
