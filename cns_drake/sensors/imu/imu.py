@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 from functools import lru_cache
 import math
@@ -43,8 +43,6 @@ _NAMES = ("specific_force", "angular_velocity")
 class Imu:
     """The systems in a diagram that together form an IMU with the frame I.
 
-    It can be unpacked: `accelerometer, gyroscope = imu`.
-
     Attributes:
         accelerometer: system whose `measurement` is the exact specific force in
             I [m/s^2]; at rest it is +9.81 along the upward axis.
@@ -68,16 +66,13 @@ class Imu:
     noise: ImuNoise | None = None
     noisy: NoisyImu | None = None
 
-    def __iter__(self) -> Iterator[System]:
-        yield self.accelerometer
-        yield self.gyroscope
-
     def ports(self) -> dict[str, OutputPort]:
         """Returns the output ports `specific_force` and `angular_velocity`."""
         if self.noisy is not None:
             return {name: self.noisy.GetOutputPort(name) for name in _NAMES}
-        ideal = [one.get_measurement_output_port() for one in self]
-        return dict(zip(_NAMES, ideal, strict=True))
+        ideal = self.accelerometer, self.gyroscope
+        ports = (one.get_measurement_output_port() for one in ideal)
+        return dict(zip(_NAMES, ports, strict=True))
 
 
 def add_imu(
@@ -98,14 +93,16 @@ def add_imu(
             that is fixed on such a body.
         X_PI: pose of the IMU in P.
         rate: samples per second; None for one per frame (scan) of a recorder.
-        noise: errors of the IMU, which need a rate; by default none.
+        noise: errors of the IMU, which need a rate; by default none. The random
+            numbers depend on the name of the IMU, unless the noise has a
+            `sensor_name`.
         motion: system with the poses, velocities and accelerations of the
             plant's bodies; by default the plant.
         name: the systems are named `<name>_accelerometer`, `<name>_gyroscope`
             and `<name>_noise`.
 
     Returns:
-        The systems of the IMU; unpack them as in the example.
+        The systems of the IMU, with the method `ports`.
 
     Raises:
         RuntimeError: the plant is not finalized.
@@ -115,7 +112,8 @@ def add_imu(
     Example:
         from cns_drake import add_imu
 
-        accelerometer, gyroscope = add_imu(builder, body, X_BI)
+        imu = add_imu(builder, body, X_BI)
+        builder.ExportOutput(imu.ports()["specific_force"], "specific_force")
     """
     if rate is not None and not 0.0 < rate < math.inf:
         raise ValueError(
@@ -123,6 +121,8 @@ def add_imu(
         )
     if noise is not None and rate is None:
         raise ValueError("noise: it needs a rate; give rate as well")
+    if noise is not None and noise.sensor_name == ImuNoise.sensor_name:
+        noise = replace(noise, sensor_name=name)
     body, X_BI = carriers.body_and_pose(body, X_PI)
     # The accelerometer's default is no gravity.
     gravity = body.GetParentPlant().gravity_field().gravity_vector()
@@ -232,12 +232,9 @@ class NoisyImu(LeafSystem):
             )
 
     def _measure(self, context: Context) -> np.ndarray:
-        """Returns the present sample; the latest block of errors is cached."""
+        """Returns the present sample."""
         sample = math.floor(context.get_time() * self._rate + _TOLERANCE)
-        exact = [
-            port.Eval(context) if port.HasValue(context) else np.zeros(3)
-            for port in self._inputs
-        ]
+        exact = [port.Eval(context) for port in self._inputs]
         return self._errors.measure(sample, np.hstack(exact)[None])[0]
 
 

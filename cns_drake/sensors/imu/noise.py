@@ -41,7 +41,8 @@ class ImuNoise:
         gyroscope_range: greatest angular velocity that an axis measures, either
             way [rad/s].
         seed: seed of all random numbers.
-        sensor_name: distinguishes the errors of several IMUs.
+        sensor_name: distinguishes the errors of several IMUs. `add_imu`
+            replaces the default by its own `name`.
 
     Example:
         from cns_drake import ImuNoise

@@ -25,12 +25,15 @@ from cns_drake import (
     ApplyLidarConfig,
     ApplyOdometryConfig,
     ImuConfig,
+    ImuNoise,
     LidarConfig,
     OdometryConfig,
+    add_imu,
     add_lidar,
     load_scenario,
 )
 from cns_drake.scene.drake_releases import find_bus
+from cns_drake.sensors.imu.noise import ImuErrors
 
 X_WR = RigidTransform(RollPitchYaw(0.0, 0.0, 0.6), [1.0, -2.0, 0.5])
 X_RS = RigidTransform(RollPitchYaw(0.1, -0.2, 2.0), [0.3, 0.1, 0.9])
@@ -294,6 +297,28 @@ def test_an_imu_has_the_errors_of_its_config():
     bias = np.array(values)[:, 3:]
     assert (bias == bias[0]).all()
     assert 0.01 < np.abs(bias[0]).max() < 0.5
+
+
+def test_imus_with_different_names_have_different_errors():
+    builder, plant = make_site()
+    noise = ImuNoise(gyroscope_turn_on_bias=0.1, seed=5)
+    imus = [
+        add_imu(builder, plant.world_body(), X_RS, rate=9, noise=one, name=name)
+        for name, one in (
+            ("front", noise),
+            ("rear", noise),
+            ("roof", dataclasses.replace(noise, sensor_name="own")),
+        )
+    ]
+    config = ImuConfig(name="left", gyroscope_turn_on_bias=0.1, seed=5)
+    imus.append(ApplyImuConfig(config, builder, lcm=DrakeLcm("memq://")))
+    context = builder.Build().CreateDefaultContext()
+    for name, imu in zip(("front", "rear", "own", "left"), imus, strict=True):
+        port = imu.ports()["angular_velocity"]
+        found = port.Eval(port.get_system().GetMyContextFromRoot(context))
+        named = dataclasses.replace(noise, sensor_name=name)
+        expected = ImuErrors(named, 9).at(0)[3:]
+        np.testing.assert_allclose(found, expected, rtol=0, atol=1e-12)
 
 
 def test_buses_by_name():
