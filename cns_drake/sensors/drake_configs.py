@@ -430,6 +430,9 @@ def _publish(
 ) -> None:
     """Adds systems that convert ports to an LCM message and publish it.
 
+    Nothing is added for a bus that is null, such as in `lcm_buses: {default:
+    null}`, as for Drake's cameras.
+
     Args:
         builder: builder of a diagram with the sensor.
         config: description of the sensor.
@@ -453,6 +456,8 @@ def _publish(
                 "without lcm_buses"
             )
         lcm = builder.AddSystem(LcmInterfaceSystem(lcm=DrakeLcm()))
+    if lcm.get_lcm_url() == LcmBuses.kLcmUrlMemqNull:
+        return
     is_cloud = isinstance(to_lcm, PointCloudToLcm)
     publisher = drake_lcm.LcmPublisherSystem.Make(
         f"DRAKE_{kind}_{config.name}",

@@ -391,6 +391,22 @@ def test_rates_out_of_range(struct, apply):
 
 
 @pytest.mark.parametrize(("struct", "apply"), APPLIED)
+def test_nothing_is_published_on_a_null_bus(struct, apply):
+    """As Drake's `ApplyCameraConfig`, which adds its camera alone."""
+    added = {}
+    for url in ("memq://", None):
+        builder, _ = make_site()
+        params = url and DrakeLcmParams(lcm_url=url)
+        buses = ApplyLcmBusConfig({"default": params}, builder)
+        before = len(builder.GetSystems())
+        apply(struct(name="top"), builder, lcm_buses=buses)
+        systems = builder.GetSystems()[before:]
+        added[url] = [system.get_name() for system in systems]
+    published = ["top_to_lcm", "top_publisher"]
+    assert added["memq://"] == added[None] + published
+
+
+@pytest.mark.parametrize(("struct", "apply"), APPLIED)
 @pytest.mark.parametrize("value", [".nan", ".inf", "-.inf"])
 def test_places_that_are_no_numbers(struct, apply, value):
     text = f"{{name: top, X_PB: {{translation: [0, {value}, 0]}}}}"
