@@ -273,16 +273,16 @@ class VehicleMotion(LeafSystem):
             states, row = self._states(np.array([time])), 0
         else:
             number, row = divmod(tick, _BLOCK)
-            states = self._block(number)
+            states = self._block(number, period)
         q, v, vdot = (values[row] for values in states)
         now = self._default.Clone()
         self._plant.SetPositions(now, q)
         self._plant.SetVelocities(now, v)
         value.set_value((now, vdot))
 
-    def _calc_block(self, number: int) -> _State:
+    def _calc_block(self, number: int, period: float) -> _State:
         ticks = number * _BLOCK + np.arange(_BLOCK)
-        return self._states(ticks * self._period)
+        return self._states(ticks * period)
 
     def _states(self, times: np.ndarray) -> _State:
         """Returns the states at times (N,); each depends only on its time."""
