@@ -251,7 +251,10 @@ class Suspension:
 
 
 def _exponential(matrix: np.ndarray) -> np.ndarray:
-    """Returns exp(matrix), from a Taylor series that is squared repeatedly."""
+    """Returns exp(matrix), from a Taylor series that is squared repeatedly.
+
+    The result has the same bits on every processor, unlike SciPy's `expm`.
+    """
     _, exponent = math.frexp(np.abs(matrix).sum(axis=1).max())
     squarings = max(exponent + 1, 0)
     part = matrix / 2.0**squarings

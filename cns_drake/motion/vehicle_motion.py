@@ -205,13 +205,11 @@ class VehicleMotion(LeafSystem):
         self._plant = plant
         self._trajectory = trajectory
         self._period = period
-        # The number of the last block of states, and these states.
-        self._block: tuple[int, _State] | None = None
         self._base = plant.GetUniqueFloatingBaseBodyOrThrow(vehicle)
-        # Scratch space to compute the motion of bodies from q and v. Every use
-        # sets all values that it reads.
-        self._plant_context = plant.CreateDefaultContext()
-        self._default_q = plant.GetPositions(self._plant_context).copy()
+        # What depends on a Context is not an attribute, since threads may share
+        # the system.
+        self._default = plant.CreateDefaultContext()
+        self._block = functools.lru_cache(maxsize=4)(self._calc_block)
         self._joints = [
             (joint, *self._describe(joint))
             for joint in map(plant.get_joint, plant.GetJointIndices(vehicle))
@@ -248,8 +246,8 @@ class VehicleMotion(LeafSystem):
         self, joint: Joint
     ) -> tuple[Callable[[Moments], JointMotion], float]:
         """Returns the function for the motion of a joint, and its sign."""
-        context = self._plant_context
-        X_BJ = joint.frame_on_child().CalcPose(context, self._base.body_frame())
+        base = self._base.body_frame()
+        X_BJ = joint.frame_on_child().CalcPose(self._default, base)
         R_BJ = X_BJ.rotation().matrix()
         wheel = WheelMotion(self._trajectory, X_BJ.translation())
         if isinstance(joint, RevoluteJoint):
@@ -268,28 +266,33 @@ class VehicleMotion(LeafSystem):
         )
 
     def _calc_state(self, context: Context, value: AbstractValue) -> None:
+        """Sets a Context of the plant, and the plant's vdot."""
         time, period = context.get_time(), self._period
         tick = round(time / period) if period else 0
         if period is None or tick * period != time:
             states, row = self._states(np.array([time])), 0
         else:
             number, row = divmod(tick, _BLOCK)
-            if self._block is None or self._block[0] != number:
-                ticks = number * _BLOCK + np.arange(_BLOCK)
-                self._block = number, self._states(ticks * period)
-            states = self._block[1]
-        value.set_value(_State(*(values[row] for values in states)))
+            states = self._block(number, period)
+        q, v, vdot = (values[row] for values in states)
+        now = self._default.Clone()
+        self._plant.SetPositions(now, q)
+        self._plant.SetVelocities(now, v)
+        value.set_value((now, vdot))
+
+    def _calc_block(self, number: int, period: float) -> _State:
+        ticks = number * _BLOCK + np.arange(_BLOCK)
+        return self._states(ticks * period)
 
     def _states(self, times: np.ndarray) -> _State:
         """Returns the states at times (N,); each depends only on its time."""
-        plant, base = self._plant, self._base
+        plant, base, scratch = self._plant, self._base, self._default.Clone()
         moments = self._trajectory.at(times)
         X_WBs, motion = poses_and_motion(moments)
         q = np.empty((len(times), plant.num_positions()))
-        plant.SetPositions(self._plant_context, self._default_q)
         for k, X_WB in enumerate(X_WBs):
-            plant.SetFreeBodyPose(self._plant_context, base, X_WB)
-            q[k] = plant.GetPositions(self._plant_context)
+            plant.SetFreeBodyPose(scratch, base, X_WB)
+            q[k] = plant.GetPositions(scratch)
         v, vdot = np.zeros((2, len(times), plant.num_velocities()))
         # A floating base's velocities are V_WB, expressed in W.
         start = base.floating_velocities_start_in_v()
@@ -303,22 +306,18 @@ class VehicleMotion(LeafSystem):
         return _State(q, v, vdot)
 
     def _calc_position(self, context: Context, output: BasicVector) -> None:
-        output.SetFromVector(self._state.Eval(context).q)
+        now, _ = self._state.Eval(context)
+        output.SetFromVector(self._plant.GetPositions(now))
 
     def _calc_bodies(
         self, name: str, context: Context, output: AbstractValue
     ) -> None:
-        plant, scratch = self._plant, self._plant_context
-        state = self._state.Eval(context)
-        plant.SetPositions(scratch, state.q)
-        plant.SetVelocities(scratch, state.v)
+        plant, (now, vdot) = self._plant, self._state.Eval(context)
         if name == "body_spatial_accelerations":
             # The port of a plant would have those of its dynamics.
-            output.set_value(
-                plant.CalcSpatialAccelerationsFromVdot(scratch, state.vdot)
-            )
+            output.set_value(plant.CalcSpatialAccelerationsFromVdot(now, vdot))
         else:
-            output.set_value(plant.GetOutputPort(name).Eval(scratch))
+            output.set_value(plant.GetOutputPort(name).Eval(now))
 
 
 class Sweep(NamedTuple):

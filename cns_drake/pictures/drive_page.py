@@ -550,7 +550,6 @@ class MeshcatRecorder(LeafSystem):
         self.DeclarePeriodicPublishEvent(
             period_sec=period, offset_sec=0.0, publish=self._publish
         )
-        self.DeclareForcedPublishEvent(self._publish)
 
     def show_too(self, name: str, frames: Sequence[FrameId]) -> None:
         """Adds a moving object to the page.

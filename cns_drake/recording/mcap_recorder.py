@@ -35,9 +35,6 @@ from cns_drake.recording.recorded_topics import (
 from cns_drake.recording.rosbag2_metadata import Topic
 from cns_drake.recording.schedule import Schedule, make_schedule
 
-# Events of a periodic schedule come at multiples of the period. Their times
-# differ from a tick's only by rounding, at most this [ticks].
-_TICK_TOLERANCE = 1e-3
 _IMAGES = {"color": ImageRgba8U, "depth": ImageDepth32F, "label": ImageLabel16I}
 
 
@@ -110,11 +107,11 @@ class McapRecorder(LeafSystem):
     Ports that are not connected are not recorded.
 
     Messages are due at ticks; tick i is at the time i * period of the schedule.
-    At a tick, a periodic publish event (from time zero on) or a forced publish
-    writes all messages that are due, from the current inputs. The samples on a
-    port `imu_samples` need no events of their own: each event writes all
-    samples since the last event. A simulation that starts before time zero
-    causes a warning.
+    At a tick, from time zero on, a periodic publish event writes all messages
+    that are due, from the current inputs. The samples on a port `imu_samples`
+    need no events of their own: each event writes all samples since the last
+    event. A simulation that starts before time zero causes a warning. A forced
+    publish writes nothing.
 
     Connect the inputs directly to continuous outputs. A publish event sees the
     state before any update at the same time, so with a zero-order hold in
@@ -236,7 +233,6 @@ class McapRecorder(LeafSystem):
             self._add_sensor(name, sensor)
         self.DeclareInitializationPublishEvent(publish=_warn_of_early_start)
         self._declare_events()
-        self.DeclareForcedPublishEvent(self._publish)
 
     def _declare(self, name: str, example: object) -> InputPort:
         """Declares an abstract port of the value's type; object means any."""
@@ -343,7 +339,8 @@ class McapRecorder(LeafSystem):
             )
 
     def _publish(self, context: Context) -> EventStatus:
-        tick = self._tick(context.get_time())
+        # The event's time differs from a tick's only by rounding.
+        tick = round(context.get_time() / self._schedule.period)
         stamp_ns = self._start_ns + self._schedule.time_ns(tick)
         due = set(self._schedule.due(tick))
         if self._X_BCs and self._last_tick is None:
@@ -441,17 +438,6 @@ class McapRecorder(LeafSystem):
         if not isinstance(message, bytes):
             message = ros_types.serialize(message)
         self._bag.write(topic.name, stamp_ns, message, sequence)
-
-    def _tick(self, time: float) -> int:
-        period = self._schedule.period
-        ticks = time / period
-        if abs(ticks - round(ticks)) > _TICK_TOLERANCE:
-            raise ValueError(
-                f"time {time} s is no multiple of the period {period} s"
-            )
-        if round(ticks) < 0:
-            raise ValueError(f"time {time} s: a recording starts at time zero")
-        return round(ticks)
 
 
 def _value_of(port: InputPort, context: Context) -> Any:

@@ -159,7 +159,6 @@ class OdometryConfig:
         X_PB: pose of the observed frame B in a frame P of the plant. The field
             `base_frame` of this pose names P; by default P is the world frame.
         rate: messages per second; by default 20.
-        seed: not used, since the odometry is exact.
         lcm_bus: name of the bus on which the odometry is published.
 
     Example:
@@ -171,7 +170,6 @@ class OdometryConfig:
     name: str = "odometry"
     X_PB: Transform = field(default_factory=Transform)
     rate: int | None = None
-    seed: int = 0
     lcm_bus: str = "default"
 
 
@@ -264,7 +262,8 @@ def ApplyImuConfig(
         config: description of the IMU.
         builder: builder of the diagram.
         plant: finalized plant; by default the system named `plant`.
-        scene_graph: not used.
+        scene_graph: ignored, so that the signature is that of Drake's
+            `ApplyCameraConfig`.
         lcm_buses: the available buses; `config.lcm_bus` names one of them.
         lcm: interface to publish on, instead of a bus. If both `lcm_buses` and
             `lcm` are None, an interface to the default URL is added.
@@ -315,7 +314,8 @@ def ApplyOdometryConfig(
         config: description of the odometry.
         builder: builder of the diagram.
         plant: finalized plant; by default the system named `plant`.
-        scene_graph: not used.
+        scene_graph: ignored, so that the signature is that of Drake's
+            `ApplyCameraConfig`.
         lcm_buses: the available buses; `config.lcm_bus` names one of them.
         lcm: interface to publish on, instead of a bus. If both `lcm_buses` and
             `lcm` are None, an interface to the default URL is added.
@@ -430,6 +430,9 @@ def _publish(
 ) -> None:
     """Adds systems that convert ports to an LCM message and publish it.
 
+    Nothing is added for a bus that is null, such as in `lcm_buses: {default:
+    null}`, as for Drake's cameras.
+
     Args:
         builder: builder of a diagram with the sensor.
         config: description of the sensor.
@@ -453,6 +456,8 @@ def _publish(
                 "without lcm_buses"
             )
         lcm = builder.AddSystem(LcmInterfaceSystem(lcm=DrakeLcm()))
+    if lcm.get_lcm_url() == LcmBuses.kLcmUrlMemqNull:
+        return
     is_cloud = isinstance(to_lcm, PointCloudToLcm)
     publisher = drake_lcm.LcmPublisherSystem.Make(
         f"DRAKE_{kind}_{config.name}",

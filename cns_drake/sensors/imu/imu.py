@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from dataclasses import dataclass, replace
+from functools import lru_cache
 import math
 
 import numpy as np
@@ -42,8 +43,6 @@ _NAMES = ("specific_force", "angular_velocity")
 class Imu:
     """The systems in a diagram that together form an IMU with the frame I.
 
-    It can be unpacked: `accelerometer, gyroscope = imu`.
-
     Attributes:
         accelerometer: system whose `measurement` is the exact specific force in
             I [m/s^2]; at rest it is +9.81 along the upward axis.
@@ -67,16 +66,13 @@ class Imu:
     noise: ImuNoise | None = None
     noisy: NoisyImu | None = None
 
-    def __iter__(self) -> Iterator[System]:
-        yield self.accelerometer
-        yield self.gyroscope
-
     def ports(self) -> dict[str, OutputPort]:
         """Returns the output ports `specific_force` and `angular_velocity`."""
         if self.noisy is not None:
             return {name: self.noisy.GetOutputPort(name) for name in _NAMES}
-        ideal = [one.get_measurement_output_port() for one in self]
-        return dict(zip(_NAMES, ideal, strict=True))
+        ideal = self.accelerometer, self.gyroscope
+        ports = (one.get_measurement_output_port() for one in ideal)
+        return dict(zip(_NAMES, ports, strict=True))
 
 
 def add_imu(
@@ -97,14 +93,16 @@ def add_imu(
             that is fixed on such a body.
         X_PI: pose of the IMU in P.
         rate: samples per second; None for one per frame (scan) of a recorder.
-        noise: errors of the IMU, which need a rate; by default none.
+        noise: errors of the IMU, which need a rate; by default none. The random
+            numbers depend on the name of the IMU, unless the noise has a
+            `sensor_name`.
         motion: system with the poses, velocities and accelerations of the
             plant's bodies; by default the plant.
         name: the systems are named `<name>_accelerometer`, `<name>_gyroscope`
             and `<name>_noise`.
 
     Returns:
-        The systems of the IMU; unpack them as in the example.
+        The systems of the IMU, with the method `ports`.
 
     Raises:
         RuntimeError: the plant is not finalized.
@@ -114,7 +112,8 @@ def add_imu(
     Example:
         from cns_drake import add_imu
 
-        accelerometer, gyroscope = add_imu(builder, body, X_BI)
+        imu = add_imu(builder, body, X_BI)
+        builder.ExportOutput(imu.ports()["specific_force"], "specific_force")
     """
     if rate is not None and not 0.0 < rate < math.inf:
         raise ValueError(
@@ -122,6 +121,8 @@ def add_imu(
         )
     if noise is not None and rate is None:
         raise ValueError("noise: it needs a rate; give rate as well")
+    if noise is not None and noise.sensor_name == ImuNoise.sensor_name:
+        noise = replace(noise, sensor_name=name)
     body, X_BI = carriers.body_and_pose(body, X_PI)
     # The accelerometer's default is no gravity.
     gravity = body.GetParentPlant().gravity_field().gravity_vector()
@@ -231,12 +232,9 @@ class NoisyImu(LeafSystem):
             )
 
     def _measure(self, context: Context) -> np.ndarray:
-        """Returns the present sample; the latest block of errors is cached."""
+        """Returns the present sample."""
         sample = math.floor(context.get_time() * self._rate + _TOLERANCE)
-        exact = [
-            port.Eval(context) if port.HasValue(context) else np.zeros(3)
-            for port in self._inputs
-        ]
+        exact = [port.Eval(context) for port in self._inputs]
         return self._errors.measure(sample, np.hstack(exact)[None])[0]
 
 
@@ -287,8 +285,8 @@ class VehicleImu(LeafSystem):
         self._gravity_W = np.array(gravity_W)
         self._rate = rate
         self._add_errors = measure or (lambda first, exact: exact)
-        # Number of a block -> its samples; the last two are kept.
-        self._blocks: dict[int, ImuSamples] = {}
+        # Threads may share the system.
+        self._block = lru_cache(maxsize=4)(self._calc_block)
         for name in ("specific_force", "angular_velocity"):
             self.DeclareVectorOutputPort(
                 name,
@@ -328,14 +326,13 @@ class VehicleImu(LeafSystem):
         parts = []
         for number in range(first // _BLOCK, (end - 1) // _BLOCK + 1):
             start = number * _BLOCK
-            if number not in self._blocks:
-                times = (start + np.arange(_BLOCK)) / self._rate
-                self._blocks[number] = self._measure(start, times)
-                if len(self._blocks) > 2:
-                    del self._blocks[next(iter(self._blocks))]
             rows = slice(max(first - start, 0), end - start)
-            parts.append([one[rows] for one in self._blocks[number][1:]])
+            parts.append([one[rows] for one in self._block(number)[1:]])
         return ImuSamples(first, *map(np.concatenate, zip(*parts, strict=True)))
+
+    def _calc_block(self, number: int) -> ImuSamples:
+        start = number * _BLOCK
+        return self._measure(start, (start + np.arange(_BLOCK)) / self._rate)
 
     def _measure(self, first: int, times: np.ndarray) -> ImuSamples:
         """Returns samples number `first` onwards, taken at (N,) times [s]."""

@@ -1,6 +1,7 @@
 """The errors of an IMU, as functions of the sample number."""
 
 from dataclasses import dataclass
+from functools import lru_cache
 
 import numpy as np
 
@@ -40,7 +41,8 @@ class ImuNoise:
         gyroscope_range: greatest angular velocity that an axis measures, either
             way [rad/s].
         seed: seed of all random numbers.
-        sensor_name: distinguishes the errors of several IMUs.
+        sensor_name: distinguishes the errors of several IMUs. `add_imu`
+            replaces the default by its own `name`.
 
     Example:
         from cns_drake import ImuNoise
@@ -101,8 +103,8 @@ class ImuErrors:
         self._white = white * np.sqrt(rate)
         self._walk = walk / np.sqrt(rate)
         self._turn_on = turn_on * self._draw(_TURN_ON, 0, 1)[0]
-        self._block_number: int | None = None
-        self._block = np.empty((_BLOCK, 6))
+        # Threads may share the errors.
+        self._block = lru_cache(maxsize=4)(self.of_block)
 
     def measure(self, first: int, exact: np.ndarray) -> np.ndarray:
         """Returns exact samples with the errors of the IMU added.
@@ -130,11 +132,8 @@ class ImuErrors:
         """Returns the (count, 6) errors of consecutive samples."""
         parts = []
         for number in range(first // _BLOCK, (first + count - 1) // _BLOCK + 1):
-            if number != self._block_number:
-                self._block = self.of_block(number)
-                self._block_number = number
             start = first - number * _BLOCK
-            parts.append(self._block[max(start, 0) : start + count])
+            parts.append(self._block(number)[max(start, 0) : start + count])
         return np.concatenate(parts)
 
     def of_block(self, number: int) -> np.ndarray:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Collection
+from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 import warnings
 
@@ -79,7 +80,9 @@ def add_lidar(
             for calibrated returns, which have their own.
         dropout: probability that a return is lost; 0 for calibrated returns.
         seed: seed of noise, dropout and returns that are `calibrated`. Random
-            numbers depend on the seed, the name and the number of the frame.
+            numbers depend on the seed, the name and the number of the frame. A
+            model of noise or returns with a `sensor_name` uses that instead of
+            the name.
         returns: `ideal`, `calibrated` by the data sheet of a preset, or a
             `CalibratedReturns`.
         options: further arguments of `Lidar`, such as `causal`; also
@@ -170,6 +173,10 @@ def add_lidar(
             seed=seed,
             sensor_name=name,
         )
+    for option in ("measurement", "returns"):
+        model = options.get(option)
+        if model is not None and not model.sensor_name:
+            options[option] = replace(model, sensor_name=name)
     if isinstance(body, RigidBody):
         plant = body.GetParentPlant()
         source = plant.get_source_id()

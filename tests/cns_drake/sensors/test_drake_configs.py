@@ -25,12 +25,15 @@ from cns_drake import (
     ApplyLidarConfig,
     ApplyOdometryConfig,
     ImuConfig,
+    ImuNoise,
     LidarConfig,
     OdometryConfig,
+    add_imu,
     add_lidar,
     load_scenario,
 )
 from cns_drake.scene.drake_releases import find_bus
+from cns_drake.sensors.imu.noise import ImuErrors
 
 X_WR = RigidTransform(RollPitchYaw(0.0, 0.0, 0.6), [1.0, -2.0, 0.5])
 X_RS = RigidTransform(RollPitchYaw(0.1, -0.2, 2.0), [0.3, 0.1, 0.9])
@@ -116,8 +119,11 @@ def test_yaml_and_back():
 def test_fields_are_those_of_a_scenario(struct, section):
     described = section(load_scenario("riverside_01"))
     fields = {f.name: f.default for f in dataclasses.fields(struct)}
-    for name in ("name", "X_PB", "seed", "lcm_bus"):
+    for name in ("name", "X_PB", "lcm_bus"):
         del fields[name]
+    # Odometry is exact.
+    assert ("seed" in fields) == (struct is not OdometryConfig)
+    fields.pop("seed", None)
     names = set(type(described).model_fields) - {"xyz", "rpy_deg", "layout"}
     if struct is LidarConfig:
         # These are as in `add_lidar`.
@@ -296,6 +302,28 @@ def test_an_imu_has_the_errors_of_its_config():
     assert 0.01 < np.abs(bias[0]).max() < 0.5
 
 
+def test_imus_with_different_names_have_different_errors():
+    builder, plant = make_site()
+    noise = ImuNoise(gyroscope_turn_on_bias=0.1, seed=5)
+    imus = [
+        add_imu(builder, plant.world_body(), X_RS, rate=9, noise=one, name=name)
+        for name, one in (
+            ("front", noise),
+            ("rear", noise),
+            ("roof", dataclasses.replace(noise, sensor_name="own")),
+        )
+    ]
+    config = ImuConfig(name="left", gyroscope_turn_on_bias=0.1, seed=5)
+    imus.append(ApplyImuConfig(config, builder, lcm=DrakeLcm("memq://")))
+    context = builder.Build().CreateDefaultContext()
+    for name, imu in zip(("front", "rear", "own", "left"), imus, strict=True):
+        port = imu.ports()["angular_velocity"]
+        found = port.Eval(port.get_system().GetMyContextFromRoot(context))
+        named = dataclasses.replace(noise, sensor_name=name)
+        expected = ImuErrors(named, 9).at(0)[3:]
+        np.testing.assert_allclose(found, expected, rtol=0, atol=1e-12)
+
+
 def test_buses_by_name():
     builder, _ = make_site()
     params = DrakeLcmParams(lcm_url="memq://")
@@ -363,6 +391,22 @@ def test_rates_out_of_range(struct, apply):
     for rate in (0, -1, 1001, 10**9):
         with pytest.raises(ValueError, match="rate"):
             apply(struct(rate=rate), make_site()[0], lcm=DrakeLcm("memq://"))
+
+
+@pytest.mark.parametrize(("struct", "apply"), APPLIED)
+def test_nothing_is_published_on_a_null_bus(struct, apply):
+    """As Drake's `ApplyCameraConfig`, which adds its camera alone."""
+    added = {}
+    for url in ("memq://", None):
+        builder, _ = make_site()
+        params = url and DrakeLcmParams(lcm_url=url)
+        buses = ApplyLcmBusConfig({"default": params}, builder)
+        before = len(builder.GetSystems())
+        apply(struct(name="top"), builder, lcm_buses=buses)
+        systems = builder.GetSystems()[before:]
+        added[url] = [system.get_name() for system in systems]
+    published = ["top_to_lcm", "top_publisher"]
+    assert added["memq://"] == added[None] + published
 
 
 @pytest.mark.parametrize(("struct", "apply"), APPLIED)

@@ -296,13 +296,20 @@ def test_calibrated_unit_has_its_own_elevations(returns):
 
 
 def test_calibrated_returns_of_a_preset():
-    measured = {}
-    for seed in (1, 2):
-        builder, lidar = facing_wall("vlp-16", returns="calibrated", seed=seed)
+    unit = CalibratedReturns.of_preset("vlp-16", seed=1)
+    measured = []
+    for options in (
+        {"returns": "calibrated", "seed": 1},
+        {"returns": unit},
+        {"returns": unit, "name": "other"},
+        {"returns": "calibrated", "seed": 2},
+    ):
+        builder, lidar = facing_wall("vlp-16", **options)
         context = builder.Build().CreateDefaultContext()
-        measured[seed] = lidar.GetOutputPort("scan").Eval(
-            lidar.GetMyContextFromRoot(context)
-        )
-    first, second = (np.median(scan["intensity"]) for scan in measured.values())
-    assert first == second > 1.0
-    assert measured[1].tobytes() != measured[2].tobytes()
+        port = lidar.GetOutputPort("scan")
+        scan = port.Eval(lidar.GetMyContextFromRoot(context))
+        measured.append(np.column_stack([scan["x"], scan["intensity"]]))
+    medians = [np.median(one[:, 1]) for one in measured]
+    assert medians[0] == medians[3] > 1.0
+    same = [np.array_equal(measured[0], one) for one in measured]
+    assert same == [True, True, False, False]

@@ -172,9 +172,15 @@ def test_noise_is_that_of_a_measurement_model():
     model = MeasurementModel(**noise, sensor_name="lidar")
     noisy = Site().ranges(**noise)
     np.testing.assert_array_equal(noisy, Site().ranges(measurement=model))
+    unnamed = MeasurementModel(**noise)
+    np.testing.assert_array_equal(noisy, Site().ranges(measurement=unnamed))
     exact = Site().ranges()
     assert 0.75 < len(noisy) / len(exact) < 0.85
-    assert not np.array_equal(noisy, Site().ranges(**noise, name="other"))
+    for options in (noise, {"measurement": unnamed}):
+        other = Site().ranges(**options, name="other")
+        assert not np.array_equal(noisy, other)
+    other = Site().ranges(measurement=model, name="other")
+    np.testing.assert_array_equal(noisy, other)
     # A turn before time zero has noise of its own.
     earlier = Site().ranges(time=-1.0, **noise)
     assert 0.75 < len(earlier) / len(exact) < 0.85

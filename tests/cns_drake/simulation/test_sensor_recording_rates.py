@@ -11,7 +11,7 @@ from pydrake.systems.framework import DiagramBuilder
 import pytest
 
 from cns_drake.base.drives.mcap_drive import McapDrive
-from cns_drake.sensors.imu.imu import add_imu
+from cns_drake.sensors.imu.imu import NoisyImu, add_imu
 from cns_drake.sensors.imu.noise import ImuErrors, ImuNoise
 from cns_drake.sensors.lidar.adding import add_lidar
 from cns_drake.sensors.lidar.presets import make_beam_pattern
@@ -133,6 +133,13 @@ def test_between_samples_an_error_holds():
         read[time] = diagram.GetOutputPort("specific_force").Eval(context)
     np.testing.assert_array_equal(read[0.5], read[0.5049])
     assert len({tuple(values) for values in read.values()}) == 3
+
+
+def test_errors_need_a_connected_imu():
+    system = NoisyImu(NOISE, 100)
+    context = system.CreateDefaultContext()
+    with pytest.raises(RuntimeError, match=r"specific_force.* not connected"):
+        system.GetOutputPort("specific_force").Eval(context)
 
 
 def test_what_makes_no_sense_is_refused(tmp_path):

@@ -129,13 +129,6 @@ def test_nothing_is_recorded_in_silence_to_nowhere(drive):
         drive.simulator.AdvanceTo(3 * PERIOD)
 
 
-def test_nothing_is_published_before_time_zero(drive):
-    context = drive.fresh_context()
-    context.SetTime(-PERIOD)
-    with pytest.raises(ValueError, match="starts at time zero"), drive.bag:
-        drive.diagram.ForcedPublish(context)
-
-
 def test_a_saved_context_gives_the_same_scan_again(drive):
     simulator = drive.simulator
     with drive.bag:
