@@ -2,12 +2,12 @@
 
 Of each scan, sixteen patches of 8 m within 30 m of the LiDAR are described by
 features. Boosted trees then learn to tell the patches of the two sets apart; a
-place is never in both training and test data. Scans less than 30 m from the
-first scan of a place belong to that place; so do all scans of one folder. The
-AUC of the classifier is 1 if it tells all patches apart, and 0.5 for guessing.
-As a control, the classifier tells the first half of the simulated places from
-the second half. All AUCs are means over random draws of patches; single draws
-differ by up to 0.04.
+place is never in both training and test data. A place consists of the scans
+less than 30 m from its first scan, even of several passes or drives, or of all
+scans in a folder without poses. The AUC of the classifier is 1 if it tells all
+patches apart, and 0.5 for guessing. As a control, the classifier tells the
+first half of the simulated places from the second half. All AUCs are means over
+random draws of patches; single draws differ by up to 0.04.
 
 Some features need the ring (laser) of each point. Rings are read from
 recordings, or from files that store one ring after the other, like KITTI's. If
@@ -18,7 +18,7 @@ The module needs the optional packages of the extra `judge`.
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 
 import numpy as np
 from scipy.spatial import cKDTree
@@ -69,23 +69,30 @@ def scan_table(scan: np.ndarray) -> np.ndarray:
     return table[np.isfinite(table[:, :3]).all(axis=1)]
 
 
-def places_of(drive: Drive) -> list[list[np.ndarray]]:
-    """Returns at most 40 scans of a drive, as a list of scans for each place.
+def places_of(drives: Iterable[Drive]) -> list[list[np.ndarray]]:
+    """Returns at most 40 scans of each drive, as a list for each place.
 
-    A place is a run of successive scans that are less than 30 m from the first
-    scan of the run; where the drive comes back later, a new place begins. Each
-    scan is a table as `scan_table` returns it.
+    A place begins with a scan that is at least 30 m from the first scans of all
+    earlier places in the same world frame and map. All other scans belong to
+    the earliest place whose first scan is less than 30 m away. Scans at one
+    position are therefore always at one place, even if a drive comes back, or
+    if they are from different drives. Each scan is a table as `scan_table`
+    returns it.
     """
-    step = -(-len(drive) // _MOST_SCANS)
-    places: list[list[np.ndarray]] = []
-    first = np.full(3, np.inf)
-    for k in range(0, len(drive), step):
-        p_WS = drive.X_WS[k, :3, 3]
-        if not np.linalg.norm(p_WS - first) < _APART:
-            places.append([])
-            first = p_WS
-        places[-1].append(scan_table(drive.scan(k)))
-    return places
+    places: dict[tuple, list[np.ndarray]] = {}
+    for drive in drives:
+        world = drive.world_frame, (drive.scenario or {}).get("map")
+        for k in range(0, len(drive), -(-len(drive) // _MOST_SCANS)):
+            p_WS = drive.X_WS[k, :3, 3]
+            near = (
+                first
+                for first in places
+                if first[0] == world
+                and np.linalg.norm(p_WS - first[1]) < _APART
+            )
+            place = next(near, (world, tuple(p_WS)))
+            places.setdefault(place, []).append(scan_table(drive.scan(k)))
+    return list(places.values())
 
 
 def patches(scan: np.ndarray, rng: np.random.Generator) -> Iterator[np.ndarray]:
