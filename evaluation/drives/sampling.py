@@ -109,12 +109,10 @@ def within_range(points: np.ndarray, max_range: float) -> np.ndarray:
         points: (N, 3) points in the frame of the sensor [m].
         max_range: greatest absolute value of each coordinate [m].
     """
-    kept = np.ones(len(points), dtype=bool)
-    # One column at a time, because NumPy reduces slowly along a short axis.
-    for coordinates in points.T:
-        # A comparison with NaN is false, so NaN is out of range.
-        kept &= np.abs(coordinates) <= max_range
-    return kept
+    # One column at a time, because NumPy reduces slowly along a short axis. A
+    # comparison with NaN is false, so NaN is out of range.
+    x, y, z = np.abs(points.T)
+    return (x <= max_range) & (y <= max_range) & (z <= max_range)
 
 
 def gather(
