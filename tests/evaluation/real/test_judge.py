@@ -80,7 +80,9 @@ def plain(judge, program, tmp_path_factory):
 
 
 def test_equal_sets_are_not_told_apart(judge, program, plain, tmp_path):
-    result = judge.judge(plain, features(judge, program, tmp_path / "set", 2))
+    result = judge.aucs_by_group(
+        plain, features(judge, program, tmp_path / "set", 2)
+    )
     assert abs(result["auc"]["all"] - 0.5) < 0.15
     assert abs(result["control"]["all"] - 0.5) < 0.2
 
@@ -96,7 +98,7 @@ def test_it_finds_the_difference(
     judge, program, plain, tmp_path, options, group, feature
 ):
     other = features(judge, program, tmp_path / "set", 3, **options)
-    result = judge.judge(plain, other)
+    result = judge.aucs_by_group(plain, other)
     assert result["auc"][group] > 0.95
     names = judge.common_names([plain, other])
     features_of_both = program.strongest(plain, other, names)
@@ -124,7 +126,7 @@ def test_a_result_is_the_mean_of_draws(judge, program, tmp_path, monkeypatch):
             make_place(folder, 100 * seed + place)
         sets.append(program.read_places(tmp_path / str(seed)))
     single = [
-        judge.judge(*(judge.Features(places, seed) for places in sets))
+        judge.aucs_by_group(*(judge.Features(places, seed) for places in sets))
         for seed in (0, 1)
     ]
     mean = judge.judge_draws(*sets, 2)
