@@ -197,7 +197,7 @@ def survey_in_one_world(
     ], reports
 
 
-def compare(
+def compare_maps(
     source: Surveyed,
     target: Surveyed,
     control: Surveyed | None = None,

@@ -91,14 +91,11 @@ def in_convex_hull(
             rank -= 1
             continue
         return _in_half_spaces(inside @ axes[:rank].T, facets, tolerance) & (
-            _is_flat(inside, hull, axes[rank:], tolerance)
+            _is_within(inside, hull, axes[rank:], tolerance)
         )
-    along = inside @ axes[:rank].T
-    ends = hull @ axes[:rank].T
-    within = (along >= ends.min(axis=0) - tolerance) & (
-        along <= ends.max(axis=0) + tolerance
+    return _is_within(inside, hull, axes[:rank], tolerance) & (
+        _is_within(inside, hull, axes[rank:], tolerance)
     )
-    return within.all(axis=1) & _is_flat(inside, hull, axes[rank:], tolerance)
 
 
 def _in_half_spaces(
@@ -113,15 +110,15 @@ def _in_half_spaces(
     return result
 
 
-def _is_flat(
+def _is_within(
     points: np.ndarray,
     hull: np.ndarray,
-    normals: np.ndarray,
+    axes: np.ndarray,
     tolerance: float,
 ) -> np.ndarray:
-    """Returns which points lie in the plane or line that the hull spans."""
-    heights = hull @ normals.T
-    out = points @ normals.T
+    """Returns which points lie within the hull's extent along some axes."""
+    heights = hull @ axes.T
+    out = points @ axes.T
     return (
         (out >= heights.min(axis=0) - tolerance)
         & (out <= heights.max(axis=0) + tolerance)
@@ -310,11 +307,11 @@ def covered(
 
         near_both = points[covered(points, (positions_a, positions_b))]
     """
-    kept = np.ones(len(points), dtype=bool)
-    for positions in trajectories:
-        distances, _ = cKDTree(positions[:, :2]).query(points[:, :2])
-        kept &= distances <= radius
-    return kept
+    near = [
+        cKDTree(positions[:, :2]).query(points[:, :2])[0] <= radius
+        for positions in trajectories
+    ]
+    return np.all(near, axis=0)
 
 
 def _directed(

@@ -86,7 +86,7 @@ def tcr(
     surveys, alignments = change.survey_in_one_world(
         paths, align, terminal.track, lidar, columns
     )
-    report = change.compare(
+    report = change.compare_maps(
         surveys[0],
         surveys[1],
         control=None if control is None else surveys[2],

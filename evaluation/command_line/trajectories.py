@@ -99,7 +99,7 @@ def _drive_rows(found: DriveComparison) -> Iterator[tuple[str, str]]:
     yield "", shown("these", "Boreas", "KAIST")
     rows: list[tuple[str, float | str, str, str]] = [
         (
-            "stops that meet the other drive",
+            "stations that meet the other drive",
             met,
             "1593 of 1593",
             "1166 of 1194",

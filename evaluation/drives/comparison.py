@@ -1,4 +1,4 @@
-"""How the paths of two drives differ: offsets, lanes, headings, stops.
+"""How the paths of two drives differ: offsets, lanes, headings, speeds.
 
 Two drives along one route differ because of their drivers. The quantities here
 serve to compare real drives with simulated ones.
@@ -15,10 +15,9 @@ from cns_drake.base.errors import InputError
 from cns_drake.base.json_text import json_values
 from evaluation.drives.sampling import corners, travelled
 
-# Distance between the stations at which two drives are compared [m]; the code
-# calls the stations stops.
-STOP_SPACING = 5.0
-# Two drives meet at a stop if they pass within this distance [m].
+# Distance between the stations at which two drives are compared [m].
+STATION_SPACING = 5.0
+# Two drives meet at a station if they pass within this distance [m].
 MEETING_RADIUS = 12.0
 # Beyond this offset, two drives are in different lanes [m].
 LANE_OFFSET = 1.5
@@ -47,8 +46,7 @@ class Driving:
         speed_10, speed_50, speed_90: 10 %, 50 % and 90 % quantiles of the speed
             while the car moves [m/s]; NaN if it never moves.
         roll_spread_deg, pitch_spread_deg: standard deviations of the sensor's
-            roll and pitch, at points of the path that are `STOP_SPACING` apart
-            [deg].
+            roll and pitch, at points of the path every `STATION_SPACING` [deg].
     """
 
     name: str
@@ -65,23 +63,22 @@ class Driving:
 class DriveComparison:
     """How the path of a drive B differs from that of a drive A.
 
-    The drives are compared at points every `STOP_SPACING` along A's path, which
-    are called stops here, although the cars need not stand there. B meets a
-    stop if B's path passes within `MEETING_RADIUS` of the stop. In this case,
-    the stop is compared with the nearest point of B's path that has A's
-    direction. Offsets are horizontal and perpendicular to A's path. Values
-    without a measurement are NaN.
+    The drives are compared at stations, which are points every
+    `STATION_SPACING` along A's path. B meets a station if B's path passes
+    within `MEETING_RADIUS` of it. In this case, the station is compared with
+    the nearest point of B's path that has A's direction. Offsets are horizontal
+    and perpendicular to A's path. Values without a measurement are NaN.
 
     Attributes:
         first, second: how A and B were driven.
-        num_stops: number of stops of A.
-        num_met: number of these stops that B meets.
-        reverse: share of the met stops that B meets only in the opposite
+        num_stops: number of stations of A.
+        num_met: number of these stations that B meets.
+        reverse: share of the met stations that B meets only in the opposite
             direction.
         offset_50, offset_75, offset_90, offset_95, offset_99: quantiles of the
             absolute offset in the same direction [m].
-        other_lane: share of the stops met in the same direction at which the
-            offset exceeds `LANE_OFFSET`.
+        other_lane: share of the stations met in the same direction at which
+            the offset exceeds `LANE_OFFSET`.
         episode_50, episode_90: quantiles of the length of a stretch in another
             lane [m].
         wander: standard deviation of the offset in the same lane [m].
@@ -142,12 +139,11 @@ class _Way:
     p_WS: np.ndarray
     tangent: np.ndarray
 
-    def stops(self) -> np.ndarray:
-        """Returns the indices of the samples at the stops.
-
-        Stops are points of the path at every `STOP_SPACING` metres.
-        """
-        return np.arange(0, len(self.p_WS), round(STOP_SPACING / _PATH_SPACING))
+    def stations(self) -> np.ndarray:
+        """Returns the indices of the samples every `STATION_SPACING`."""
+        return np.arange(
+            0, len(self.p_WS), round(STATION_SPACING / _PATH_SPACING)
+        )
 
 
 def compare_drives(first: Drive, second: Drive) -> DriveComparison:
@@ -169,8 +165,8 @@ def compare_drives(first: Drive, second: Drive) -> DriveComparison:
     """
     check_same_world(first, second)
     way_a, way_b = _way(first), _way(second)
-    stops = way_a.stops()
-    p_A, tangent = way_a.p_WS[stops], way_a.tangent[stops]
+    stations = way_a.stations()
+    p_A, tangent = way_a.p_WS[stations], way_a.tangent[stations]
     same, opposite = (
         _nearest(p_A, sign * tangent, way_b) for sign in (1.0, -1.0)
     )
@@ -179,7 +175,7 @@ def compare_drives(first: Drive, second: Drive) -> DriveComparison:
     offset = _offsets(p_A, tangent, way_b, same)
     within = np.abs(offset) <= LANE_OFFSET
     outside = np.abs(offset) > LANE_OFFSET
-    R_WA = first.X_WS[way_a.frame[stops[meets]], :3, :3]
+    R_WA = first.X_WS[way_a.frame[stations[meets]], :3, :3]
     R_WB = second.X_WS[way_b.frame[same[meets]], :3, :3]
     R_AB = np.swapaxes(R_WA, 1, 2) @ R_WB
     heading = np.degrees(np.arctan2(R_AB[:, 1, 0], R_AB[:, 0, 0]))
@@ -188,7 +184,7 @@ def compare_drives(first: Drive, second: Drive) -> DriveComparison:
     backwards = _offsets(p_A, tangent, way_b, opposite)[reverse]
     quantiles = (
         _quantiles("offset_{}", np.abs(offset[meets]), 50, 75, 90, 95, 99)
-        | _quantiles("episode_{}", _runs(outside) * STOP_SPACING, 50, 90)
+        | _quantiles("episode_{}", _runs(outside) * STATION_SPACING, 50, 90)
         | _quantiles("heading_{}_deg", heading, 5, 95)
         | _quantiles("height_{}", height, 5, 95)
         | _quantiles("reverse_{}", np.abs(backwards), 25, 50, 75, 95)
@@ -196,7 +192,7 @@ def compare_drives(first: Drive, second: Drive) -> DriveComparison:
     return DriveComparison(
         first=_driving(first, way_a),
         second=_driving(second, way_b),
-        num_stops=len(stops),
+        num_stops=len(stations),
         num_met=int(np.count_nonzero(meets | reverse)),
         reverse=_share(reverse[meets | reverse]),
         other_lane=_share(outside[meets]),
@@ -213,10 +209,10 @@ def _way(drive: Drive) -> _Way:
     p_WC = p_WS[kept]
     passed = travelled(p_WC)
     length = float(passed[-1])
-    if length < STOP_SPACING:
+    if length < STATION_SPACING:
         raise InputError(
             f"{drive.name}: it moves {length:.1f} m in all; drives are "
-            f"compared every {STOP_SPACING:g} m"
+            f"compared every {STATION_SPACING:g} m"
         )
     s = np.arange(0.0, length, _PATH_SPACING)
 
@@ -243,12 +239,12 @@ def _nearest(p_A: np.ndarray, direction: np.ndarray, way: _Way) -> np.ndarray:
     xy = way.p_WS[:, :2]
     found = np.full(len(p_A), -1)
     near = cKDTree(xy).query_ball_point(p_A[:, :2], MEETING_RADIUS)
-    for stop, steps in enumerate(near):
+    for station, steps in enumerate(near):
         steps = np.sort(np.array(steps, dtype=int))
-        steps = steps[way.tangent[steps] @ direction[stop] > 0.0]
+        steps = steps[way.tangent[steps] @ direction[station] > 0.0]
         if len(steps):
-            distance = np.linalg.norm(xy[steps] - p_A[stop, :2], axis=1)
-            found[stop] = steps[distance.argmin()]
+            distance = np.linalg.norm(xy[steps] - p_A[station, :2], axis=1)
+            found[station] = steps[distance.argmin()]
     return found
 
 
@@ -264,8 +260,8 @@ def _offsets(
 def _correlation_length(offset: np.ndarray, within: np.ndarray) -> float:
     """Returns the distance at which the correlation has fallen to 1/e [m].
 
-    The correlation is interpolated between stops. The result is NaN if the
-    correlation does not fall so far within a quarter of the stops.
+    The correlation is interpolated between stations. The result is NaN if the
+    correlation does not fall so far within a quarter of the stations.
     """
     if not within.any():
         return math.nan
@@ -282,7 +278,7 @@ def _correlation_length(offset: np.ndarray, within: np.ndarray) -> float:
         now = float(np.mean(products[both]) / variance)
         if now <= 1 / math.e:
             part = (before - 1 / math.e) / (before - now)
-            return STOP_SPACING * (lag - 1 + part)
+            return STATION_SPACING * (lag - 1 + part)
         before = now
     return math.nan
 
@@ -297,7 +293,7 @@ def _driving(drive: Drive, way: _Way) -> Driving:
     moved = np.linalg.norm(p_WS[later] - p_WS[now], axis=1)
     speed = moved / (time[later] - time[now])
     stands = speed < STANDING_SPEED
-    R_WS = drive.X_WS[way.frame[way.stops()], :3, :3]
+    R_WS = drive.X_WS[way.frame[way.stations()], :3, :3]
     roll = np.arctan2(R_WS[:, 2, 1], R_WS[:, 2, 2])
     pitch = -np.arcsin(np.clip(R_WS[:, 2, 0], -1.0, 1.0))
     # Relative to the mean, so that a tilted mount does not wrap around.

@@ -38,12 +38,12 @@ class QuerySensor:
     Attributes:
         X_SQ: (4, 4) a rotation; None if Q is not turned.
         hidden_from: azimuth in S at which the hidden sector begins [rad].
-        hidden: angle of the hidden sector [rad]; 0 for none.
+        hidden_angle: angle of the hidden sector [rad]; 0 for none.
     """
 
     X_SQ: np.ndarray | None = None
     hidden_from: float = 0.0
-    hidden: float = 0.0
+    hidden_angle: float = 0.0
 
     @classmethod
     def draw(
@@ -78,12 +78,12 @@ class QuerySensor:
 
     def without_hidden(self, scan: np.ndarray) -> np.ndarray:
         """Returns the points of a scan in S outside the hidden sector."""
-        if self.hidden == 0.0:
+        if self.hidden_angle == 0.0:
             return scan
         azimuth = np.arctan2(scan["y"], scan["x"]).astype(np.float64)
         turned = np.mod(azimuth - self.hidden_from, 2.0 * math.pi)
         # Points that are not finite are in no sector.
-        return scan[~(turned < self.hidden)]
+        return scan[~(turned < self.hidden_angle)]
 
 
 def corners(positions: np.ndarray, apart: float) -> list[int]:
@@ -141,12 +141,10 @@ def within_range(points: np.ndarray, max_range: float) -> np.ndarray:
         points: (N, 3) points in the frame of the sensor [m].
         max_range: greatest absolute value of each coordinate [m].
     """
-    kept = np.ones(len(points), dtype=bool)
-    # One column at a time, because NumPy reduces slowly along a short axis.
-    for coordinates in points.T:
-        # A comparison with NaN is false, so NaN is out of range.
-        kept &= np.abs(coordinates) <= max_range
-    return kept
+    # One column at a time, because NumPy reduces slowly along a short axis. A
+    # comparison with NaN is false, so NaN is out of range.
+    x, y, z = np.abs(points.T)
+    return (x <= max_range) & (y <= max_range) & (z <= max_range)
 
 
 def gather(

@@ -428,8 +428,7 @@ def _in_order(
     path: Path, stamps_ns: np.ndarray, X_WB: np.ndarray
 ) -> Trajectory:
     # Loggers may repeat lines; equal rows are harmless.
-    news = np.ones(len(stamps_ns), dtype=bool)
-    news[1:] = np.diff(stamps_ns) != 0
+    news = np.append(True, np.diff(stamps_ns) != 0)
     news[1:] |= (np.diff(X_WB, axis=0) != 0.0).any(axis=(1, 2))
     check_increasing(path, stamps_ns[news], "pose")
     return Trajectory(path, stamps_ns[news], X_WB[news])

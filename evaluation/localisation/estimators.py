@@ -287,7 +287,7 @@ class Fit:
     covariance: np.ndarray
 
 
-def judge(surface: Surface, scan: np.ndarray, X_WS: np.ndarray) -> Fit:
+def fit_at(surface: Surface, scan: np.ndarray, X_WS: np.ndarray) -> Fit:
     """Returns how well a scan fits a map at a given pose, see `Fit`.
 
     Args:

@@ -30,7 +30,7 @@ from evaluation.localisation.estimators import (
     Estimator,
     LocalisationMap,
     Settings,
-    judge,
+    fit_at,
     thinned,
 )
 from evaluation.localisation.robust import MAX_RANGE
@@ -290,7 +290,7 @@ class Localiser:
         far = self.surroundings.distances(poses.transform(X_WS, points))
         row["unmapped"] = np.mean(far > self.settings.voxel)
         if end is not None:
-            fit = judge(self.surroundings.surface, points, end)
+            fit = fit_at(self.surroundings.surface, points, end)
             row["own_score"] = fit.share if found.score is None else found.score
             row["fit"], row["residual"] = fit.share, fit.residual
             row["translation_error"], row["rotation_error_deg"] = pose_error(

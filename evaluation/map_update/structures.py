@@ -68,15 +68,14 @@ def verdicts(
     unobserved, kept, changed = SIDES[side]
     rows = np.flatnonzero(instances)
     numbers, places = np.unique(instances[rows], return_inverse=True)
-    count = np.zeros((len(numbers), 3), np.int64)
-    for column, chosen in enumerate(
-        (
-            np.ones(len(rows), bool),
-            np.isin(labels[rows], (kept, changed)),
-            labels[rows] == changed,
-        )
-    ):
-        count[:, column] = np.bincount(places[chosen], minlength=len(numbers))
+    chosen = (
+        np.ones(len(rows), bool),
+        np.isin(labels[rows], (kept, changed)),
+        labels[rows] == changed,
+    )
+    count = np.stack(
+        [np.bincount(places[c], minlength=len(numbers)) for c in chosen], axis=1
+    )
     found = np.where(2 * count[:, 2] > count[:, 1], changed, kept)
     return numbers, count, np.where(count[:, 1] == 0, unobserved, found)
 

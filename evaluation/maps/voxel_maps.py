@@ -243,8 +243,8 @@ class VoxelMap:
         found = np.floor((self.centroids_W - origin) / voxel_size)
         order = np.lexsort(found.T[::-1])
         indices = found[order].astype(np.int32)
-        is_first = np.ones(len(order), bool)
-        is_first[1:] = (np.diff(indices, axis=0) != 0).any(axis=1)
+        # NaN counts as a difference: the first row is that of a new voxel.
+        is_first = np.diff(found[order], axis=0, prepend=np.nan).any(axis=1)
         rows = np.cumsum(is_first) - 1
         counts = np.zeros(int(is_first.sum()), np.int64)
         np.add.at(counts, rows, self.counts[order])

@@ -18,6 +18,7 @@ from pathlib import Path
 from typing import Literal
 
 import numpy as np
+from numpy.lib.stride_tricks import sliding_window_view
 from pydantic import computed_field
 
 from cns_drake.base.errors import InputError
@@ -25,6 +26,7 @@ from cns_drake.base.files import check_regular, user_errors
 from cns_drake.base.npz_files import read_npz
 from cns_drake.base.terminal import note
 from evaluation.methods.method import Method, MethodConfig, register, yaw_pose
+from evaluation.methods.overlap_maps import extremes
 
 RINGS = 64
 SECTORS = 192
@@ -91,10 +93,7 @@ def polar_image(points: np.ndarray, sensor_height: float) -> np.ndarray:
         cell * (len(_BANDS) + 1) + band,
         minlength=RINGS * SECTORS * (len(_BANDS) + 1),
     ).reshape(RINGS * SECTORS, -1)
-    greatest = np.full(RINGS * SECTORS, -np.inf)
-    np.maximum.at(greatest, cell, height)
-    least = np.full(RINGS * SECTORS, np.inf)
-    np.minimum.at(least, cell, height)
+    least, greatest = extremes(height, cell, RINGS * SECTORS)
     filled = np.isfinite(least)
     greatest, least = greatest[filled], least[filled]
     image = np.zeros((RINGS * SECTORS, CHANNELS), np.uint8)
@@ -326,18 +325,11 @@ def _infer(weights: Mapping[str, np.ndarray], image: np.ndarray) -> np.ndarray:
     last = len(LAYERS) - 1
     for number, (before, after, down, along) in enumerate(LAYERS):
         rings, sectors = cells.shape[0] // down, cells.shape[1] // along
-        padded = np.zeros(
-            (cells.shape[0] + 2, cells.shape[1] + 2, before), np.float32
-        )
-        padded[1:-1, 1:-1] = cells
-        padded[1:-1, 0], padded[1:-1, -1] = cells[:, -1], cells[:, 0]
-        taps = np.empty((rings, sectors, 9, before), np.float32)
-        for tap in range(9):
-            row, column = divmod(tap, 3)
-            taps[:, :, tap] = padded[
-                row : row + down * rings : down,
-                column : column + along * sectors : along,
-            ]
+        # Sectors go round; there is nothing beyond the first and last ring.
+        round_trip = np.pad(cells, ((0, 0), (1, 1), (0, 0)), "wrap")
+        padded = np.pad(round_trip, ((1, 1), (0, 0), (0, 0)))
+        windows = sliding_window_view(padded, (3, 3), (0, 1))[::down, ::along]
+        taps = windows.transpose(0, 1, 3, 4, 2)
         flat = taps.reshape(rings * sectors, 9 * before)
         flat = flat @ weights[f"kernel_{number}"] + weights[f"bias_{number}"]
         if number < last:

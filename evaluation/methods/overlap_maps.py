@@ -87,7 +87,7 @@ def layer_cells(
     counts = np.bincount(
         layer * GRID * GRID + number, minlength=4 * GRID * GRID
     )
-    bottom, top = _extremes(height, number, GRID * GRID)
+    bottom, top = extremes(height, number, GRID * GRID)
     step = top - bottom
     is_kerb = (
         (top <= _HEIGHTS[0]) & (_KERB_STEP[0] <= step) & (step <= _KERB_STEP[1])
@@ -118,7 +118,7 @@ def _ground_below(
     sector = np.minimum((turn * (0.25 * _SECTORS)).astype(int), _SECTORS - 1)
     ring = (np.sqrt(x * x + y * y) / _RING).astype(int)
     num_rings = math.ceil(half * math.sqrt(2.0) / _RING) + 1
-    lowest, _ = _extremes(z, ring * _SECTORS + sector, num_rings * _SECTORS)
+    lowest, _ = extremes(z, ring * _SECTORS + sector, num_rings * _SECTORS)
     lowest = lowest.reshape(num_rings, _SECTORS)
     height, last = np.full(_SECTORS, start), np.full(_SECTORS, -1)
     ground = np.empty_like(lowest)
@@ -131,12 +131,17 @@ def _ground_below(
     return ground[ring, sector]
 
 
-def _extremes(
+def extremes(
     values: np.ndarray, cells: np.ndarray, size: int
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Returns the least and the greatest of values (N,) in each cell, (size,).
+    """Returns the least and the greatest of values in each cell, both (size,).
 
     For a cell without values they are inf and -inf.
+
+    Args:
+        values: (N,) values.
+        cells: (N,) number of each value's cell.
+        size: number of cells.
     """
     least, greatest = np.full(size, np.inf), np.full(size, -np.inf)
     np.minimum.at(least, cells, values)

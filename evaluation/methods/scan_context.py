@@ -269,7 +269,8 @@ class ScanContext(Method[Contexts, ContextDatabase]):
         first = _key_shift(
             query.aligning_keys[0], database.aligning_keys[chosen]
         )
-        half = _round_half_up(0.5 * self.config.search_ratio * num_columns)
+        # A half is rounded up.
+        half = math.floor(0.5 * self.config.search_ratio * num_columns + 0.5)
         window = np.arange(-half, half + 1)
         shifts = (first[:, None] + window) % num_columns
         cosines = columns[0].T @ database.columns[chosen]
@@ -378,7 +379,3 @@ def _key_shift(key: np.ndarray, others: np.ndarray) -> np.ndarray:
     column = np.arange(len(key))
     rolled = key[(column + column[:, None]) % len(key)]
     return (others @ rolled.T).argmax(axis=1)
-
-
-def _round_half_up(value: float) -> int:
-    return math.floor(value + 0.5)

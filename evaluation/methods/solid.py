@@ -77,14 +77,12 @@ class SolidConfig(MethodConfig):
             lidar: number of rings of the LiDAR, and lowest and highest
                 elevation [deg].
         """
-        elevations, lowest_deg, highest_deg = lidar
-        if self.elevations is not None:
-            elevations = self.elevations
-        if self.lowest_deg is not None:
-            lowest_deg = self.lowest_deg
-        if self.highest_deg is not None:
-            highest_deg = self.highest_deg
-        return LidarField(elevations, lowest_deg, highest_deg)
+        low, high = self.lowest_deg, self.highest_deg
+        return LidarField(
+            lidar.rings if self.elevations is None else self.elevations,
+            lidar.lowest_deg if low is None else low,
+            lidar.highest_deg if high is None else high,
+        )
 
 
 @dataclass(frozen=True)
@@ -139,12 +137,8 @@ class SolidMethod(Method[Solid, SolidDatabase]):
     def for_lidar(self, field: LidarField | None) -> SolidMethod:
         if field is None:
             return self
-        elevations, lowest_deg, highest_deg = self.config.field(field)
-        own = {
-            "elevations": elevations,
-            "lowest_deg": lowest_deg,
-            "highest_deg": highest_deg,
-        }
+        names = "elevations", "lowest_deg", "highest_deg"
+        own = dict(zip(names, self.config.field(field), strict=True))
         return type(self)(self.config.model_copy(update=own))
 
     def assumption(self, field: LidarField | None) -> str | None:

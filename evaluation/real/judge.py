@@ -2,12 +2,12 @@
 
 Of each scan, sixteen patches of 8 m within 30 m of the LiDAR are described by
 features. Boosted trees then learn to tell the patches of the two sets apart; a
-place is never in both training and test data. Scans less than 30 m from the
-first scan of a place belong to that place; so do all scans of one folder. The
-AUC of the classifier is 1 if it tells all patches apart, and 0.5 for guessing.
-As a control, the classifier tells the first half of the simulated places from
-the second half. All AUCs are means over random draws of patches; single draws
-differ by up to 0.04.
+place is never in both training and test data. A place consists of the scans
+less than 30 m from its first scan, even of several passes or drives, or of all
+scans in a folder without poses. The AUC of the classifier is 1 if it tells all
+patches apart, and 0.5 for guessing. As a control, the classifier tells the
+first half of the simulated places from the second half. All AUCs are means over
+random draws of patches; single draws differ by up to 0.04.
 
 Some features need the ring (laser) of each point. Rings are read from
 recordings, or from files that store one ring after the other, like KITTI's. If
@@ -18,12 +18,12 @@ The module needs the optional packages of the extra `judge`.
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 
 import numpy as np
 from scipy.spatial import cKDTree
 from sklearn.ensemble import HistGradientBoostingClassifier
-from sklearn.metrics import roc_auc_score
+from sklearn.model_selection import PredefinedSplit, cross_val_score
 from threadpoolctl import threadpool_limits
 
 from cns_drake.base.progress import Track, silent
@@ -69,23 +69,30 @@ def scan_table(scan: np.ndarray) -> np.ndarray:
     return table[np.isfinite(table[:, :3]).all(axis=1)]
 
 
-def places_of(drive: Drive) -> list[list[np.ndarray]]:
-    """Returns at most 40 scans of a drive, as a list of scans for each place.
+def places_of(drives: Iterable[Drive]) -> list[list[np.ndarray]]:
+    """Returns at most 40 scans of each drive, as a list for each place.
 
-    A place is a run of successive scans that are less than 30 m from the first
-    scan of the run; where the drive comes back later, a new place begins. Each
-    scan is a table as `scan_table` returns it.
+    A place begins with a scan that is at least 30 m from the first scans of all
+    earlier places in the same world frame and map. All other scans belong to
+    the earliest place whose first scan is less than 30 m away. Scans at one
+    position are therefore always at one place, even if a drive comes back, or
+    if they are from different drives. Each scan is a table as `scan_table`
+    returns it.
     """
-    step = -(-len(drive) // _MOST_SCANS)
-    places: list[list[np.ndarray]] = []
-    first = np.full(3, np.inf)
-    for k in range(0, len(drive), step):
-        p_WS = drive.X_WS[k, :3, 3]
-        if not np.linalg.norm(p_WS - first) < _APART:
-            places.append([])
-            first = p_WS
-        places[-1].append(scan_table(drive.scan(k)))
-    return places
+    places: dict[tuple, list[np.ndarray]] = {}
+    for drive in drives:
+        world = drive.world_frame, (drive.scenario or {}).get("map")
+        for k in range(0, len(drive), -(-len(drive) // _MOST_SCANS)):
+            p_WS = drive.X_WS[k, :3, 3]
+            near = (
+                first
+                for first in places
+                if first[0] == world
+                and np.linalg.norm(p_WS - first[1]) < _APART
+            )
+            place = next(near, (world, tuple(p_WS)))
+            places.setdefault(place, []).append(scan_table(drive.scan(k)))
+    return list(places.values())
 
 
 def patches(scan: np.ndarray, rng: np.random.Generator) -> Iterator[np.ndarray]:
@@ -135,6 +142,7 @@ def describe(patch: np.ndarray, rng: np.random.Generator) -> dict[str, float]:
     count = min(len(p), _NEIGHBOURHOODS)
     chosen = rng.choice(len(p), count, replace=False)
     groups = tree.query_ball_point(p[chosen], _RADIUS)
+    chosen = chosen[[len(g) >= 8 for g in groups]]
     shapes = [_shape(p[g], ring[g]) for g in groups if len(g) >= 8]
     if not shapes:
         return result
@@ -150,7 +158,7 @@ def describe(patch: np.ndarray, rng: np.random.Generator) -> dict[str, float]:
     )
     result["eigenvalues: oblique"] = _mean((up > 0.3) & (up < 0.85), flat)
     result["eigenvalues: up"] = _mean(up > 0.95, flat)
-    ground = flat & (up > 0.95) & (p[chosen][_kept(groups), 2] < low + 0.5)
+    ground = flat & (up > 0.95) & (p[chosen, 2] < low + 0.5)
     for name, mask in (("ground", ground), ("walls", flat & (up < 0.2))):
         for kind, values in (
             ("all", residual),
@@ -161,12 +169,8 @@ def describe(patch: np.ndarray, rng: np.random.Generator) -> dict[str, float]:
             for part in _QUANTILES:
                 key = f"roughness: {name}, {kind}, {part:.0%} [log mm]"
                 result[key] = _quantile(known, part)
-    result["intensity: ground"] = _mean(bright[chosen][_kept(groups)], ground)
+    result["intensity: ground"] = _mean(bright[chosen], ground)
     return result
-
-
-def _kept(groups: np.ndarray) -> np.ndarray:
-    return np.array([len(group) >= 8 for group in groups])
 
 
 def _intensity(bright: np.ndarray, tree: cKDTree) -> dict[str, float]:
@@ -197,7 +201,6 @@ def _density(
     result["density: isolated"] = float(np.mean(distance[:, 3] > 0.02))
     along, across = np.full((2, 1), np.nan)
     if np.isfinite(ring).all():
-        gap = np.linalg.norm(np.diff(p, axis=0), axis=1) / ranges[1:]
         order = np.lexsort((np.arctan2(p[:, 1], p[:, 0]), ring))
         gap = np.linalg.norm(np.diff(p[order], axis=0), axis=1)
         gap /= ranges[order][1:]
@@ -347,17 +350,19 @@ def tell_apart(real: Features, simulated: Features, names: list[str]) -> float:
     x = np.concatenate([real.of(names), simulated.of(names)])
     y = np.repeat([1, 0], [len(real.rows), len(simulated.rows)])
     fold = np.concatenate([one % folds for one in sets])
-    aucs = []
-    for k in range(folds):
-        model = HistGradientBoostingClassifier(
-            max_iter=_TREES, min_samples_leaf=10, random_state=0
-        )
-        learned = fold != k
-        share = y[learned].mean()
-        weight = np.where(y == 1, 1.0 / share, 1.0 / (1.0 - share))
-        model.fit(x[learned], y[learned], weight[learned])
-        score = model.predict_proba(x[~learned])[:, 1]
-        aucs.append(roc_auc_score(y[~learned], score))
+    model = HistGradientBoostingClassifier(
+        max_iter=_TREES,
+        min_samples_leaf=10,
+        random_state=0,
+        class_weight="balanced",
+    )
+    # A patch weighs 1 over the share of its set, which is twice the weight that
+    # `balanced` gives. The scale matters: a leaf needs a fixed sum of Hessians.
+    weights = {"sample_weight": np.full(len(y), 2.0)}
+    folded = PredefinedSplit(fold)
+    aucs = cross_val_score(
+        model, x, y, cv=folded, scoring="roc_auc", params=weights
+    )
     return float(np.mean(aucs))
 
 
@@ -366,7 +371,7 @@ def _in_folds(one: Features) -> np.ndarray:
     return np.unique(one.place, return_inverse=True)[1]
 
 
-def judge(real: Features, simulated: Features) -> dict:
+def aucs_by_group(real: Features, simulated: Features) -> dict:
     """Returns how well a classifier tells real from simulated scans.
 
     The result contains the AUC of the classifier for each group of features,
@@ -405,7 +410,7 @@ def judge_draws(
 ) -> dict:
     """Returns how well a classifier tells real from simulated scans.
 
-    The result is that of `judge`, averaged over several random draws of
+    The result is that of `aucs_by_group`, averaged over several random draws of
     patches.
 
     Args:
@@ -416,7 +421,7 @@ def judge_draws(
     results = []
     for seed in track(range(draws), "judging", draws):
         sets = Features(real, seed), Features(simulated, seed)
-        results.append(judge(*sets))
+        results.append(aucs_by_group(*sets))
     for key in ("auc", "control"):
         results[0][key] = {
             group: float(np.mean([one[key][group] for one in results]))

@@ -321,15 +321,12 @@ class Measuring:
             return
         from evaluation.real import judge
 
-        places = judge.places_of(one.drive)
+        places = judge.places_of([one.drive])
         if len(places) < 2:
             self._note(f"{one.name}: one place, not judged")
             return
         found = judge.judge_draws(
-            places,
-            [place for drive in made for place in judge.places_of(drive)],
-            _DRAWS,
-            self._track,
+            places, judge.places_of(made), _DRAWS, self._track
         )
         for group, auc in found["auc"].items():
             values = {"auc": auc, "auc_control": found["control"][group]}

@@ -10,7 +10,7 @@ import numpy as np
 
 from evaluation.methods.method import Method
 from evaluation.recognition.description import DescribedDrive, DescribedScans
-from evaluation.recognition.scoring import ranking, score_places
+from evaluation.recognition.scoring import ranked_places, score_places
 
 
 @dataclass(frozen=True)
@@ -114,7 +114,7 @@ def query_ms(
             gate_radius=gate_radius,
         )
         if with_pose and not np.isnan(found).all():
-            best = int(ranking(found)[0])
+            best = int(ranked_places(found)[0])
             method.relative_pose(queries.descriptors[row], indexed, best)
 
     return float(np.median([cpu_ms(ask, row) for row in rows.tolist()][1:]))

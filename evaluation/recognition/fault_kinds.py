@@ -38,8 +38,8 @@ class PairEvidence:
     Attributes:
         overlaps: (Q,) share of the query's scan that the right place's scan
             shows; NaN without a match.
-        hidden: (Q,) share of the query's scan that is hidden from the right
-            place's sensor; NaN without a match.
+        hidden_shares: (Q,) share of the query's scan that is hidden from the
+            right place's sensor; NaN without a match.
         changed: (Q,) share of upright points that show a change, among all
             upright points of the query and its right place. A point shows a
             change if it is not hidden from the sensor of the other scan, but
@@ -59,7 +59,7 @@ class PairEvidence:
     """
 
     overlaps: np.ndarray
-    hidden: np.ndarray
+    hidden_shares: np.ndarray
     changed: np.ndarray
     changed_classes: list[str]
     right_fits: np.ndarray
@@ -155,7 +155,7 @@ def fault_kinds(result: PlaceRecognition, evidence: PairEvidence) -> list[str]:
     retrieval = result.retrieval
     little = evidence.overlaps < _ENOUGH
     unseen = 1.0 - evidence.overlaps
-    is_hidden = little & (evidence.hidden >= 0.5 * unseen)
+    is_hidden = little & (evidence.hidden_shares >= 0.5 * unseen)
     conditions = [
         ~result.outcomes.has_match,
         retrieval.best_places < 0,

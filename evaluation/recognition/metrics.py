@@ -141,8 +141,7 @@ def weighted_counts(
     order = answered[np.argsort(-outcomes.best_scores[answered], kind="stable")]
     scores = outcomes.best_scores[order]
     # The last query of each group of equal scores, which are accepted together.
-    is_last = np.ones(len(scores), dtype=bool)
-    is_last[:-1] = scores[1:] != scores[:-1]
+    is_last = np.append(scores[1:] != scores[:-1], len(scores) > 0)
     ends = np.flatnonzero(is_last)
 
     def accepted(counts: np.ndarray) -> np.ndarray:
@@ -162,12 +161,11 @@ def areas_under(precision: np.ndarray, recall: np.ndarray) -> np.ndarray:
         precision: (B, K) precision at K thresholds; K can be 0.
         recall: (B, K) recall at these thresholds, increasing.
     """
-    if precision.shape[1] == 0:
-        return np.zeros(len(precision))
-    start = precision[:, 0] * recall[:, 0]
-    heights = 0.5 * (precision[:, 1:] + precision[:, :-1])
-    widths = np.diff(recall, axis=1)
-    return start + (heights * widths).sum(axis=1)
+    # Imported here: it is slow to load.
+    from scipy.integrate import trapezoid
+
+    start = (precision[:, :1] * recall[:, :1]).sum(axis=1)
+    return start + trapezoid(precision, recall, axis=1)
 
 
 def recall_of(tp: np.ndarray, fn: np.ndarray) -> np.ndarray:
@@ -375,10 +373,9 @@ def _filled_from_right(values: np.ndarray) -> np.ndarray:
     if values.shape[1] == 0:
         return values
     known = ~np.isnan(values)
-    first = known.argmax(axis=1)
-    rows = np.arange(len(values))
-    start = np.where(known.any(axis=1), values[rows, first], 0.0)
-    return np.where(known, values, start[:, None])
+    first = known.argmax(axis=1)[:, None]
+    start = np.nan_to_num(np.take_along_axis(values, first, axis=1))
+    return np.where(known, values, start)
 
 
 @dataclass(frozen=True)

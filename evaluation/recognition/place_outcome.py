@@ -249,8 +249,8 @@ def place_numbers(
     for name in FAULTS:
         yield now.number(name, float(np.sum(now.columns["why"] == name)))
     # Their best match shows less than half of their scan.
-    is_hidden = (overlaps < _HALF) & ~outcomes.is_right
-    yield now.number("hidden", float(is_hidden.sum()))
+    is_little_shown = (overlaps < _HALF) & ~outcomes.is_right
+    yield now.number("hidden", float(is_little_shown.sum()))
     if not math.isnan(shown := mean_visible_change(overlaps)[0]):
         yield now.number("visible_change", shown)
 

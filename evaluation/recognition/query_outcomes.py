@@ -170,19 +170,15 @@ def auroc(scores: np.ndarray, is_positive: np.ndarray) -> float:
         scores: (N,) scores; NaN is the lowest.
         is_positive: (N,) bool.
     """
-    num_with = int(is_positive.sum())
-    num_without = len(scores) - num_with
-    if num_with == 0 or num_without == 0:
-        return math.nan
     # Imported here: it is slow to load.
-    from scipy.stats import rankdata
+    from scipy.stats import mannwhitneyu
 
-    # This is the sum of ranks of Mann and Whitney's U test; equal scores share
-    # the mean of their ranks.
     values = np.where(np.isnan(scores), -np.inf, scores)
-    ranks = rankdata(values)[is_positive].sum()
-    wins = ranks - 0.5 * num_with * (num_with + 1)
-    return float(wins / (num_with * num_without))
+    positive, negative = values[is_positive], values[~is_positive]
+    if not (len(positive) and len(negative)):
+        return math.nan
+    test = mannwhitneyu(positive, negative, method="asymptotic")
+    return float(test.statistic / (len(positive) * len(negative)))
 
 
 def _mean(values: np.ndarray) -> float:

@@ -20,7 +20,7 @@ from evaluation.recognition.pose_errors import (
     pose_error,
 )
 from evaluation.recognition.protocol import RECORDED_PROTOCOL, RetrievalProtocol
-from evaluation.recognition.scoring import gated, ranking, score_places
+from evaluation.recognition.scoring import gated, ranked_places, score_places
 from evaluation.recognition.sequences import along_the_way
 
 
@@ -68,7 +68,7 @@ class Retrieval:
         Of several places with the best score, the first one counts.
         """
         candidate = ~np.isnan(self.scores)
-        best = ranking(self.scores)[:, 0] if self.scores.size else -1
+        best = ranked_places(self.scores)[:, 0] if self.scores.size else -1
         return np.where(candidate.any(axis=1), best, -1)
 
     @property
@@ -126,34 +126,9 @@ def retrieve(
         overlaps = overlap_matrix(database, query, protocol, track)
     (places,) = describe_drive(database, [method], {"places"}, protocol, track)
     (queries,) = describe_drive(query, [method], {"queries"}, protocol, track)
-    return compare(method, places, queries, protocol, track, overlaps)
-
-
-def compare(
-    method: Method,
-    database: DescribedDrive,
-    query: DescribedDrive,
-    protocol: RetrievalProtocol = RECORDED_PROTOCOL,
-    track: Track = silent,
-    overlaps: np.ndarray | None = None,
-) -> Retrieval:
-    """Returns the scores of a query drive against the places of another.
-
-    Args:
-        method: method that described both drives.
-        database: drive with described places.
-        query: drive with described queries, in the same world frame.
-        protocol: protocol by which both drives were described.
-        track: reports progress.
-        overlaps: (Q, D) share of each query's scan that each place's scan
-            shows; needed for matches by overlap.
-
-    Raises:
-        InputError: if the method returns an invalid result.
-    """
     radii = [protocol.gate_radius]
     (found,) = compare_with_gates(
-        method, database, query, protocol, radii, track, overlaps
+        method, places, queries, protocol, radii, track, overlaps
     )
     return found
 
@@ -174,9 +149,15 @@ def compare_with_gates(
     pose estimate. Queries are described and scored only once.
 
     Args:
-        method, database, query, track, overlaps: see `compare`.
-        protocol: protocol of the comparison; its own gate does not matter.
+        method: method that described both drives.
+        database: drive with described places.
+        query: drive with described queries, in the same world frame.
+        protocol: protocol by which both drives were described; its own gate
+            does not matter.
         gate_radii: radius of each gate [m]; None stands for no gate.
+        track: reports progress.
+        overlaps: (Q, D) share of each query's scan that each place's scan
+            shows; needed for matches by overlap.
         is_known: (Q, D) bool, which places are allowed for each query; by
             default as the protocol says.
 
@@ -222,7 +203,7 @@ def compare_with_gates(
             kept[row] = found
             if np.isnan(found).all():
                 continue
-            best = int(ranking(found)[0])
+            best = int(ranked_places(found)[0])
             if best not in poses:
                 poses[best] = checked_pose(
                     method, method.relative_pose(descriptor, indexed, best)

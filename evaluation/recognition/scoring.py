@@ -15,7 +15,7 @@ NUM_GATED = 30
 SOFTNESS = 0.05
 
 
-def ranking(scores: np.ndarray) -> np.ndarray:
+def ranked_places(scores: np.ndarray) -> np.ndarray:
     """Returns places from the best to the worst.
 
     If places have equal scores, the first one in the database is better. Places
@@ -78,7 +78,7 @@ def gated(
         InputError: if the method returns something other than poses.
     """
     num_candidates = int((~np.isnan(scores)).sum())
-    order = ranking(scores)
+    order = ranked_places(scores)
     best = order[: min(NUM_GATED, num_candidates)]
     if len(best) == 0 or not radii:
         return [scores for _ in radii]
@@ -165,7 +165,7 @@ def _reranked(
     places: Sequence[np.ndarray],
 ) -> np.ndarray:
     """Returns the scores (D,) after the second stage of a method."""
-    order = ranking(scores)
+    order = ranked_places(scores)
     num_candidates = int((~np.isnan(scores)).sum())
     best = order[: min(method.rerank_best, num_candidates)]
     result = np.full(len(scores), np.nan)

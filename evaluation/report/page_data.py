@@ -19,7 +19,7 @@ from evaluation.maps.thumbnails import CELL, HEIGHT_STEP, MAX_POINTS
 from evaluation.recognition.fault_kinds import PairEvidence, fault_kinds
 from evaluation.recognition.metrics import MODES
 from evaluation.recognition.place_recognition import PlaceRecognition
-from evaluation.recognition.scoring import ranking
+from evaluation.recognition.scoring import ranked_places
 from evaluation.report.figures import Picture
 from evaluation.results.drawing import Legend
 from evaluation.results.table_forms import by_pair, in_table_order, title
@@ -308,7 +308,9 @@ def _method_data(
 ) -> dict:
     scores = result.retrieval.scores
     best, values = [], []
-    for row, places in zip(scores, ranking(scores)[:, :_NUM_BEST], strict=True):
+    for row, places in zip(
+        scores, ranked_places(scores)[:, :_NUM_BEST], strict=True
+    ):
         places = places[~np.isnan(row[places])]
         best.append(places.tolist())
         values.append(np.round(row[places], 4).tolist())

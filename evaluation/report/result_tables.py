@@ -635,7 +635,7 @@ _QUERY_COLUMNS: Columns[_Queries] = {
     ),
     "why": lambda q: q.evidence and fault_kinds(q.result, q.evidence),
     "overlap": lambda q: q.evidence and q.evidence.overlaps,
-    "hidden": lambda q: q.evidence and q.evidence.hidden,
+    "hidden": lambda q: q.evidence and q.evidence.hidden_shares,
     "changed": lambda q: q.evidence and q.evidence.changed,
     "changed_class": lambda q: q.evidence and q.evidence.changed_classes,
     "right_fit": lambda q: q.evidence and q.evidence.right_fits,

@@ -109,7 +109,9 @@ def find_evidence(
         for number, one in (drive.instances or {}).items()
     }
     number = len(first.query_frames)
-    overlaps, hidden, changed, right_fits = np.full((4, number), math.nan)
+    overlaps, hidden_shares, changed, right_fits = np.full(
+        (4, number), math.nan
+    )
     changed_classes = [""] * number
     fits = {method: np.full(number, math.nan) for method in wrong}
     for row in track(range(number), f"why: comparing {query.name}", number):
@@ -124,7 +126,7 @@ def find_evidence(
             ]
             best = int(np.argmax([one.shown for one in seen]))
             right = shown[matches[best]]
-            overlaps[row], hidden[row] = seen[best]
+            overlaps[row], hidden_shares[row] = seen[best]
             if classes:
                 changed[row], changed_classes[row] = _change(
                     right, query_scan, classes
@@ -140,7 +142,7 @@ def find_evidence(
         for method, places in wrong.items():
             fits[method][row] = fit_of.get(int(places[row]), math.nan)
     return PairEvidence(
-        overlaps, hidden, changed, changed_classes, right_fits, fits
+        overlaps, hidden_shares, changed, changed_classes, right_fits, fits
     )
 
 

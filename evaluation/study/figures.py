@@ -4,7 +4,7 @@ from pathlib import Path
 
 from cns_drake.base.files import file_name, make_folder
 from cns_drake.base.jobs.step import Reporter
-from evaluation.change.drive_change import ChangeResult, Surveyed, compare
+from evaluation.change.drive_change import ChangeResult, Surveyed, compare_maps
 from evaluation.recognition.metrics import MODES
 from evaluation.report import figures
 from evaluation.report.page_data import (
@@ -93,7 +93,7 @@ def compare_stages(
         for one in read
     )
     control = controls[0] if controls else None
-    report = compare(earlier, later, control)
+    report = compare_maps(earlier, later, control)
     result = ChangeResult(map_name, stages, report)
     make_folder(stems[0].parent)
     figures.draw_change(

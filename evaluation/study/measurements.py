@@ -25,7 +25,6 @@ from evaluation.recognition.place_recognition import (
     judge_retrieval,
 )
 from evaluation.recognition.protocol import RetrievalProtocol
-from evaluation.recognition.retrieval import compare as score
 from evaluation.recognition.retrieval import compare_with_gates
 from evaluation.study.chosen_methods import MethodChoice
 from evaluation.study.parts import Part
@@ -73,7 +72,10 @@ def recognise_places(
     method = choice.make()
     (placed, database), (placed_query, query) = (p.read() for p in described)
     check_same_world(placed, placed_query)
-    retrieval = score(method, database, query, protocol, reporter.track)
+    radii = [protocol.gate_radius]
+    (retrieval,) = compare_with_gates(
+        method, database, query, protocol, radii, reporter.track
+    )
     if database.name == query.name and not retrieval.matches.any():
         # A route need not close a loop.
         reporter.note(f"{query.name}: it never comes back to where it was")

@@ -20,7 +20,7 @@ from sklearn.metrics import roc_auc_score
 
 from cns_drake.base import terminal
 from cns_drake.base.errors import InputError
-from evaluation.drives import open_drive
+from evaluation.drives import Drive, open_drive
 from evaluation.real.judge import (
     Features,
     common_names,
@@ -32,6 +32,14 @@ from evaluation.real.judge import (
 
 def read_places(path: Path) -> list[list[np.ndarray]]:
     """Returns the scans of each place in a data set."""
+    drives: list[Drive] = []
+    return _places_without_poses(path, drives) + places_of(drives)
+
+
+def _places_without_poses(
+    path: Path, drives: list[Drive]
+) -> list[list[np.ndarray]]:
+    """Returns a place for each folder of scans, and opens all drives."""
     if not path.is_dir():
         raise InputError(f"{path}: no folder of scans")
     files = sorted(path.glob("*.bin"))
@@ -39,13 +47,17 @@ def read_places(path: Path) -> list[list[np.ndarray]]:
         raws = (np.fromfile(file, np.float32).reshape(-1, 4) for file in files)
         return [[scan_table(raw) for raw in raws]]
     try:
-        drive = open_drive(path)
+        drives.append(open_drive(path))
     except InputError:
         folders = sorted(one for one in path.iterdir() if one.is_dir())
         if not folders:
             raise
-        return [place for one in folders for place in read_places(one)]
-    return places_of(drive)
+        return [
+            place
+            for one in folders
+            for place in _places_without_poses(one, drives)
+        ]
+    return []
 
 
 def strongest(

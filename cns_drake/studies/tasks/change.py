@@ -14,7 +14,7 @@ from cns_drake.studies.tasks.task import (
     Task,
     positive,
 )
-from evaluation.change.drive_change import Surveyed, compare
+from evaluation.change.drive_change import Surveyed, compare_maps
 from evaluation.drives.sampling import sample_frames
 from evaluation.maps.voxel_maps import CELL_SIZE, VoxelMap, map_drive
 from evaluation.recognition.place_outcome import Number
@@ -104,7 +104,7 @@ def measure_change(
     )
     # The spread over grids is not reported: it would take sixteen times as
     # long.
-    report = compare(a, b, grids=())
+    report = compare_maps(a, b, grids=())
     found = {}
     for name, change in (
         ("tcr_sym", report.change),

@@ -10,7 +10,7 @@ from cns_drake.city.generation.generate import generate_city
 from cns_drake.command_line.cli import app
 from cns_drake.studies import recording
 from cns_drake.studies import study as study_module
-from evaluation.change.drive_change import compare, survey
+from evaluation.change.drive_change import compare_maps, survey
 from evaluation.drives import open_drive
 from evaluation.methods import make_method
 from evaluation.recognition.place_recognition import run as recognise
@@ -71,7 +71,7 @@ def test_simulated_and_recorded_families_agree(tmp_path, monkeypatch):
     results = Results.read(simulated / "results.csv")
     for part, member in ((0.0, "town_01_m000_s4"), (0.5, "town_01_m500_s4")):
         here = results.where(**{"database.missing": part, "gate": False})
-        change = compare(
+        change = compare_maps(
             survey(recorded / member), survey(recorded / "town_02")
         )
         (found,) = here.where(metric="tcr_sym").rows

@@ -29,7 +29,7 @@ from cns_drake.scenarios.scenario_files import load_scenario
 from cns_drake.simulation.simulation import simulate
 from cns_drake.studies import recording, redrawing
 from cns_drake.studies.recording import is_recorded, record_all
-from evaluation.change.drive_change import compare, survey
+from evaluation.change.drive_change import compare_maps, survey
 from evaluation.drives import open_drive
 
 pytestmark = pytest.mark.slow
@@ -208,9 +208,9 @@ def test_families_on_other_cities_share_them(
 
     # Each city is another place.
     with pytest.raises(InputError, match=r"through town_c8, .* town_c7"):
-        compare(survey(query), survey(other))
+        compare_maps(survey(query), survey(other))
     changes = {
-        path.name: compare(survey(path), survey(query)).change.symmetric
+        path.name: compare_maps(survey(path), survey(query)).change.symmetric
         for path in databases
     }
     assert changes[names[0]] == 0.0  # The very same drive.

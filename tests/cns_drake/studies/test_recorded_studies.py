@@ -10,7 +10,7 @@ from cns_drake.base.jobs.cluster import Cluster
 from cns_drake.studies import study as study_module
 from cns_drake.studies.experiment import Experiment
 from cns_drake.studies.study import run_study
-from evaluation.change.drive_change import compare, survey
+from evaluation.change.drive_change import compare_maps, survey
 from evaluation.drives import open_drive
 from evaluation.methods import make_method
 from evaluation.recognition.place_recognition import run
@@ -73,7 +73,7 @@ def test_the_numbers_are_those_of_the_single_commands(folder, tmp_path):
             protocol=FAIR_PROTOCOL,
         )
         assert found[stage]["auc"] == pytest.approx(alone.metrics.auc, abs=1e-9)
-        change = compare(survey(folder / name), survey(query)).change
+        change = compare_maps(survey(folder / name), survey(query)).change
         assert values(results, **here, task="change")["tcr_sym"] == (
             pytest.approx(change.symmetric, abs=1e-9)
         )

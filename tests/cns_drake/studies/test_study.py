@@ -19,7 +19,7 @@ from cns_drake.studies import redrawing
 from cns_drake.studies import study as study_module
 from cns_drake.studies.experiment import Experiment, load_experiment
 from cns_drake.studies.study import Study, run_study
-from evaluation.change.drive_change import Surveyed, compare
+from evaluation.change.drive_change import Surveyed, compare_maps
 from evaluation.maps.voxel_maps import CELL_SIZE, VoxelAccumulator
 from evaluation.methods import make_method
 from evaluation.recognition.place_recognition import run
@@ -143,7 +143,7 @@ def test_the_numbers_are_those_of_the_single_commands(
     for stage in ("last", "own"):
         there = {"database__stage": stage, "gate": False}
         found = values(results, **there, task="change")
-        change = compare(mapped[stage], mapped["query"]).change
+        change = compare_maps(mapped[stage], mapped["query"]).change
         assert found["tcr_sym"] == pytest.approx(change.symmetric, abs=1e-9)
         for ranges in (20, 40):
             alone = run(

@@ -6,7 +6,7 @@ import pytest
 
 from cns_drake.base.errors import InputError
 from cns_drake.base.points import from_xyz
-from evaluation.change.drive_change import Surveyed, compare, survey
+from evaluation.change.drive_change import Surveyed, compare_maps, survey
 from evaluation.change.tcr import GRIDS
 from evaluation.maps.voxel_maps import CELL_SIZE, voxelise
 
@@ -66,9 +66,9 @@ def test_a_recording_maps_like_its_points(tmp_path, drives):
 
 
 def test_what_is_built_shows_and_routes_alone_do_not(drives):
-    report = compare(drives["early", "south"], drives["late", "north"])
+    report = compare_maps(drives["early", "south"], drives["late", "north"])
     assert report.change.symmetric > 0.03
-    same_stage = compare(drives["late", "south"], drives["late", "north"])
+    same_stage = compare_maps(drives["late", "south"], drives["late", "north"])
     assert same_stage.change.symmetric < 0.01
 
 
@@ -82,8 +82,8 @@ def test_what_is_built_shows_and_routes_alone_do_not(drives):
 )
 def test_control_is_compared_within_its_stage(drives, control, partner):
     a, b = drives["early", "south"], drives["late", "north"]
-    report = compare(a, b, drives[control])
-    expected = compare(drives[control], drives[partner]).change.symmetric
+    report = compare_maps(a, b, drives[control])
+    expected = compare_maps(drives[control], drives[partner]).change.symmetric
     assert report.control.symmetric == expected
     assert report.control_names == ("_".join(control), "_".join(partner))
     values = report.to_json()
@@ -92,7 +92,7 @@ def test_control_is_compared_within_its_stage(drives, control, partner):
 
 
 def test_mask_keeps_what_both_drives_passed(drives):
-    report = compare(drives["early", "south"], drives["late", "north"])
+    report = compare_maps(drives["early", "south"], drives["late", "north"])
     values = report.to_json()
     masked = values["coverage_masked"]
     assert masked["radius"] == 40.0
@@ -126,7 +126,7 @@ def _town_survey(points):
 @pytest.fixture(scope="module")
 def usual():
     towns = _built_town(False), _built_town(True)
-    return towns, compare(*map(_town_survey, towns))
+    return towns, compare_maps(*map(_town_survey, towns))
 
 
 @pytest.mark.parametrize(
@@ -149,7 +149,7 @@ def test_what_no_scan_can_measure_leaves_the_change(
     before = report.change.symmetric
     errors = np.random.default_rng(0).normal(0.0, noise, b.shape)
     moved = a + np.array(of_both), b + np.add(of_both, of_one) + errors
-    after = compare(*map(_town_survey, moved)).change.symmetric
+    after = compare_maps(*map(_town_survey, moved)).change.symmetric
     assert before > 0.1
     assert after == pytest.approx(before, abs=0.002)
 
@@ -170,11 +170,11 @@ def test_grids_are_even_and_equal_maps_have_no_spread(drives):
     middles = 5.0 / 16 * (np.arange(16) + 0.5)
     assert np.allclose(np.sort(GRIDS, axis=0), middles[:, None])
     same = drives["late", "south"]
-    assert compare(same, same).spread == (0.0, 0.0)
+    assert compare_maps(same, same).spread == (0.0, 0.0)
 
 
 def test_json_adds_up(drives):
-    values = compare(
+    values = compare_maps(
         drives["early", "south"], drives["late", "north"]
     ).to_json()
     for total, parts in (
@@ -193,11 +193,11 @@ def test_map_files_have_no_coverage_and_no_control(tmp_path, drives):
     for stage, points in TOWN.items():
         np.save(tmp_path / f"{stage}.npy", points)
     early, late = (survey(tmp_path / f"{stage}.npy") for stage in TOWN)
-    values = compare(early, late).to_json()
+    values = compare_maps(early, late).to_json()
     assert values["tcr_sym"] > 0.03
     assert values["coverage_masked"] is None
     with pytest.raises(InputError, match="not map files"):
-        compare(early, late, drives["late", "south"])
+        compare_maps(early, late, drives["late", "south"])
 
 
 def test_control_on_a_third_route(tmp_path, drives):
@@ -210,11 +210,11 @@ def test_control_on_a_third_route(tmp_path, drives):
         return dataclasses.replace(shifted, positions=positions)
 
     for y in (0.0, 0.99):
-        compare(a, b, aside(y))
+        compare_maps(a, b, aside(y))
     with pytest.raises(InputError, match=r"other: .* neither route: 1\.0 m"):
-        compare(a, b, aside(1.01))
+        compare_maps(a, b, aside(1.01))
     # No drive passes within the coverage radius of the other.
-    masked = compare(a, aside(500.0)).to_json()["coverage_masked"]
+    masked = compare_maps(a, aside(500.0)).to_json()["coverage_masked"]
     assert masked["tcr_sym"] is None
     assert "no point of either map" in masked["reason"]
 
@@ -222,7 +222,7 @@ def test_control_on_a_third_route(tmp_path, drives):
 def test_disjoint_maps_are_undefined_with_a_reason(tmp_path):
     np.save(tmp_path / "a.npy", TOWN["late"])
     np.save(tmp_path / "b.npy", TOWN["late"] + np.array([5000.0, 0.0, 0.0]))
-    values = compare(
+    values = compare_maps(
         survey(tmp_path / "a.npy"), survey(tmp_path / "b.npy")
     ).to_json()
     assert values["tcr_sym"] is None
@@ -240,4 +240,4 @@ def test_points_that_are_not_finite_are_counted(tmp_path):
 def test_other_worlds_are_refused(tmp_path, drives):
     other = survey(drive(tmp_path / "utm", "late", "south", world_frame="utm"))
     with pytest.raises(InputError, match="frame 'utm'"):
-        compare(drives["early", "south"], other)
+        compare_maps(drives["early", "south"], other)

@@ -23,7 +23,7 @@ from evaluation.localisation.estimators import (
     Estimate,
     Settings,
     default_settings,
-    judge,
+    fit_at,
     make_estimator,
     make_map,
     map_of,
@@ -254,7 +254,7 @@ def test_covariance_of_planes_in_closed_form():
     middles = np.concatenate(
         [part[(np.abs(part) < 0.8).sum(axis=1) == 2] for part in parts]
     )
-    fit = judge(surface, middles, np.eye(4))
+    fit = fit_at(surface, middles, np.eye(4))
     counts = [np.count_nonzero(middles[:, axis] == -1.0) for axis in range(3)]
     # Nothing is off its plane, so that the least roughness counts: 0.01 m.
     # Noise of normals takes 0.27 % of all points from each axis.

@@ -3,6 +3,7 @@
 from pathlib import Path
 import sys
 
+from helpers.drive_files import yaw_pose
 import numpy as np
 import pytest
 
@@ -79,7 +80,9 @@ def plain(judge, program, tmp_path_factory):
 
 
 def test_equal_sets_are_not_told_apart(judge, program, plain, tmp_path):
-    result = judge.judge(plain, features(judge, program, tmp_path / "set", 2))
+    result = judge.aucs_by_group(
+        plain, features(judge, program, tmp_path / "set", 2)
+    )
     assert abs(result["auc"]["all"] - 0.5) < 0.15
     assert abs(result["control"]["all"] - 0.5) < 0.2
 
@@ -95,7 +98,7 @@ def test_it_finds_the_difference(
     judge, program, plain, tmp_path, options, group, feature
 ):
     other = features(judge, program, tmp_path / "set", 3, **options)
-    result = judge.judge(plain, other)
+    result = judge.aucs_by_group(plain, other)
     assert result["auc"][group] > 0.95
     names = judge.common_names([plain, other])
     features_of_both = program.strongest(plain, other, names)
@@ -123,7 +126,7 @@ def test_a_result_is_the_mean_of_draws(judge, program, tmp_path, monkeypatch):
             make_place(folder, 100 * seed + place)
         sets.append(program.read_places(tmp_path / str(seed)))
     single = [
-        judge.judge(*(judge.Features(places, seed) for places in sets))
+        judge.aucs_by_group(*(judge.Features(places, seed) for places in sets))
         for seed in (0, 1)
     ]
     mean = judge.judge_draws(*sets, 2)
@@ -160,3 +163,50 @@ def test_a_long_drive_has_a_place_every_30_m(program, tmp_path):
     (tmp_path / "poses.txt").write_text("\n".join(rows))
     (tmp_path / "times.txt").write_text("\n".join(map(str, range(9))))
     assert [len(one) for one in program.read_places(tmp_path)] == [4, 4, 1]
+
+
+class Drive:
+    """A drive with a scan of one point at each position x y [m]."""
+
+    def __init__(self, *positions, world="map", city="one"):
+        self.X_WS = np.array([yaw_pose(*xy, 0.0, 0.0) for xy in positions])
+        self.world_frame, self.scenario = world, {"map": city}
+
+    def __len__(self):
+        return len(self.X_WS)
+
+    def scan(self, index):
+        return np.array([[*self.X_WS[index, :3, 3], 1.0]])
+
+
+def test_a_place_is_the_same_when_a_drive_returns(judge):
+    # Out and back, with the last scan just less than 30 m from the first one.
+    out = [(0.0, 0.0), (25.0, 0.0), (30.0, 0.0), (59.9, 0.0), (60.0, 0.0)]
+    loop = Drive(*out, *out[::-1], (0.0, 29.9))
+    found = judge.places_of([loop, Drive((0.0, -29.9), (0.0, -30.0))])
+    xs = [[tuple(scan[0, :2]) for scan in place] for place in found]
+    assert xs == [
+        [*out[:2], *out[1::-1], (0.0, 29.9), (0.0, -29.9)],
+        [*out[2:4], *out[3:1:-1]],
+        [out[4], out[4]],
+        [(0.0, -30.0)],
+    ]
+
+
+def test_other_worlds_have_other_places(judge):
+    here = (1.0, 2.0)
+    others = Drive(here, world="kitti/00"), Drive(here, city="two")
+    found = judge.places_of([Drive(here), *others, Drive(here)])
+    assert [len(place) for place in found] == [2, 1, 1]
+
+
+def test_on_a_straight_road_places_are_runs(judge):
+    x = np.cumsum(np.random.default_rng(1).uniform(0.0, 40.0, 40))
+    runs = [[x[0]]]
+    for one in x[1:]:
+        if one - runs[-1][0] < 30.0:
+            runs[-1].append(one)
+        else:
+            runs.append([one])
+    found = judge.places_of([Drive(*((one, 0.0) for one in x))])
+    assert [[scan[0, 0] for scan in place] for place in found] == runs

@@ -10,7 +10,7 @@ from evaluation.recognition.metrics import (
     resampled_weights,
 )
 from evaluation.recognition.query_outcomes import judge
-from evaluation.recognition.scoring import ranking
+from evaluation.recognition.scoring import ranked_places
 
 NAN = np.nan
 
@@ -152,7 +152,7 @@ def test_the_worst_candidate_is_before_what_is_none(right):
     assert outcomes.best_scores.tolist() == [-math.inf]
     expected = {2: 1.0, 3: 2.0}.get(right, math.inf)
     assert outcomes.first_right_ranks.tolist() == [expected]
-    assert ranking(scores).tolist() == [[2, 3, 0, 1]]
+    assert ranked_places(scores).tolist() == [[2, 3, 0, 1]]
 
 
 def test_no_candidate_is_never_accepted_and_a_miss():
@@ -347,7 +347,7 @@ def test_long_drives_need_no_array_more_of_all_pairs():
     _, peak = tracemalloc.get_traced_memory()
     tracemalloc.stop()
     assert peak < 0.1 * scores.nbytes
-    order = ranking(scores)
+    order = ranked_places(scores)
     right = np.take_along_axis(matches, order, axis=1)
     np.testing.assert_array_equal(
         found.first_right_ranks, 1 + right.argmax(axis=1)

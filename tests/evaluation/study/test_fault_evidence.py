@@ -143,9 +143,11 @@ def test_what_scans_say(tmp_path):
     behind = points[points[:, 1] > 4.5]
     height = HEIGHT + (6.0 - HEIGHT) * behind[:, 1] / 4.0
     is_hidden = behind[:, 2] < height
-    assert found.hidden[0] == pytest.approx(is_hidden.sum() / total, abs=0.03)
+    assert found.hidden_shares[0] == pytest.approx(
+        is_hidden.sum() / total, abs=0.03
+    )
     assert found.overlaps[0] == pytest.approx(len(before) / total, abs=0.03)
-    assert found.hidden[1] < 0.02
+    assert found.hidden_shares[1] < 0.02
     assert found.overlaps[1] > 0.95
     # Only standing points count, at most 8192 of each scan, drawn at random.
     # (0.51: no point of the grids lies on the limit.)
