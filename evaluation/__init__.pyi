@@ -17,6 +17,10 @@ from evaluation.recognition.metrics import (
     PlaceRecognitionMetrics as PlaceRecognitionMetrics,
 )
 from evaluation.recognition.metrics import evaluate as evaluate
+from evaluation.recognition.metrics import route_blocks as route_blocks
+from evaluation.recognition.overlap_truth import (
+    compared_frames as compared_frames,
+)
 from evaluation.recognition.protocol import (
     RetrievalProtocol as RetrievalProtocol,
 )
