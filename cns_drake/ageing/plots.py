@@ -130,7 +130,7 @@ class Plot:
         )
 
     def inside(self, area: BaseGeometry) -> BaseGeometry:
-        """Converts an area in W to S."""
+        """Converts an area from the world W to the plot's frame S."""
         moved = affinity.translate(area, -self.xy[0], -self.xy[1])
         return affinity.rotate(moved, -self.yaw, (0, 0), use_radians=True)
 

@@ -50,7 +50,7 @@ class StageDifference:
         additional: what exists only in this stage: whole structures, and upper
             parts of structures that are higher in this stage.
         absent: whole structures that exist only in the other stage.
-        lower: upper parts of structures that are higher in the other stage,
+        lower: for structures that are lower in this stage, their upper parts,
             with the shape in the other stage.
     """
 

@@ -76,9 +76,9 @@ _FIELDS: Options = {
             None,
             "Turn on loop closure: each drive is also compared with itself. A "
             "query is then compared only with places that the car passed at "
-            "least this long before [s], such as 30. Methods that otherwise "
-            "search for a few candidates, such as scan-context++, then score "
-            "all of these places.",
+            "least this long before [s], such as 30. All methods score every "
+            "such place, even those that otherwise score only a few "
+            "candidates, such as scan-context++.",
             "S",
         ),
     )

@@ -76,12 +76,15 @@ class BeamHits(NamedTuple):
 
 
 class Shots(NamedTuple):
-    """The N beams of a turn, in the order in which they are cast.
+    """The N beams of a turn, in the order in which their rays are cast.
+
+    The LiDAR may fire them in another order. Beam i is the one with the firing
+    number i.
 
     Attributes:
         key: key of the frame's random numbers; see
             `cns_drake.sensors.returns.random_numbers.frame_key`.
-        beam: (N,) number of each beam in firing order.
+        beam: (N,) firing number of each beam.
         p_WSset: (K, 3) positions of the lasers in the world [m]; beam i starts
             at position i mod K.
         times: (T,) float32 firing times as fractions of the turn; beam i fires
