@@ -394,9 +394,10 @@ def compare(
         tables: Tables of results to compare, or folders with a results.csv.
         metric: Metric to rank by: auc, r1 or another one in the tables. Give an
             unknown name to see the list of metrics.
-        protocol: Compare only results that were measured by this protocol. The
-            name own stands for a protocol with changed options. By default each
-            result is compared with all results of its own protocol.
+        protocol: Compare only results that were measured by this protocol. Use
+            own for results that were measured with changed options. By default,
+            results are compared with each other only if they used the same
+            protocol.
         gate: Compare the results that were measured with --gate. By default the
             results without it are compared.
         rankings: Compare only the order of the methods in the tables. Each

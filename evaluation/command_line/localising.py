@@ -65,8 +65,8 @@ def localise(
         odometry_drift: Drift of the simulated odometry that --track uses, as a
             share of the distance driven. With 0.01, lengths are wrong by about
             1 %, and the heading drifts by about 0.01 deg per metre.
-        output: Folder to write: localisation.csv, with the result of each
-            query, and with --track a picture.
+        output: Folder to write. It gets localisation.csv, which lists the
+            result of each query. If you give --track, it also gets a picture.
     """
     import math
 

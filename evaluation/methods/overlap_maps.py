@@ -236,15 +236,15 @@ def best_overlaps(
 ) -> tuple[np.ndarray, np.ndarray]:
     """Returns the best poses of a query near N initial poses, by overlap.
 
-    A scan is a stack of S binary maps of the same R rows and columns, see
-    `coarse_maps`; each row is a word of 64 bits. The overlap is the weighted
-    number of bits that are set in the maps of both scans.
+    A scan is a stack of S binary maps, see `coarse_maps`. Each map has R rows.
+    A row is one 64-bit word, with one bit per column. The overlap is the
+    weighted number of bits that are set in the maps of both scans.
 
     Args:
         queries: (H, R, S) uint64 maps of the query, at H headings in equal
             steps of a full turn.
-        places: (D, R + 2 m, S) uint64 maps of the places, with m empty rows
-            before and after their own.
+        places: (D, R + 2 * margin, S) uint64 maps of the places, with `margin`
+            empty rows before and after their own.
         weights: (S,) int64 weight of a bit of each map.
         starts: (N, 4) int64 initial poses: number of the place, number of the
             heading, and shifts of the query by rows and by columns.
@@ -255,8 +255,8 @@ def best_overlaps(
         For each initial pose: the greatest overlap, (N,) int64; and the number
         of the heading and the shifts by rows and by columns at which it occurs,
         (N, 3) int64. If several of the `moves` give this overlap, the first one
-        counts. If all of them shift the query by more than m rows, the overlap
-        is -1.
+        counts. If all of them shift the query by more than `margin` rows, the
+        overlap is -1.
     """
     num_headings, num_rows, num_maps = queries.shape
     margin = (places.shape[1] - num_rows) // 2

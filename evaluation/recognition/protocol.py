@@ -39,7 +39,7 @@ class RetrievalProtocol:
         max_range: largest x, y or z of a point in the sensor's frame [m];
             farther points are left out.
         scans_per_place: number of consecutive scans that are merged into the
-            described cloud; by default each method's own number.
+            described cloud; by default, each method uses its own number.
         place: which of the merged scans stands for a place: `middle`; or
             `first`, as in the paper. The pose of this scan is that of the
             place. A method's own parameter `place` overrides this value. With

@@ -162,11 +162,12 @@ def measure_places(
 
     Args:
         reporter: reports progress.
-        database: the drive of the places: its source, or the files with its
-            scans and with each method's descriptions.
+        database: the drive of the places: either the source from which its
+            scans are read, or the files that already contain its scans and each
+            method's descriptions of them.
         query: the drive of the queries, in the same world, like `database`.
-        distractors: drives through other cities: for each drive, a file with
-            the descriptions by each method.
+        distractors: for each drive through another city, and for each method,
+            the file with the method's descriptions of its places.
         num_distractors: number of places of these drives that are added to the
             database.
         methods: the methods.

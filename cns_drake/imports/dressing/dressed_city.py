@@ -465,9 +465,8 @@ def dress_city(
 ) -> Dressing:
     """Returns a city with details on its buildings and along its streets.
 
-    Before the call, all small objects of the file count as left out in
-    `city.faults`. The function removes the objects that it places from this
-    count.
+    Before the call, `city.faults` must count all small objects of the file as
+    left out. The function lowers this count by the objects that it adds.
 
     Args:
         staged: the structures of each stage.
