@@ -200,6 +200,12 @@ def route_blocks(positions: np.ndarray, frames: np.ndarray) -> np.ndarray:
     Args:
         positions: (N, 3) positions of the sensor along the drive [m].
         frames: (Q,) frame numbers of the queries.
+
+    Example:
+        from evaluation import evaluate, judge, route_blocks
+
+        blocks = route_blocks(query.X_WS[:, :3, 3], queries)
+        print(evaluate(judge(scores, matches, blocks)).auc_interval)
     """
     passed = travelled(positions)[frames] / BLOCK_LENGTH
     return np.floor(passed).astype(np.int64)

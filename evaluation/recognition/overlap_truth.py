@@ -124,6 +124,13 @@ def compared_frames(
 
     Returns:
         (Q,) increasing frame numbers of the query drive; (D,) of the database.
+
+    Example:
+        from evaluation import RetrievalProtocol, compared_frames, open_drive
+
+        database, query = map(open_drive, ("output/first", "output/second"))
+        protocol = RetrievalProtocol(query_spacing=20.0)
+        queries, places = compared_frames(database, query, protocol)
     """
     return (
         sample_frames(query.X_WS[:, :3, 3], protocol.query_spacing),

@@ -777,7 +777,16 @@ RECIPES = {
         makes=("slurm/tour/metadata.yaml",),
     ),
     "method": Recipe(
-        "import numpy as np\n\nfrom evaluation", file="heights.py"
+        "import numpy as np\n\nfrom evaluation.methods", file="heights.py"
+    ),
+    "score matrix": Recipe(
+        "import numpy as np\n\nfrom evaluation import",
+        # A program that knows how far each place is away is always right.
+        changes=(_FIRST, _LAST, ('np.load("scores.npy")', "-distances")),
+        after=("own city",),
+        file="scored.py",
+        command=".venv/bin/python scored.py",
+        prints=("1.0 Interval(low=1.0, high=1.0) 1.0 1.0",),
     ),
     "linter": Recipe(
         ".venv/bin/ruff check",
