@@ -214,8 +214,8 @@ def texture(
 
     Args:
         light: the light that smooth, uniform surfaces would return.
-        row: (B,) row of each of the B beams in `d_Wset`, which has an order of
-            its own.
+        row: (B,) for each of the B beams, in the order of `light`, its row in
+            `d_Wset`.
         p_WSset: (K, 3) positions of the sensor in the world [m]. The beam in
             row i of `d_Wset` starts at position i mod K.
         d_Wset: (B, 3) unit directions of the beams in the world.
