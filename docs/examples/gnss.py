@@ -48,7 +48,7 @@ class GnssConfig(SensorConfig):
     Attributes:
         xyz: position in `base_link` [m].
         rpy_deg: roll, pitch, yaw in `base_link` [deg].
-        rate: fixes per second, at least one a scan.
+        rate: fixes per second, at least the rate of the fastest LiDAR.
         origin_deg: latitude and longitude of the map's origin.
         noise: standard deviation of each coordinate [m].
     """
