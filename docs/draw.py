@@ -11,8 +11,10 @@ they made before is taken as it is.
 from __future__ import annotations
 
 from collections.abc import Sequence
+import csv
 import hashlib
 import io
+import itertools
 from pathlib import Path
 import re
 import subprocess
@@ -217,34 +219,46 @@ def assumptions(path: Path) -> None:
 
 
 def ranking(path: Path) -> None:
-    """Draws the means of AUC strict over the radius of a match."""
-    head, *rows = _table("docs/notes/ranking.md", "\nAUC strict:\n")
-    figure = Figure(figsize=(_WIDTH, 5.2), layout="constrained")
-    panels = figure.subplots(1, 2, sharey=True)
-    for axes, gate in zip(panels, ("without", "with"), strict=True):
-        shown = [row for row in rows if row[0] == gate]
-        radii = [float(row[1].removesuffix("m")) for row in shown]
-        for k, name in enumerate(head[2:8], 2):
-            key = name.lower().replace(" ", "-")
-            colour, style, marker = METHOD_STYLES[key]
-            means = [float(row[k].strip("*")[:4]) for row in shown]
-            axes.plot(
-                radii, means, style, color=colour, marker=marker,
-                label=title(key),
-            )  # fmt: skip
-        axes.set_xticks(radii, [f"{radius:g}" for radius in radii])
-        axes.set_ylim(0.0, 1.04)
-        axes.set_title(f"{gate} the gate", loc="left")
-        axes.set_xlabel("radius of a match [m]")
-        _plain(axes, "both")
-    panels[0].set_ylabel("AUC strict")
+    """Draws the mean AUC strict and AUC over the radius of a match."""
+    with open(ROOT / "docs/notes/ranking.csv", newline="") as stream:
+        rows = list(csv.DictReader(stream))
+    kinds = {
+        "shipped": "shipped cities",
+        "fresh": "fresh cities",
+        "plans": "other streets",
+    }
+    figure = Figure(figsize=(_WIDTH, 11.0), layout="constrained")
+    grid = figure.subplots(4, len(kinds), sharex=True, sharey=True)
+    kept = itertools.product(("auc_strict", "auc"), "01")
+    for line, (metric, gate) in zip(grid, kept, strict=True):
+        for axes, kind in zip(line, kinds, strict=True):
+            for key, (colour, style, marker) in METHOD_STYLES.items():
+                values: dict[float, list[float]] = {}
+                for row in rows:
+                    if (row["cities"], row["gate"], row["method"]) == (
+                        kind, gate, key,
+                    ):  # fmt: skip
+                        radius = float(row["radius"])
+                        values.setdefault(radius, []).append(float(row[metric]))
+                axes.plot(
+                    list(values), [np.mean(some) for some in values.values()],
+                    style, color=colour, marker=marker, label=title(key),
+                )  # fmt: skip
+            axes.set_ylim(0.0, 1.04)
+            axes.set_xticks((5.0, 7.5, 10.0, 15.0), ("5", "7.5", "10", "15"))
+            _plain(axes, "both")
+        name = {"auc": "AUC", "auc_strict": "AUC strict"}[metric]
+        line[0].set_ylabel(f"{name},\n{('without', 'with')[gate == '1']} gate")
+    for axes, name in zip(grid[0], kinds.values(), strict=True):
+        axes.set_title(name, loc="left")
+    grid[-1][1].set_xlabel("radius of a match [m]")
     _head(
         figure,
         "Layered overlap is best with the gate;\n"
         "without it, the radius decides",
     )
     figure.legend(
-        *axes.get_legend_handles_labels(), loc="outside lower center",
+        *grid[0][0].get_legend_handles_labels(), loc="outside lower center",
         ncols=3, frameon=False,
     )  # fmt: skip
     figure.savefig(path, dpi=_DPI)
