@@ -132,54 +132,58 @@ def main(names: Sequence[str]) -> None:
 
 
 def survival(path: Path) -> str:
-    """Draws what each method keeps of its AUC; returns the title."""
+    """Draws what each method keeps of its AUC and AUC strict; returns the title."""
     numbers = ("No", "One", "Two", "Three", "Four", "Five", "Six")
     tables = [kept_shares(name) for name in ("stages", "fresh")]
+    strict = kept_shares("stages", "kept_strict")
     # A method survives if the median pair keeps this share of its AUC.
     medians = [{n: np.median(some[n]) for n in some} for some in tables]
     order = sorted(METHOD_STYLES, key=medians[0].__getitem__)
     survive = sum(min(some[n] for some in medians) >= 0.95 for n in order)
-    figure = Figure(figsize=(_WIDTH, 4.6), layout="constrained")
-    axes = figure.subplots()
+    figure = Figure(figsize=(_WIDTH, 5.0), layout="constrained")
+    panels = figure.subplots(1, 2, sharey=True)
     for y, name in enumerate(order):
         colour = METHOD_STYLES[name][0]
-        for shares, offset, fill in (
-            (tables[0][name], 0.18, colour),
-            (tables[1][name], -0.18, "none"),
+        for axes, shares, offset, fill in (
+            (panels[0], tables[0][name], 0.18, colour),
+            (panels[0], tables[1][name], -0.18, "none"),
+            (panels[1], strict[name], 0.0, colour),
         ):
             shown, at = 100.0 * np.array(shares), y + offset
             heights = np.full(len(shown), at)
             axes.scatter(shown, heights, s=34, ec=colour, fc=fill)
             ends = [at - 0.17, at + 0.17]
             axes.plot([np.median(shown)] * 2, ends, color=INK, lw=3.5)
-    axes.set_yticks(range(len(order)), [title(name) for name in order])
-    axes.set_xlim(0.0, 112.0)
-    axes.axvline(100.0, color=PALE, linewidth=1, zorder=0)
-    axes.set_xlabel("AUC kept when the city is rebuilt [%]")
-    _plain(axes)
+    panels[0].set_yticks(range(len(order)), [title(name) for name in order])
+    for axes, metric in zip(panels, ("AUC", "AUC strict"), strict=True):
+        axes.set_xlim(0.0, 119.0)
+        axes.axvline(100.0, color=PALE, linewidth=1, zorder=0)
+        axes.set_xlabel(f"{metric} kept [%]")
+        _plain(axes)
     finding = (
         f"{numbers[survive]} of {numbers[len(order)].lower()} methods survive "
         "a rebuilt city"
     )
     counts = [len(some[order[0]]) for some in tables]
-    axes.set_title(
+    panels[0].set_title(
         f"● {counts[0]} pairs of shipped cities   ○ {counts[1]} of redrawn "
         "cities   ┃ median",
-        loc="left", x=-0.28,
+        loc="left", x=-0.57,
     )  # fmt: skip
     _head(figure, finding)
     figure.savefig(path, dpi=_DPI)
     return finding
 
 
-def kept_shares(table: str) -> dict[str, list[float]]:
-    """Returns method -> the shares of AUC that it keeps, one for each pair.
+def kept_shares(table: str, metric: str = "kept") -> dict[str, list[float]]:
+    """Returns method -> the shares of a metric that it keeps, one for each pair.
 
     Args:
         table: `stages` or `fresh`, a shipped table.
+        metric: `kept` for AUC, `kept_strict` for AUC strict.
     """
     file = ROOT / f"evaluation/results/baselines/{table}.csv"
-    rows = Results.read(file).where(metric="kept", gate=0).rows
+    rows = Results.read(file).where(metric=metric, gate=0).rows
     return {
         name: [row.value for row in rows if row.method == name]
         for name in METHOD_STYLES
