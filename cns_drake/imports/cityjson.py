@@ -93,20 +93,38 @@ class ReferenceSystem:
         """Returns whether a place is in or near the system's area of use.
 
         `first` and `second` are the first two coordinates of the place, in the
-        order of the system's definition. The result is False for a system
-        without an area of use.
+        order of the system's definition. The result is True for a system
+        without an area of use, since nothing speaks against the place.
         """
-        system = pyproj.CRS.from_user_input(self.name)
+        system = _horizontal(self.name)
         if system.area_of_use is None:
-            return False
-        to_degrees = pyproj.Transformer.from_crs(system, "OGC:CRS84")
-        longitude, latitude = to_degrees.transform(first, second)
+            return True
+        longitude, latitude = _degrees(system, first, second)
         west, south, east, north = system.area_of_use.bounds
         near = _NEAR_AREA_DEG
         return bool(
             west - near <= longitude <= east + near
             and south - near <= latitude <= north + near
         )
+
+
+def _horizontal(name: str) -> pyproj.CRS:
+    """Returns the system of the first two coordinates.
+
+    A system that is composed of codes, such as EPSG:31468+5783, has no area of
+    use; its horizontal part does.
+    """
+    system = pyproj.CRS.from_user_input(name)
+    return (system.sub_crs_list or [system])[0]
+
+
+def _degrees(
+    system: pyproj.CRS, first: float, second: float
+) -> tuple[float, float]:
+    """Returns the longitude and latitude of a place [deg]."""
+    to_degrees = pyproj.Transformer.from_crs(system, "OGC:CRS84")
+    longitude, latitude = to_degrees.transform(first, second)
+    return longitude, latitude
 
 
 def reference_system(name: str, where: str) -> ReferenceSystem:

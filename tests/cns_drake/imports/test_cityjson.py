@@ -418,6 +418,33 @@ def test_a_bridge_stands_above_the_ground(tmp_path):
     np.testing.assert_allclose(alone.height(xy[:1]), 7.0)
 
 
+# Berlin, Munich and Warsaw, as most programs write them: east first.
+@pytest.mark.parametrize(
+    ("system", "place", "is_north_first"),
+    [
+        ("EPSG:25833+7837", (391e3, 5820e3), False),
+        ("EPSG:31468+5783", (4467e3, 5333e3), True),
+        ("urn:ogc:def:crs,crs:EPSG::31468,crs:EPSG::5783", (4467e3, 5333e3), True),
+        ("EPSG:2180+9651", (637e3, 487e3), True),
+        # A system without an area; the faces show the order.
+        ("+proj=utm +zone=33 +axis=neu +type=crs", (391e3, 5820e3), True),
+    ],
+)  # fmt: skip
+def test_composed_systems_have_an_order_of_axes(
+    tmp_path, system, place, is_north_first
+):
+    city = CityWriter(origin=(*place, 30.0))
+    city.metadata = {"referenceSystem": system}
+    city.box("house", 0, 0, (6, 4, 3))
+    read = read_cityjson(city.write(tmp_path / "city.json"))
+    low, high = read.bounds()
+    np.testing.assert_allclose(low, [*place, 30], atol=1e-6)
+    np.testing.assert_allclose(high - low, [6, 4, 3], atol=1e-6)
+    rows = str(read.faults.rows())
+    assert ("read as east first" in rows) == is_north_first
+    assert "beyond the area" not in rows
+
+
 TOKYO, RIGA, MADRID = "EPSG:6677", "EPSG:3059", "EPSG:25830"
 
 
