@@ -42,6 +42,8 @@ _ROWS = {
 }
 # A city may be at most this far outside its system's area of use [deg].
 _NEAR_AREA_DEG = 0.5
+# A projection that changes lengths by more than this share is refused.
+_MOST_STRETCHED = 0.005
 _PLAIN = ("east [metre]", "north [metre]", "up [metre]")
 
 
@@ -338,7 +340,40 @@ def read_cityjson(path: Path) -> CityFile:
             f"{path}: coordinates look like degrees; project them to metres"
             " first (for example with cjio's crs_reproject)"
         )
+    if city.system.name:
+        _check_lengths(city.system.name, (low + high) / 2.0, path)
     return city
+
+
+def _check_lengths(name: str, place: np.ndarray, path: Path) -> None:
+    """Checks that a metre of a reference system is a metre on the ground.
+
+    Places beyond the area of the system are not checked, since they may well be
+    those of another one.
+
+    Args:
+        name: name of the reference system.
+        place: (3,) metres east, north and up.
+        path: the file, for the message.
+
+    Raises:
+        InputError: if it is not, as in Web Mercator (EPSG:3857).
+    """
+    defined = reference_system(name, "")
+    first, second, _ = np.linalg.solve(defined.matrix, place).tolist()
+    if not defined.has_place(first, second):
+        return
+    system = _horizontal(name)
+    degrees = _degrees(system, first, second)
+    factors = pyproj.Proj(system).get_factors(*degrees)
+    extremes = factors.tissot_semimajor, factors.tissot_semiminor
+    stretch = max(extremes, key=lambda factor: abs(factor - 1.0))
+    if _MOST_STRETCHED < abs(stretch - 1.0) < np.inf:
+        raise InputError(
+            f"{path}: metadata.referenceSystem: in {name}, 1 m on the ground is"
+            f" {stretch:.3g} m long; project the file to another system first"
+            " (for example with cjio's crs_reproject)"
+        )
 
 
 def _documents(path: Path) -> Iterator[tuple[int, dict]]:

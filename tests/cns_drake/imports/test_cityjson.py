@@ -1,6 +1,7 @@
 """CityJSON files, right ones and wrong ones."""
 
 import json
+import re
 
 from helpers.small_cityjson import CityWriter
 import numpy as np
@@ -443,6 +444,28 @@ def test_composed_systems_have_an_order_of_axes(
     rows = str(read.faults.rows())
     assert ("read as east first" in rows) == is_north_first
     assert "beyond the area" not in rows
+
+
+@pytest.mark.parametrize(
+    ("latitude", "is_refused"), [(4.0, False), (8.0, True), (52.5, True)]
+)
+def test_a_projection_that_stretches_a_city_is_refused(
+    tmp_path, latitude, is_refused
+):
+    """Web Mercator's lengths grow by 1 / cos(latitude), on a sphere."""
+    phi = np.radians(latitude)
+    north = 6378137.0 * np.log(np.tan(np.pi / 4 + phi / 2))
+    city = CityWriter(origin=(1490000.0, float(north), 0.0))
+    city.metadata = {"referenceSystem": "EPSG:3857"}
+    city.box("house", 0, 0, (6, 4, 3))
+    path = city.write(tmp_path / "city.json")
+    if not is_refused:
+        read_cityjson(path)
+        return
+    with pytest.raises(InputError, match="referenceSystem: in EPSG") as info:
+        read_cityjson(path)
+    (factor,) = re.findall(r"is (\S+) m long", str(info.value))
+    assert float(factor) == pytest.approx(1 / np.cos(phi), rel=8e-3)
 
 
 TOKYO, RIGA, MADRID = "EPSG:6677", "EPSG:3059", "EPSG:25830"
