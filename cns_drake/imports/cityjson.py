@@ -307,6 +307,7 @@ def read_cityjson(path: Path) -> CityFile:
     city = CityFile()
     whole: dict = {}
     whole_system = ""
+    templates = _Templates({}, "")
     for number, document in _documents(path):
         kind = document.get("type")
         where = str(path) if number == 0 else f"{path}: line {number}"
@@ -325,9 +326,10 @@ def read_cityjson(path: Path) -> CityFile:
                 )
             if not city.objects:
                 city.system, whole_system = system, system.name
+            templates = _Templates(document, where)
         elif kind != "CityJSONFeature" or not whole:
             raise InputError(f"{where}: type {kind!r} is not CityJSON")
-        _read_objects(document, whole, where, city)
+        _read_objects(document, whole, templates, where, city)
     if not city.objects:
         raise InputError(f"{path}: the file has no objects")
     if not any(city.faces()):
@@ -414,7 +416,11 @@ def _reference_system(document: dict, where: str) -> ReferenceSystem:
 
 
 def _read_objects(
-    document: dict, whole: dict, where: str, city: CityFile
+    document: dict,
+    whole: dict,
+    templates: _Templates,
+    where: str,
+    city: CityFile,
 ) -> None:
     objects = document.get("CityObjects", {})
     if not isinstance(objects, dict):
@@ -427,8 +433,8 @@ def _read_objects(
     vertices = _vertices(document, transform, where)
     if not city.objects and len(vertices):
         _settle_axes(city, vertices)
-    vertices = city.system.to_metres(vertices)
-    templates = _Templates(whole, vertices, city.system, where)
+    templates.vertices = city.system.to_metres(vertices)
+    templates.system = city.system
     for name, value in objects.items():
         if not isinstance(value, dict) or not isinstance(
             value.get("type"), str
@@ -596,15 +602,14 @@ def _numbers(values: Any, where: str) -> np.ndarray:
 
 
 class _Templates:
-    """Geometry templates of a file, which objects place in the world."""
+    """Geometry templates of a file, which objects place in the world.
 
-    def __init__(
-        self,
-        whole: dict,
-        vertices: np.ndarray,
-        system: ReferenceSystem,
-        where: str,
-    ):
+    Attributes:
+        vertices: (N, 3) vertices of the document whose objects are read [m].
+        system: reference system of the templates.
+    """
+
+    def __init__(self, whole: dict, where: str):
         templates = whole.get("geometry-templates")
         templates = templates if isinstance(templates, dict) else {}
         self._geometries = templates.get("templates") or []
@@ -612,8 +617,8 @@ class _Templates:
             templates.get("vertices-templates", []),
             f"{where}: geometry-templates.vertices-templates",
         )
-        self.vertices = vertices
-        self._system = system
+        self.vertices = np.zeros((0, 3))
+        self.system = ReferenceSystem()
 
     def place(self, instance: dict) -> tuple[Any, np.ndarray]:
         """Returns an instance's template, and the vertices of the instance.
@@ -640,7 +645,7 @@ class _Templates:
         if not (np.abs(placed) <= _FARTHEST).all():
             raise ValueError
         return template, (
-            self._system.to_metres(placed) + self.vertices[reference]
+            self.system.to_metres(placed) + self.vertices[reference]
         )
 
 

@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 from cns_drake.base.errors import InputError
+from cns_drake.imports import cityjson
 from cns_drake.imports.cityjson import import_structures, read_cityjson
 from cns_drake.imports.drives.free_space import find_free_space
 from cns_drake.imports.ground import ground_of
@@ -177,6 +178,42 @@ def test_a_drive_has_vertices_of_each_feature(tmp_path):
     path.write_text("\n".join(lines) + "\n\n")
     _, found = structures(path)
     assert [volume(one) for one in found.values()] == pytest.approx([1, 2, 3])
+
+
+def test_features_share_the_templates_of_their_file(tmp_path, monkeypatch):
+    read = []
+    numbers = cityjson._numbers
+
+    def counted(values, where):
+        if where.endswith("vertices-templates") and values:
+            read.append(where)
+        return numbers(values, where)
+
+    monkeypatch.setattr(cityjson, "_numbers", counted)
+    city = CityWriter()
+    shape = {"type": "MultiSurface", "lod": 2, "boundaries": [[[0, 1, 2]]]}
+    corners = [[0, 0, 0], [2, 0, 0], [0, 2, 0]]
+    city.templates = {"templates": [shape], "vertices-templates": corners}
+    head = city.document()
+    lines = [head | {"CityObjects": {}}]
+    for k in range(3):
+        instance = {
+            "type": "GeometryInstance",
+            "template": 0,
+            "boundaries": [0],
+            "transformationMatrix": np.eye(4).ravel().tolist(),
+        }
+        tree = {"type": "SolitaryVegetationObject", "geometry": [instance]}
+        vertices = [[1000 * k, 0, 0]]
+        feature = {"type": "CityJSONFeature", "CityObjects": {f"t{k}": tree}}
+        lines.append(feature | {"vertices": vertices})
+    path = tmp_path / "city.city.jsonl"
+    path.write_text("\n".join(map(json.dumps, lines)))
+    _, found = structures(path)
+    for k in range(3):
+        corner = found[f"t{k}"].triangles.reshape(-1, 3).min(axis=0)
+        np.testing.assert_allclose(corner, [k, 0, 0], atol=1e-9)
+    assert len(read) == 1
 
 
 def broken(change):
