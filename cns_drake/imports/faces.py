@@ -139,7 +139,7 @@ def flat_surface(
     The triangles face upwards. Faults are counted in `faults`, with `name` as
     the name of the object.
     """
-    return face_triangles(_rings(polygon, z), name, faults)
+    return face_triangles(_rings(orient(polygon), z), name, faults)
 
 
 def extruded(

@@ -462,12 +462,16 @@ def test_a_bridge_stands_above_the_ground(tmp_path):
     [
         ("EPSG:25833+7837", (391e3, 5820e3), False),
         ("EPSG:31468+5783", (4467e3, 5333e3), True),
-        ("urn:ogc:def:crs,crs:EPSG::31468,crs:EPSG::5783", (4467e3, 5333e3), True),
+        (
+            "urn:ogc:def:crs,crs:EPSG::31468,crs:EPSG::5783",
+            (4467e3, 5333e3),
+            True,
+        ),
         ("EPSG:2180+9651", (637e3, 487e3), True),
         # A system without an area; the faces show the order.
         ("+proj=utm +zone=33 +axis=neu +type=crs", (391e3, 5820e3), True),
     ],
-)  # fmt: skip
+)
 def test_composed_systems_have_an_order_of_axes(
     tmp_path, system, place, is_north_first
 ):

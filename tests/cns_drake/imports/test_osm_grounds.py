@@ -50,6 +50,28 @@ def test_grounds_by_what_they_are_made_of(tmp_path, tags, kind, plain):
             assert (one.triangles[:, :, 2] < 0.0).all()
 
 
+def test_the_ground_looks_upwards(tmp_path):
+    osm = OsmWriter()
+    osm.box(0, 0, 10, 10, building="yes")
+    osm.box(20, 0, 30, 20, landuse="grass")
+    crossing = osm.node(0, -20, highway="crossing", crossing="zebra")
+    ends = osm.node(-50, -20), osm.node(50, -20)
+    osm.way_of(
+        [ends[0], crossing, ends[1]], highway="tertiary", sidewalk="both"
+    )
+    surfaces = [
+        o
+        for o in read(osm, tmp_path).structures
+        if o.is_ground or o.kind == "Sidewalk"
+    ]
+    assert {o.kind for o in surfaces} == {
+        "LandUse", "Road", "Sidewalk", "Crossing"
+    }  # fmt: skip
+    for one in surfaces:
+        a, b, c = np.moveaxis(one.triangles, 1, 0)
+        assert (np.cross(b - a, c - a)[:, 2] > 0.0).all(), one.kind
+
+
 def test_a_pitch_has_the_colour_of_its_surface(tmp_path):
     osm = OsmWriter()
     osm.box(0, 0, 10, 10, building="yes")
