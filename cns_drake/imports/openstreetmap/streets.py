@@ -385,9 +385,13 @@ def ground_areas(
     """Yields areas on the ground, such as lawns and water.
 
     If `dressed`, there are more kinds, such as sports grounds, and areas have
-    the colours of their materials.
+    the colours of their materials. A path that is a closed way is a line, such
+    as the path around a square, unless it has `area=yes`.
     """
     for name, tags, polygons in features.areas:
+        is_path = name.startswith("w") and path_width(tags) is not None
+        if is_path and tags.get("area") != "yes":
+            tags = {k: v for k, v in tags.items() if k != "highway"}
         look = _look(tags) if dressed else _plain_look(tags)
         if look is None or has_tag(tags, "building"):
             continue

@@ -32,6 +32,11 @@ def kinds(city):
      ({"leisure": "playground"}, "Playground", "LandUse"),
      ({"landuse": "basin"}, "WaterBody", None),
      ({"highway": "footway", "area": "yes"}, "Square", None),
+     ({"highway": "footway"}, None, None),
+     ({"highway": "pedestrian"}, None, None),
+     ({"highway": "pedestrian", "area": "yes"}, "Square", "Square"),
+     ({"highway": "pedestrian", "place": "square"}, "Square", "Square"),
+     ({"highway": "platform"}, "Square", None),
      ({"amenity": "parking"}, "Parking", "Parking"),
      ({"amenity": "parking", "parking": "underground"}, None, "Parking"),
      ({"natural": "water", "layer": "-1"}, None, "WaterBody"),
@@ -48,6 +53,20 @@ def test_grounds_by_what_they_are_made_of(tmp_path, tags, kind, plain):
         if one.structure.name == name:
             assert area(one) == pytest.approx(600.0, abs=1.0)
             assert (one.triangles[:, :, 2] < 0.0).all()
+
+
+def test_a_multipolygon_of_a_path_is_an_area(tmp_path):
+    osm = OsmWriter()
+    osm.box(0, 0, 10, 10, building="yes")
+    outer, inner = osm.box(20, 0, 30, 20), osm.box(30, 5, 10, 10)
+    square = osm.relation(
+        {"outer": [outer], "inner": [inner]},
+        type="multipolygon",
+        highway="pedestrian",
+    )
+    (one,) = (o for o in read(osm, tmp_path).structures if o.kind == "Square")
+    assert one.structure.name == f"land_r{square}"
+    assert area(one) == pytest.approx(500.0, abs=1.0)
 
 
 def test_the_ground_looks_upwards(tmp_path):
