@@ -6,6 +6,8 @@ https://wiki.openstreetmap.org/wiki/Map_features
 from collections.abc import Iterable, Iterator, Sequence
 from collections.abc import Set as AbstractSet
 from dataclasses import dataclass
+import math
+import re
 from typing import NamedTuple
 
 import numpy as np
@@ -72,7 +74,8 @@ class Bridges:
 def bridges_of(ways: Iterable[OsmWay], local: Local) -> Bridges:
     """Returns the bridges and the tunnels among the ways of a file.
 
-    `local` converts longitudes and latitudes to coordinates in metres.
+    Of two bridges that cross, the upper one counts as a bridge over another
+    way. `local` converts longitudes and latitudes to coordinates in metres.
     """
     used = [
         way
@@ -94,10 +97,22 @@ def bridges_of(ways: Iterable[OsmWay], local: Local) -> Bridges:
             open_ways[k]
             for k in tree.query(line, "intersects")
             if not set(open_ways[k].nodes) & set(way.nodes)
-            and not has_tag(open_ways[k].tags, "bridge")
+            and _height_rank(open_ways[k]) < _height_rank(way)
         ]
         (over if crossed else level).add(way.name)
     return Bridges(over, level, tunnels)
+
+
+def _height_rank(way: OsmWay) -> tuple[float, str]:
+    """Returns what is greater for the upper one of two ways that cross.
+
+    One of two bridges in the same layer is above the other; the file does not
+    say which, and so the name decides.
+    """
+    if not has_tag(way.tags, "bridge"):
+        return -math.inf, ""
+    layer = re.fullmatch(r"[+-]?\d+(\.\d+)?", way.tags.get("layer", ""))
+    return float(layer[0]) if layer else 1.0, way.name
 
 
 class Look(NamedTuple):

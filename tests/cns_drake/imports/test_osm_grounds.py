@@ -154,6 +154,37 @@ def test_bridges_are_level_or_left_out(tmp_path):
 
 
 @pytest.mark.parametrize(
+    ("layers", "upper"),
+    [
+        (("1", "2"), 1),
+        (("2", "1"), 0),
+        # A bridge is in layer 1 if its tags do not say otherwise.
+        ((None, "2"), 1),
+        (("0", None), 1),
+        (("-1", "-2"), 0),
+        (("1", "1"), None),
+    ],
+)
+def test_the_upper_one_of_two_bridges_is_left_out(tmp_path, layers, upper):
+    osm = OsmWriter()
+    osm.box(-60, 20, 10, 10, building="yes")
+    names = []
+    for line, layer in zip(
+        ([(-40, 0), (40, 0)], [(0, -40), (0, 40)]), layers, strict=True
+    ):
+        tags = {"layer": layer} if layer is not None else {}
+        names.append(osm.way(line, highway="primary", bridge="yes", **tags))
+    city = read(osm, tmp_path)
+    built = {o.structure.name for o in city.structures if o.kind != "Building"}
+    (out,) = (n for n in names if f"road_w{n}" not in built)
+    assert upper is None or out == names[upper]
+    names.remove(out)
+    assert built == {f"road_w{names[0]}", f"parapet_w{names[0]}"}
+    row = ("bridge over a street or railway, left out", 1, f"w{out}")
+    assert row in city.faults.rows()
+
+
+@pytest.mark.parametrize(
     ("tags", "right", "left"),
     [({}, True, True),
      ({"parking:both": "no"}, False, False),
