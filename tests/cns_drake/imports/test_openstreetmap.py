@@ -87,6 +87,32 @@ def test_roofs_hold_their_volume(roof, part, turned):
     assert (normals[:, 2] > 0).all()
 
 
+L_SHAPE = [(0, 0), (30, 0), (30, 8), (8, 8), (8, 30), (0, 30)]
+SHORT_L = [(0, 0), (12, 0), (12, 10), (10, 10), (10, 12), (0, 12)]
+DART = [(0, 0), (10, 4), (20, 0), (10, 20)]
+
+
+@pytest.mark.parametrize(
+    ("corners", "roof", "is_made"),
+    [
+        (L_SHAPE, "pyramidal", False),
+        (SHORT_L, "pyramidal", True),
+        (DART, "gabled", False),
+        (DART, "pyramidal", True),
+    ],
+)
+def test_no_roof_leaves_its_outline(corners, roof, is_made):
+    faults = ImportFaults()
+    polygon = Polygon(corners)
+    _, top = extruded(polygon, 0.0, 9.0, "a", faults, roof, 3.0)
+    flat = [Polygon(triangle) for triangle in top[..., :2]]
+    # Triangles that neither overlap nor leave the outline have its area.
+    assert sum(one.area for one in flat) == pytest.approx(polygon.area)
+    assert np.ptp(top[..., 2]) == (3.0 if is_made else 0.0)
+    made_flat = (f"roof of shape {roof}, made flat", 1, "a")
+    assert faults.rows() == ([] if is_made else [made_flat])
+
+
 def test_a_hipped_roof_slopes_on_four_sides():
     polygon = Polygon([(0, 0), (12, 0), (12, 6), (0, 6)])
     walls, top = extruded(polygon, 0, 9, "a", ImportFaults(), "hipped", 3.0)
