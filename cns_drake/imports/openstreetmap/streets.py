@@ -36,6 +36,7 @@ from cns_drake.imports.openstreetmap.tags import (
     lanes_beside,
     path_width,
     sidewalk_sides,
+    speed_limit,
     street_width,
 )
 from cns_drake.imports.options import ImportFaults
@@ -242,6 +243,8 @@ def street_surfaces(
         if width is None:
             walks.append((name, course.buffer((narrow or 0.0) / 2.0, 4)))
             continue
+        for is_forward in {True, "maxspeed:backward" not in tags}:
+            speed_limit(tags, is_forward, (name, faults))
         if has_tag(tags, "bridge") and name not in bridges.level:
             faults.add("bridge, laid on the ground", name)
         roads.append((name, course.buffer(width / 2.0, 4)))
