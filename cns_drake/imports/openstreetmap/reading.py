@@ -223,8 +223,10 @@ class Local:
 
     The constructor takes the longitude and latitude of the origin [deg]. An
     object is called with longitudes and latitudes (N, 2) [deg], and returns x
-    and y (N, 2) [m]. It uses the Earth's radii of curvature at the origin,
-    which is exact to 1 in 10,000 within 10 km.
+    and y (N, 2) [m]. It uses the Earth's radii of curvature at the origin.
+    Places d metres north and east of it are off by about 1.1 d^2 tan(latitude)
+    / R, where R is the Earth's radius: at 52 deg by 0.5 m if d is 1.5 km, and
+    by 22 m if d is 10 km. Lengths 10 km north are wrong by 20 in 10,000 there.
     """
 
     def __init__(self, longitude: float, latitude: float):

@@ -4,6 +4,7 @@ import re
 
 from helpers.small_osm import LAT, LON, OsmWriter
 import numpy as np
+import pyproj
 import pytest
 from shapely.geometry import Polygon
 
@@ -11,6 +12,7 @@ from cns_drake.base.errors import InputError
 from cns_drake.imports.faces import extruded
 from cns_drake.imports.import_map import ImportOptions, import_city
 from cns_drake.imports.openstreetmap.city import import_openstreetmap
+from cns_drake.imports.openstreetmap.reading import Local
 from cns_drake.imports.openstreetmap.tags import (
     count,
     heights,
@@ -335,6 +337,20 @@ def test_limits_that_cannot_be_read_are_noted(tmp_path):
         (f"maxspeed {told}", 1, f"w{fast}"),
         (f"maxspeed:backward {told}", 1, f"w{back}"),
     ]
+
+
+@pytest.mark.parametrize(
+    ("distance", "error"), [(1500.0, 0.5), (10000.0, 22.4)]
+)
+@pytest.mark.parametrize("east", [1.0, -1.0])
+def test_places_are_as_exact_as_stated(distance, error, east):
+    x, y = east * distance, distance
+    to_degrees = pyproj.Transformer.from_crs(
+        f"+proj=aeqd +lat_0={LAT} +lon_0={LON} +ellps=WGS84", "OGC:CRS84"
+    )
+    places = np.array([to_degrees.transform(x, y)])
+    off = Local(LON, LAT)(places)[0] - (x, y)
+    assert np.hypot(*off) == pytest.approx(error, rel=0.02)
 
 
 def test_half_a_country_is_refused(tmp_path):
