@@ -17,6 +17,7 @@ from evaluation.map_update.sessions import (
     Label,
     MapBuilder,
     Pair,
+    read_labels,
     read_pair,
     read_session,
     write_labels,
@@ -367,6 +368,23 @@ def test_bad_labels_are_refused(tmp_path, capsys):
     )
     assert_refused(capsys, ["map-update", folder], folder / "B", "poses.txt")
     assert_refused(capsys, ["map-update", tmp_path], "no folder A")
+
+
+def test_labels_of_a_cloud_are_its_predictions(tmp_path):
+    """A cloud may contain the truth, too."""
+    pair, truth = clouds(tmp_path)
+    rows = "0 0 0 1 2\n" * 400
+    text = (
+        "ply\nformat ascii 1.0\nelement vertex 400\nproperty double x\n"
+        "property double y\nproperty double z\nproperty uchar {}\n"
+        "property uchar {}\nend_header\n"
+    )
+    path = tmp_path / "labels.ply"
+    path.write_text(text.format("truth", "prediction") + rows)
+    assert (read_labels(path, pair.A, truth=False) == Label.GONE).all()
+    path.write_text(text.format("truth", "change") + rows)
+    with pytest.raises(InputError, match="no property `prediction`"):
+        read_labels(path, pair.A, truth=False)
 
 
 def write_column(path, kind, value):
