@@ -123,10 +123,6 @@ def localise(
         )
         values |= {"odometry_drift": odometry_drift}
         values |= tracking.summary(rows)
-        if output is not None:
-            from evaluation.report.curve_figures import draw_track
-
-            draw_track(rows, output / "track")
     else:
         frames = queries.query_frames(drive, is_mapped, query_spacing)
         rows = queries.localise(
@@ -137,8 +133,18 @@ def localise(
             num_jobs,
             terminal.track,
         )
+    if all(map(math.isnan, rows["unmapped"])):
+        raise InputError(
+            f"{drive.name}: no scan has {estimators.FEWEST_POINTS} points in"
+            f" different voxels of {settings.scan_voxel:g} m"
+        )
+    queries.note_sparse(drive.name, rows, terminal.note)
     values |= queries.summary(rows)
     if output is not None:
+        if track:
+            from evaluation.report.curve_figures import draw_track
+
+            draw_track(rows, output / "track")
         queries.write_rows(rows, output / "localisation.csv")
         terminal.note(f"wrote {output / 'localisation.csv'}")
     options.show(values, _rows(values), json=json)

@@ -36,12 +36,12 @@ from evaluation.alignment.registration import (
 from evaluation.clouds.cloud_files import OnNote, no_note, read_blocks
 from evaluation.drives.sampling import sample_frames, within_range
 from evaluation.localisation.robust import MAX_RANGE, align_robustly
-from evaluation.maps.voxel_maps import VoxelAccumulator, thin
+from evaluation.maps.voxel_maps import VoxelAccumulator
 from evaluation.methods.method import run_module, with_named_faults
 
 # Distance between the scans of a drive that enter the map [m].
 _MAP_SPACING = 1.0
-# Least number of points to which a normal is fitted.
+# Least number of points of a map, and of a thinned scan that is aligned.
 FEWEST_POINTS = 10
 # An alignment ends when a step is below these [m, rad].
 _STILL = (1e-4, 1e-5)
@@ -516,23 +516,3 @@ def make_estimator(method: str, settings: Settings) -> Estimator:
             f"{path}: has {len(own)} functions, none of which is `localise`"
         )
     return partial(_by_own, with_named_faults(function, path), path)
-
-
-def thinned(measured: np.ndarray, settings: Settings, where: str) -> np.ndarray:
-    """Returns a scan with at most one point per voxel, (M, 3).
-
-    Args:
-        measured: (N, 3) points of the scan [m].
-        settings: settings with the side of a voxel, `scan_voxel`.
-        where: name of the scan, for the error message.
-
-    Raises:
-        InputError: too few points are left.
-    """
-    points = thin(measured, settings.scan_voxel)
-    if len(points) < FEWEST_POINTS:
-        raise InputError(
-            f"{where}: {len(points)} points in voxels of"
-            f" {settings.scan_voxel:g} m, fewer than {FEWEST_POINTS}"
-        )
-    return points

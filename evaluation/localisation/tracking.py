@@ -95,7 +95,7 @@ def track_drive(
         first scan, and the length since the previous scan [m].
 
     Raises:
-        InputError: a scan cannot be read, or has too few points.
+        InputError: a scan cannot be read, or fewer than two are in the map.
     """
     X_WS = query.X_WS
     way = travelled(X_WS[:, :3, 3])

@@ -298,9 +298,11 @@ class Measuring:
                     k, k, drive.scan(k), X_WS[k], R_WT[k], *_STARTS.draw(k)
                 )
                 found[name].append(row)
-        for name, rows in found.items():
+        for k, (name, rows) in enumerate(found.items()):
             if rows:
                 found_rows = np.array(rows)
+                if k == 0:
+                    localise.note_sparse(one.name, found_rows, self._note)
                 numbers = localise.numbers(found_rows, name)
                 columns = localise.columns(found_rows)
                 self._add(one, "localise", name, numbers, columns=columns)

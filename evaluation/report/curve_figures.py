@@ -113,7 +113,7 @@ def draw_track(rows: np.ndarray, stem: Path) -> None:
     bottom.set(
         xlabel="way [m]",
         ylabel="scan\nwithout map",
-        ylim=(0.0, max(0.1, 1.05 * float(rows["unmapped"].max()))),
+        ylim=(0.0, max(0.1, 1.05 * float(np.nanmax(rows["unmapped"])))),
     )
     for axes in (top, bottom):
         axes.grid(alpha=0.3)

@@ -36,6 +36,7 @@ from evaluation.localisation.localise import (
     is_right,
     localise,
     mapped_frames,
+    note_sparse,
     summary,
     way_axes,
 )
@@ -465,6 +466,24 @@ def test_an_end_without_a_pose_is_a_failure():
     assert values["translation_median"] is None
 
 
+@pytest.mark.parametrize(("number", "is_sparse"), [(9, True), (10, False)])
+def test_a_scan_of_few_points_is_a_failure(number, is_sparse):
+    found = localiser(street(), "icp")
+    X_WS, still = a_pose(0, 0, 1.7), np.zeros((2, 3))
+    rows = np.array(
+        [
+            one_query(found, X_WS, street()[:number], *still),
+            one_query(found, X_WS, street(), *still),
+        ]
+    )
+    values, notes = summary(rows), []
+    note_sparse("town", rows, notes.append)
+    assert values["success_03m_1deg"] == (0.5 if is_sparse else 1.0)
+    assert values["without_pose"] == int(is_sparse) == len(notes)
+    assert values["unmapped_mean"] == 0.0
+    assert notes == [] or notes[0].startswith("town: 1 of 2 scans")
+
+
 OWN = {
     "no_rotation": (
         "import numpy as np\ndef f(map, scan, start):\n"
@@ -533,7 +552,7 @@ def test_bad_input(streets, tmp_path, capsys, monkeypatch):
         ([streets["map"], streets["away"], *gicp], "away", "the nearest scan"),
         ([tmp_path / "none.npy", pair[1], *gicp], "none.npy", "0 points"),
         ([tmp_path / "few.npy", pair[1], *gicp], "few.npy", "1 points"),
-        ([pair[0], tmp_path / "none.npy", *gicp], "none.npy", "0 points"),
+        ([pair[0], tmp_path / "none.npy", *gicp], "none.npy: no scan has 10"),
         ([tmp_path / "street.npy", streets["away"], *gicp], "the nearest scan"),
     ):
         assert_refused(capsys, ["localise", *arguments], *words)

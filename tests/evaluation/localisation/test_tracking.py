@@ -123,6 +123,15 @@ def test_losses_and_returns():
     assert values["within_03m"] == pytest.approx(84.0 / 99.0, rel=1e-3)
 
 
+def test_a_scan_without_points_is_passed_by_odometry(monkeypatch):
+    line = Line(9)
+    some = {4: CLOUD[:0], 5: CLOUD[:9]}
+    monkeypatch.setattr(line, "scan", lambda k: from_xyz(some.get(k, CLOUD)))
+    rows = follow(line, stay)
+    assert np.flatnonzero(np.isnan(rows["unmapped"])).tolist() == [4, 5]
+    assert rows["translation_error"][6:] == pytest.approx(0.5)
+
+
 def test_each_stretch_has_a_start_of_its_own():
     line = Line(60)
     mapped = np.ones(60, bool)
