@@ -452,13 +452,11 @@ def summary(rows: np.ndarray) -> dict[str, float | int | None]:
     ):
         found[f"auroc_{name}"] = auroc(scores, right)
     found["believed_from"] = least
-    found["confident_wrong"] = float(np.mean(believed & ~right))
-    wrong = np.count_nonzero(~right)
-    found["confident_of_wrong"] = (
-        float(np.count_nonzero(believed & ~right) / wrong)
-        if wrong and right.any()
-        else None
-    )
+    # Without a right result, there is no threshold.
+    harmful = float((believed & ~right).sum()) if right.any() else math.nan
+    wrong = int((~right).sum())
+    found["confident_wrong"] = harmful / len(rows)
+    found["confident_of_wrong"] = harmful / wrong if wrong else None
     known = rows["unmapped"][~np.isnan(rows["unmapped"])]
     found["unmapped_mean"] = float(known.mean()) if len(known) else None
     found["seconds_mean"] = float(rows["seconds"].mean())

@@ -442,7 +442,7 @@ def test_whether_an_estimator_knows():
     assert values["translation_median"] == 0.0
     nothing = with_scores([1.0, 2.0], [True, True])
     assert nothing["auroc_own_score"] is None is nothing["believed_from"]
-    assert nothing["confident_wrong"] == 0.0
+    assert nothing["confident_wrong"] is None is nothing["confident_of_wrong"]
 
 
 def test_auroc_of_scores():
