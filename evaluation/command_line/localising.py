@@ -169,7 +169,10 @@ def _rows(values: dict) -> Iterator[tuple[str, str]]:
             f" {values['lost_for_good']} for good)",
         )
         yield "  found again after", f"{text('back_after_median')} m"
-    yield "scans", str(values["queries"])
+    yield (
+        "scans",
+        f"{values['queries']}, {values['without_pose']} without a pose",
+    )
     yield "within 0.3 m and 1 deg", text("success_03m_1deg")
     yield "within 2 m and 5 deg", text("success_2m_5deg")
     for name, unit in (("translation", "m"), ("rotation", "deg")):
