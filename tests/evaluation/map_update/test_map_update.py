@@ -190,6 +190,30 @@ def test_points_are_left_out(tmp_path):
     assert score(pair, truth, guess, {})["miou"] == 1.0
 
 
+def test_the_updated_map_is_the_nearest_points(tmp_path):
+    """Points without a true label are not scored, but others lie near them."""
+    pair, truth = clouds(tmp_path)
+    _, guess = clouds(tmp_path / "other", seed=8)
+    truth.A[:100] = truth.B[300:] = Label.IGNORED
+    found = score(pair, truth, guess, {})["updated_map"]
+    A, B = pair.A.points, pair.B.points
+    # New (3) or newly seen (4) points of B are added.
+    updated = np.concatenate([A[guess.A != 2], B[np.isin(guess.B, [3, 4])]])
+    scored = np.concatenate(
+        [
+            A[(guess.A != 2) & np.isin(truth.A, [1, 2])],
+            B[np.isin(guess.B, [3, 4]) & (truth.B != 255)],
+        ]
+    )
+    own, other = (
+        np.linalg.norm(one[:, None] - others, axis=2).min(axis=1)
+        for one, others in ((scored, B), (B[truth.B != 255], updated))
+    )
+    assert found["accuracy"] == np.mean(own <= 0.2)
+    assert found["completeness"] == np.mean(other <= 0.2)
+    assert found["chamfer"] == pytest.approx((own.mean() + other.mean()) / 2)
+
+
 def test_a_structure_is_what_most_of_its_observed_points_are():
     instances = np.array([1, 1, 1, 1, 2, 2, 3, 0, 4, 4], np.uint16)
     labels = np.array([0, 0, 2, 0, 2, 1, 0, 2, 1, 1])
