@@ -298,6 +298,12 @@ class Measuring:
                     k, k, drive.scan(k), X_WS[k], R_WT[k], *_STARTS.draw(k)
                 )
                 found[name].append(row)
+        number = max(map(len, found.values()), default=len(drive))
+        if number < len(drive):
+            self._note(
+                f"{one.name}: {number} of {len(drive)} scans localised; the"
+                f" others have no other scan within {localise.NEAR:g} m"
+            )
         for k, (name, rows) in enumerate(found.items()):
             if rows:
                 found_rows = np.array(rows)

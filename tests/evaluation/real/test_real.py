@@ -87,6 +87,20 @@ def test_each_scan_is_localised_in_the_map_of_the_others(measured):
     assert {row.protocol for row in results.rows} == {"fair"}
 
 
+def test_scans_that_are_alone_are_counted(tmp_path):
+    # The limit is 7.5 m.
+    alone = {
+        **{name: FRAMES[name] for name in ("000026", "003528")},
+        "004481": (1, 0.0, 2.0, 8.51),
+    }
+    notes = []
+    measuring = Measuring(("icp",), silent, notes.append)
+    measuring.run(fill(tmp_path, alone), None)
+    (note,) = (one for one in notes if "localised" in one)
+    assert note.startswith("kitti_00_revisits: 2 of 3 scans localised")
+    assert {row.n for row in measuring.rows} == {2}
+
+
 def test_what_is_missing_or_another_is_named(measured):
     lines = measured[2]
     for name in ("kitti_00/velodyne/*.bin", "nclt/*.bin"):
