@@ -302,16 +302,18 @@ def room(size, beams=(200, 60), window=None):
 
 
 def test_free_space_sees_past_what_is_gone(tmp_path):
-    """A's map: a wall at 10 m, a box at 5 m, a thing outside at 30 m.
+    """A's map: a wall at 10 m, a box at 5 m, things at 30 m and overhead.
 
     B sees the wall, but not the box; what is outside, the wall hides. Points of
-    B beside some of the box, but not at it, do not keep it.
+    B beside some of the box, but not at it, do not keep it. A bird does not
+    widen B's field of view to what is overhead.
     """
     rng = np.random.default_rng(1)
     box = np.array([5.0, 0.0, 0.0]) + rng.uniform(-0.5, 0.5, (200, 3))
     outside = np.array([30.0, 0.0, 0.0]) + rng.uniform(-0.5, 0.5, (200, 3))
+    overhead = np.array([0.0, 0.0, 9.0]) + rng.uniform(-0.5, 0.5, (200, 3))
     wall = room(10.0)[::7]
-    write_map(tmp_path / "A", np.concatenate([wall, box, outside]))
+    write_map(tmp_path / "A", np.concatenate([wall, box, outside, overhead]))
     beside = box[:100] + np.array([0.15, 0.0, 0.0])
     away = np.linalg.norm(beside[:, None] - box, axis=2).min(axis=1)
     beside = beside[away > 0.125]
@@ -319,8 +321,9 @@ def test_free_space_sees_past_what_is_gone(tmp_path):
     write_map(tmp_path / "B", np.concatenate([room(10.0), beside]))
     folder = tmp_path / "B" / "Scans"
     folder.mkdir()
-    rows = "\n".join(" ".join(f"{v:.6f}" for v in p) for p in room(10.0))
-    count = len(room(10.0))
+    scan = np.concatenate([room(10.0), [[0.01, 0.0, 3.0]]])
+    rows = "\n".join(" ".join(f"{v:.6f}" for v in p) for p in scan)
+    count = len(scan)
     (folder / "000000.pcd").write_text(
         "VERSION 0.7\nFIELDS x y z\nSIZE 4 4 4\nTYPE F F F\nCOUNT 1 1 1\n"
         f"WIDTH {count}\nHEIGHT 1\nVIEWPOINT 0 0 0 1 0 0 0\nPOINTS {count}\n"
@@ -332,7 +335,7 @@ def test_free_space_sees_past_what_is_gone(tmp_path):
     n = len(wall)
     assert (labels[:n] == Label.KEPT).all()
     assert (labels[n : n + 200] == Label.GONE).all()
-    # Beyond its reach, which is that of the farthest return, or hidden.
+    # Beyond its reach or its field of view, or hidden.
     assert (labels[n + 200 :] == Label.UNOBSERVED).all()
 
 
@@ -396,7 +399,7 @@ def test_bad_labels_are_refused(tmp_path, capsys):
 
 def test_labels_of_a_cloud_are_its_predictions(tmp_path):
     """A cloud may contain the truth, too."""
-    pair, truth = clouds(tmp_path)
+    pair, _ = clouds(tmp_path)
     rows = "0 0 0 1 2\n" * 400
     text = (
         "ply\nformat ascii 1.0\nelement vertex 400\nproperty double x\n"
