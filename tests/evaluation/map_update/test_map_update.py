@@ -363,6 +363,8 @@ def test_real_drives_need_only_labels(towns, tmp_path, capsys):
     drives = towns / "town_01", towns / "town_02"
     status, out, err = run(capsys, "map-sessions", *drives, "--output", output)
     assert (status, out) == (0, f"{output}\n"), err
+    # A command that needs labels cannot come next.
+    assert "next:" not in err
     for side, label in (("A", 1), ("B", 3)):
         size = len(read_session(output / side).points)
         labels = np.full(size, 255, np.uint8)
