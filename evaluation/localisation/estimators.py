@@ -86,24 +86,33 @@ class Settings:
     neighbours: int = 10
     iterations: int = 50
 
-    def with_values(self, values: Iterable[tuple[str, Any]]) -> "Settings":
+    def with_values(
+        self, values: Iterable[tuple[str, Any]], method: str
+    ) -> "Settings":
         """Returns the settings with other values of some of them.
 
         Args:
             values: pairs of a name and its value, a number or text.
+            method: name of the method, which must have these settings.
 
         Raises:
             InputError: if a setting is unknown, or a value does not fit.
         """
+        unused = {
+            *(() if method in _ALIGNING else _ALIGNMENT),
+            *(() if method in _VOXELS else ("resolution",)),
+        }
         known: dict[str, Callable] = {
             one.name: int if isinstance(one.default, int) else float
             for one in fields(self)
+            if one.name not in unused
         }
         found = {}
         for name, text in values:
             if name not in known:
                 raise InputError(
-                    f"--set: no setting {name!r} (known: {', '.join(known)})"
+                    f"--set: {method} has no setting {name!r} (known:"
+                    f" {', '.join(known)})"
                 )
             try:
                 value = known[name](text)
@@ -454,6 +463,12 @@ _KINDS = {
 _ROBUST = {"robust-plane-icp": "PLANE_ICP", "robust-gicp": "GICP"}
 KISS_MATCHER = "kiss-matcher"
 METHODS = (*_KINDS, *_ROBUST, KISS_MATCHER)
+# Settings that only the methods with an iterative alignment use, and methods
+# with the setting `resolution`. All methods use the others: they thin map and
+# scan, and measure the fit.
+_ALIGNING = (*_KINDS, *_ROBUST)
+_ALIGNMENT = ("width", "last_width", "iterations")
+_VOXELS = ("vgicp", KISS_MATCHER)
 # The best on unchanged cities; see docs/localisation.md.
 _DEFAULTS = {
     "gicp": Settings(width=8.0),

@@ -1,5 +1,7 @@
 """Localisation of scans in a map, against scenes with known answers."""
 
+from contextlib import nullcontext
+from dataclasses import fields
 import json
 import math
 from pathlib import Path
@@ -543,10 +545,26 @@ def test_bad_input(streets, tmp_path, capsys, monkeypatch):
         ),
         ([*pair, *gicp, "--start-turn", "181"], "--start-turn: 181 deg"),
         ([*pair, *gicp, "--seed", "-1"], "--seed"),
-        ([*pair, *gicp, "--query-spacing", "0"], "--query-spacing"),
-        ([*pair, *gicp, "--odometry-drift", "2"], "--odometry-drift"),
+        ([*pair, *gicp, "--query-spacing", "0"], "--query-spacing: 0"),
+        (
+            [*pair, *gicp, "--track", "--query-spacing", "10"],
+            "--query-spacing: not together",
+        ),
+        (
+            [*pair, *gicp, "--track", "--odometry-drift", "2"],
+            "--odometry-drift: 2",
+        ),
+        (
+            [*pair, *gicp, "--odometry-drift", "0.01"],
+            "--odometry-drift: only together",
+        ),
+        (
+            [tmp_path / "street.npy", pair[1], *gicp, "--align", "always"],
+            "--align: ",
+            "street.npy",
+        ),
         ([*pair, *gicp, "--set", "width=x"], "--set: width"),
-        ([*pair, *gicp, "--set", "wide=1"], "--set: no setting 'wide'"),
+        ([*pair, *gicp, "--set", "wide=1"], "gicp has no setting 'wide'"),
         ([*pair, "--method", "ndt"], "no method 'ndt'"),
         ([*pair, "--method", "nowhere.py"], "nowhere.py: no such file"),
         ([streets["map"], streets["away"], *gicp], "away", "the nearest scan"),
@@ -566,11 +584,35 @@ def test_bad_input(streets, tmp_path, capsys, monkeypatch):
 
 
 def test_settings_are_checked():
-    changed = Settings().with_values([("width", "1.5"), ("neighbours", "20")])
+    changed = Settings().with_values(
+        [("width", "1.5"), ("neighbours", "20")], "gicp"
+    )
     assert (changed.width, changed.neighbours) == (1.5, 20)
     for name, value in (("width", "0"), ("neighbours", "3"), ("voxel", "-1")):
         with pytest.raises(InputError, match=name):
-            Settings().with_values([(name, value)])
+            Settings().with_values([(name, value)], "gicp")
+
+
+@pytest.mark.parametrize(
+    ("method", "lacks"),
+    [
+        ("gicp", {"resolution"}),
+        ("robust-gicp", {"resolution"}),
+        ("vgicp", set()),
+        ("kiss-matcher", {"width", "last_width", "iterations"}),
+        ("x.py", {"resolution", "width", "last_width", "iterations"}),
+    ],
+)
+def test_a_setting_that_a_method_lacks_is_refused(method, lacks):
+    for one in fields(Settings):
+        with (
+            nullcontext()
+            if one.name not in lacks
+            else pytest.raises(
+                InputError, match=f"{method} has no setting '{one.name}'"
+            )
+        ):
+            Settings().with_values([(one.name, 5)], method)
 
 
 @pytest.mark.slow
