@@ -396,7 +396,7 @@ def note_sparse(name: str, rows: np.ndarray, on_note: OnNote) -> None:
     if sparse := np.count_nonzero(np.isnan(rows["unmapped"])):
         on_note(
             f"{name}: {sparse} of {len(rows)} scans have fewer than"
-            f" {FEWEST_POINTS} points in different voxels; they count as"
+            f" {FEWEST_POINTS} points after thinning; they count as"
             " failures"
         )
 
