@@ -71,7 +71,7 @@ class Weather:
     snowfall: float = 0.0
 
     def __post_init__(self) -> None:
-        if self.visibility is not None and not 5.0 <= self.visibility < 1e6:
+        if self.visibility is not None and not 5.0 <= self.visibility <= 1e6:
             raise ValueError(
                 f"visibility: {self.visibility} is not within 5 m and 1000 km"
             )

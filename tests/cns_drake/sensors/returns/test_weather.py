@@ -187,14 +187,15 @@ def test_wet_asphalt_is_darker():
     ("field", "value"),
     [
         ("visibility", 4.999),
-        ("visibility", 1e6),
+        ("visibility", 1e6 + 1.0),
         ("rain", -0.001),
         ("snowfall", 300.001),
         ("rain", np.nan),
     ],
 )
 def test_senseless_weather(field, value):
-    assert not Weather(5.0, 300.0, 300.0).is_clear
+    for visibility in (5.0, 1e6):
+        assert not Weather(visibility, 300.0, 300.0).is_clear
     with pytest.raises(ValueError, match=field):
         Weather(**{field: value})
 
