@@ -181,7 +181,8 @@ def tabulate_scattering(
     from scipy.integrate import cumulative_trapezoid
 
     distances = _DISTANCES[min_range < _DISTANCES]
-    distances = np.concatenate([[min_range], distances])
+    # At no distance at all, light would be infinitely strong.
+    distances = np.concatenate([[max(min_range, 1e-6)], distances])
     radius = _APERTURE + divergence * distances
     overlap = np.interp(distances, _OVERLAP, (0.0, 1.0))
     rate = np.zeros(len(distances))
