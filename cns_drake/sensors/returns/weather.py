@@ -16,6 +16,8 @@ follows from the lidar ratio of ice crystals, 25 sr (Young and Vaughan, 2009).
 Fog is a homogeneous medium. With the meteorological visibility V [m], its
 extinction is alpha = ln 20 / V [1/m], and its back-scatter coefficient is 0.046
 / V [1/(m sr)] (Rasshofer et al., 2011).
+
+The section "Limits" of docs/notes/calibrated_returns.md says what is missing.
 """
 
 from dataclasses import dataclass
