@@ -13,8 +13,8 @@ from cns_drake.traffic.lane_graph import SPACING, LaneGraph, Piece, resampled
 _SHORTEST_LANE = 14.0
 # Distance from a stop line to the end of its lane, in steps of `SPACING`.
 _STOP_STEPS = 2
-# Greatest number of short lanes in a way, and of ways from a lane.
-_MOST_SHORT, _MOST_WAYS = 8, 12
+# Greatest number of short lanes in a way.
+_MOST_SHORT = 8
 
 
 class DirectedLane(NamedTuple):
@@ -165,14 +165,20 @@ def _merge(
 def _ways(
     first: int, after: Sequence[Sequence[int]], long: set[int]
 ) -> Iterator[tuple[tuple[int, ...], int]]:
-    """Yields short lanes that follow a lane, and the long lane behind."""
+    """Yields short lanes that follow a lane, and the long lane behind.
+
+    There is one way to each long lane: the first of those with the fewest short
+    lanes.
+    """
     waiting: list[tuple[int, ...]] = [()]
-    found = 0
-    while waiting and found < _MOST_WAYS:
+    reached: set[int] = set()
+    while waiting:
         short = waiting.pop(0)
         for k in after[short[-1] if short else first]:
+            if k in reached:
+                continue
+            reached.add(k)
             if k in long:
                 yield short, k
-                found += 1
-            elif k not in short and len(short) < _MOST_SHORT:
+            elif len(short) < _MOST_SHORT:
                 waiting.append((*short, k))
