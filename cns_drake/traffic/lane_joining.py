@@ -4,9 +4,16 @@ from collections.abc import Iterable, Iterator, Mapping, Sequence
 from typing import NamedTuple
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from cns_drake.traffic import lane_graph
-from cns_drake.traffic.lane_graph import SPACING, LaneGraph, Piece, resampled
+from cns_drake.traffic.lane_graph import (
+    SPACING,
+    LaneGraph,
+    Piece,
+    length_of,
+    resampled,
+)
 
 # A lane must have room for any vehicle. A shorter one is part of the ways that
 # lead over it [m].
@@ -105,6 +112,14 @@ def join_lanes(
     return LaneGraph(tuple(lane_graph.without_dead_ends(pieces)))
 
 
+def usual_limit(limits: ArrayLike, lengths: ArrayLike) -> float:
+    """Returns the median of limits (N,), weighted with their lengths (N,)."""
+    order = np.argsort(limits)
+    reached = np.cumsum(np.asarray(lengths)[order])
+    middle = np.searchsorted(reached, reached[-1] / 2.0)
+    return float(np.asarray(limits)[order][middle])
+
+
 def _merge(
     lanes: Sequence[DirectedLane],
     links: Iterable[tuple[int, int]],
@@ -145,7 +160,10 @@ def _merge(
     merged = [
         DirectedLane(
             np.concatenate([lanes[k].points for k in chain]),
-            min(lanes[k].limit for k in chain),
+            usual_limit(
+                [lanes[k].limit for k in chain],
+                [length_of(lanes[k].points) for k in chain],
+            ),
             lanes[chain[0]].connects,
         )
         for chain in chains

@@ -405,7 +405,7 @@ class ImportedRoad:
             lanes, positive to the left [m].
         sections: stretches with the same lanes, one after the other.
         keeps_left: whether traffic keeps left.
-        limits: start and value of each speed limit [m, m/s].
+        limits: speed limit [m/s]; 0 where it is unknown.
         things: signals and objects.
         spans: `bridge` or `tunnel`, for each bridge or tunnel on the road.
     """
@@ -419,7 +419,7 @@ class ImportedRoad:
     lane_offset: Cubics
     sections: tuple[LaneSection, ...]
     keeps_left: bool = False
-    limits: tuple[tuple[float, float], ...] = ()
+    limits: Cubics = NOWHERE
     things: tuple[Thing, ...] = ()
     spans: tuple[str, ...] = ()
 

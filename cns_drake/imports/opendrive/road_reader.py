@@ -28,6 +28,8 @@ _MARK_WIDTH, _WIDEST_MARK = 0.12, 1.0
 _CLOSEST_DASHES = 0.1
 _ENDS = ("predecessor", "successor")
 _UNITS = {"m/s": 1.0, "km/h": 1 / 3.6, "mph": 0.44704}
+# Greatest speed limit [m/s].
+_FASTEST = 100.0
 # Larger networks, such as whole countries, are refused [m].
 _LARGEST = 20_000.0
 _LONGEST_ROAD = 100_000.0
@@ -343,7 +345,7 @@ def _road(
         lane_offset=_cubics(offsets, "s"),
         sections=tuple(sections),
         keeps_left=element.value("rule", "RHT").upper() == "LHT",
-        limits=tuple(_limits(element)),
+        limits=_steps(_limits(element, name, faults)),
         things=tuple(read_things(element, name, faults)),
         spans=tuple(
             one.tag
@@ -525,16 +527,19 @@ def _lane(
     return lane
 
 
-def _limits(road: Element) -> Iterator[tuple[float, float]]:
+def _limits(
+    road: Element, name: str, faults: ImportFaults
+) -> Iterator[tuple[float, float]]:
     """Yields the start [m] and the value [m/s] of each speed limit."""
     for one in road.all("type"):
+        limit = 0.0
         speed = one.first("speed")
-        if speed is None:
-            continue
-        try:
-            limit = float(speed.value("max", ""))
-        except ValueError:
-            continue
-        limit *= _UNITS.get(speed.value("unit", "m/s"), 1.0)
-        if math.isfinite(limit) and limit > 0.0:
-            yield one.number("s", 0.0), limit
+        if speed is not None:
+            with contextlib.suppress(ValueError):
+                limit = float(speed.value("max", ""))
+            limit *= _UNITS.get(speed.value("unit", "m/s"), 0.0)
+            if not 0.0 < limit <= _FASTEST:
+                kind = "unlimited or unreadable speed, taken as 50 km/h"
+                faults.add(kind, name)
+                limit = 0.0
+        yield one.number("s", 0.0), limit

@@ -231,12 +231,20 @@ def test_speed_limits_have_units(tmp_path):
         '<type s="0" type="town"><speed max="36" unit="km/h"/></type>'
         '<type s="9" type="town"><speed max="no limit"/></type>'
         '<type s="20" type="town"><speed max="10" unit="mph"/></type>'
+        '<type s="30" type="town"><speed max="50" unit="kmh"/></type>'
+        '<type s="35" type="town"/>'
+        '<type s="40" type="town"><speed max="101"/></type>'
     )
     path = write_roads(
         tmp_path / "a.xodr", straight("1", 0, 0, 50, 0, more=limits)
     )
-    (one,) = read_roads(path, ImportFaults()).roads
-    assert one.limits == ((0.0, pytest.approx(10.0)), (20.0, 4.4704))
+    faults = ImportFaults()
+    (one,) = read_roads(path, faults).roads
+    at = np.array([0.0, 8.9, 9.1, 20.0, 30.0, 36.0, 41.0])
+    limits = [10.0, 10.0, 0.0, 4.4704, 0.0, 0.0, 0.0]
+    assert one.limits.at(at, at).tolist() == pytest.approx(limits)
+    (fault,) = faults.rows()
+    assert fault == ("unlimited or unreadable speed, taken as 50 km/h", 3, "1")
 
 
 def test_a_lane_of_nothing_among_others_is_paved(tmp_path):
