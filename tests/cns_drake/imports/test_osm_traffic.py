@@ -1,5 +1,7 @@
 """Traffic on streets of OpenStreetMap."""
 
+from itertools import pairwise
+
 from helpers.small_osm import OsmWriter
 import numpy as np
 import pytest
@@ -239,6 +241,29 @@ def test_one_way_streets(tmp_path):
     ]
     assert sum(map(len, eastwards)) > 100
     assert min(steps.min() for steps in eastwards if len(steps)) > 0
+
+
+@pytest.mark.parametrize("is_cut", [False, True])
+def test_lanes_do_not_fold_in_sharp_bends(tmp_path, is_cut):
+    """Each of four lanes turns by 360 deg around a rectangle, and no more.
+
+    Its corners lie within a street, or where one street ends and another
+    begins.
+    """
+    osm = OsmWriter()
+    nodes = [osm.node(*xy) for xy in CORNERS]
+    nodes.append(nodes[0])
+    for part in pairwise(nodes) if is_cut else (nodes,):
+        osm.way_of(part, highway="tertiary", lanes="4", width="14")
+    osm.box(-40, -30, 80, 60, building="yes")
+    _, (graph, *_) = lanes_of(osm.write(tmp_path / "a.osm"), tmp_path)
+    total = 0.0
+    for piece in graph.pieces:
+        x, y = np.diff(piece.points[:, :2], axis=0).T
+        turns = np.abs(np.diff(np.unwrap(np.arctan2(y, x))))
+        assert turns.max() < np.radians(50.0)
+        total += turns.sum()
+    assert total == pytest.approx(4 * 2 * np.pi, rel=0.05)
 
 
 def test_no_lane_without_a_round_trip(tmp_path):
