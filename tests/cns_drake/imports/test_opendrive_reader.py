@@ -423,11 +423,6 @@ def test_attributes_of_lanes(tmp_path, attribute, fault):
             "further outline of an object, not read",
         ),
         (
-            '<objects><object s="1" t="9"><outline><cornerLocal u="0" v="0" '
-            'z="2.0"/></outline></object></objects>',
-            "z of cornerLocal, not read",
-        ),
-        (
             '<signals><signal s="1" t="9"><positionInertial x="1" y="2"/>'
             "</signal></signals>",
             "positionInertial of signal, not read",
