@@ -8,6 +8,7 @@ file, as faults.
 from collections.abc import Iterable, Iterator, Mapping
 import contextlib
 from dataclasses import replace
+from itertools import pairwise
 import math
 from pathlib import Path
 import re
@@ -38,6 +39,8 @@ _LONGEST_TOGETHER = 2_000_000.0
 _FAR = 10_000.0
 # Lengths that differ by less than this are equal [m].
 _ROUNDING = 0.01
+# Pieces of a road's course that are farther apart are counted [m].
+_WIDEST_JOINT = 0.1
 # Greatest width of a lane, and greatest curvature of a curve [m, 1/m].
 _WIDEST = 100.0
 _SHARPEST = 100.0
@@ -326,6 +329,8 @@ def _road(
     if not sections:
         faults.add("road without lanes, left out", name)
         return None
+    if max(pieces[0].s, sections[0].start) > _WIDEST_JOINT:
+        faults.add("road whose course or lanes begin after its start", name)
     if element.first("lateralProfile", "shape") is not None:
         faults.add("lateral shape of a road, not read", name)
     junction = element.value("junction", "-1")
@@ -381,6 +386,11 @@ def _pieces(
         s, x, y, heading = (one.number(k) for k in ("s", "x", "y", "hdg"))
         found.append(road_model.Piece(s, x, y, heading, length, shape))
     found.sort(key=lambda piece: piece.s)
+    for one, other in pairwise(found):
+        end = one.evaluate(np.array([other.s]))[0]
+        gap = math.hypot(end[0] - other.x, end[1] - other.y)
+        if max(gap, abs(one.s + one.length - other.s)) > _WIDEST_JOINT:
+            faults.add("gap of over 0.1 m in the course of a road", name)
     return found
 
 

@@ -444,6 +444,31 @@ def test_other_parts_of_roads_that_are_not_read_are_counted(
     assert faults_of(path)[1].get(fault) == 1
 
 
+@pytest.mark.parametrize("gap", [0.0, 0.09, 0.11, 10.0])
+def test_gaps_in_the_course_of_a_road_are_counted(tmp_path, gap):
+    """Beside the next piece's start, along the road, and before its lanes."""
+
+    def two(x, y, s, first=0.0):
+        pieces = [
+            geometry(0.0, 0.0, 0.0, 0.0, 50.0, "<line/>"),
+            geometry(s, x, y, 0.0, 100.0 - s, "<line/>"),
+        ]
+        lanes = [section(first, lane(-1, "driving", 3.5))]
+        return road("1", 100.0, pieces, lanes)
+
+    def counted(one):
+        return faults_of(write_roads(tmp_path / "a.xodr", one))[1]
+
+    in_course = {"gap of over 0.1 m in the course of a road": 1}
+    too_late = {"road whose course or lanes begin after its start": 1}
+    counts = gap > 0.1
+    assert counted(two(50.0, gap, 50.0)) == (in_course if counts else {})
+    assert counted(two(50.0 + gap, 0, 50.0 + gap)) == (
+        in_course if counts else {}
+    )
+    assert counted(two(50.0, 0, 50.0, gap)) == (too_late if counts else {})
+
+
 def test_what_stands_above_the_roads_in_a_file_is_counted(tmp_path):
     fall = '<crossfall side="left" s="0" a="0.02" b="0" c="0" d="0"/>'
     path = write_roads(
