@@ -386,10 +386,10 @@ def _pieces(
         s, x, y, heading = (one.number(k) for k in ("s", "x", "y", "hdg"))
         found.append(road_model.Piece(s, x, y, heading, length, shape))
     found.sort(key=lambda piece: piece.s)
-    for one, other in pairwise(found):
-        end = one.evaluate(np.array([other.s]))[0]
-        gap = math.hypot(end[0] - other.x, end[1] - other.y)
-        if max(gap, abs(one.s + one.length - other.s)) > _WIDEST_JOINT:
+    for piece, after in pairwise(found):
+        end = piece.evaluate(np.array([after.s]))[0]
+        gap = math.hypot(end[0] - after.x, end[1] - after.y)
+        if max(gap, abs(piece.s + piece.length - after.s)) > _WIDEST_JOINT:
             faults.add("gap of over 0.1 m in the course of a road", name)
     return found
 

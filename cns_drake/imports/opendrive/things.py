@@ -262,7 +262,7 @@ def _solid(
         return None
     else:
         half = max(length, _LEAST_SIDE) / 2, max(width, _LEAST_SIDE) / 2
-        footprint = box(-half[0], -half[1], *half).exterior
+        footprint: LineString = box(-half[0], -half[1], *half).exterior
         heights = rise = np.zeros(len(footprint.coords))
         if thing.outline is not None:
             footprint = LineString(thing.outline[:, :2])
