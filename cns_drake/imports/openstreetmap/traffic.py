@@ -432,10 +432,12 @@ class StreetTraffic:
             entering[lane.exit_arm].append(k)
         for node, arms in self._arms.items():
             # Vehicles enter a crossing as they would enter a junction.
-            is_junction = len(arms) > 2 or node in self._crossed
+            is_entered = len(arms) > 2 or node in self._crossed
             for a, b in product(arms, arms):
                 if a == b:
                     continue
+                # So they do where a street loses a lane.
+                is_junction = is_entered or len(entering[a]) > len(leaving[b])
                 for first, last in product(entering[a], leaving[b]):
                     one, other = lanes[first], lanes[last]
                     before, after = _direction(one, -1), _direction(other, 0)
