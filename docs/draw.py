@@ -11,8 +11,10 @@ they made before is taken as it is.
 from __future__ import annotations
 
 from collections.abc import Sequence
+import csv
 import hashlib
 import io
+import itertools
 from pathlib import Path
 import re
 import subprocess
@@ -130,54 +132,58 @@ def main(names: Sequence[str]) -> None:
 
 
 def survival(path: Path) -> str:
-    """Draws what each method keeps of its AUC; returns the title."""
+    """Draws what each method keeps of its AUC and AUC strict; returns the title."""
     numbers = ("No", "One", "Two", "Three", "Four", "Five", "Six")
     tables = [kept_shares(name) for name in ("stages", "fresh")]
+    strict = kept_shares("stages", "kept_strict")
     # A method survives if the median pair keeps this share of its AUC.
     medians = [{n: np.median(some[n]) for n in some} for some in tables]
     order = sorted(METHOD_STYLES, key=medians[0].__getitem__)
     survive = sum(min(some[n] for some in medians) >= 0.95 for n in order)
-    figure = Figure(figsize=(_WIDTH, 4.6), layout="constrained")
-    axes = figure.subplots()
+    figure = Figure(figsize=(_WIDTH, 5.0), layout="constrained")
+    panels = figure.subplots(1, 2, sharey=True)
     for y, name in enumerate(order):
         colour = METHOD_STYLES[name][0]
-        for shares, offset, fill in (
-            (tables[0][name], 0.18, colour),
-            (tables[1][name], -0.18, "none"),
+        for axes, shares, offset, fill in (
+            (panels[0], tables[0][name], 0.18, colour),
+            (panels[0], tables[1][name], -0.18, "none"),
+            (panels[1], strict[name], 0.0, colour),
         ):
             shown, at = 100.0 * np.array(shares), y + offset
             heights = np.full(len(shown), at)
             axes.scatter(shown, heights, s=34, ec=colour, fc=fill)
             ends = [at - 0.17, at + 0.17]
             axes.plot([np.median(shown)] * 2, ends, color=INK, lw=3.5)
-    axes.set_yticks(range(len(order)), [title(name) for name in order])
-    axes.set_xlim(0.0, 112.0)
-    axes.axvline(100.0, color=PALE, linewidth=1, zorder=0)
-    axes.set_xlabel("AUC kept when the city is rebuilt [%]")
-    _plain(axes)
+    panels[0].set_yticks(range(len(order)), [title(name) for name in order])
+    for axes, metric in zip(panels, ("AUC", "AUC strict"), strict=True):
+        axes.set_xlim(0.0, 119.0)
+        axes.axvline(100.0, color=PALE, linewidth=1, zorder=0)
+        axes.set_xlabel(f"{metric} kept [%]")
+        _plain(axes)
     finding = (
         f"{numbers[survive]} of {numbers[len(order)].lower()} methods survive "
         "a rebuilt city"
     )
     counts = [len(some[order[0]]) for some in tables]
-    axes.set_title(
+    panels[0].set_title(
         f"● {counts[0]} pairs of shipped cities   ○ {counts[1]} of redrawn "
         "cities   ┃ median",
-        loc="left", x=-0.28,
+        loc="left", x=-0.57,
     )  # fmt: skip
     _head(figure, finding)
     figure.savefig(path, dpi=_DPI)
     return finding
 
 
-def kept_shares(table: str) -> dict[str, list[float]]:
-    """Returns method -> the shares of AUC that it keeps, one for each pair.
+def kept_shares(table: str, metric: str = "kept") -> dict[str, list[float]]:
+    """Returns method -> the shares of a metric that it keeps, one for each pair.
 
     Args:
         table: `stages` or `fresh`, a shipped table.
+        metric: `kept` for AUC, `kept_strict` for AUC strict.
     """
     file = ROOT / f"evaluation/results/baselines/{table}.csv"
-    rows = Results.read(file).where(metric="kept", gate=0).rows
+    rows = Results.read(file).where(metric=metric, gate=0).rows
     return {
         name: [row.value for row in rows if row.method == name]
         for name in METHOD_STYLES
@@ -217,34 +223,46 @@ def assumptions(path: Path) -> None:
 
 
 def ranking(path: Path) -> None:
-    """Draws the means of AUC strict over the radius of a match."""
-    head, *rows = _table("docs/notes/ranking.md", "\nAUC strict:\n")
-    figure = Figure(figsize=(_WIDTH, 5.2), layout="constrained")
-    panels = figure.subplots(1, 2, sharey=True)
-    for axes, gate in zip(panels, ("without", "with"), strict=True):
-        shown = [row for row in rows if row[0] == gate]
-        radii = [float(row[1].removesuffix("m")) for row in shown]
-        for k, name in enumerate(head[2:8], 2):
-            key = name.lower().replace(" ", "-")
-            colour, style, marker = METHOD_STYLES[key]
-            means = [float(row[k].strip("*")[:4]) for row in shown]
-            axes.plot(
-                radii, means, style, color=colour, marker=marker,
-                label=title(key),
-            )  # fmt: skip
-        axes.set_xticks(radii, [f"{radius:g}" for radius in radii])
-        axes.set_ylim(0.0, 1.04)
-        axes.set_title(f"{gate} the gate", loc="left")
-        axes.set_xlabel("radius of a match [m]")
-        _plain(axes, "both")
-    panels[0].set_ylabel("AUC strict")
+    """Draws the mean AUC strict and AUC over the radius of a match."""
+    with open(ROOT / "docs/notes/ranking.csv", newline="") as stream:
+        rows = list(csv.DictReader(stream))
+    kinds = {
+        "shipped": "shipped cities",
+        "fresh": "fresh cities",
+        "plans": "other streets",
+    }
+    figure = Figure(figsize=(_WIDTH, 11.0), layout="constrained")
+    grid = figure.subplots(4, len(kinds), sharex=True, sharey=True)
+    kept = itertools.product(("auc_strict", "auc"), "01")
+    for line, (metric, gate) in zip(grid, kept, strict=True):
+        for axes, kind in zip(line, kinds, strict=True):
+            for key, (colour, style, marker) in METHOD_STYLES.items():
+                values: dict[float, list[float]] = {}
+                for row in rows:
+                    if (row["cities"], row["gate"], row["method"]) == (
+                        kind, gate, key,
+                    ):  # fmt: skip
+                        radius = float(row["radius"])
+                        values.setdefault(radius, []).append(float(row[metric]))
+                axes.plot(
+                    list(values), [np.mean(some) for some in values.values()],
+                    style, color=colour, marker=marker, label=title(key),
+                )  # fmt: skip
+            axes.set_ylim(0.0, 1.04)
+            axes.set_xticks((5.0, 7.5, 10.0, 15.0), ("5", "7.5", "10", "15"))
+            _plain(axes, "both")
+        name = {"auc": "AUC", "auc_strict": "AUC strict"}[metric]
+        line[0].set_ylabel(f"{name},\n{('without', 'with')[gate == '1']} gate")
+    for axes, name in zip(grid[0], kinds.values(), strict=True):
+        axes.set_title(name, loc="left")
+    grid[-1][1].set_xlabel("radius of a match [m]")
     _head(
         figure,
         "Layered overlap is best with the gate;\n"
         "without it, the radius decides",
     )
     figure.legend(
-        *axes.get_legend_handles_labels(), loc="outside lower center",
+        *grid[0][0].get_legend_handles_labels(), loc="outside lower center",
         ncols=3, frameon=False,
     )  # fmt: skip
     figure.savefig(path, dpi=_DPI)

@@ -42,6 +42,8 @@ _ROWS = {
 }
 # A city may be at most this far outside its system's area of use [deg].
 _NEAR_AREA_DEG = 0.5
+# A projection that changes lengths by more than this share is refused.
+_MOST_STRETCHED = 0.005
 _PLAIN = ("east [metre]", "north [metre]", "up [metre]")
 
 
@@ -93,20 +95,38 @@ class ReferenceSystem:
         """Returns whether a place is in or near the system's area of use.
 
         `first` and `second` are the first two coordinates of the place, in the
-        order of the system's definition. The result is False for a system
-        without an area of use.
+        order of the system's definition. The result is True for a system
+        without an area of use, since nothing speaks against the place.
         """
-        system = pyproj.CRS.from_user_input(self.name)
+        system = _horizontal(self.name)
         if system.area_of_use is None:
-            return False
-        to_degrees = pyproj.Transformer.from_crs(system, "OGC:CRS84")
-        longitude, latitude = to_degrees.transform(first, second)
+            return True
+        longitude, latitude = _degrees(system, first, second)
         west, south, east, north = system.area_of_use.bounds
         near = _NEAR_AREA_DEG
         return bool(
             west - near <= longitude <= east + near
             and south - near <= latitude <= north + near
         )
+
+
+def _horizontal(name: str) -> pyproj.CRS:
+    """Returns the system of the first two coordinates.
+
+    A system that is composed of codes, such as EPSG:31468+5783, has no area of
+    use; its horizontal part does.
+    """
+    system = pyproj.CRS.from_user_input(name)
+    return (system.sub_crs_list or [system])[0]
+
+
+def _degrees(
+    system: pyproj.CRS, first: float, second: float
+) -> tuple[float, float]:
+    """Returns the longitude and latitude of a place [deg]."""
+    to_degrees = pyproj.Transformer.from_crs(system, "OGC:CRS84")
+    longitude, latitude = to_degrees.transform(first, second)
+    return longitude, latitude
 
 
 def reference_system(name: str, where: str) -> ReferenceSystem:
@@ -287,6 +307,7 @@ def read_cityjson(path: Path) -> CityFile:
     city = CityFile()
     whole: dict = {}
     whole_system = ""
+    templates = _Templates({}, "")
     for number, document in _documents(path):
         kind = document.get("type")
         where = str(path) if number == 0 else f"{path}: line {number}"
@@ -305,9 +326,10 @@ def read_cityjson(path: Path) -> CityFile:
                 )
             if not city.objects:
                 city.system, whole_system = system, system.name
+            templates = _Templates(document, where)
         elif kind != "CityJSONFeature" or not whole:
             raise InputError(f"{where}: type {kind!r} is not CityJSON")
-        _read_objects(document, whole, where, city)
+        _read_objects(document, whole, templates, where, city)
     if not city.objects:
         raise InputError(f"{path}: the file has no objects")
     if not any(city.faces()):
@@ -320,7 +342,40 @@ def read_cityjson(path: Path) -> CityFile:
             f"{path}: coordinates look like degrees; project them to metres"
             " first (for example with cjio's crs_reproject)"
         )
+    if city.system.name:
+        _check_lengths(city.system.name, (low + high) / 2.0, path)
     return city
+
+
+def _check_lengths(name: str, place: np.ndarray, path: Path) -> None:
+    """Checks that a metre of a reference system is a metre on the ground.
+
+    Places beyond the area of the system are not checked, since they may well be
+    those of another one.
+
+    Args:
+        name: name of the reference system.
+        place: (3,) metres east, north and up.
+        path: the file, for the message.
+
+    Raises:
+        InputError: if it is not, as in Web Mercator (EPSG:3857).
+    """
+    defined = reference_system(name, "")
+    first, second, _ = np.linalg.solve(defined.matrix, place).tolist()
+    if not defined.has_place(first, second):
+        return
+    system = _horizontal(name)
+    degrees = _degrees(system, first, second)
+    factors = pyproj.Proj(system).get_factors(*degrees)
+    extremes = factors.tissot_semimajor, factors.tissot_semiminor
+    stretch = max(extremes, key=lambda factor: abs(factor - 1.0))
+    if _MOST_STRETCHED < abs(stretch - 1.0) < np.inf:
+        raise InputError(
+            f"{path}: metadata.referenceSystem: in {name}, 1 m on the ground is"
+            f" {stretch:.3g} m long; project the file to another system first"
+            " (for example with cjio's crs_reproject)"
+        )
 
 
 def _documents(path: Path) -> Iterator[tuple[int, dict]]:
@@ -361,7 +416,11 @@ def _reference_system(document: dict, where: str) -> ReferenceSystem:
 
 
 def _read_objects(
-    document: dict, whole: dict, where: str, city: CityFile
+    document: dict,
+    whole: dict,
+    templates: _Templates,
+    where: str,
+    city: CityFile,
 ) -> None:
     objects = document.get("CityObjects", {})
     if not isinstance(objects, dict):
@@ -374,8 +433,8 @@ def _read_objects(
     vertices = _vertices(document, transform, where)
     if not city.objects and len(vertices):
         _settle_axes(city, vertices)
-    vertices = city.system.to_metres(vertices)
-    templates = _Templates(whole, vertices, city.system, where)
+    templates.vertices = city.system.to_metres(vertices)
+    templates.system = city.system
     for name, value in objects.items():
         if not isinstance(value, dict) or not isinstance(
             value.get("type"), str
@@ -543,15 +602,14 @@ def _numbers(values: Any, where: str) -> np.ndarray:
 
 
 class _Templates:
-    """Geometry templates of a file, which objects place in the world."""
+    """Geometry templates of a file, which objects place in the world.
 
-    def __init__(
-        self,
-        whole: dict,
-        vertices: np.ndarray,
-        system: ReferenceSystem,
-        where: str,
-    ):
+    Attributes:
+        vertices: (N, 3) vertices of the document whose objects are read [m].
+        system: reference system of the templates.
+    """
+
+    def __init__(self, whole: dict, where: str):
         templates = whole.get("geometry-templates")
         templates = templates if isinstance(templates, dict) else {}
         self._geometries = templates.get("templates") or []
@@ -559,8 +617,8 @@ class _Templates:
             templates.get("vertices-templates", []),
             f"{where}: geometry-templates.vertices-templates",
         )
-        self.vertices = vertices
-        self._system = system
+        self.vertices = np.zeros((0, 3))
+        self.system = ReferenceSystem()
 
     def place(self, instance: dict) -> tuple[Any, np.ndarray]:
         """Returns an instance's template, and the vertices of the instance.
@@ -587,7 +645,7 @@ class _Templates:
         if not (np.abs(placed) <= _FARTHEST).all():
             raise ValueError
         return template, (
-            self._system.to_metres(placed) + self.vertices[reference]
+            self.system.to_metres(placed) + self.vertices[reference]
         )
 
 

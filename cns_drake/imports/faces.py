@@ -139,7 +139,7 @@ def flat_surface(
     The triangles face upwards. Faults are counted in `faults`, with `name` as
     the name of the object.
     """
-    return face_triangles(_rings(polygon, z), name, faults)
+    return face_triangles(_rings(orient(polygon), z), name, faults)
 
 
 def extruded(
@@ -163,8 +163,9 @@ def extruded(
         high: height of the highest point [m].
         name: name of the object, as an example in `faults`.
         faults: counts roofs and areas that were replaced or left out.
-        roof: `flat`; `pyramidal`, on any footprint; `gabled` or `hipped`, on a
-            footprint with four corners.
+        roof: `flat`; `pyramidal`, on a footprint without holes whose centroid
+            sees all of its walls; `gabled` or `hipped`, on a footprint with
+            four corners.
         roof_height: height of the roof above the eaves [m].
     """
     polygon = orient(polygon)
@@ -177,7 +178,11 @@ def extruded(
     ridge = None
     if roof != "flat" and roof_height > 0.0:
         ridge = _ridge(roof, polygon, corners, high)
-        if ridge is None:
+        # A slope that looks downwards reaches beyond the footprint.
+        if ridge is None or (
+            long_normals(np.concatenate(ridge[0]))[:, 2].min() < -_LEAST_AREA
+        ):
+            ridge = None
             faults.add(f"roof of shape {roof}, made flat", name)
     if ridge is None:
         roofs = flat_surface(polygon, high, name, faults)

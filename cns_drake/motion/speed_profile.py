@@ -77,8 +77,12 @@ def find_speed_profile(
     knot = (u / path.spacing).astype(int).clip(0, len(speed_limits) - 2)
     limit = np.minimum(limit, speed_limits[knot])
     limit = np.minimum(limit, speed_limits[knot + 1])
+    # Along the path v = |p'| u', and therefore v' = |p'| u'' + |p'|' u'^2. The
+    # second term may take up half of the acceleration.
+    half = speeds.longitudinal_acceleration / 2.0
+    parametric = np.maximum(np.abs(jet.dspeed), 1e-9)
+    limit = np.minimum(limit, np.sqrt(half / parametric))
     limit = _early_and_late(limit, u[1])
-    # Along the path v = |p'| u', and therefore v' = |p'| u'' + |p'|' u'^2.
     parametric = np.max(np.abs(jet.dspeed) * limit**2)
     acceleration = _MARGIN * speeds.longitudinal_acceleration - parametric
     speed = np.sqrt(_reachable(limit**2, acceleration, u[1]))

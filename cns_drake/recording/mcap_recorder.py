@@ -1,6 +1,6 @@
 """Recording the sensors of a Diagram as ROS 2 messages."""
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Collection, Mapping
 import functools
 import math
 from typing import Any, NamedTuple
@@ -137,6 +137,7 @@ class McapRecorder(LeafSystem):
         further: Mapping[str, RecordedSensor] | None = None,
         layouts: Mapping[str, str] | None = None,
         num_rings: Mapping[str, int] | None = None,
+        calibrated: Collection[str] = (),
         imu_variances: tuple[float, float] = (0.0, 0.0),
         with_imu_samples: bool = False,
         with_objects: bool = False,
@@ -160,6 +161,8 @@ class McapRecorder(LeafSystem):
                 default `cns`.
             num_rings: LiDAR name -> number of its rings. With it, the layout
                 `velodyne` counts rings from the lowest.
+            calibrated: names of the LiDARs with calibrated intensities, from 0
+                to 255.
             imu_variances: variances of specific force [m^2/s^4] and of
                 angular velocity [rad^2/s^2].
             with_imu_samples: whether there is a port `imu_samples`.
@@ -221,8 +224,13 @@ class McapRecorder(LeafSystem):
         if with_objects:
             self._add_objects()
         for name in X_BSs:
-            rings = (num_rings or {}).get(name)
-            self._add_lidar(name, layouts.get(name, "cns"), rings)
+            convert = functools.partial(
+                to_layout,
+                layout=layouts.get(name, "cns"),
+                num_rings=(num_rings or {}).get(name),
+                is_calibrated=name in calibrated,
+            )
+            self._add_lidar(name, convert)
         for name, X_BS in X_BSs.items():
             if X_BS is None:
                 self._add_pose(name, RigidTransform())
@@ -277,14 +285,16 @@ class McapRecorder(LeafSystem):
 
         self._add_port("objects", recorded_topics.OBJECTS_TOPIC, make)
 
-    def _add_lidar(self, name: str, layout: str, num_rings: int | None) -> None:
+    def _add_lidar(
+        self, name: str, convert: Callable[[np.ndarray], np.ndarray]
+    ) -> None:
         topic = recorded_topics.points_topic(name)
         encode = messages.encode_point_cloud
 
         def make(scan: np.ndarray, stamp_ns: int) -> dict:
-            points = to_layout(scan, layout, num_rings)
+            points = convert(scan)
             made = {topic: encode(points, name, stamp_ns)}
-            if layout != "cns":
+            if points is not scan:
                 labels = encode(to_labels(scan), name, stamp_ns)
                 made[recorded_topics.labels_topic(name)] = labels
             return made

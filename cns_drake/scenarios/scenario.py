@@ -476,11 +476,12 @@ class Scenario(Section):
         Args:
             returns: `ideal` or `calibrated`. With `calibrated`, the settings
                 for noise and losses of ideal returns are removed; with `ideal`,
-                the weather is removed.
+                weather, echoes and errors of the unit are removed.
             weather: the weather; by default that of the scenario.
         """
         if returns == "ideal":
             update: dict = {"returns": returns, "echoes": Echoes.STRONGEST}
+            update["unit_seed"] = 0
             weather = WeatherConfig()
         else:
             ideal_fields = ("range_noise", "dropout", "faint_dropout")

@@ -239,6 +239,11 @@ def make_station(
                 n: make_pattern(one).num_rings
                 for n, one in scenario.lidars.items()
             },
+            calibrated=[
+                n
+                for n, one in scenario.lidars.items()
+                if one.returns == "calibrated"
+            ],
             imu_variances=scenario.imu.noise(scenario.seed).variances(
                 scenario.imu.sample_rate(scenario.fastest_rate)
             ),

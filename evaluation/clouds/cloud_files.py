@@ -6,7 +6,7 @@ import functools
 import itertools
 import math
 from pathlib import Path
-from typing import BinaryIO, NamedTuple
+from typing import Any, BinaryIO, NamedTuple
 import warnings
 
 import numpy as np
@@ -101,8 +101,7 @@ def _text_records(
                 raise ValueError(
                     f"{start + len(texts)} instead of {count} rows of numbers"
                 )
-            values = parse_rows(texts, np.dtype(float), first=start)
-            yield _to_records(values, dtype, kind)
+            yield _to_records(texts, dtype, kind, start)
         if not more and next(lines, None) is not None:
             raise ValueError(f"more than the {count} rows of the header")
     if count == 0:
@@ -129,19 +128,43 @@ def _lines(stream: BinaryIO) -> Iterator[bytes]:
             yield line
 
 
-def _to_records(values: np.ndarray, dtype: np.dtype, kind: str) -> np.ndarray:
-    """Returns (N,) records of a type from rows of numbers (N, K)."""
+def _to_records(
+    texts: list[bytes], dtype: np.dtype, kind: str, first: int
+) -> np.ndarray:
+    """Returns (N,) records of a type from rows of numbers.
+
+    Args:
+        texts: N rows.
+        kind: the kind of file, for errors.
+        first: number of rows before these, for errors.
+    """
     names = dtype.names or ()
-    widths = [math.prod(dtype[name].shape) for name in names]
-    if values.shape[1] != sum(widths):
-        raise ValueError(
-            f"{kind}: {values.shape[1]} numbers in a row instead of"
-            f" {sum(widths)}"
+    # A float64 rounds whole numbers above 2^53.
+    exact = [
+        (
+            name,
+            dtype[name].base if dtype[name].base.itemsize == 8 else float,
+            dtype[name].shape,
         )
-    records = np.empty(len(values), dtype)
-    columns = np.split(values, np.cumsum(widths)[:-1], axis=1)
-    for name, column in zip(names, columns, strict=True):
-        store(records, name, column.reshape(records[name].shape))
+        for name in names
+    ]
+    columns: Any
+    try:
+        columns = parse_rows(texts, np.dtype(exact), first=first)
+    except ValueError:
+        # A whole number may be written as 5.0.
+        values = parse_rows(texts, np.dtype(float), first=first)
+        widths = [math.prod(dtype[name].shape) for name in names]
+        if values.shape[1] != sum(widths):
+            raise ValueError(
+                f"{kind}: {values.shape[1]} numbers in a row instead of"
+                f" {sum(widths)}"
+            ) from None
+        parts = np.split(values, np.cumsum(widths)[:-1], axis=1)
+        columns = dict(zip(names, parts, strict=True))
+    records = np.empty(len(texts), dtype)
+    for name in names:
+        store(records, name, columns[name].reshape(records[name].shape))
     return records
 
 

@@ -24,9 +24,11 @@ def localise(
     start_turn: float = 2.0,
     seed: int = 0,
     parameter: options.Parameters = None,
-    query_spacing: float = 10.0,
+    query_spacing: float | None = None,
     track: Annotated[bool, typer.Option("--track")] = False,
-    odometry_drift: Annotated[float, typer.Option(metavar="PART")] = 0.01,
+    odometry_drift: Annotated[
+        float | None, typer.Option(metavar="PART")
+    ] = None,
     align: options.Align = "auto",
     lidar: options.LidarName = None,
     columns: options.Columns = None,
@@ -58,13 +60,15 @@ def localise(
             true orientation [deg].
         seed: Seed of the random directions in which the initial guesses are
             moved and turned.
-        query_spacing: Distance that the car drives between two queries [m].
+        query_spacing: Distance that the car drives between two queries [m]; by
+            default 10. Not with --track.
         track: Track the whole drive instead of localising single scans: the
             initial guess of each scan is the estimated pose of the previous
             scan, moved by the odometry.
         odometry_drift: Drift of the simulated odometry that --track uses, as a
-            share of the distance driven. With 0.01, lengths are wrong by about
-            1 %, and the heading drifts by about 0.01 deg per metre.
+            share of the distance driven. With 0.01, the default, lengths are
+            wrong by about 1 %, and the heading drifts by about 0.01 deg per
+            metre.
         output: Folder to write. It gets localisation.csv, which lists the
             result of each query. If you give --track, it also gets a picture.
     """
@@ -81,6 +85,12 @@ def localise(
 
     num_jobs = choose_cluster(jobs, None).num_workers
     starts = queries.Starts(start, start_turn, seed)
+    if track and query_spacing is not None:
+        raise InputError("--query-spacing: not together with --track")
+    if not track and odometry_drift is not None:
+        raise InputError("--odometry-drift: only together with --track")
+    query_spacing = 10.0 if query_spacing is None else query_spacing
+    odometry_drift = 0.01 if odometry_drift is None else odometry_drift
     if not (math.isfinite(query_spacing) and query_spacing > 0.0):
         raise InputError(f"--query-spacing: {query_spacing:g} is not above 0")
     if not 0.0 <= odometry_drift <= 1.0:
@@ -88,7 +98,7 @@ def localise(
             f"--odometry-drift: {odometry_drift:g} is not from 0 to 1"
         )
     settings = estimators.default_settings(method).with_values(
-        map(parse_setting, parameter or [])
+        map(parse_setting, parameter or []), method
     )
     estimator = estimators.make_estimator(method, settings)
     source = open_source(place, lidar, columns)
@@ -99,6 +109,8 @@ def localise(
     for one in (source, drive):
         for note in one.notes if isinstance(one, Drive) else ():
             terminal.note(note)
+    if align == "always" and not isinstance(source, Drive):
+        raise InputError(f"--align: {place} is no drive, and stays as it is")
     if isinstance(source, Drive):
         source, drive = options.aligned((source, drive), align)
         check_same_world(source, drive)
@@ -123,10 +135,6 @@ def localise(
         )
         values |= {"odometry_drift": odometry_drift}
         values |= tracking.summary(rows)
-        if output is not None:
-            from evaluation.report.curve_figures import draw_track
-
-            draw_track(rows, output / "track")
     else:
         frames = queries.query_frames(drive, is_mapped, query_spacing)
         rows = queries.localise(
@@ -137,8 +145,18 @@ def localise(
             num_jobs,
             terminal.track,
         )
+    if all(map(math.isnan, rows["unmapped"])):
+        raise InputError(
+            f"{drive.name}: no scan has {estimators.FEWEST_POINTS} points in"
+            f" different voxels of {settings.scan_voxel:g} m"
+        )
+    queries.note_sparse(drive.name, rows, terminal.note)
     values |= queries.summary(rows)
     if output is not None:
+        if track:
+            from evaluation.report.curve_figures import draw_track
+
+            draw_track(rows, output / "track")
         queries.write_rows(rows, output / "localisation.csv")
         terminal.note(f"wrote {output / 'localisation.csv'}")
     options.show(values, _rows(values), json=json)
@@ -163,7 +181,10 @@ def _rows(values: dict) -> Iterator[tuple[str, str]]:
             f" {values['lost_for_good']} for good)",
         )
         yield "  found again after", f"{text('back_after_median')} m"
-    yield "scans", str(values["queries"])
+    yield (
+        "scans",
+        f"{values['queries']}, {values['without_pose']} without a pose",
+    )
     yield "within 0.3 m and 1 deg", text("success_03m_1deg")
     yield "within 2 m and 5 deg", text("success_2m_5deg")
     for name, unit in (("translation", "m"), ("rotation", "deg")):

@@ -96,7 +96,9 @@ def map_sessions(
 
     The command writes the maps, scans and poses that cns-drake map-truth
     writes, but no labels. Use it for drives whose world is unknown, such as
-    real ones. Both drives must be in the same world frame.
+    real ones. Both drives must be in the same world frame. Before cns-eval
+    map-update can score labels, add your true labels, A/truth.npy and
+    B/truth.npy.
 
     Args:
         a: Older drive A.
@@ -113,7 +115,6 @@ def map_sessions(
         for side, drive in zip(SIDES, drives, strict=True):
             write_session(drive, draft / side, spacing, terminal.track)
     print(output)
-    terminal.next_command("cns-eval", "map-update", output)
 
 
 def _rows(name: str, scores: dict) -> Iterator[tuple[str, str]]:

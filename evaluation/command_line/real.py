@@ -27,8 +27,9 @@ def real(
         folder: Folder with the excerpts of public data sets.
         output: Folder for the results; created if it does not exist.
         method: Place-recognition method or registration method to run: the name
-            of a shipped one, or a Python file with your own. By default all
-            shipped ones. May be repeated.
+            of a shipped one, or a Python file that registers your own method or
+            defines your own function `localise`. By default all shipped ones.
+            May be repeated.
         simulated: Folder with simulated recordings. Recordings with the same
             model of LiDAR as a data set are used in two ways: their scans are
             added to the data set's database as further places, and a classifier

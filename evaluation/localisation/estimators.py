@@ -36,12 +36,12 @@ from evaluation.alignment.registration import (
 from evaluation.clouds.cloud_files import OnNote, no_note, read_blocks
 from evaluation.drives.sampling import sample_frames, within_range
 from evaluation.localisation.robust import MAX_RANGE, align_robustly
-from evaluation.maps.voxel_maps import VoxelAccumulator, thin
+from evaluation.maps.voxel_maps import VoxelAccumulator
 from evaluation.methods.method import run_module, with_named_faults
 
 # Distance between the scans of a drive that enter the map [m].
 _MAP_SPACING = 1.0
-# Least number of points to which a normal is fitted.
+# Least number of points of a map, and of a thinned scan that is aligned.
 FEWEST_POINTS = 10
 # An alignment ends when a step is below these [m, rad].
 _STILL = (1e-4, 1e-5)
@@ -86,24 +86,33 @@ class Settings:
     neighbours: int = 10
     iterations: int = 50
 
-    def with_values(self, values: Iterable[tuple[str, Any]]) -> "Settings":
+    def with_values(
+        self, values: Iterable[tuple[str, Any]], method: str
+    ) -> "Settings":
         """Returns the settings with other values of some of them.
 
         Args:
             values: pairs of a name and its value, a number or text.
+            method: name of the method, which must have these settings.
 
         Raises:
             InputError: if a setting is unknown, or a value does not fit.
         """
+        unused = {
+            *(() if method in _ALIGNING else _ALIGNMENT),
+            *(() if method in _VOXELS else ("resolution",)),
+        }
         known: dict[str, Callable] = {
             one.name: int if isinstance(one.default, int) else float
             for one in fields(self)
+            if one.name not in unused
         }
         found = {}
         for name, text in values:
             if name not in known:
                 raise InputError(
-                    f"--set: no setting {name!r} (known: {', '.join(known)})"
+                    f"--set: {method} has no setting {name!r} (known:"
+                    f" {', '.join(known)})"
                 )
             try:
                 value = known[name](text)
@@ -454,6 +463,12 @@ _KINDS = {
 _ROBUST = {"robust-plane-icp": "PLANE_ICP", "robust-gicp": "GICP"}
 KISS_MATCHER = "kiss-matcher"
 METHODS = (*_KINDS, *_ROBUST, KISS_MATCHER)
+# Settings that only the methods with an iterative alignment use, and methods
+# with the setting `resolution`. All methods use the others: they thin map and
+# scan, and measure the fit.
+_ALIGNING = (*_KINDS, *_ROBUST)
+_ALIGNMENT = ("width", "last_width", "iterations")
+_VOXELS = ("vgicp", KISS_MATCHER)
 # The best on unchanged cities; see docs/localisation.md.
 _DEFAULTS = {
     "gicp": Settings(width=8.0),
@@ -516,23 +531,3 @@ def make_estimator(method: str, settings: Settings) -> Estimator:
             f"{path}: has {len(own)} functions, none of which is `localise`"
         )
     return partial(_by_own, with_named_faults(function, path), path)
-
-
-def thinned(measured: np.ndarray, settings: Settings, where: str) -> np.ndarray:
-    """Returns a scan with at most one point per voxel, (M, 3).
-
-    Args:
-        measured: (N, 3) points of the scan [m].
-        settings: settings with the side of a voxel, `scan_voxel`.
-        where: name of the scan, for the error message.
-
-    Raises:
-        InputError: too few points are left.
-    """
-    points = thin(measured, settings.scan_voxel)
-    if len(points) < FEWEST_POINTS:
-        raise InputError(
-            f"{where}: {len(points)} points in voxels of"
-            f" {settings.scan_voxel:g} m, fewer than {FEWEST_POINTS}"
-        )
-    return points

@@ -23,17 +23,18 @@ from cns_drake.base.drives.drive import Drive
 from cns_drake.base.errors import InputError, errors_at
 from cns_drake.base.json_text import json_values
 from cns_drake.base.progress import Track, silent
-from evaluation.clouds.cloud_files import read_cloud
+from evaluation.clouds.cloud_files import OnNote, read_cloud
 from evaluation.drives.sampling import cropped, sample_frames
 from evaluation.drives.scan_files import FileDrive
 from evaluation.localisation.estimators import (
+    FEWEST_POINTS,
     Estimator,
     LocalisationMap,
     Settings,
     fit_at,
-    thinned,
 )
 from evaluation.localisation.robust import MAX_RANGE
+from evaluation.maps.voxel_maps import thin
 from evaluation.recognition.place_outcome import Number
 from evaluation.recognition.pose_errors import (
     SUCCESS_ROTATION_DEG,
@@ -64,8 +65,8 @@ _WAITING = 4
 # One row per query: its frame and time; the start's offset in W [m], and its
 # turn as a rotation vector in S; errors of the result; scores; standard
 # deviations of the result from its covariance [m]; the share of the scan that,
-# at the true pose, has no point of the map within a voxel; number of steps, and
-# CPU time [s].
+# at the true pose, has no point of the map within a voxel, NaN if the scan has
+# too few points to be aligned; number of steps, and CPU time [s].
 QUERY = np.dtype(
     [
         ("frame", "<i8"),
@@ -265,28 +266,27 @@ class Localiser:
                 `turn`.
 
         Returns:
-            A record of `QUERY`; and the estimated pose X_WS (4, 4), or None.
-
-        Raises:
-            InputError: the scan has too few points.
+            A record of `QUERY`; and the estimated pose X_WS (4, 4), or None. A
+            scan with too few points has no pose.
         """
         if X_WS0 is None:
             R = Rotation.from_rotvec(turn).as_matrix()
             X_WS0 = poses.make_pose(X_WS[:3, :3] @ R, X_WS[:3, 3] + offset)
         measured = cropped(scan, MAX_RANGE)
-        points = thinned(measured, self.settings, f"scan {frame}")
-        begin = time.process_time()
-        found = self.estimator(self.surroundings, points, measured, X_WS0)
-        end = found.X_WS
+        points = thin(measured, self.settings.scan_voxel)
         row = np.zeros((), QUERY)
-        row["seconds"] = time.process_time() - begin
-        row["iterations"] = found.iterations
         for name in COLUMNS[8:-2]:
             row[name] = np.nan
         row["own_score"] = row["fit"] = -math.inf
         row["frame"], row["stamp_ns"] = frame, stamp_ns
         for axis, o, t in zip("xyz", offset, np.degrees(turn), strict=True):
             row[f"start_{axis}"], row[f"start_turn_{axis}_deg"] = o, t
+        if len(points) < FEWEST_POINTS:
+            return row, None
+        begin = time.process_time()
+        found = self.estimator(self.surroundings, points, measured, X_WS0)
+        row["seconds"] = time.process_time() - begin
+        row["iterations"], end = found.iterations, found.X_WS
         far = self.surroundings.distances(poses.transform(X_WS, points))
         row["unmapped"] = np.mean(far > self.settings.voxel)
         if end is not None:
@@ -334,7 +334,7 @@ def localise(
         (K,) records of `QUERY`, in the order of the frames.
 
     Raises:
-        InputError: a scan cannot be read, or has too few points.
+        InputError: a scan cannot be read.
     """
     global _localiser
     X_WS, stamps = query.X_WS, query.stamps_ns
@@ -383,6 +383,22 @@ def is_right(
     return (rows["translation_error"] <= translation) & (
         rows["rotation_error_deg"] <= rotation_deg
     )
+
+
+def note_sparse(name: str, rows: np.ndarray, on_note: OnNote) -> None:
+    """Notes how many scans had too few points to be aligned, if any.
+
+    Args:
+        name: name of the query drive.
+        rows: (K,) results, records of `QUERY`.
+        on_note: is called with the note.
+    """
+    if sparse := np.count_nonzero(np.isnan(rows["unmapped"])):
+        on_note(
+            f"{name}: {sparse} of {len(rows)} scans have fewer than"
+            f" {FEWEST_POINTS} points after thinning; they count as"
+            " failures"
+        )
 
 
 def _believed_from(rows: np.ndarray) -> float:
@@ -436,14 +452,13 @@ def summary(rows: np.ndarray) -> dict[str, float | int | None]:
     ):
         found[f"auroc_{name}"] = auroc(scores, right)
     found["believed_from"] = least
-    found["confident_wrong"] = float(np.mean(believed & ~right))
-    wrong = np.count_nonzero(~right)
-    found["confident_of_wrong"] = (
-        float(np.count_nonzero(believed & ~right) / wrong)
-        if wrong and right.any()
-        else None
-    )
-    found["unmapped_mean"] = float(rows["unmapped"].mean())
+    # Without a right result, there is no threshold.
+    harmful = float((believed & ~right).sum()) if right.any() else math.nan
+    wrong = int((~right).sum())
+    found["confident_wrong"] = harmful / len(rows)
+    found["confident_of_wrong"] = harmful / wrong if wrong else None
+    known = rows["unmapped"][~np.isnan(rows["unmapped"])]
+    found["unmapped_mean"] = float(known.mean()) if len(known) else None
     found["seconds_mean"] = float(rows["seconds"].mean())
     return json_values(found)
 

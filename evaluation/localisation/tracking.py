@@ -29,7 +29,11 @@ _TURN_OF_DRIFT_DEG = 1.0
 _DRIFT_SEED = 5
 
 TRACKED = np.dtype(
-    [("stretch", "<i8"), ("way", "<f8"), ("step", "<f8"), *QUERY.descr]
+    [
+        ("stretch", "<i8"),
+        *((name, "<f8") for name in ("way", "step", "track_error")),
+        *QUERY.descr,
+    ]
 )
 
 
@@ -92,10 +96,12 @@ def track_drive(
     Returns:
         (K,) records of `TRACKED`. Before the fields of `QUERY`, each contains
         the number of the section, the length of the path since the drive's
-        first scan, and the length since the previous scan [m].
+        first scan, the length since the previous scan [m], and the error of the
+        tracked position [m]. This is the error of the result or, without one,
+        of the odometry.
 
     Raises:
-        InputError: a scan cannot be read, or has too few points.
+        InputError: a scan cannot be read, or fewer than two are in the map.
     """
     X_WS = query.X_WS
     way = travelled(X_WS[:, :3, 3])
@@ -135,17 +141,18 @@ def track_drive(
             turn,
             start,
         )
-        # Without a pose, the estimate continues by odometry.
         last = end
-        if end is None:
+        if last is None:
+            # The estimate continues by odometry.
             R = Rotation.from_rotvec(turn).as_matrix()
             last = poses.make_pose(
                 X_WS[frame, :3, :3] @ R, X_WS[frame, :3, 3] + offset
             )
-            row["translation_error"] = np.linalg.norm(offset)
-            row["rotation_error_deg"] = np.degrees(np.linalg.norm(turn))
         for name in COLUMNS:
             rows[name][k] = row[name]
+        rows["track_error"][k] = np.linalg.norm(
+            last[:3, 3] - X_WS[frame, :3, 3]
+        )
         rows["stretch"][k], rows["way"][k] = stretches[k], way[frame]
         rows["step"][k] = 0.0 if is_first else way[frame] - way[frames[k - 1]]
     return rows
@@ -166,7 +173,7 @@ def losses(tracked: np.ndarray) -> list[tuple[float, bool]]:
     found = []
     for stretch in np.unique(tracked["stretch"]):
         rows = tracked[tracked["stretch"] == stretch]
-        lost = rows["translation_error"] > LOST
+        lost = rows["track_error"] > LOST
         begins = np.flatnonzero(np.diff(lost.astype(int), prepend=0) == 1)
         for begin in begins.tolist():
             back = np.flatnonzero(~lost[begin:])
@@ -185,7 +192,7 @@ def summary(tracked: np.ndarray) -> dict[str, float | int | None]:
         tracked: records of `TRACKED`.
     """
     way = float(tracked["step"].sum())
-    within = tracked["translation_error"] <= RIGHT_TRANSLATION
+    within = tracked["track_error"] <= RIGHT_TRANSLATION
     found = losses(tracked)
     back = [length for length, is_back in found if is_back]
     return {

@@ -52,6 +52,10 @@ _CELL, _NEAR = 0.2, 0.2
 _BEHIND, _ON = 0.5, 0.2
 # Distance driven between two scans [m].
 _SPACING = 2.0
+# Number of the lowest, highest and farthest returns that do not count for the
+# field of view, since a few may come from a bird or a reflection. A ring of
+# beams has many more returns.
+_STRAYS = 10
 # Number of scans that must show a kept cell: this share of the scans from which
 # the cell is hidden, but at most this number.
 _SHOWN, _ENOUGH = 0.05, 2
@@ -162,15 +166,16 @@ def _count_views(
     counts = np.zeros((3, len(points)), np.int32)
     chosen = sample_frames(other.X_WS[:, :3, 3], _SPACING).tolist()
     # The field of view reaches from the lowest to the highest return, and as
-    # far as the farthest.
+    # far as the farthest, without the strays.
     some = chosen[:: max(len(chosen) // 20, 1)]
     scans = [other.scan(number) for number in some]
     returns = np.concatenate([np.zeros((0, 3)), *scans])
     if len(returns) == 0:
         return counts
-    slopes = _slopes(returns)
-    low, high = slopes.min(), slopes.max()
-    reach = np.linalg.norm(returns, axis=1).max()
+    slopes = np.sort(_slopes(returns))
+    strays = min(_STRAYS, (len(returns) - 1) // 2)
+    low, high = slopes[[strays, -1 - strays]]
+    reach = np.sort(np.linalg.norm(returns, axis=1))[-1 - strays]
 
     def look(number: int) -> list[np.ndarray]:
         X_WS = other.X_WS[number]

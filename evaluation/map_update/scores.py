@@ -231,16 +231,19 @@ def _called(both: _Labelled) -> dict[str, float]:
 
 def _updated_map(both: _Labelled) -> dict[str, float]:
     pair, truth, predicted, counted = both
-    stays = counted[0] & (predicted.A != Label.GONE)
-    comes = counted[1] & (predicted.B != Label.KEPT)
-    observed = stays & (truth.A != Label.UNOBSERVED)
-    target = pair.B.points[counted[1]]
+    stays = predicted.A != Label.GONE
+    comes = predicted.B != Label.KEPT
+    observed = stays & counted[0] & (truth.A != Label.UNOBSERVED)
     updated = np.concatenate([pair.A.points[stays], pair.B.points[comes]])
-    # Points that B adds lie on B's map: their distance is 0.
+    # Points that B adds lie on B's map: their distance is 0. Points without a
+    # true label are not scored, but a scored point can lie near to them.
     own = np.concatenate(
-        [nearest(pair.A.points[observed], target), np.zeros(comes.sum())]
+        [
+            nearest(pair.A.points[observed], pair.B.points),
+            np.zeros((comes & counted[1]).sum()),
+        ]
     )
-    other = nearest(target, updated)
+    other = nearest(pair.B.points[counted[1]], updated)
     tolerance = _TOLERANCES["within_02m"]
     if len(own) == 0 or len(other) == 0:
         return dict.fromkeys(("completeness", "accuracy", "chamfer"), math.nan)

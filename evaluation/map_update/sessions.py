@@ -247,7 +247,7 @@ def read_labels(path: Path, session: Session, *, truth: bool) -> np.ndarray:
 
     Args:
         path: an array `.npy` of integers, or a cloud `.ply` with a property
-            `truth`, `change` or `prediction` for each point.
+            `prediction` for each point.
         session: the session to which the labels belong.
         truth: whether the labels are exact labels. Only these may have the
             value `Label.IGNORED`.
@@ -288,10 +288,9 @@ def write_labels(path: Path, labels: np.ndarray) -> None:
 def _read_array(path: Path) -> np.ndarray:
     if path.suffix == ".ply":
         points = np.concatenate(list(read_blocks(path)))
-        for name in ("truth", "change", "prediction"):
-            if name in (points.dtype.names or ()):
-                return points[name]
-        raise InputError(f"{path}: no property truth, change or prediction")
+        if "prediction" not in (points.dtype.names or ()):
+            raise InputError(f"{path}: no property `prediction`")
+        return points["prediction"]
     return read_npy(path)
 
 

@@ -18,13 +18,14 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from cns_drake.base.errors import InputError
 from cns_drake.base.progress import Track
 from evaluation.clouds.cloud_files import OnNote
 from evaluation.drives import Drive
 from evaluation.localisation import estimators, localise
 from evaluation.maps.voxel_maps import map_drive
 from evaluation.methods import Method, make_method, shipped_methods
-from evaluation.methods.method import load_method
+from evaluation.methods.method import load_method, run_module
 from evaluation.real.data_sets import (
     RealScans,
     open_data_sets,
@@ -86,30 +87,45 @@ class Measuring:
 
         Args:
             names: names of methods and estimators, or Python files with your
-                own methods; if empty, all shipped ones.
+                own; if empty, all shipped ones. A file of an estimator defines
+                a function `localise`.
             track: reports progress.
             on_note: is called with each note for the user.
 
         Raises:
-            InputError: a method is not known, or its file cannot be used.
+            InputError: a method is not known, its file cannot be used, or two
+                estimators have one name.
         """
         self.rows: list[Row] = []
         self.answers: list[Answers] = []
         self._track = track
         self._note = on_note
         chosen = names or (*shipped_methods(), *_ESTIMATORS)
+        aligning = {
+            one: Path(one).stem
+            for one in chosen
+            if one in estimators.METHODS
+            or (
+                one.endswith(".py")
+                and hasattr(run_module(Path(one)), "localise")
+            )
+        }
         self._methods = [
             load_method(Path(one)).name if one.endswith(".py") else one
             for one in chosen
-            if one not in estimators.METHODS
+            if one not in aligning
         ]
         self._made_for(1.0)
         settings = estimators.default_settings
         self._estimators = {
-            one: (estimators.make_estimator(one, settings(one)), settings(one))
-            for one in chosen
-            if one in estimators.METHODS
+            name: (estimators.make_estimator(one, settings(one)), settings(one))
+            for one, name in aligning.items()
         }
+        if len(self._estimators) < len(aligning):
+            raise InputError(
+                "--method: two registration methods have one name:"
+                f" {', '.join(aligning)}"
+            )
 
     def _made_for(self, height: float) -> list[Method]:
         """Returns the methods for a height of the LiDAR [m]."""
@@ -298,9 +314,17 @@ class Measuring:
                     k, k, drive.scan(k), X_WS[k], R_WT[k], *_STARTS.draw(k)
                 )
                 found[name].append(row)
-        for name, rows in found.items():
+        number = max(map(len, found.values()), default=len(drive))
+        if number < len(drive):
+            self._note(
+                f"{one.name}: {number} of {len(drive)} scans localised; the"
+                f" others have no other scan within {localise.NEAR:g} m"
+            )
+        for k, (name, rows) in enumerate(found.items()):
             if rows:
                 found_rows = np.array(rows)
+                if k == 0:
+                    localise.note_sparse(one.name, found_rows, self._note)
                 numbers = localise.numbers(found_rows, name)
                 columns = localise.columns(found_rows)
                 self._add(one, "localise", name, numbers, columns=columns)

@@ -102,7 +102,7 @@ def draw_track(rows: np.ndarray, stem: Path) -> None:
     top, bottom = figure.subplots(2, 1, sharex=True, height_ratios=(2, 1))
     for stretch in np.unique(rows["stretch"]):
         some = rows[rows["stretch"] == stretch]
-        error = np.maximum(some["translation_error"], 1e-4)
+        error = np.maximum(some["track_error"], 1e-4)
         top.plot(some["way"], error, "-", color=INK, linewidth=1.0)
         bottom.fill_between(
             some["way"], some["unmapped"], color=PALE, linewidth=0.0
@@ -113,7 +113,7 @@ def draw_track(rows: np.ndarray, stem: Path) -> None:
     bottom.set(
         xlabel="way [m]",
         ylabel="scan\nwithout map",
-        ylim=(0.0, max(0.1, 1.05 * float(rows["unmapped"].max()))),
+        ylim=(0.0, max(0.1, 1.05 * float(np.nanmax(rows["unmapped"])))),
     )
     for axes in (top, bottom):
         axes.grid(alpha=0.3)

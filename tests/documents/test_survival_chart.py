@@ -132,3 +132,25 @@ def test_fresh_rows_are_those_of_the_five_versions():
     assert both == {"learned", "layered-overlap"}
     assert unbeaten.pop("riverside, fresh 01 → 02") == {"layered-overlap"}
     assert list(unbeaten.values()) == [{"learned"}] * 6
+
+
+def test_the_first_table_has_the_medians_over_pairs():
+    page = documents.read("docs/results.md")
+    table = documents.table(page, "# Results")
+    names = ["learned", "layered-overlap", "btc"]
+    names += ["ring++", "scan-context++", "solid"]
+    notes = documents.ROOT / "docs/notes"
+    for row, file, column, unit in (
+        (table[0], "results_fair.csv", "kept", 0.01),
+        (table[1], "results_fair.csv", "kept_strict", 0.01),
+        (table[2], "fresh.csv", "kept", 0.01),
+        (table[3], "results_fair.csv", "auc_strict", 1.0),
+        (table[4], "results_fair.csv", "r1", 1.0),
+    ):
+        with (notes / file).open(newline="", encoding="utf-8") as stream:
+            pairs = list(csv.DictReader(stream))
+        for name, shown in zip(names, row[1:], strict=True):
+            values = [float(p[column]) for p in pairs if p["method"] == name]
+            assert float(shown.removesuffix(" %")) * unit == pytest.approx(
+                np.median(values), abs=0.0051
+            ), (row[0], name)

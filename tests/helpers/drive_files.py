@@ -65,6 +65,7 @@ def write_recording(
     mast: str = "mast",
     compression: CompressionType = CompressionType.ZSTD,
     without_pose: list[int] | None = None,
+    later_poses: dict[int, np.ndarray] | None = None,
     **writing,
 ) -> Path:
     """Writes a rosbag2 folder; rotations of X_WBs are about z only.
@@ -85,6 +86,7 @@ def write_recording(
         mast: parent of the sensor's frame; the vehicle carries `mast`.
         compression: of the chunks.
         without_pose: frames without a message of odometry.
+        later_poses: stamp [ns] -> pose of the vehicle (4, 4), on /tf.
         writing: further options of the writer.
 
     Returns:
@@ -115,8 +117,9 @@ def write_recording(
                 "/lidar/points": "sensor_msgs/msg/PointCloud2",
                 "/odometry": "nav_msgs/msg/Odometry",
                 "/tf_static": "tf2_msgs/msg/TFMessage",
+                "/tf": "tf2_msgs/msg/TFMessage",
             }.items()
-            if name in topics
+            if name in topics or (name == "/tf" and later_poses)
         }
 
         def add(topic, message, log_time, sequence):
@@ -143,6 +146,8 @@ def write_recording(
                     i,
                 )
             add("/lidar/points", point_cloud(scan, stamp), stamp, i)
+        for stamp, X_WB in (later_poses or {}).items():
+            add("/tf", _tf(X_WB, world_frame, stamp), stamp, 0)
         writer.finish()
     return path
 
@@ -207,6 +212,21 @@ def _odometry(X_WB: np.ndarray, frame_id: str, stamp_ns: int):
             covariance=np.zeros(36),
         ),
     )
+
+
+def _tf(X_WB: np.ndarray, frame_id: str, stamp_ns: int):
+    t = TYPES.types
+    pose = _odometry(X_WB, frame_id, stamp_ns).pose.pose
+    place = t["geometry_msgs/msg/Transform"](
+        translation=t["geometry_msgs/msg/Vector3"](**vars(pose.position)),
+        rotation=pose.orientation,
+    )
+    edge = t["geometry_msgs/msg/TransformStamped"](
+        header=_header(frame_id, stamp_ns),
+        child_frame_id="base_link",
+        transform=place,
+    )
+    return t["tf2_msgs/msg/TFMessage"](transforms=[edge])
 
 
 def _tf_static(p_BS, quat_xyzw_BS, parent: str, stamp_ns: int):

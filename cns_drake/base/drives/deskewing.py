@@ -22,12 +22,12 @@ def deskew(drive: Drive, index: int) -> np.ndarray:
 
     In a recorded scan, each point was measured `t` ns after the stamp and is
     expressed in the LiDAR's frame at that time. The pose at that time comes
-    from cubic splines through the poses of the drive around the scan: one for
+    from cubic splines through the recorded poses around the scan: one for
     positions, and scipy's RotationSpline, with smooth angular rates, for
     rotations. With this pose the point is transformed to the world, and from
     there, with the pose at the stamp, to the LiDAR's frame S at the stamp.
 
-    At the end of the drive the motion is extrapolated over one scan.
+    If no pose is recorded after the last scan, its motion is extrapolated.
 
     Args:
         drive: drive whose scans have a field `t` [ns].
@@ -39,7 +39,7 @@ def deskew(drive: Drive, index: int) -> np.ndarray:
 
     Raises:
         InputError: if the scan cannot be read, has no field `t` in nanoseconds,
-            or the drive has too few poses.
+            or the drive has only one scan.
     """
     points = drive.scan(index).copy()
     if "t" not in (points.dtype.names or ()):
@@ -47,17 +47,13 @@ def deskew(drive: Drive, index: int) -> np.ndarray:
             f"{drive.name}: scan {index}: no field t, the time of each point"
             " [ns]"
         )
-    first = max(0, index - _REACH)
-    around = slice(first, index + _REACH + 2)
-    X_WS = drive.X_WS[around]
-    if len(X_WS) < 2:
-        raise InputError(f"{drive.name}: one pose is not enough for a motion")
-    # Differences of int64 are exact; stamps as doubles would not be.
-    stamps_ns = drive.stamps_ns[around] - drive.stamps_ns[index]
     # Most points share their firing time with a whole column.
     t_ns, column = np.unique(points["t"], return_inverse=True)
     scan_s = np.ptp(t_ns) * 1e-9 if len(t_ns) else 0.0
-    step_s = np.diff(stamps_ns).mean() * 1e-9
+    if len(drive) < 2:
+        raise InputError(f"{drive.name}: one scan is not enough for a motion")
+    near = drive.stamps_ns[max(0, index - _REACH) : index + _REACH + 2]
+    step_s = np.diff(near).mean() * 1e-9
     if points["t"].dtype.kind not in "iu" or (
         scan_s > 0.0 and not 1.0 / _MOST_OFF < scan_s / step_s < _MOST_OFF
     ):
@@ -65,8 +61,13 @@ def deskew(drive: Drive, index: int) -> np.ndarray:
             f"{drive.name}: scan {index}: t: from {t_ns[0]:g} to {t_ns[-1]:g};"
             f" no nanoseconds of a scan, where scans are {step_s:.3g} s apart"
         )
-    X_WT = _evaluate(stamps_ns * 1e-9, X_WS, t_ns * 1e-9)
-    X_ST = poses.inverse(X_WS[index - first]) @ X_WT
+    # Differences of int64 are exact; stamps as doubles would not be.
+    stamps_ns, X_WS = drive.motion
+    times_ns = stamps_ns - drive.stamps_ns[index]
+    first, end = np.searchsorted(times_ns, [0, t_ns.max(initial=0)])
+    around = slice(max(0, first - _REACH), end + _REACH + 1)
+    X_WT = _evaluate(times_ns[around] * 1e-9, X_WS[around], t_ns * 1e-9)
+    X_ST = poses.inverse(X_WS[first]) @ X_WT
     p_T = np.stack([points[axis] for axis in "xyz"], axis=1).astype(float)
     R_ST, p_ST = X_ST[column, :3, :3], X_ST[column, :3, 3]
     p_S = np.einsum("nij,nj->ni", R_ST, p_T) + p_ST

@@ -143,6 +143,15 @@ class Drive(abc.ABC):
     def X_WS(self) -> np.ndarray:
         """(N, 4, 4) float64 pose of the LiDAR at each scan's stamp."""
 
+    @property
+    def motion(self) -> tuple[np.ndarray, np.ndarray]:
+        """All recorded poses of the LiDAR, at least that of each scan.
+
+        Returns:
+            Stamps (M,) [ns], strictly increasing, and poses X_WS (M, 4, 4).
+        """
+        return self.stamps_ns, self.X_WS
+
     @abc.abstractmethod
     def scan(self, index: int) -> np.ndarray:
         """Returns one scan as an array of points.

@@ -24,6 +24,7 @@ from cns_drake.base.json_text import parse_json
 _LIDAR_TOPIC = "/lidar/points"
 _ODOMETRY_TOPIC = "/odometry"
 _IMU_TOPIC = "/imu/data"
+_TF_TOPIC = "/tf"
 _TF_STATIC_TOPIC = "/tf_static"
 _KALIBR = "imu.yaml"
 # By REP 105 of ROS, other frames, such as `odom`, may start anew in each drive.
@@ -85,6 +86,8 @@ class McapDrive(Drive):
             self._message_types[_IMU_TOPIC] = ros_types.IMU
         for topic, message_type in self._message_types.items():
             self._check_topic(topic, message_type)
+        if self._file.topics.get(_TF_TOPIC) == [f"{ros_types.TF} in cdr"]:
+            self._message_types[_TF_TOPIC] = ros_types.TF
         self._all_scans = self._file.locate(self._lidar_topic)
         # `image_transport` adds compressedDepth to the names of depth images.
         self._camera_topics = [
@@ -107,6 +110,35 @@ class McapDrive(Drive):
     @property
     def X_WS(self) -> np.ndarray:
         return self._track[1]
+
+    @cached_property
+    def motion(self) -> tuple[np.ndarray, np.ndarray]:
+        _, odometry = self._stamps_and_odometry
+        rows = np.concatenate([odometry, self._later_poses()])
+        stamps_ns, kept = np.unique(rows["stamp_ns"], return_index=True)
+        X_WB = checked_poses(
+            rows["position"][kept], rows["quat_xyzw"][kept], str(self._path)
+        )
+        return stamps_ns, X_WB @ self.X_BS
+
+    def _later_poses(self) -> np.ndarray:
+        """Returns poses of the vehicle on /tf that are later than the odometry.
+
+        They are records of `ODOMETRY_DTYPE` with velocities of zero.
+        """
+        if _TF_TOPIC not in self._message_types:
+            return np.zeros(0, ODOMETRY_DTYPE)
+        last = self._file.locate(_ODOMETRY_TOPIC)[-1]
+        odometry = self._message(_ODOMETRY_TOPIC, last)
+        places = self._file.locate(_TF_TOPIC)
+        found = [
+            mcap_messages.transform_row(edge)
+            for place in places[places["log_time_ns"] > last["log_time_ns"]]
+            for edge in self._message(_TF_TOPIC, place).transforms
+            if _vehicle_frames(edge) == _vehicle_frames(odometry)
+        ]
+        rows = np.array(found, ODOMETRY_DTYPE)
+        return rows[rows["stamp_ns"] > mcap_messages.stamp_ns(odometry.header)]
 
     @property
     def lidar_names(self) -> tuple[str, ...]:

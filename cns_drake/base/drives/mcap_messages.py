@@ -94,6 +94,16 @@ def odometry_row(message: Any) -> tuple:
     )
 
 
+def transform_row(message: Any) -> tuple:
+    """Returns a geometry_msgs/msg/TransformStamped as `odometry_row` does.
+
+    The velocities are zero.
+    """
+    transform = message.transform
+    place = xyz(transform.translation), xyzw(transform.rotation)
+    return stamp_ns(message.header), *place, 0.0, 0.0
+
+
 def imu_row(message: Any) -> tuple:
     """Returns a message sensor_msgs/msg/Imu as a record of `IMU_DTYPE`.
 

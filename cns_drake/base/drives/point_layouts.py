@@ -182,18 +182,21 @@ _LAYOUTS = {
 
 
 def to_layout(
-    points: np.ndarray, layout: str, num_rings: int | None = None
+    points: np.ndarray,
+    layout: str,
+    num_rings: int | None = None,
+    is_calibrated: bool = False,
 ) -> np.ndarray:
     """Returns points with the fields of another layout, such as Ouster's.
 
     Args:
-        points: (N,) with the fields x y z intensity ring t. If all intensities
-            are at most 1, they are read as 0 to 1, and otherwise as calibrated
-            intensities from 0 to 255.
+        points: (N,) with the fields x y z intensity ring t.
         layout: one of `LAYOUT_NAMES`; `cns` is the layout that the points
             have.
         num_rings: number of rings of the LiDAR. With it, the layout `velodyne`
             counts rings from the lowest, as Velodyne's driver does.
+        is_calibrated: whether the intensities are calibrated, from 0 to 255.
+            Otherwise they are from 0 to 1.
 
     Returns:
         (N,). Ranges are in millimetres for `ouster`; `t` and `time_stamp` in
@@ -205,7 +208,7 @@ def to_layout(
         return points
     x, y, z = (points[axis].astype(float) for axis in "xyz")
     distance = np.sqrt(x * x + y * y + z * z)
-    full = _FULL if points["intensity"].max(initial=0.0) > 1.0 else 1.0
+    full = _FULL if is_calibrated else 1.0
     brightness = np.rint(_FULL * np.clip(points["intensity"] / full, 0.0, 1.0))
     columns = {name: points[name] for name in points.dtype.names or ()}
     columns |= {

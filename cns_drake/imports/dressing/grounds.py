@@ -272,7 +272,7 @@ def _laid(
             aside = (flat - a)[..., :2] @ normal[:2]
             flat[..., 2] = a[2] - aside / normal[2] + above
             found.append(flat)
-    return turned_up(np.concatenate(found))
+    return np.concatenate(found)
 
 
 # Width of the widest gap, and area of the smallest one, that is paved [m, m^2].
@@ -341,7 +341,7 @@ def paved_gaps(
         )
     found = [some for some in surfaces.values() if some]
     for number, some in enumerate(found):
-        surface = turned_up(np.concatenate(some))
+        surface = np.concatenate(some)
         yield _paved(f"sidewalk_gap_{number}", "sidewalk", surface)
 
 

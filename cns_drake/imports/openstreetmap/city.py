@@ -153,9 +153,8 @@ def import_openstreetmap(
         if reading.is_building(one.tags)
         or (dressed and reading.was_building(one.tags))
     ]
-    buildings = list(standing_buildings(buildings, faults, dressed))
-    if dressed:
-        buildings = list(_without_outers(buildings, features))
+    standing = standing_buildings(buildings, faults, dressed)
+    buildings = list(_without_outers(standing, features))
     if not buildings:
         raise InputError(f"{path}: {_no_buildings(faults)}")
     low, high = _bounds(buildings)

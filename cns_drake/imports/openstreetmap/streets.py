@@ -6,6 +6,8 @@ https://wiki.openstreetmap.org/wiki/Map_features
 from collections.abc import Iterable, Iterator, Sequence
 from collections.abc import Set as AbstractSet
 from dataclasses import dataclass
+import math
+import re
 from typing import NamedTuple
 
 import numpy as np
@@ -34,6 +36,7 @@ from cns_drake.imports.openstreetmap.tags import (
     lanes_beside,
     path_width,
     sidewalk_sides,
+    speed_limit,
     street_width,
 )
 from cns_drake.imports.options import ImportFaults
@@ -72,7 +75,8 @@ class Bridges:
 def bridges_of(ways: Iterable[OsmWay], local: Local) -> Bridges:
     """Returns the bridges and the tunnels among the ways of a file.
 
-    `local` converts longitudes and latitudes to coordinates in metres.
+    Of two bridges that cross, the upper one counts as a bridge over another
+    way. `local` converts longitudes and latitudes to coordinates in metres.
     """
     used = [
         way
@@ -94,10 +98,22 @@ def bridges_of(ways: Iterable[OsmWay], local: Local) -> Bridges:
             open_ways[k]
             for k in tree.query(line, "intersects")
             if not set(open_ways[k].nodes) & set(way.nodes)
-            and not has_tag(open_ways[k].tags, "bridge")
+            and _height_rank(open_ways[k]) < _height_rank(way)
         ]
         (over if crossed else level).add(way.name)
     return Bridges(over, level, tunnels)
+
+
+def _height_rank(way: OsmWay) -> tuple[float, str]:
+    """Returns what is greater for the upper one of two ways that cross.
+
+    One of two bridges in the same layer is above the other; the file does not
+    say which, and so the name decides.
+    """
+    if not has_tag(way.tags, "bridge"):
+        return -math.inf, ""
+    layer = re.fullmatch(r"[+-]?\d+(\.\d+)?", way.tags.get("layer", ""))
+    return float(layer[0]) if layer else 1.0, way.name
 
 
 class Look(NamedTuple):
@@ -227,6 +243,8 @@ def street_surfaces(
         if width is None:
             walks.append((name, course.buffer((narrow or 0.0) / 2.0, 4)))
             continue
+        for is_forward in {True, "maxspeed:backward" not in tags}:
+            speed_limit(tags, is_forward, (name, faults))
         if has_tag(tags, "bridge") and name not in bridges.level:
             faults.add("bridge, laid on the ground", name)
         roads.append((name, course.buffer(width / 2.0, 4)))
@@ -385,9 +403,13 @@ def ground_areas(
     """Yields areas on the ground, such as lawns and water.
 
     If `dressed`, there are more kinds, such as sports grounds, and areas have
-    the colours of their materials.
+    the colours of their materials. A path that is a closed way is a line, such
+    as the path around a square, unless it has `area=yes`.
     """
     for name, tags, polygons in features.areas:
+        is_path = name.startswith("w") and path_width(tags) is not None
+        if is_path and tags.get("area") != "yes":
+            tags = {k: v for k, v in tags.items() if k != "highway"}
         look = _look(tags) if dressed else _plain_look(tags)
         if look is None or has_tag(tags, "building"):
             continue

@@ -47,7 +47,9 @@ _FASTEST = 60.0  # [m/s]
 _WALKING_PACE = 7.0 * _KM_H
 # Speed limit of links, such as ramps [km/h].
 _LINKS = 50.0
-_SPEED = re.compile(r"(\d{1,3})(?:\s*(km/h|kmh|kph|mph))?")
+_SPEED = re.compile(r"(?:zone)?\s*(\d{1,3})(?:\s*(km/h|kmh|kph|mph))?")
+# Tags that give a limit by a rule, and countries whose rules are in miles.
+_SPEED_RULES, _IN_MILES = ("zone:maxspeed", "maxspeed:type"), ("gb", "uk", "us")
 
 
 def length(text: str | None) -> float | None:
@@ -246,10 +248,10 @@ def driven_ways(tags: Mapping[str, str]) -> tuple[bool, bool]:
     The first result is for the direction of the street's line, the second for
     the opposite direction.
     """
-    if any(
-        tags.get(key) in ("no", "private", "bus", "agricultural")
-        for key in ("motor_vehicle", "motorcar", "vehicle")
-    ) or tags.get("access") in ("no", "private"):
+    # The most specific tag counts.
+    keys = ("motorcar", "motor_vehicle", "vehicle", "access")
+    access = next((tags[key] for key in keys if key in tags), "yes")
+    if access in ("no", "private", "bus", "agricultural"):
         return False, False
     one_way = tags.get("oneway", "")
     if one_way in ("-1", "reverse"):
@@ -400,15 +402,24 @@ def lane_layout(tags: Mapping[str, str], width: float) -> LaneLayout:
     return LaneLayout(forward, backward, min(most_used, width / total), total)
 
 
-def speed_limit(tags: Mapping[str, str], is_forward: bool = True) -> float:
+def speed_limit(
+    tags: Mapping[str, str],
+    is_forward: bool = True,
+    where: tuple[str, ImportFaults] | None = None,
+) -> float:
     """Returns the speed limit on a street [m/s].
 
-    Without a tag, it is the usual limit for the kind of street. `is_forward` is
-    the direction of travel: along the street's line, or against it.
+    Without a tag, it is the usual limit for the kind of street.
+
+    Args:
+        tags: tags of the street.
+        is_forward: direction of travel: along the street's line, or against it.
+        where: id of the street, and the counts to which tags that cannot be
+            read are added. By default they are not counted.
     """
     side = "forward" if is_forward else "backward"
-    for key in (f"maxspeed:{side}", "maxspeed", "maxspeed:type"):
-        found = _speed(tags.get(key, ""))
+    for key in (f"maxspeed:{side}", "maxspeed", *_SPEED_RULES):
+        found = tag_value(tags, key, _speed, _FASTEST, where)
         if found is not None:
             return found
     kind = tags.get("highway", "")
@@ -416,15 +427,19 @@ def speed_limit(tags: Mapping[str, str], is_forward: bool = True) -> float:
 
 
 def _speed(text: str) -> float | None:
-    """Returns the lowest speed in a tag's value [m/s]; None if it has none."""
+    """Returns the lowest speed in a tag's value [m/s]; None if it has none.
+
+    A country may precede a speed or the name of a rule, as in `FR:80`.
+    """
     speeds = []
     for part in text.lower().split(";"):
-        found = _SPEED.fullmatch(part.strip())
-        rule = part.strip().partition(":")[2]
+        country, _, rule = part.strip().rpartition(":")
+        found = _SPEED.fullmatch(rule)
         if found:
-            unit = _MILES_H if found[2] == "mph" else _KM_H
-            speeds.append(int(found[1]) * unit)
-        elif part.strip() == "walk":
+            unit = found[2] or ("mph" if country.startswith(_IN_MILES) else "")
+            scale = _MILES_H if unit == "mph" else _KM_H
+            speeds.append(int(found[1]) * scale)
+        elif rule == "walk":
             speeds.append(_WALKING_PACE)
         elif rule in TABLES["rules"]:
             speeds.append(TABLES["rules"][rule] * _KM_H)

@@ -29,6 +29,8 @@ if TYPE_CHECKING:
 class WeatherConfig(Section):
     """The weather. It affects only LiDARs with calibrated returns.
 
+    The notes on calibrated returns list the limits of the model.
+
     Attributes:
         visibility: meteorological visibility in fog [m]; the smaller, the
             denser the fog. By default there is no fog.
@@ -69,7 +71,8 @@ class LidarSection(Mount):
         returns: model of the returns: `ideal`, or `calibrated` with the losses,
             errors and intensities of the unit's data sheet.
         echoes: which echoes of a beam are reported, with calibrated returns.
-            `dual` reports the strongest and the last one.
+            `dual` reports the strongest and the last one. Fog has an echo only
+            in beams without any other.
         unit_seed: seed of the individual unit, with calibrated returns. It
             decides the errors in the ranges, angles and gains of the unit's
             lasers. Use the same seed in all drives with the same unit.

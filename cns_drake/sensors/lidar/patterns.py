@@ -320,8 +320,10 @@ class SpinningPattern(BeamPattern):
                 "elevations_rad: they must descend, from pi/2 at most to "
                 "-pi/2 at least, and there must be one"
             )
-        if not np.isfinite(self.azimuths_rad or (0.0, 0.0)).all():
-            raise ValueError(f"azimuths_rad: {self.azimuths_rad} is no part")
+        if not np.ptp(self.azimuths_rad or 0.0) <= 2.0 * math.pi + 1e-9:
+            raise ValueError(
+                f"azimuths_rad: {self.azimuths_rad} is no part of a turn"
+            )
 
     @property
     def num_rings(self) -> int:

@@ -16,6 +16,8 @@ follows from the lidar ratio of ice crystals, 25 sr (Young and Vaughan, 2009).
 Fog is a homogeneous medium. With the meteorological visibility V [m], its
 extinction is alpha = ln 20 / V [1/m], and its back-scatter coefficient is 0.046
 / V [1/(m sr)] (Rasshofer et al., 2011).
+
+The section "Limits" of docs/notes/calibrated_returns.md says what is missing.
 """
 
 from dataclasses import dataclass
@@ -71,7 +73,7 @@ class Weather:
     snowfall: float = 0.0
 
     def __post_init__(self) -> None:
-        if self.visibility is not None and not 5.0 <= self.visibility < 1e6:
+        if self.visibility is not None and not 5.0 <= self.visibility <= 1e6:
             raise ValueError(
                 f"visibility: {self.visibility} is not within 5 m and 1000 km"
             )
@@ -181,7 +183,8 @@ def tabulate_scattering(
     from scipy.integrate import cumulative_trapezoid
 
     distances = _DISTANCES[min_range < _DISTANCES]
-    distances = np.concatenate([[min_range], distances])
+    # At no distance at all, light would be infinitely strong.
+    distances = np.concatenate([[max(min_range, 1e-6)], distances])
     radius = _APERTURE + divergence * distances
     overlap = np.interp(distances, _OVERLAP, (0.0, 1.0))
     rate = np.zeros(len(distances))

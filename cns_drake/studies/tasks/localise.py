@@ -186,4 +186,5 @@ def measure_localisation(
                     *draw.draw(frame),
                 )
                 next(ends).append(row)
+    localise.note_sparse(asked.name, np.array(found[0]), reporter.note)
     return [np.array(rows) for rows in found]

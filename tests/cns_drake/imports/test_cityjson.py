@@ -1,12 +1,14 @@
 """CityJSON files, right ones and wrong ones."""
 
 import json
+import re
 
 from helpers.small_cityjson import CityWriter
 import numpy as np
 import pytest
 
 from cns_drake.base.errors import InputError
+from cns_drake.imports import cityjson
 from cns_drake.imports.cityjson import import_structures, read_cityjson
 from cns_drake.imports.drives.free_space import find_free_space
 from cns_drake.imports.ground import ground_of
@@ -176,6 +178,42 @@ def test_a_drive_has_vertices_of_each_feature(tmp_path):
     path.write_text("\n".join(lines) + "\n\n")
     _, found = structures(path)
     assert [volume(one) for one in found.values()] == pytest.approx([1, 2, 3])
+
+
+def test_features_share_the_templates_of_their_file(tmp_path, monkeypatch):
+    read = []
+    numbers = cityjson._numbers
+
+    def counted(values, where):
+        if where.endswith("vertices-templates") and values:
+            read.append(where)
+        return numbers(values, where)
+
+    monkeypatch.setattr(cityjson, "_numbers", counted)
+    city = CityWriter()
+    shape = {"type": "MultiSurface", "lod": 2, "boundaries": [[[0, 1, 2]]]}
+    corners = [[0, 0, 0], [2, 0, 0], [0, 2, 0]]
+    city.templates = {"templates": [shape], "vertices-templates": corners}
+    head = city.document()
+    lines = [head | {"CityObjects": {}}]
+    for k in range(3):
+        instance = {
+            "type": "GeometryInstance",
+            "template": 0,
+            "boundaries": [0],
+            "transformationMatrix": np.eye(4).ravel().tolist(),
+        }
+        tree = {"type": "SolitaryVegetationObject", "geometry": [instance]}
+        vertices = [[1000 * k, 0, 0]]
+        feature = {"type": "CityJSONFeature", "CityObjects": {f"t{k}": tree}}
+        lines.append(feature | {"vertices": vertices})
+    path = tmp_path / "city.city.jsonl"
+    path.write_text("\n".join(map(json.dumps, lines)))
+    _, found = structures(path)
+    for k in range(3):
+        corner = found[f"t{k}"].triangles.reshape(-1, 3).min(axis=0)
+        np.testing.assert_allclose(corner, [k, 0, 0], atol=1e-9)
+    assert len(read) == 1
 
 
 def broken(change):
@@ -416,6 +454,59 @@ def test_a_bridge_stands_above_the_ground(tmp_path):
     assert space.clearance_at(np.array([[0.0, 0.0]])) > 2.5
     alone = ground_of([found["deck"]], below_bridges=True)
     np.testing.assert_allclose(alone.height(xy[:1]), 7.0)
+
+
+# Berlin, Munich and Warsaw, as most programs write them: east first.
+@pytest.mark.parametrize(
+    ("system", "place", "is_north_first"),
+    [
+        ("EPSG:25833+7837", (391e3, 5820e3), False),
+        ("EPSG:31468+5783", (4467e3, 5333e3), True),
+        (
+            "urn:ogc:def:crs,crs:EPSG::31468,crs:EPSG::5783",
+            (4467e3, 5333e3),
+            True,
+        ),
+        ("EPSG:2180+9651", (637e3, 487e3), True),
+        # A system without an area; the faces show the order.
+        ("+proj=utm +zone=33 +axis=neu +type=crs", (391e3, 5820e3), True),
+    ],
+)
+def test_composed_systems_have_an_order_of_axes(
+    tmp_path, system, place, is_north_first
+):
+    city = CityWriter(origin=(*place, 30.0))
+    city.metadata = {"referenceSystem": system}
+    city.box("house", 0, 0, (6, 4, 3))
+    read = read_cityjson(city.write(tmp_path / "city.json"))
+    low, high = read.bounds()
+    np.testing.assert_allclose(low, [*place, 30], atol=1e-6)
+    np.testing.assert_allclose(high - low, [6, 4, 3], atol=1e-6)
+    rows = str(read.faults.rows())
+    assert ("read as east first" in rows) == is_north_first
+    assert "beyond the area" not in rows
+
+
+@pytest.mark.parametrize(
+    ("latitude", "is_refused"), [(4.0, False), (8.0, True), (52.5, True)]
+)
+def test_a_projection_that_stretches_a_city_is_refused(
+    tmp_path, latitude, is_refused
+):
+    """Web Mercator's lengths grow by 1 / cos(latitude), on a sphere."""
+    phi = np.radians(latitude)
+    north = 6378137.0 * np.log(np.tan(np.pi / 4 + phi / 2))
+    city = CityWriter(origin=(1490000.0, float(north), 0.0))
+    city.metadata = {"referenceSystem": "EPSG:3857"}
+    city.box("house", 0, 0, (6, 4, 3))
+    path = city.write(tmp_path / "city.json")
+    if not is_refused:
+        read_cityjson(path)
+        return
+    with pytest.raises(InputError, match="referenceSystem: in EPSG") as info:
+        read_cityjson(path)
+    (factor,) = re.findall(r"is (\S+) m long", str(info.value))
+    assert float(factor) == pytest.approx(1 / np.cos(phi), rel=8e-3)
 
 
 TOKYO, RIGA, MADRID = "EPSG:6677", "EPSG:3059", "EPSG:25830"

@@ -39,8 +39,8 @@ from cns_drake.imports.staged_city import grow, stage_city
 from cns_drake.scenarios.drive_table import write_table
 
 # The digest of an import as it was before dressing existed, but for a count of
-# what is left out.
-PLAIN = "b82e0047ece25132"
+# what is left out, and for the ground, which now looks upwards.
+PLAIN = "2ec83d30fd418392"
 NO_PAVING = UpperSides(np.zeros((0, 3, 3)))
 STREET = np.column_stack([np.linspace(-80, 80, 41), np.full(41, -12.0)])
 

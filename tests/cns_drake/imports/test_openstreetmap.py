@@ -4,6 +4,7 @@ import re
 
 from helpers.small_osm import LAT, LON, OsmWriter
 import numpy as np
+import pyproj
 import pytest
 from shapely.geometry import Polygon
 
@@ -11,6 +12,7 @@ from cns_drake.base.errors import InputError
 from cns_drake.imports.faces import extruded
 from cns_drake.imports.import_map import ImportOptions, import_city
 from cns_drake.imports.openstreetmap.city import import_openstreetmap
+from cns_drake.imports.openstreetmap.reading import Local
 from cns_drake.imports.openstreetmap.tags import (
     count,
     heights,
@@ -85,6 +87,32 @@ def test_roofs_hold_their_volume(roof, part, turned):
     assert faults.rows() == []
     normals = np.cross(top[:, 1] - top[:, 0], top[:, 2] - top[:, 0])
     assert (normals[:, 2] > 0).all()
+
+
+L_SHAPE = [(0, 0), (30, 0), (30, 8), (8, 8), (8, 30), (0, 30)]
+SHORT_L = [(0, 0), (12, 0), (12, 10), (10, 10), (10, 12), (0, 12)]
+DART = [(0, 0), (10, 4), (20, 0), (10, 20)]
+
+
+@pytest.mark.parametrize(
+    ("corners", "roof", "is_made"),
+    [
+        (L_SHAPE, "pyramidal", False),
+        (SHORT_L, "pyramidal", True),
+        (DART, "gabled", False),
+        (DART, "pyramidal", True),
+    ],
+)
+def test_no_roof_leaves_its_outline(corners, roof, is_made):
+    faults = ImportFaults()
+    polygon = Polygon(corners)
+    _, top = extruded(polygon, 0.0, 9.0, "a", faults, roof, 3.0)
+    flat = [Polygon(triangle) for triangle in top[..., :2]]
+    # Triangles that neither overlap nor leave the outline have its area.
+    assert sum(one.area for one in flat) == pytest.approx(polygon.area)
+    assert np.ptp(top[..., 2]) == (3.0 if is_made else 0.0)
+    made_flat = (f"roof of shape {roof}, made flat", 1, "a")
+    assert faults.rows() == ([] if is_made else [made_flat])
 
 
 def test_a_hipped_roof_slopes_on_four_sides():
@@ -270,7 +298,11 @@ def building_of(*places):
         (
             building_of((52, 13), (52.001, 13)).replace(
                 '<nd ref="1"/><tag', "<tag"
-            ), "whose outline does not close",
+            ), "building whose outline does not close, left out",
+        ),
+        (
+            building_of((52, 13), (52.001, 13.001), (52, 13.001), (52.001, 13)),
+            "building whose outline crosses itself, left out",
         ),
         (
             building_of((52, 13), (52.001, 13), (52.001, 13.001)).replace(
@@ -289,6 +321,36 @@ def test_why_no_building_is_usable_is_said(tmp_path, text, fault):
     assert message.startswith(f"{path}: the file has no usable building; ")
     assert fault in message
     assert message.endswith(", left out: 1, such as w9")
+
+
+def test_limits_that_cannot_be_read_are_noted(tmp_path):
+    osm = OsmWriter()
+    osm.box(0, 10, 10, 10, building="yes")
+    ends = [(0, 0), (50, 0)]
+    osm.way(ends, highway="tertiary", maxspeed="80")
+    osm.way(ends, highway="tertiary", maxspeed="30", maxspeed__type="sign")
+    fast = osm.way(ends, highway="tertiary", maxspeed="fast")
+    back = osm.way(ends, highway="tertiary", maxspeed__backward="999")
+    city, _ = read(osm.write(tmp_path / "city.osm"))
+    told = "unreadable or implausible, the usual one taken"
+    assert city.faults.rows() == [
+        (f"maxspeed {told}", 1, f"w{fast}"),
+        (f"maxspeed:backward {told}", 1, f"w{back}"),
+    ]
+
+
+@pytest.mark.parametrize(
+    ("distance", "error"), [(1500.0, 0.5), (10000.0, 22.4)]
+)
+@pytest.mark.parametrize("east", [1.0, -1.0])
+def test_places_are_as_exact_as_stated(distance, error, east):
+    x, y = east * distance, distance
+    to_degrees = pyproj.Transformer.from_crs(
+        f"+proj=aeqd +lat_0={LAT} +lon_0={LON} +ellps=WGS84", "OGC:CRS84"
+    )
+    places = np.array([to_degrees.transform(x, y)])
+    off = Local(LON, LAT)(places)[0] - (x, y)
+    assert np.hypot(*off) == pytest.approx(error, rel=0.02)
 
 
 def test_half_a_country_is_refused(tmp_path):
@@ -356,13 +418,13 @@ def test_objects_cut_off_at_the_edge_are_noted(tmp_path):
     city, _ = read(path)
     assert sorted(city.faults.rows()) == [
         (
-            "building whose outline does not close, left out",
-            2,
-            f"w{house}",
+            "building whose outline does not close or crosses itself, left out",
+            1,
+            f"r{open_}",
         ),
+        ("building whose outline does not close, left out", 1, f"w{house}"),
         ("place of a way that is not in the file, left out", 1, f"w{street}"),
     ]
-    assert open_ > 0
 
 
 @pytest.mark.parametrize("number", ["-7", "7"])

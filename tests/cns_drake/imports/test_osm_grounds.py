@@ -32,6 +32,11 @@ def kinds(city):
      ({"leisure": "playground"}, "Playground", "LandUse"),
      ({"landuse": "basin"}, "WaterBody", None),
      ({"highway": "footway", "area": "yes"}, "Square", None),
+     ({"highway": "footway"}, None, None),
+     ({"highway": "pedestrian"}, None, None),
+     ({"highway": "pedestrian", "area": "yes"}, "Square", "Square"),
+     ({"highway": "pedestrian", "place": "square"}, "Square", "Square"),
+     ({"highway": "platform"}, "Square", None),
      ({"amenity": "parking"}, "Parking", "Parking"),
      ({"amenity": "parking", "parking": "underground"}, None, "Parking"),
      ({"natural": "water", "layer": "-1"}, None, "WaterBody"),
@@ -48,6 +53,42 @@ def test_grounds_by_what_they_are_made_of(tmp_path, tags, kind, plain):
         if one.structure.name == name:
             assert area(one) == pytest.approx(600.0, abs=1.0)
             assert (one.triangles[:, :, 2] < 0.0).all()
+
+
+def test_a_multipolygon_of_a_path_is_an_area(tmp_path):
+    osm = OsmWriter()
+    osm.box(0, 0, 10, 10, building="yes")
+    outer, inner = osm.box(20, 0, 30, 20), osm.box(30, 5, 10, 10)
+    square = osm.relation(
+        {"outer": [outer], "inner": [inner]},
+        type="multipolygon",
+        highway="pedestrian",
+    )
+    (one,) = (o for o in read(osm, tmp_path).structures if o.kind == "Square")
+    assert one.structure.name == f"land_r{square}"
+    assert area(one) == pytest.approx(500.0, abs=1.0)
+
+
+def test_the_ground_looks_upwards(tmp_path):
+    osm = OsmWriter()
+    osm.box(0, 0, 10, 10, building="yes")
+    osm.box(20, 0, 30, 20, landuse="grass")
+    crossing = osm.node(0, -20, highway="crossing", crossing="zebra")
+    ends = osm.node(-50, -20), osm.node(50, -20)
+    osm.way_of(
+        [ends[0], crossing, ends[1]], highway="tertiary", sidewalk="both"
+    )
+    surfaces = [
+        o
+        for o in read(osm, tmp_path).structures
+        if o.is_ground or o.kind == "Sidewalk"
+    ]
+    assert {o.kind for o in surfaces} == {
+        "LandUse", "Road", "Sidewalk", "Crossing"
+    }  # fmt: skip
+    for one in surfaces:
+        a, b, c = np.moveaxis(one.triangles, 1, 0)
+        assert (np.cross(b - a, c - a)[:, 2] > 0.0).all(), one.kind
 
 
 def test_a_pitch_has_the_colour_of_its_surface(tmp_path):
@@ -110,6 +151,37 @@ def test_bridges_are_level_or_left_out(tmp_path):
     assert wall.triangles[:, :, 2].max() == pytest.approx(1.0)
     plain = read(osm, tmp_path, dressed=False)
     assert f"road_w{over}" in kinds(plain)
+
+
+@pytest.mark.parametrize(
+    ("layers", "upper"),
+    [
+        (("1", "2"), 1),
+        (("2", "1"), 0),
+        # A bridge is in layer 1 if its tags do not say otherwise.
+        ((None, "2"), 1),
+        (("0", None), 1),
+        (("-1", "-2"), 0),
+        (("1", "1"), None),
+    ],
+)
+def test_the_upper_one_of_two_bridges_is_left_out(tmp_path, layers, upper):
+    osm = OsmWriter()
+    osm.box(-60, 20, 10, 10, building="yes")
+    names = []
+    for line, layer in zip(
+        ([(-40, 0), (40, 0)], [(0, -40), (0, 40)]), layers, strict=True
+    ):
+        tags = {"layer": layer} if layer is not None else {}
+        names.append(osm.way(line, highway="primary", bridge="yes", **tags))
+    city = read(osm, tmp_path)
+    built = {o.structure.name for o in city.structures if o.kind != "Building"}
+    (out,) = (n for n in names if f"road_w{n}" not in built)
+    assert upper is None or out == names[upper]
+    names.remove(out)
+    assert built == {f"road_w{names[0]}", f"parapet_w{names[0]}"}
+    row = ("bridge over a street or railway, left out", 1, f"w{out}")
+    assert row in city.faults.rows()
 
 
 @pytest.mark.parametrize(

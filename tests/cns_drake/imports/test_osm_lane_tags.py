@@ -32,6 +32,13 @@ def tags(**values):
         ({"highway": "primary"}, 14.0, (2, 2)),
         ({"highway": "motorway"}, 7.2, (2, 0)),
         ({"highway": "residential", "access": "private"}, 6.5, (0, 0)),
+        # The tag for the most specific vehicle counts.
+        ({"highway": "residential", "access": "no", "motor_vehicle": "yes"},
+         6.5, (1, 1)),
+        ({"highway": "residential", "vehicle": "no", "motorcar": "yes"},
+         6.5, (1, 1)),
+        ({"highway": "residential", "access": "yes", "motorcar": "no"},
+         6.5, (0, 0)),
     ],
 )  # fmt: skip
 def test_numbers_of_lanes(street, width, lanes):
@@ -85,6 +92,12 @@ def test_lanes_share_the_width_of_the_street(street, width, places):
         ({"maxspeed": "walk"}, 7 / 3.6),
         ({"maxspeed": "DE:urban"}, 50 / 3.6),
         ({"maxspeed": "DE:zone:30"}, 30 / 3.6),
+        ({"maxspeed": "DE:zone30"}, 30 / 3.6),
+        ({"zone__maxspeed": "DE:30"}, 30 / 3.6),
+        ({"maxspeed": "FR:80"}, 80 / 3.6),
+        ({"maxspeed": "BE-VLG:70"}, 70 / 3.6),
+        ({"maxspeed": "GB:nsl_single"}, 60 * 1609.344 / 3600),
+        ({"maxspeed": "GB:zone20"}, 20 * 1609.344 / 3600),
         ({"maxspeed": "none", "highway": "motorway"}, 120 / 3.6),
         ({"maxspeed": "0", "highway": "residential"}, 30 / 3.6),
         ({"maxspeed": "999", "highway": "primary"}, 50 / 3.6),
@@ -94,7 +107,7 @@ def test_lanes_share_the_width_of_the_street(street, width, places):
     ],
 )
 def test_speed_limits(street, limit):
-    assert speed_limit(tags(**street)) == pytest.approx(limit)
+    assert speed_limit(tags(**street)) == pytest.approx(limit, rel=1e-4)
 
 
 def test_a_limit_of_one_direction():

@@ -114,6 +114,22 @@ def test_a_straight_drive_takes_the_time_of_bounded_acceleration():
     assert speed[0] == pytest.approx(10.0, abs=1e-9)
 
 
+def test_half_of_a_small_acceleration_remains_for_speeding_up():
+    # Points that are unevenly spaced take up the other half.
+    bound = 0.1
+    points = helix_points(12.0, 0.0, 60)
+    points[::2] *= 1.01
+    speeds = Speeds(
+        cruise=14.0, longitudinal_acceleration=bound, lateral_acceleration=9.0
+    )
+    trajectory = Trajectory(lane_path(points), speeds)
+    assert bound / 2 * 0.99 < trajectory.speed_profile.acceleration < bound
+    t = np.arange(0.0, trajectory.duration, 0.05)
+    speed, along, _ = motion(trajectory, t)
+    assert np.abs(along).max() <= bound
+    assert speed.max() > 0.5
+
+
 def test_velocity_and_acceleration_are_derivatives_of_the_pose():
     trajectory = Trajectory(lane_path(wavy_points(1)), CAREFUL)
     times = np.linspace(1.0, trajectory.duration - 1.0, 41)

@@ -101,11 +101,12 @@ def test_points_come_back(points, layout):
     )
 
 
+@pytest.mark.parametrize("most", [256, 2])
 @pytest.mark.parametrize("layout", ["cns", *FIELDS])
-def test_calibrated_intensities_come_back(points, layout):
-    points["intensity"] = np.arange(500) % 256
+def test_calibrated_intensities_come_back(points, layout, most):
+    points["intensity"] = np.arange(500) % most
     read = from_layout(
-        to_points(sent(to_layout(points, layout))),
+        to_points(sent(to_layout(points, layout, is_calibrated=True))),
         is_calibrated=lambda: True,
     )
     np.testing.assert_array_equal(read["intensity"], points["intensity"])

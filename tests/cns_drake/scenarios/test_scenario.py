@@ -101,7 +101,8 @@ def test_returns_and_weather_are_replaced(small_map):
     # A written scenario is read again.
     values = foggy.model_dump(mode="json")
     assert make_scenario(values, "test") == foggy
-    clear = foggy.with_returns("ideal")
+    unit = {"lidars": {"a": {"unit_seed": 5, "echoes": "dual"}}}
+    clear = foggy.with_fields(unit, "test").with_returns("ideal")
     assert clear.lidars["a"] == LidarSection()
     # Without these fields a scenario is written as before there were any.
     dumped = clear.model_dump(mode="json")

@@ -274,11 +274,15 @@ def test_impossible_limits(limits, fault):
         ((0.0,), 0, None, "num_columns: 0"),
         ((0.0,), 2.5, None, "num_columns: 2.5"),
         ((0.0,), 4, (0.0, np.inf), "azimuths_rad"),
+        ((0.0,), 4, (0.0, np.nan), "azimuths_rad"),
+        ((0.0,), 4, (2.0 * np.pi + 1e-6, 0.0), "azimuths_rad"),
     ],
 )
 def test_turns_that_are_none(elevations, columns, azimuths, fault):
     with pytest.raises(ValueError, match=fault):
         SpinningPattern(elevations, columns, 0.1, 9.0, 0.1, azimuths)
+    whole = SpinningPattern((0.0,), 4, 0.1, 9.0, 0.1, (0.0, 2.0 * np.pi))
+    assert whole.beams(0).column_t_ns[-1] == 0.1e9
 
 
 def test_patterns_that_never_repeat_have_limits_of_their_own():

@@ -31,7 +31,12 @@ FRAMES = 12
 LIDARS = {
     "lidar": {**UNIT, "rate": 10, "range_noise": 0.02},
     "rear": {**UNIT, "rate": 20, "layout": "velodyne"},
-    "slow": {**UNIT, "rate": 5, "layout": "autoware"},
+    "slow": {
+        **UNIT,
+        "rate": 5,
+        "layout": "autoware",
+        "returns": "calibrated",
+    },
 }
 
 
@@ -39,6 +44,9 @@ def make(folder, **changes):
     folder.mkdir(exist_ok=True)
     kalibr = folder / "adis.yaml"
     kalibr.write_text(yaml.safe_dump(KALIBR))
+    (folder / "structures.csv").write_text(
+        "instance,name,class,reflectivity\n1,ground,road,0.5\n"
+    )
     values = {
         "lidars": LIDARS,
         "imu": {"rate": 400, "kalibr": str(kalibr), "accelerometer_range": 50},
@@ -153,7 +161,7 @@ def test_layouts_hold_the_same_points(recording, tmp_path):
         assert len(one) == len(other) > 3
         for scan, expected in zip(one, other, strict=True):
             assert len(scan) > 10
-            for name in ("x", "y", "z", "label", "instance"):
+            for name in ("x", "y", "z", "intensity", "label"):
                 np.testing.assert_array_equal(scan[name], expected[name])
             # Velodyne's driver counts from below.
             below = 15 - expected["ring"].astype(int)

@@ -14,14 +14,23 @@ TURN = 0.1
 SECONDS = np.arange(NUM) / NUM * TURN
 
 
-def record(folder, name, kind, values):
+def record(folder, name, kind, values, *, x_m=lambda t: 10.0 * t, later=()):
     dtype = [(axis, "<f4") for axis in "xyz"] + [(name, kind)]
     scan = np.zeros(NUM, dtype)
     scan["x"] = 20.0
     scan[name] = values
-    poses = [yaw_pose(1.0 * k, 0.0, 0.0, 0.0) for k in range(6)]
-    stamps_ns = [T0_NS + k * 100_000_000 for k in range(6)]
-    return write_recording(folder / "s", [scan] * 6, poses, stamps_ns=stamps_ns)
+    poses = {
+        T0_NS + round(t * 1e9): yaw_pose(x_m(t), 0.0, 0.0, 0.0)
+        for t in [k * TURN for k in range(6)] + [*later]
+    }
+    stamps_ns = list(poses)
+    return write_recording(
+        folder / "s",
+        [scan] * 6,
+        list(poses.values())[:6],
+        stamps_ns=stamps_ns[:6],
+        later_poses={stamp: poses[stamp] for stamp in stamps_ns[6:]},
+    )
 
 
 @pytest.mark.parametrize(
@@ -73,3 +82,16 @@ def test_times_that_are_not(tmp_path, name, kind, values):
 def test_points_measured_at_once(tmp_path):
     drive = open_drive(record(tmp_path, "t", "<u4", np.zeros(NUM)))
     np.testing.assert_array_equal(deskew(drive, 2), drive.scan(2))
+
+
+def test_the_last_scan_is_corrected_by_the_poses_on_tf(tmp_path):
+    # The vehicle begins to brake when the last scan does.
+    def x_m(t):
+        return 10.0 * t - 400.0 * max(0.0, t - 0.5) ** 3
+
+    later = np.arange(0.51, 0.61, 0.01)
+    path = record(tmp_path, "t", "<u4", SECONDS * 1e9, x_m=x_m, later=later)
+    moved = [x_m(0.5 + t) - x_m(0.5) for t in SECONDS]
+    np.testing.assert_allclose(
+        deskew(open_drive(path), 5)["x"], np.add(20.0, moved), atol=5e-4
+    )

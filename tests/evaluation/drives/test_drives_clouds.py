@@ -54,6 +54,29 @@ def test_files_of_open3d(tmp_path, kind, ascii_, compressed):
     np.testing.assert_allclose(xyz(read_cloud(path)), points, rtol=1e-5)
 
 
+def test_text_keeps_all_digits_of_whole_numbers(tmp_path):
+    header = {
+        "FIELDS": "x y z t n",
+        "SIZE": "4 4 4 8 8",
+        "TYPE": "F F F U I",
+        "COUNT": "1 1 1 1 2",
+        "DATA": "ascii",
+    }
+    path = tmp_path / "times.pcd"
+    numbers = 2**64 - 1, 2**53 + 1, -(2**63) + 1
+    row = "1 2 3.5 {} {} {}\n".format(*numbers)
+    write_pcd(path, HEADER | ONE | header, row.encode())
+    cloud = read_cloud(path)
+    assert (cloud["t"].tolist(), cloud["n"].tolist()) == (
+        [numbers[0]],
+        [[*numbers[1:]]],
+    )
+    assert xyz(cloud).tolist() == [[1.0, 2.0, 3.5]]
+    # A writer of floats.
+    write_pcd(path, HEADER | ONE | header, b"1 2 3.5 17.0 5 6e0\n")
+    assert read_cloud(path)["t"].tolist() == [17]
+
+
 def test_pcd_with_padding_doubles_and_arrays(tmp_path):
     dtype = np.dtype(
         [

@@ -1,5 +1,7 @@
 """Localisation of scans in a map, against scenes with known answers."""
 
+from contextlib import nullcontext
+from dataclasses import fields
 import json
 import math
 from pathlib import Path
@@ -36,6 +38,7 @@ from evaluation.localisation.localise import (
     is_right,
     localise,
     mapped_frames,
+    note_sparse,
     summary,
     way_axes,
 )
@@ -441,7 +444,7 @@ def test_whether_an_estimator_knows():
     assert values["translation_median"] == 0.0
     nothing = with_scores([1.0, 2.0], [True, True])
     assert nothing["auroc_own_score"] is None is nothing["believed_from"]
-    assert nothing["confident_wrong"] == 0.0
+    assert nothing["confident_wrong"] is None is nothing["confident_of_wrong"]
 
 
 def test_auroc_of_scores():
@@ -463,6 +466,24 @@ def test_an_end_without_a_pose_is_a_failure():
     assert values["without_pose"] == 1
     assert values["success_2m_5deg"] == 0.0
     assert values["translation_median"] is None
+
+
+@pytest.mark.parametrize(("number", "is_sparse"), [(9, True), (10, False)])
+def test_a_scan_of_few_points_is_a_failure(number, is_sparse):
+    found = localiser(street(), "icp")
+    X_WS, still = a_pose(0, 0, 1.7), np.zeros((2, 3))
+    rows = np.array(
+        [
+            one_query(found, X_WS, street()[:number], *still),
+            one_query(found, X_WS, street(), *still),
+        ]
+    )
+    values, notes = summary(rows), []
+    note_sparse("town", rows, notes.append)
+    assert values["success_03m_1deg"] == (0.5 if is_sparse else 1.0)
+    assert values["without_pose"] == int(is_sparse) == len(notes)
+    assert values["unmapped_mean"] == 0.0
+    assert notes == [] or notes[0].startswith("town: 1 of 2 scans")
 
 
 OWN = {
@@ -524,16 +545,32 @@ def test_bad_input(streets, tmp_path, capsys, monkeypatch):
         ),
         ([*pair, *gicp, "--start-turn", "181"], "--start-turn: 181 deg"),
         ([*pair, *gicp, "--seed", "-1"], "--seed"),
-        ([*pair, *gicp, "--query-spacing", "0"], "--query-spacing"),
-        ([*pair, *gicp, "--odometry-drift", "2"], "--odometry-drift"),
+        ([*pair, *gicp, "--query-spacing", "0"], "--query-spacing: 0"),
+        (
+            [*pair, *gicp, "--track", "--query-spacing", "10"],
+            "--query-spacing: not together",
+        ),
+        (
+            [*pair, *gicp, "--track", "--odometry-drift", "2"],
+            "--odometry-drift: 2",
+        ),
+        (
+            [*pair, *gicp, "--odometry-drift", "0.01"],
+            "--odometry-drift: only together",
+        ),
+        (
+            [tmp_path / "street.npy", pair[1], *gicp, "--align", "always"],
+            "--align: ",
+            "street.npy",
+        ),
         ([*pair, *gicp, "--set", "width=x"], "--set: width"),
-        ([*pair, *gicp, "--set", "wide=1"], "--set: no setting 'wide'"),
+        ([*pair, *gicp, "--set", "wide=1"], "gicp has no setting 'wide'"),
         ([*pair, "--method", "ndt"], "no method 'ndt'"),
         ([*pair, "--method", "nowhere.py"], "nowhere.py: no such file"),
         ([streets["map"], streets["away"], *gicp], "away", "the nearest scan"),
         ([tmp_path / "none.npy", pair[1], *gicp], "none.npy", "0 points"),
         ([tmp_path / "few.npy", pair[1], *gicp], "few.npy", "1 points"),
-        ([pair[0], tmp_path / "none.npy", *gicp], "none.npy", "0 points"),
+        ([pair[0], tmp_path / "none.npy", *gicp], "none.npy: no scan has 10"),
         ([tmp_path / "street.npy", streets["away"], *gicp], "the nearest scan"),
     ):
         assert_refused(capsys, ["localise", *arguments], *words)
@@ -547,11 +584,35 @@ def test_bad_input(streets, tmp_path, capsys, monkeypatch):
 
 
 def test_settings_are_checked():
-    changed = Settings().with_values([("width", "1.5"), ("neighbours", "20")])
+    changed = Settings().with_values(
+        [("width", "1.5"), ("neighbours", "20")], "gicp"
+    )
     assert (changed.width, changed.neighbours) == (1.5, 20)
     for name, value in (("width", "0"), ("neighbours", "3"), ("voxel", "-1")):
         with pytest.raises(InputError, match=name):
-            Settings().with_values([(name, value)])
+            Settings().with_values([(name, value)], "gicp")
+
+
+@pytest.mark.parametrize(
+    ("method", "lacks"),
+    [
+        ("gicp", {"resolution"}),
+        ("robust-gicp", {"resolution"}),
+        ("vgicp", set()),
+        ("kiss-matcher", {"width", "last_width", "iterations"}),
+        ("x.py", {"resolution", "width", "last_width", "iterations"}),
+    ],
+)
+def test_a_setting_that_a_method_lacks_is_refused(method, lacks):
+    for one in fields(Settings):
+        with (
+            nullcontext()
+            if one.name not in lacks
+            else pytest.raises(
+                InputError, match=f"{method} has no setting '{one.name}'"
+            )
+        ):
+            Settings().with_values([(one.name, 5)], method)
 
 
 @pytest.mark.slow

@@ -11,6 +11,7 @@ from scipy.spatial.transform import Rotation
 from cns_drake.base import poses
 from cns_drake.base.points import from_xyz
 from evaluation.drives.sampling import travelled
+from evaluation.localisation import localise as queries
 from evaluation.localisation.estimators import Estimate, Settings, map_of
 from evaluation.localisation.localise import Localiser, Starts
 from evaluation.localisation.tracking import (
@@ -112,7 +113,10 @@ def test_losses_and_returns():
         return Estimate(None if k == 50 else X_WS, 1.0)
 
     rows = follow(line, wavering)
-    assert rows["translation_error"][50] == pytest.approx(0.0, abs=1e-9)
+    # The odometry's error is none of a result.
+    assert rows["track_error"][50] == pytest.approx(0.0, abs=1e-9)
+    assert np.flatnonzero(np.isnan(rows["translation_error"])).tolist() == [50]
+    assert queries.summary(rows)["without_pose"] == 1
     (one, two), values = losses(rows), summary(rows)
     assert one == (pytest.approx(10.0, abs=0.02), True)
     assert two == (pytest.approx(18.0, abs=0.02), False)
@@ -121,6 +125,15 @@ def test_losses_and_returns():
     assert values["lost_per_km"] == pytest.approx(2.0 / 0.198, rel=1e-3)
     assert values["back_after_median"] == pytest.approx(10.0, abs=0.02)
     assert values["within_03m"] == pytest.approx(84.0 / 99.0, rel=1e-3)
+
+
+def test_a_scan_without_points_is_passed_by_odometry(monkeypatch):
+    line = Line(9)
+    some = {4: CLOUD[:0], 5: CLOUD[:9]}
+    monkeypatch.setattr(line, "scan", lambda k: from_xyz(some.get(k, CLOUD)))
+    rows = follow(line, stay)
+    assert np.flatnonzero(np.isnan(rows["unmapped"])).tolist() == [4, 5]
+    assert rows["track_error"] == pytest.approx(0.5)
 
 
 def test_each_stretch_has_a_start_of_its_own():
@@ -161,6 +174,6 @@ def test_the_command_tracks(towns, tmp_path, capsys):
     picture = (tmp_path / "track.png").read_bytes()
     assert picture.startswith(b"\x89PNG")
     table = (tmp_path / "localisation.csv").read_text().splitlines()
-    assert table[0].startswith("stretch,way,step,frame,")
+    assert table[0].startswith("stretch,way,step,track_error,frame,")
     status, out, _ = run(capsys, *command)
     assert "a kilometre" in out

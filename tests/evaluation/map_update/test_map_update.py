@@ -17,6 +17,7 @@ from evaluation.map_update.sessions import (
     Label,
     MapBuilder,
     Pair,
+    read_labels,
     read_pair,
     read_session,
     write_labels,
@@ -189,6 +190,30 @@ def test_points_are_left_out(tmp_path):
     assert score(pair, truth, guess, {})["miou"] == 1.0
 
 
+def test_the_updated_map_is_the_nearest_points(tmp_path):
+    """Points without a true label are not scored, but others lie near them."""
+    pair, truth = clouds(tmp_path)
+    _, guess = clouds(tmp_path / "other", seed=8)
+    truth.A[:100] = truth.B[300:] = Label.IGNORED
+    found = score(pair, truth, guess, {})["updated_map"]
+    A, B = pair.A.points, pair.B.points
+    # New (3) or newly seen (4) points of B are added.
+    updated = np.concatenate([A[guess.A != 2], B[np.isin(guess.B, [3, 4])]])
+    scored = np.concatenate(
+        [
+            A[(guess.A != 2) & np.isin(truth.A, [1, 2])],
+            B[np.isin(guess.B, [3, 4]) & (truth.B != 255)],
+        ]
+    )
+    own, other = (
+        np.linalg.norm(one[:, None] - others, axis=2).min(axis=1)
+        for one, others in ((scored, B), (B[truth.B != 255], updated))
+    )
+    assert found["accuracy"] == np.mean(own <= 0.2)
+    assert found["completeness"] == np.mean(other <= 0.2)
+    assert found["chamfer"] == pytest.approx((own.mean() + other.mean()) / 2)
+
+
 def test_a_structure_is_what_most_of_its_observed_points_are():
     instances = np.array([1, 1, 1, 1, 2, 2, 3, 0, 4, 4], np.uint16)
     labels = np.array([0, 0, 2, 0, 2, 1, 0, 2, 1, 1])
@@ -277,16 +302,18 @@ def room(size, beams=(200, 60), window=None):
 
 
 def test_free_space_sees_past_what_is_gone(tmp_path):
-    """A's map: a wall at 10 m, a box at 5 m, a thing outside at 30 m.
+    """A's map: a wall at 10 m, a box at 5 m, things at 30 m and overhead.
 
     B sees the wall, but not the box; what is outside, the wall hides. Points of
-    B beside some of the box, but not at it, do not keep it.
+    B beside some of the box, but not at it, do not keep it. A bird does not
+    widen B's field of view to what is overhead.
     """
     rng = np.random.default_rng(1)
     box = np.array([5.0, 0.0, 0.0]) + rng.uniform(-0.5, 0.5, (200, 3))
     outside = np.array([30.0, 0.0, 0.0]) + rng.uniform(-0.5, 0.5, (200, 3))
+    overhead = np.array([0.0, 0.0, 9.0]) + rng.uniform(-0.5, 0.5, (200, 3))
     wall = room(10.0)[::7]
-    write_map(tmp_path / "A", np.concatenate([wall, box, outside]))
+    write_map(tmp_path / "A", np.concatenate([wall, box, outside, overhead]))
     beside = box[:100] + np.array([0.15, 0.0, 0.0])
     away = np.linalg.norm(beside[:, None] - box, axis=2).min(axis=1)
     beside = beside[away > 0.125]
@@ -294,8 +321,9 @@ def test_free_space_sees_past_what_is_gone(tmp_path):
     write_map(tmp_path / "B", np.concatenate([room(10.0), beside]))
     folder = tmp_path / "B" / "Scans"
     folder.mkdir()
-    rows = "\n".join(" ".join(f"{v:.6f}" for v in p) for p in room(10.0))
-    count = len(room(10.0))
+    scan = np.concatenate([room(10.0), [[0.01, 0.0, 3.0]]])
+    rows = "\n".join(" ".join(f"{v:.6f}" for v in p) for p in scan)
+    count = len(scan)
     (folder / "000000.pcd").write_text(
         "VERSION 0.7\nFIELDS x y z\nSIZE 4 4 4\nTYPE F F F\nCOUNT 1 1 1\n"
         f"WIDTH {count}\nHEIGHT 1\nVIEWPOINT 0 0 0 1 0 0 0\nPOINTS {count}\n"
@@ -307,7 +335,7 @@ def test_free_space_sees_past_what_is_gone(tmp_path):
     n = len(wall)
     assert (labels[:n] == Label.KEPT).all()
     assert (labels[n : n + 200] == Label.GONE).all()
-    # Beyond its reach, which is that of the farthest return, or hidden.
+    # Beyond its reach or its field of view, or hidden.
     assert (labels[n + 200 :] == Label.UNOBSERVED).all()
 
 
@@ -335,6 +363,8 @@ def test_real_drives_need_only_labels(towns, tmp_path, capsys):
     drives = towns / "town_01", towns / "town_02"
     status, out, err = run(capsys, "map-sessions", *drives, "--output", output)
     assert (status, out) == (0, f"{output}\n"), err
+    # A command that needs labels cannot come next.
+    assert "next:" not in err
     for side, label in (("A", 1), ("B", 3)):
         size = len(read_session(output / side).points)
         labels = np.full(size, 255, np.uint8)
@@ -367,6 +397,23 @@ def test_bad_labels_are_refused(tmp_path, capsys):
     )
     assert_refused(capsys, ["map-update", folder], folder / "B", "poses.txt")
     assert_refused(capsys, ["map-update", tmp_path], "no folder A")
+
+
+def test_labels_of_a_cloud_are_its_predictions(tmp_path):
+    """A cloud may contain the truth, too."""
+    pair, _ = clouds(tmp_path)
+    rows = "0 0 0 1 2\n" * 400
+    text = (
+        "ply\nformat ascii 1.0\nelement vertex 400\nproperty double x\n"
+        "property double y\nproperty double z\nproperty uchar {}\n"
+        "property uchar {}\nend_header\n"
+    )
+    path = tmp_path / "labels.ply"
+    path.write_text(text.format("truth", "prediction") + rows)
+    assert (read_labels(path, pair.A, truth=False) == Label.GONE).all()
+    path.write_text(text.format("truth", "change") + rows)
+    with pytest.raises(InputError, match="no property `prediction`"):
+        read_labels(path, pair.A, truth=False)
 
 
 def write_column(path, kind, value):

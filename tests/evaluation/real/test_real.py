@@ -9,6 +9,7 @@ from helpers.layered_scans import matrix, seen_from, town
 import numpy as np
 import pytest
 
+from cns_drake.base.errors import InputError
 from cns_drake.base.progress import silent
 from evaluation.real import data_sets
 from evaluation.real.measuring import Measuring
@@ -85,6 +86,38 @@ def test_each_scan_is_localised_in_the_map_of_the_others(measured):
     rows = results.where(task="localise").rows
     assert {row.n for row in rows} == {4}
     assert {row.protocol for row in results.rows} == {"fair"}
+
+
+def test_an_own_registration_function(tmp_path):
+    text = (
+        "def other(): pass\ndef localise(map, scan, start): return start, 1.0"
+    )
+    for name in ("mine", "icp"):
+        (tmp_path / f"{name}.py").write_text(text)
+    mine = str(tmp_path / "mine.py")
+    measuring = Measuring((mine,), silent, lambda note: None)
+    measuring.run(fill(tmp_path / "scans"), None)
+    found = values(measuring.results(), task="localise", method="mine")
+    # The start is 2 m off.
+    assert found["translation_median"] == pytest.approx(2.0)
+    assert {row.task for row in measuring.rows} == {"localise"}
+    both = ("icp", str(tmp_path / "icp.py"))
+    with pytest.raises(InputError, match="two registration methods"):
+        Measuring(both, silent, lambda note: None)
+
+
+def test_scans_that_are_alone_are_counted(tmp_path):
+    # The limit is 7.5 m.
+    alone = {
+        **{name: FRAMES[name] for name in ("000026", "003528")},
+        "004481": (1, 0.0, 2.0, 8.51),
+    }
+    notes = []
+    measuring = Measuring(("icp",), silent, notes.append)
+    measuring.run(fill(tmp_path, alone), None)
+    (note,) = (one for one in notes if "localised" in one)
+    assert note.startswith("kitti_00_revisits: 2 of 3 scans localised")
+    assert {row.n for row in measuring.rows} == {2}
 
 
 def test_what_is_missing_or_another_is_named(measured):

@@ -87,6 +87,27 @@ def test_the_table_of_drops_is_an_integral():
     assert table.counts[0] == 0.0
 
 
+def test_nothing_is_seen_within_the_least_distance_of_the_receiver():
+    """Up to 1 m, so least ranges below that change nothing."""
+    sheet = UNIT_SHEETS["os1-64"]
+    for weather in (Weather(50.0), Weather(rain=50.0), Weather(snowfall=5.0)):
+        tables = [
+            tabulate_scattering(
+                weather, sheet.budget, sheet.divergence, sheet.resolution, least
+            )
+            for least in (0.0, 0.3)
+        ]
+        places = np.linspace(0.5, 60.0, 20)
+        for name in ("counts", "fog_counts"):
+            zero, some = (
+                np.interp(places, table.distances, getattr(table, name))
+                for table in tables
+            )
+            np.testing.assert_allclose(zero, some, rtol=1e-12)
+            assert zero[0] == 0.0
+        assert tables[0].counts[-1] + tables[0].fog_counts[-1] > 0.0
+
+
 def test_fog_sends_back_less_with_the_square_of_the_distance():
     sheet = UNIT_SHEETS["os1-64"]
     weather = Weather(visibility=100.0)
@@ -187,14 +208,15 @@ def test_wet_asphalt_is_darker():
     ("field", "value"),
     [
         ("visibility", 4.999),
-        ("visibility", 1e6),
+        ("visibility", 1e6 + 1.0),
         ("rain", -0.001),
         ("snowfall", 300.001),
         ("rain", np.nan),
     ],
 )
 def test_senseless_weather(field, value):
-    assert not Weather(5.0, 300.0, 300.0).is_clear
+    for visibility in (5.0, 1e6):
+        assert not Weather(visibility, 300.0, 300.0).is_clear
     with pytest.raises(ValueError, match=field):
         Weather(**{field: value})
 
