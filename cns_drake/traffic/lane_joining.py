@@ -4,17 +4,24 @@ from collections.abc import Iterable, Iterator, Mapping, Sequence
 from typing import NamedTuple
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from cns_drake.traffic import lane_graph
-from cns_drake.traffic.lane_graph import SPACING, LaneGraph, Piece, resampled
+from cns_drake.traffic.lane_graph import (
+    SPACING,
+    LaneGraph,
+    Piece,
+    length_of,
+    resampled,
+)
 
 # A lane must have room for any vehicle. A shorter one is part of the ways that
 # lead over it [m].
 _SHORTEST_LANE = 14.0
 # Distance from a stop line to the end of its lane, in steps of `SPACING`.
 _STOP_STEPS = 2
-# Greatest number of short lanes in a way, and of ways from a lane.
-_MOST_SHORT, _MOST_WAYS = 8, 12
+# Greatest number of short lanes in a way.
+_MOST_SHORT = 8
 
 
 class DirectedLane(NamedTuple):
@@ -105,6 +112,14 @@ def join_lanes(
     return LaneGraph(tuple(lane_graph.without_dead_ends(pieces)))
 
 
+def usual_limit(limits: ArrayLike, lengths: ArrayLike) -> float:
+    """Returns the median of limits (N,), weighted with their lengths (N,)."""
+    order = np.argsort(limits)
+    reached = np.cumsum(np.asarray(lengths)[order])
+    middle = np.searchsorted(reached, reached[-1] / 2.0)
+    return float(np.asarray(limits)[order][middle])
+
+
 def _merge(
     lanes: Sequence[DirectedLane],
     links: Iterable[tuple[int, int]],
@@ -145,7 +160,10 @@ def _merge(
     merged = [
         DirectedLane(
             np.concatenate([lanes[k].points for k in chain]),
-            min(lanes[k].limit for k in chain),
+            usual_limit(
+                [lanes[k].limit for k in chain],
+                [length_of(lanes[k].points) for k in chain],
+            ),
             lanes[chain[0]].connects,
         )
         for chain in chains
@@ -165,14 +183,20 @@ def _merge(
 def _ways(
     first: int, after: Sequence[Sequence[int]], long: set[int]
 ) -> Iterator[tuple[tuple[int, ...], int]]:
-    """Yields short lanes that follow a lane, and the long lane behind."""
+    """Yields short lanes that follow a lane, and the long lane behind.
+
+    There is one way to each long lane: the first of those with the fewest short
+    lanes.
+    """
     waiting: list[tuple[int, ...]] = [()]
-    found = 0
-    while waiting and found < _MOST_WAYS:
+    reached: set[int] = set()
+    while waiting:
         short = waiting.pop(0)
         for k in after[short[-1] if short else first]:
+            if k in reached:
+                continue
+            reached.add(k)
             if k in long:
                 yield short, k
-                found += 1
-            elif k not in short and len(short) < _MOST_SHORT:
+            elif len(short) < _MOST_SHORT:
                 waiting.append((*short, k))

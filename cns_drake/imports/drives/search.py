@@ -80,7 +80,7 @@ class WaypointDrive:
     Attributes:
         waypoints: (N, 2) or (N, 3) places through which the car drives [m].
         path: (M, 2) closely spaced places on the path [m].
-        limit: lowest speed limit along the path [m/s]; None without one.
+        limit: usual speed limit along the path [m/s]; None without one.
     """
 
     waypoints: np.ndarray

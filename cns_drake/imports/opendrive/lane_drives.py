@@ -1,6 +1,6 @@
 """Finds drives, and lanes for traffic, in an imported road network."""
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -12,7 +12,11 @@ from cns_drake.imports.drives.search import Obstacle, WaypointDrive
 from cns_drake.imports.opendrive.lanes import DRIVEN, KerbHeights, LaneBand
 from cns_drake.traffic.lane_file import lane_text
 from cns_drake.traffic.lane_graph import Walkway, resampled
-from cns_drake.traffic.lane_joining import DirectedLane, join_lanes
+from cns_drake.traffic.lane_joining import (
+    DirectedLane,
+    join_lanes,
+    usual_limit,
+)
 
 # A lane follows another one if its start is within the first distance of the
 # other's end, and their headings differ by less than the second number [m,
@@ -29,7 +33,7 @@ _SPACING = 2.0
 # Numbers of waypoints to both sides in the running mean of a drive, tried in
 # turn.
 _SMOOTHING = (0, 1, 2, 3)
-# Speed limit of roads that have none in the file [m/s].
+# Speed limit where the file gives none [m/s].
 _LIMIT = 13.9
 _SIDEWALKS = frozenset({"sidewalk", "walking"})
 # Walkers' least distance from the edges of a sidewalk, and greatest distance
@@ -102,12 +106,12 @@ class BandGraph(search.WayGraph):
         points = search.evenly_spaced(_forwards(line), _SPACING)[
             : int(search.LONGEST / _SPACING) + 1
         ]
-        limits = [limit for k in way for _, limit in self.bands[k].road.limits]
         found: WaypointDrive | Obstacle = points[0, :2]
         for window in _SMOOTHING:
             found = search.steerable_drive(_smoothed(points, window))
             if isinstance(found, WaypointDrive):
-                return replace(found, limit=min(limits, default=None))
+                some = [self.bands[k] for k in way]
+                return replace(found, limit=_usual_limit(some))
         return found
 
     def blocked(self, way: Sequence[int], place: np.ndarray) -> np.ndarray:
@@ -145,6 +149,17 @@ def _driven_line(band: LaneBand) -> np.ndarray:
     kept = np.concatenate([[True], steps > 1e-3])
     kept[-1] = True
     return line[kept]
+
+
+def _usual_limit(bands: Iterable[LaneBand]) -> float:
+    """Returns the median of the speed limit along lanes [m/s]."""
+    limits, lengths = [], []
+    for band in bands:
+        middle = (band.s[1:] + band.s[:-1]) / 2.0
+        limit = band.road.limits.at(middle, middle)
+        limits.append(np.where(limit > 0.0, limit, _LIMIT))
+        lengths.append(np.diff(band.s))
+    return usual_limit(np.concatenate(limits), np.concatenate(lengths))
 
 
 def _heading(two: np.ndarray) -> float:
@@ -188,7 +203,7 @@ def lanes_for_traffic(
     lanes = [
         DirectedLane(
             line,
-            min((limit for _, limit in band.road.limits), default=_LIMIT),
+            _usual_limit([band]),
             band.road.junction is not None,
         )
         for band, line in zip(graph.bands, graph.lines, strict=True)

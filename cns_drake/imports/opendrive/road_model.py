@@ -367,10 +367,11 @@ class Thing(NamedTuple):
         z: height above the road [m].
         heading: heading relative to that of the road [rad].
         size: length, width and height; 0 where unknown [m].
-        outline: (N, 3) corners as u, v and height relative to the object [m];
-            None if not in the file.
-        road_outline: (N, 3) corners as s, t and height [m]; None if not in the
-            file.
+        outline: (N, 4) corners as u, v, height of the foot above that of the
+            object, and height above this foot [m]; None if not in the file.
+        road_outline: (N, 4) corners as s, t, height of the foot above the road,
+            and height above this foot [m]; None if not in the file.
+        is_open: whether the outline is a line, not the edge of an area.
         is_dynamic: whether its state can change, as that of a traffic light.
         faces_back: whether it is for traffic against the direction of the road.
     """
@@ -385,6 +386,7 @@ class Thing(NamedTuple):
     size: tuple[float, float, float]
     outline: np.ndarray | None = None
     road_outline: np.ndarray | None = None
+    is_open: bool = False
     is_dynamic: bool = False
     faces_back: bool = False
 
@@ -405,7 +407,7 @@ class ImportedRoad:
             lanes, positive to the left [m].
         sections: stretches with the same lanes, one after the other.
         keeps_left: whether traffic keeps left.
-        limits: start and value of each speed limit [m, m/s].
+        limits: speed limit [m/s]; 0 where it is unknown.
         things: signals and objects.
         spans: `bridge` or `tunnel`, for each bridge or tunnel on the road.
     """
@@ -419,7 +421,7 @@ class ImportedRoad:
     lane_offset: Cubics
     sections: tuple[LaneSection, ...]
     keeps_left: bool = False
-    limits: tuple[tuple[float, float], ...] = ()
+    limits: Cubics = NOWHERE
     things: tuple[Thing, ...] = ()
     spans: tuple[str, ...] = ()
 

@@ -8,6 +8,7 @@ file, as faults.
 from collections.abc import Iterable, Iterator, Mapping
 import contextlib
 from dataclasses import replace
+from itertools import pairwise
 import math
 from pathlib import Path
 import re
@@ -28,6 +29,8 @@ _MARK_WIDTH, _WIDEST_MARK = 0.12, 1.0
 _CLOSEST_DASHES = 0.1
 _ENDS = ("predecessor", "successor")
 _UNITS = {"m/s": 1.0, "km/h": 1 / 3.6, "mph": 0.44704}
+# Greatest speed limit [m/s].
+_FASTEST = 100.0
 # Larger networks, such as whole countries, are refused [m].
 _LARGEST = 20_000.0
 _LONGEST_ROAD = 100_000.0
@@ -36,6 +39,8 @@ _LONGEST_TOGETHER = 2_000_000.0
 _FAR = 10_000.0
 # Lengths that differ by less than this are equal [m].
 _ROUNDING = 0.01
+# Pieces of a road's course that are farther apart are counted [m].
+_WIDEST_JOINT = 0.1
 # Greatest width of a lane, and greatest curvature of a curve [m, 1/m].
 _WIDEST = 100.0
 _SHARPEST = 100.0
@@ -324,6 +329,8 @@ def _road(
     if not sections:
         faults.add("road without lanes, left out", name)
         return None
+    if max(pieces[0].s, sections[0].start) > _WIDEST_JOINT:
+        faults.add("road whose course or lanes begin after its start", name)
     if element.first("lateralProfile", "shape") is not None:
         faults.add("lateral shape of a road, not read", name)
     junction = element.value("junction", "-1")
@@ -343,7 +350,7 @@ def _road(
         lane_offset=_cubics(offsets, "s"),
         sections=tuple(sections),
         keeps_left=element.value("rule", "RHT").upper() == "LHT",
-        limits=tuple(_limits(element)),
+        limits=_steps(_limits(element, name, faults)),
         things=tuple(read_things(element, name, faults)),
         spans=tuple(
             one.tag
@@ -379,6 +386,11 @@ def _pieces(
         s, x, y, heading = (one.number(k) for k in ("s", "x", "y", "hdg"))
         found.append(road_model.Piece(s, x, y, heading, length, shape))
     found.sort(key=lambda piece: piece.s)
+    for piece, after in pairwise(found):
+        end = piece.evaluate(np.array([after.s]))[0]
+        gap = math.hypot(end[0] - after.x, end[1] - after.y)
+        if max(gap, abs(piece.s + piece.length - after.s)) > _WIDEST_JOINT:
+            faults.add("gap of over 0.1 m in the course of a road", name)
     return found
 
 
@@ -525,16 +537,19 @@ def _lane(
     return lane
 
 
-def _limits(road: Element) -> Iterator[tuple[float, float]]:
+def _limits(
+    road: Element, name: str, faults: ImportFaults
+) -> Iterator[tuple[float, float]]:
     """Yields the start [m] and the value [m/s] of each speed limit."""
     for one in road.all("type"):
+        limit = 0.0
         speed = one.first("speed")
-        if speed is None:
-            continue
-        try:
-            limit = float(speed.value("max", ""))
-        except ValueError:
-            continue
-        limit *= _UNITS.get(speed.value("unit", "m/s"), 1.0)
-        if math.isfinite(limit) and limit > 0.0:
-            yield one.number("s", 0.0), limit
+        if speed is not None:
+            with contextlib.suppress(ValueError):
+                limit = float(speed.value("max", ""))
+            limit *= _UNITS.get(speed.value("unit", "m/s"), 0.0)
+            if not 0.0 < limit <= _FASTEST:
+                kind = "unlimited or unreadable speed, taken as 50 km/h"
+                faults.add(kind, name)
+                limit = 0.0
+        yield one.number("s", 0.0), limit

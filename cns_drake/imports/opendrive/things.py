@@ -1,12 +1,13 @@
 """Signals and objects beside OpenDRIVE roads, as structures."""
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 import math
 import zlib
 
 import numpy as np
+from scipy.spatial import cKDTree
 import shapely
-from shapely.geometry import Polygon, box
+from shapely.geometry import LineString, Polygon, box
 from shapely.geometry.base import BaseGeometry
 
 from cns_drake.base.xml_elements import Element
@@ -81,8 +82,8 @@ def _object(one: Element, name: str) -> Thing:
             f"{_LARGEST:g} m"
         )
     outline = next(one.all("outlines", "outline"), one.first("outline"))
-    corners = _corners(outline, "cornerLocal", "u", "v")
-    road_corners = _corners(outline, "cornerRoad", "s", "t")
+    corners = _corners(outline, "cornerLocal", "uvz")
+    road_corners = _corners(outline, "cornerRoad", ("s", "t", "dz"))
     return Thing(
         name=name,
         is_signal=False,
@@ -94,19 +95,26 @@ def _object(one: Element, name: str) -> Thing:
         size=size,
         outline=corners,
         road_outline=road_corners,
+        is_open=outline is not None and outline.value("closed", "") == "false",
     )
 
 
 def _corners(
-    outline: Element | None, tag: str, first: str, second: str
+    outline: Element | None, tag: str, names: Sequence[str]
 ) -> np.ndarray | None:
     if outline is None:
         return None
+    x, y, z = names
     rows = [
-        (one.number(first), one.number(second), one.number("height", 0.0))
+        (
+            one.number(x),
+            one.number(y),
+            one.number(z, 0.0),
+            one.number("height", 0.0),
+        )
         for one in outline.all(tag)
     ]
-    return np.array(rows) if len(rows) >= 3 else None
+    return np.array(rows) if len(rows) >= 2 else None
 
 
 def _repeated(
@@ -129,20 +137,27 @@ def _repeated(
         at = k * step if distance > 0.0 else (k + 0.5) * length / max(count, 1)
         part = min(1.0, at / length) if length > 0.0 else 0.0
 
-        def value(name: str, default: float, part: float = part) -> float:
+        def ends(name: str, default: float) -> tuple[float, float]:
             first = repeat.number(f"{name}Start", default)
-            last = repeat.number(f"{name}End", first)
+            return first, repeat.number(f"{name}End", first)
+
+        def value(name: str, default: float, part: float = part) -> float:
+            first, last = ends(name, default)
             return first + part * (last - first)
 
         own, width, height = thing.size
+        heading = thing.heading
         if distance <= 0.0 and length > 0.0:
-            own = length / count
+            first, last = ends("t", thing.t)
+            own = math.hypot(length, last - first) / count
+            heading += math.atan2(last - first, length)
         size = (own, value("width", width), value("height", height))
         yield thing._replace(
             name=f"{thing.name}_{number}_{k}",
             s=start + at,
             t=value("t", thing.t),
             z=value("zOffset", thing.z),
+            heading=heading,
             size=size,
             road_outline=None,
         )
@@ -234,26 +249,38 @@ def _solid(
     """Returns an object extruded from its outline; None without an outline."""
     x, y, z, heading = place
     length, width, high = thing.size
+    is_open = thing.is_open
     if thing.road_outline is not None:
-        s, t, heights = thing.road_outline.T
+        s, t, rise, heights = thing.road_outline.T
         s = np.clip(s, 0.0, road.length)
         inside = np.clip(s, 1e-6, road.length - 1e-6)
-        polygon = Polygon(road.points(s, inside, t)[:, :2])
-        high = float(heights.max()) or high
+        corners = road.points(s, inside, t)
+        low = corners[:, 2] + rise
+        line = LineString(corners[:, :2])
     elif thing.outline is None and length == width == 0.0:
         faults.add("object without a size, left out", name)
         return None
     else:
+        half = max(length, _LEAST_SIDE) / 2, max(width, _LEAST_SIDE) / 2
+        footprint: LineString = box(-half[0], -half[1], *half).exterior
+        heights = rise = np.zeros(len(footprint.coords))
         if thing.outline is not None:
-            footprint = Polygon(thing.outline[:, :2])
-            high = float(thing.outline[:, 2].max()) or high
+            footprint = LineString(thing.outline[:, :2])
+            rise, heights = thing.outline[:, 2:].T
         else:
-            half = max(length, _LEAST_SIDE) / 2, max(width, _LEAST_SIDE) / 2
-            footprint = box(-half[0], -half[1], *half)
-        polygon = placed(footprint, (x, y), heading + thing.heading)
-    if high < _LEAST_HEIGHT:
+            is_open = False
+        low = z + rise
+        line = placed(footprint, (x, y), heading + thing.heading)
+    if not heights.any():
+        heights = np.full(len(low), high)
+    if heights.max() < _LEAST_HEIGHT:
         faults.add("object without a height, left out", name)
         return None
+    places = shapely.get_coordinates(line)
+    if is_open or len(places) == 2:
+        polygon = line.buffer(_LEAST_SIDE, cap_style="flat", join_style="mitre")
+    else:
+        polygon = Polygon(places)
     if not polygon.is_valid:
         faults.add("outline that crosses itself, repaired", name)
     pieces = [
@@ -266,15 +293,23 @@ def _solid(
     if not pieces:
         faults.add("object without an area, left out", name)
         return None
-    solids = [
-        np.concatenate(extruded(piece, z, z + high, name, faults))
-        for piece in pieces
-    ]
+    foot = float(low.min())
+    triangles = np.concatenate(
+        [
+            part
+            for piece in pieces
+            for part in extruded(piece, foot, foot + 1.0, name, faults)
+        ]
+    )
+    # Each vertex has the heights of the nearest corner.
+    _, nearest = cKDTree(places).query(triangles[..., :2])
+    is_top = triangles[..., 2] > foot
+    triangles[..., 2] = low[nearest] + is_top * heights[nearest]
     one = make_imported(
         name,
         _by_type(thing.kind, "objects", "other-object"),
         "Object",
-        {"body": np.concatenate(solids)},
+        {"body": triangles},
         {},
     ).structure
     model = Model(one.model.parts, one.model.meshes, shapely.union_all(pieces))

@@ -343,11 +343,13 @@ class LaneLayout(NamedTuple):
         forward: number of lanes in the direction of the street's line.
         backward: number of lanes in the opposite direction.
         width: width of each lane [m].
+        total: number of all lanes. Those between the two directions are empty.
     """
 
     forward: int
     backward: int
     width: float
+    total: int
 
     def offset(self, is_forward: bool, number: int) -> float:
         """Returns the distance of a lane from the middle of the street [m].
@@ -360,10 +362,8 @@ class LaneLayout(NamedTuple):
             number: number of the lane in this direction; 0 is the innermost
                 one.
         """
-        same, other = self.forward, self.backward
-        if not is_forward:
-            same, other = other, same
-        return self.width * (number + (1 + other - same) / 2.0)
+        same = self.forward if is_forward else self.backward
+        return self.width * (number + (1 + self.total) / 2.0 - same)
 
 
 def lane_layout(tags: Mapping[str, str], width: float) -> LaneLayout:
@@ -376,15 +376,14 @@ def lane_layout(tags: Mapping[str, str], width: float) -> LaneLayout:
     directions = is_along + is_against
     most = int(width / _LEAST)
     if directions == 0 or most < directions:
-        return LaneLayout(0, 0, 0.0)
+        return LaneLayout(0, 0, 0.0, 0)
 
     def number(key: str) -> int | None:
         value = tag_value(tags, key, count, _MOST_LANES, None, 1.0)
         return None if value is None else int(value)
 
-    total = number("lanes") or directions * int(
-        max(1.0, width / directions / _USUAL)
-    )
+    tagged = number("lanes")
+    total = tagged or directions * int(max(1.0, width / directions / _USUAL))
     if directions == 1:
         forward = min(total, most) * is_along
         backward = min(total, most) * is_against
@@ -398,9 +397,9 @@ def lane_layout(tags: Mapping[str, str], width: float) -> LaneLayout:
                 forward -= 1
             else:
                 backward -= 1
-    return LaneLayout(
-        forward, backward, min(_USED, width / (forward + backward))
-    )
+    total = max(forward + backward, min(tagged or 0, most))
+    most_used = width if tagged == total else _USED
+    return LaneLayout(forward, backward, min(most_used, width / total), total)
 
 
 def speed_limit(

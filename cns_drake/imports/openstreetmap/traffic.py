@@ -211,11 +211,13 @@ def _sidewalk_lines(streets: Iterable[Street]) -> Iterator[BaseGeometry]:
 
 # A way through a junction is a turn if its heading changes by more than this.
 _STRAIGHT_DEG = 35.0
-# Length of the running mean that rounds the corners of a street [m].
-_ROUND = 7.0
-# Lanes end at this distance from the corner of two streets, and from a place
-# where just one street continues. The third is the greatest distance from a
-# junction [m].
+# Lengths of the running means that round the corners of a street, and of a lane
+# on the inner side of a sharp bend [m]. There, the lane's points would be less
+# than this share of their distance apart, or fold over.
+_ROUND, _ROUND_LANE, _FOLDED = 7.0, 4.0, 0.2
+# Lanes end at this distance from the corner of two streets, and at least at the
+# second from a place where just one street continues. The third is the greatest
+# distance from either [m].
 _BEFORE_CORNER, _JOINT, _FARTHEST_STOP = 1.0, 3.0, 25.0
 # Least length of a lane between two junctions [m].
 _SHORTEST = 1.0
@@ -358,21 +360,25 @@ class StreetTraffic:
     def _wanted_setback(self, arm: _Arm) -> float:
         stretch = self.stretches[arm[0]]
         arms = self._arms[stretch.nodes[arm[1]]]
-        if len(arms) < 3:
-            return _JOINT
-        farthest = 0.0
+        is_joint = len(arms) < 3
+        reach = _JOINT if is_joint else _BEFORE_CORNER
         half = stretch.street.width / 2.0
         for other in arms:
             if other == arm:
                 continue
             crossed = self.stretches[other[0]]
+            wide = crossed.street.width / 2.0
             angle = abs(
                 wrapped(crossed.heading(other[1]) - stretch.heading(arm[1]))
             )
             # The corner where the edges of both streets meet.
-            corner = crossed.street.width / 2.0 + half * np.cos(angle)
-            farthest = max(farthest, corner / max(np.sin(angle), 0.1))
-        return float(min(farthest + _BEFORE_CORNER, _FARTHEST_STOP))
+            if is_joint:
+                corner = max(wide, half) / max(np.tan(angle / 2.0), 0.1)
+            else:
+                corner = (wide + half * np.cos(angle)) / max(np.sin(angle), 0.1)
+                corner += _BEFORE_CORNER
+            reach = max(reach, corner)
+        return float(min(reach, _FARTHEST_STOP))
 
     def _stretch_lanes(self) -> Iterator[_Lane]:
         for k, stretch in enumerate(self.stretches):
@@ -399,6 +405,15 @@ class StreetTraffic:
                     offset = stretch.layout.offset(is_forward, number)
                     offset *= self._side * (1.0 if is_forward else -1.0)
                     points = middle + offset * right
+                    ahead = (np.diff(points, axis=0) * tangent[1:]).sum(axis=1)
+                    if ahead.min() < _FOLDED * SPACING:
+                        parts = shapely.get_parts(
+                            shapely.LineString(middle).offset_curve(-offset)
+                        )
+                        if not len(parts):
+                            continue
+                        longest = parts[shapely.length(parts).argmax()]
+                        points = _rounded(longest, _ROUND_LANE)
                     yield _Lane(
                         k,
                         is_forward,
@@ -417,10 +432,12 @@ class StreetTraffic:
             entering[lane.exit_arm].append(k)
         for node, arms in self._arms.items():
             # Vehicles enter a crossing as they would enter a junction.
-            is_junction = len(arms) > 2 or node in self._crossed
+            is_entered = len(arms) > 2 or node in self._crossed
             for a, b in product(arms, arms):
                 if a == b:
                     continue
+                # So they do where a street loses a lane.
+                is_junction = is_entered or len(entering[a]) > len(leaving[b])
                 for first, last in product(entering[a], leaving[b]):
                     one, other = lanes[first], lanes[last]
                     before, after = _direction(one, -1), _direction(other, 0)
@@ -471,18 +488,22 @@ def _stretches(
     for street, line, ends in cut_at_nodes(used, crossed):
         if shapely.LineString(line).length > SPACING:
             layout = tags.lane_layout(street.tags, street.width)
-            yield Stretch(street, _rounded(line), ends, layout)
+            yield Stretch(
+                street, _rounded(shapely.LineString(line), _ROUND), ends, layout
+            )
 
 
-def _rounded(line: np.ndarray) -> np.ndarray:
-    """Returns evenly spaced points (N, 2) along a line with smooth corners."""
-    whole = shapely.LineString(line)
+def _rounded(whole: shapely.LineString, mean: float) -> np.ndarray:
+    """Returns evenly spaced points (N, 2) along a line with smooth corners.
+
+    `mean` is the length of the running mean that rounds them [m].
+    """
     count = max(3, round(whole.length / SPACING) + 1)
     places = np.linspace(0.0, 1.0, count)
     points = shapely.get_coordinates(
         shapely.line_interpolate_point(whole, places, normalized=True)
     )
-    window = min(int(_ROUND / SPACING), count // 3) // 2 * 2 + 1
+    window = min(int(mean / SPACING), count // 3) // 2 * 2 + 1
     reach = window // 2
     # Mirrored at both ends, so that these stay in place.
     longer = np.concatenate(

@@ -231,12 +231,20 @@ def test_speed_limits_have_units(tmp_path):
         '<type s="0" type="town"><speed max="36" unit="km/h"/></type>'
         '<type s="9" type="town"><speed max="no limit"/></type>'
         '<type s="20" type="town"><speed max="10" unit="mph"/></type>'
+        '<type s="30" type="town"><speed max="50" unit="kmh"/></type>'
+        '<type s="35" type="town"/>'
+        '<type s="40" type="town"><speed max="101"/></type>'
     )
     path = write_roads(
         tmp_path / "a.xodr", straight("1", 0, 0, 50, 0, more=limits)
     )
-    (one,) = read_roads(path, ImportFaults()).roads
-    assert one.limits == ((0.0, pytest.approx(10.0)), (20.0, 4.4704))
+    faults = ImportFaults()
+    (one,) = read_roads(path, faults).roads
+    at = np.array([0.0, 8.9, 9.1, 20.0, 30.0, 36.0, 41.0])
+    limits = [10.0, 10.0, 0.0, 4.4704, 0.0, 0.0, 0.0]
+    assert one.limits.at(at, at).tolist() == pytest.approx(limits)
+    (fault,) = faults.rows()
+    assert fault == ("unlimited or unreadable speed, taken as 50 km/h", 3, "1")
 
 
 def test_a_lane_of_nothing_among_others_is_paved(tmp_path):
@@ -415,11 +423,6 @@ def test_attributes_of_lanes(tmp_path, attribute, fault):
             "further outline of an object, not read",
         ),
         (
-            '<objects><object s="1" t="9"><outline><cornerLocal u="0" v="0" '
-            'z="2.0"/></outline></object></objects>',
-            "z of cornerLocal, not read",
-        ),
-        (
             '<signals><signal s="1" t="9"><positionInertial x="1" y="2"/>'
             "</signal></signals>",
             "positionInertial of signal, not read",
@@ -439,6 +442,31 @@ def test_other_parts_of_roads_that_are_not_read_are_counted(
         tmp_path / "a.xodr", straight("1", 0, 0, 50, 0, more=more)
     )
     assert faults_of(path)[1].get(fault) == 1
+
+
+@pytest.mark.parametrize("gap", [0.0, 0.09, 0.11, 10.0])
+def test_gaps_in_the_course_of_a_road_are_counted(tmp_path, gap):
+    """Beside the next piece's start, along the road, and before its lanes."""
+
+    def two(x, y, s, first=0.0):
+        pieces = [
+            geometry(0.0, 0.0, 0.0, 0.0, 50.0, "<line/>"),
+            geometry(s, x, y, 0.0, 100.0 - s, "<line/>"),
+        ]
+        lanes = [section(first, lane(-1, "driving", 3.5))]
+        return road("1", 100.0, pieces, lanes)
+
+    def counted(one):
+        return faults_of(write_roads(tmp_path / "a.xodr", one))[1]
+
+    in_course = {"gap of over 0.1 m in the course of a road": 1}
+    too_late = {"road whose course or lanes begin after its start": 1}
+    counts = gap > 0.1
+    assert counted(two(50.0, gap, 50.0)) == (in_course if counts else {})
+    assert counted(two(50.0 + gap, 0, 50.0 + gap)) == (
+        in_course if counts else {}
+    )
+    assert counted(two(50.0, 0, 50.0, gap)) == (too_late if counts else {})
 
 
 def test_what_stands_above_the_roads_in_a_file_is_counted(tmp_path):

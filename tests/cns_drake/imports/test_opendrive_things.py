@@ -5,10 +5,12 @@ import math
 from helpers.small_opendrive import cubic, straight, write_roads
 import numpy as np
 import pytest
+import shapely
 from shapely.geometry import LineString, box
 
 from cns_drake.imports.opendrive.lanes import lane_bands, split_levels
 from cns_drake.imports.opendrive.road_reader import read_roads
+from cns_drake.imports.opendrive.things import thing_structures
 from cns_drake.imports.opendrive.town import build_town
 from cns_drake.imports.options import ImportFaults
 
@@ -75,6 +77,80 @@ def test_signals_and_objects_stand_at_their_places(tmp_path):
         if one.semantic_class == "building" and one.name != "object_1_0"
     ]
     assert all(one.disjoint(house.footprint_W) for one in drawn)
+
+
+def solids(path, objects, **more):
+    """Returns vertices (N, 3) and footprint of the objects of a road."""
+    text = f"<objects>{objects}</objects>"
+    write_roads(path, straight("1", 0, 0, 100, 0, more=text, **more))
+    (one,) = read_roads(path, ImportFaults()).roads
+    found = list(thing_structures(one, box(0, -4, 100, 4), ImportFaults()))
+    meshes = [m for s in found for m in s.model.meshes.values()]
+    vertices = np.concatenate([mesh.vertices for mesh in meshes])
+    return vertices, shapely.union_all([s.footprint_W for s in found])
+
+
+def corner(tag, **numbers):
+    values = " ".join(f'{key}="{v}"' for key, v in numbers.items())
+    return f"<{tag} {values}/>"
+
+
+def barrier(corners, attributes="", more=""):
+    return (
+        f'<object id="1" type="barrier" s="20" t="6" zOffset="0" hdg="0">{more}'
+        f"<outlines><outline {attributes}>{corners}</outline></outlines>"
+        "</object>"
+    )
+
+
+def test_each_corner_of_an_outline_has_its_heights(tmp_path):
+    """On a road that rises by 1 in 10, and on one with a step of 0.5 m."""
+    on_road = "".join(
+        corner("cornerRoad", s=s, t=t, dz=0.2, height=h)
+        for s, t, h in ((20, 6, 1), (80, 6, 2), (80, 7, 2), (20, 7, 1))
+    )
+    rise = cubic("elevation", 0, 0, 0.1, 0, 0, "s")
+    path = tmp_path / "a.xodr"
+    vertices, _ = solids(path, barrier(on_road), elevation=rise)
+    for x, low, high in ((20, 2.2, 3.2), (80, 8.2, 10.2)):
+        z = vertices[np.isclose(vertices[:, 0], x), 2]
+        assert (z.min(), z.max()) == pytest.approx((low, high))
+    local = "".join(
+        corner("cornerLocal", u=u, v=v, z=z, height=1)
+        for u, v, z in ((0, 0, 0), (8, 0, 0.5), (8, 2, 0.5))
+    )
+    vertices, _ = solids(path, barrier(local))
+    z = vertices[np.isclose(vertices[:, 0], 28), 2]
+    assert (z.min(), z.max()) == (0.5, 1.5)
+
+
+@pytest.mark.parametrize("count", [2, 3])
+def test_an_open_outline_is_a_wall(tmp_path, count):
+    places = ((0, 0), (8, 0), (8, 5))[:count]
+    corners = "".join(
+        corner("cornerLocal", u=u, v=v, z=0, height=1) for u, v in places
+    )
+    _, footprint = solids(
+        tmp_path / "a.xodr", barrier(corners, 'closed="false"')
+    )
+    line = LineString([(20 + u, 6 + v) for u, v in places])
+    assert footprint.covers(line)
+    assert footprint.hausdorff_distance(line) < 0.1
+
+
+def test_a_wall_leads_from_one_side_to_the_other(tmp_path):
+    """A repeated wall from t = 6 m to 12 m is as long as its diagonal."""
+    repeat = (
+        '<repeat s="20" length="8" distance="0" tStart="6" tEnd="12"'
+        ' widthStart="0.2" heightStart="1"/>'
+    )
+    _, footprint = solids(
+        tmp_path / "a.xodr",
+        f'<object id="1" type="barrier" s="20" t="6" length="1">{repeat}'
+        "</object>",
+    )
+    assert footprint.covers(LineString([(20.01, 6.01), (27.99, 11.99)]))
+    assert footprint.area == pytest.approx(10.0 * 0.2, rel=0.01)
 
 
 @pytest.mark.slow

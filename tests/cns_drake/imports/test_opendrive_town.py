@@ -462,6 +462,22 @@ def test_a_reversed_lane_leads_the_other_way(tmp_path):
     assert (drive.path[-1] - drive.path[0])[0] > 100.0
 
 
+def slow_end(length):
+    """Limits of 12 m/s, and of 3 m/s on the last 10 m."""
+    return "".join(
+        f'<type s="{s}" type="town"><speed max="{limit}"/></type>'
+        for s, limit in ((0.0, 12), (length - 10.0, 3))
+    )
+
+
+def test_a_short_slow_part_does_not_slow_a_drive(tmp_path):
+    path = write_roads(
+        tmp_path / "a.xodr", straight("1", 0, 0, 200, 0, more=slow_end(200))
+    )
+    (drive,) = find_lane_drives(bands_of(path))
+    assert drive.limit == 12.0
+
+
 @pytest.mark.parametrize("pieces", [1, 2])
 def test_a_ring_road_without_a_junction_has_traffic(tmp_path, pieces):
     radius = 60.0
@@ -473,13 +489,16 @@ def test_a_ring_road_without_a_junction_has_traffic(tmp_path, pieces):
         x, y = radius * math.sin(start), -radius * math.cos(start)
         arc = f'<arc curvature="{1 / radius!r}"/>'
         piece = geometry(0.0, x, y, start, length, arc)
-        roads.append(road(str(k), length, [piece], [lanes]))
+        more = slow_end(length)
+        roads.append(road(str(k), length, [piece], [lanes], more=more))
     path = write_roads(tmp_path / "ring.xodr", *roads)
     bands = bands_of(path)
     text = lanes_for_traffic(bands, KerbHeights(bands, 0.1))
     lanes_file = tmp_path / "lanes.json"
     lanes_file.write_text(text)
-    whole = sum(p.length for p in read_lanes(lanes_file).graph.pieces)
+    graph_pieces = read_lanes(lanes_file).graph.pieces
+    assert {piece.limit for piece in graph_pieces} == {12.0}
+    whole = sum(piece.length for piece in graph_pieces)
     assert whole == pytest.approx(2 * 2 * math.pi * radius, rel=5e-3)
 
 

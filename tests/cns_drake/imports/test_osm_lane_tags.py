@@ -59,6 +59,29 @@ def test_lanes_lie_side_by_side():
 
 
 @pytest.mark.parametrize(
+    ("street", "width", "places"),
+    [
+        # The lane between both directions is for turning.
+        ({"lanes": "3", "lanes__both_ways": "1"}, 9.6, [3.2]),
+        ({"lanes": "5", "lanes__forward": "2", "lanes__backward": "2"}, 15.0,
+         [3.0, 6.0]),
+        ({"lanes": "2"}, 12.0, [3.0]),
+        ({"lanes": "2", "oneway": "yes"}, 12.0, [-3.0, 3.0]),
+        # Without the tag, or with a wrong one, lanes are not wider than usual.
+        ({}, 8.0, [1.625]),
+        ({"lanes": "1"}, 12.0, [1.625]),
+        ({"lanes__forward": "1", "lanes__backward": "1"}, 14.0, [1.625]),
+        # One lane has no room.
+        ({"lanes": "4", "oneway": "yes"}, 9.0, [-3.0, 0.0, 3.0]),
+    ],
+)  # fmt: skip
+def test_lanes_share_the_width_of_the_street(street, width, places):
+    layout = lane_layout(tags(**street), width)
+    found = [layout.offset(True, k) for k in range(layout.forward)]
+    assert found == pytest.approx(places)
+
+
+@pytest.mark.parametrize(
     ("street", "limit"),
     [
         ({"maxspeed": "50"}, 50 / 3.6),

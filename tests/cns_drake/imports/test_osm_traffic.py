@@ -1,5 +1,7 @@
 """Traffic on streets of OpenStreetMap."""
 
+from itertools import pairwise
+
 from helpers.small_osm import OsmWriter
 import numpy as np
 import pytest
@@ -239,6 +241,50 @@ def test_one_way_streets(tmp_path):
     ]
     assert sum(map(len, eastwards)) > 100
     assert min(steps.min() for steps in eastwards if len(steps)) > 0
+
+
+@pytest.mark.parametrize("is_cut", [False, True])
+def test_lanes_do_not_fold_in_sharp_bends(tmp_path, is_cut):
+    """Each of four lanes turns by 360 deg around a rectangle, and no more.
+
+    Its corners lie within a street, or where one street ends and another
+    begins.
+    """
+    osm = OsmWriter()
+    nodes = [osm.node(*xy) for xy in CORNERS]
+    nodes.append(nodes[0])
+    for part in pairwise(nodes) if is_cut else (nodes,):
+        osm.way_of(part, highway="tertiary", lanes="4", width="14")
+    osm.box(-40, -30, 80, 60, building="yes")
+    _, (graph, *_) = lanes_of(osm.write(tmp_path / "a.osm"), tmp_path)
+    total = 0.0
+    for piece in graph.pieces:
+        x, y = np.diff(piece.points[:, :2], axis=0).T
+        turns = np.abs(np.diff(np.unwrap(np.arctan2(y, x))))
+        assert turns.max() < np.radians(50.0)
+        total += turns.sum()
+    assert total == pytest.approx(4 * 2 * np.pi, rel=0.05)
+
+
+def test_two_lanes_merge_on_their_ways(tmp_path):
+    """They stay apart where a street of four lanes goes on with two."""
+    osm = OsmWriter()
+    around = [osm.node(*xy) for xy in CORNERS]
+    south, north = osm.node(0, -70), osm.node(0, 70)
+    middle = osm.node(0, 0)
+    nodes = [around[0], south, around[1], around[2], north, around[3]]
+    osm.way_of([*nodes, around[0]], highway="tertiary", lanes="2")
+    osm.way_of([south, middle], highway="primary", lanes="4", width="13")
+    osm.way_of([middle, north], highway="primary", lanes="2", width="6.5")
+    osm.box(-70, -35, 40, 70, building="yes")
+    osm.box(30, -35, 40, 70, building="yes")
+    _, (graph, *_) = lanes_of(osm.write(tmp_path / "a.osm"), tmp_path)
+    (inner,) = (k for k in graph.lanes if graph.pieces[k].right >= 0)
+    outer = graph.pieces[inner].right
+    one, other = (lines(graph)[k] for k in (inner, outer))
+    assert one.distance(other) == pytest.approx(13 / 4, abs=0.05)
+    ways = [graph.pieces[k].after for k in (inner, outer)]
+    assert len({graph.pieces[way].after for (way,) in ways}) == 1
 
 
 def test_no_lane_without_a_round_trip(tmp_path):

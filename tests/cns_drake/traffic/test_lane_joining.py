@@ -186,3 +186,19 @@ def test_a_ring_that_is_one_lane_follows_itself(through_junction):
     assert lane.after == (1,)
     assert way.after == (0,)
     assert lane.length + way.length == pytest.approx(80.0 * np.pi, rel=2e-3)
+
+
+def test_one_way_leads_to_each_lane():
+    """Parallel short lanes add no ways, and no turn is lost behind them."""
+    short, ends = range(1, 4), range(4, 11)
+    lanes = [
+        straight((0, 0), (40, 0)),
+        *(straight((40, 0), (43, 0), connects=True) for _ in short),
+        *(straight((43, 0), (90, 10 * k)) for k in ends),
+    ]
+    links = [(0, k) for k in short] + [(k, 0) for k in ends]
+    # Two short lanes lead to the same six lanes, the third to the last one.
+    links += [(k, end) for k in (1, 2) for end in ends[:-1]] + [(3, ends[-1])]
+    graph = join_lanes(lanes, links)
+    reached = [graph.pieces[way].after[0] for way in graph.pieces[0].after]
+    assert reached == list(range(1, len(ends) + 1))
