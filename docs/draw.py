@@ -192,7 +192,7 @@ def kept_shares(table: str, metric: str = "kept") -> dict[str, list[float]]:
 
 def assumptions(path: Path) -> None:
     """Draws what BTC keeps after 40 years, by where new furniture stands."""
-    head, *rows = _table("docs/ageing.md", "## After how many years")
+    head, *rows = _table("docs/ageing.md", "In the row *none*")
     colour, _, marker = METHOD_STYLES["btc"]
     figure = Figure(figsize=(_WIDTH, 6.6), layout="constrained")
     axes = figure.subplots()
