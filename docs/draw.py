@@ -132,7 +132,7 @@ def main(names: Sequence[str]) -> None:
 
 
 def survival(path: Path) -> str:
-    """Draws what each method keeps of its AUC and AUC strict; returns the title."""
+    """Draws what each method keeps of both AUC; returns the title."""
     numbers = ("No", "One", "Two", "Three", "Four", "Five", "Six")
     tables = [kept_shares(name) for name in ("stages", "fresh")]
     strict = kept_shares("stages", "kept_strict")
@@ -176,7 +176,7 @@ def survival(path: Path) -> str:
 
 
 def kept_shares(table: str, metric: str = "kept") -> dict[str, list[float]]:
-    """Returns method -> the shares of a metric that it keeps, one for each pair.
+    """Returns method -> the shares of a metric that it keeps, one a pair.
 
     Args:
         table: `stages` or `fresh`, a shipped table.
