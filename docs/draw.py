@@ -166,7 +166,7 @@ def survival(path: Path) -> str:
     )
     counts = [len(some[order[0]]) for some in tables]
     panels[0].set_title(
-        f"● {counts[0]} pairs of shipped cities   ○ {counts[1]} of redrawn "
+        f"● {counts[0]} pairs of shipped cities   ○ {counts[1]} of fresh "
         "cities   ┃ median",
         loc="left", x=-0.57,
     )  # fmt: skip
