@@ -224,26 +224,29 @@ def assumptions(path: Path) -> None:
 
 def ranking(path: Path) -> None:
     """Draws the mean AUC strict and AUC over the radius of a match."""
-    with open(ROOT / "docs/notes/ranking.csv", newline="") as stream:
-        rows = list(csv.DictReader(stream))
+    metrics = {"auc_strict": "AUC strict", "auc": "AUC"}
+    gates = {"0": "without gate", "1": "with gate"}
     kinds = {
         "shipped": "shipped cities",
         "fresh": "fresh cities",
         "plans": "other streets",
     }
+    # Metric, gate, cities and method -> radius -> values.
+    found: dict[tuple[str, ...], dict[float, list[float]]] = {}
+    with open(ROOT / "docs/notes/ranking.csv", newline="") as stream:
+        for row in csv.DictReader(stream):
+            for metric in metrics:
+                place = metric, row["gate"], row["cities"], row["method"]
+                of_radius = found.setdefault(place, {})
+                radius, value = float(row["radius"]), float(row[metric])
+                of_radius.setdefault(radius, []).append(value)
     figure = Figure(figsize=(_WIDTH, 11.0), layout="constrained")
     grid = figure.subplots(4, len(kinds), sharex=True, sharey=True)
-    kept = itertools.product(("auc_strict", "auc"), "01")
-    for line, (metric, gate) in zip(grid, kept, strict=True):
+    lines = zip(grid, itertools.product(metrics, gates), strict=True)
+    for line, (metric, gate) in lines:
         for axes, kind in zip(line, kinds, strict=True):
             for key, (colour, style, marker) in METHOD_STYLES.items():
-                values: dict[float, list[float]] = {}
-                for row in rows:
-                    if (row["cities"], row["gate"], row["method"]) == (
-                        kind, gate, key,
-                    ):  # fmt: skip
-                        radius = float(row["radius"])
-                        values.setdefault(radius, []).append(float(row[metric]))
+                values = found[metric, gate, kind, key]
                 axes.plot(
                     list(values), [np.mean(some) for some in values.values()],
                     style, color=colour, marker=marker, label=title(key),
@@ -251,8 +254,7 @@ def ranking(path: Path) -> None:
             axes.set_ylim(0.0, 1.04)
             axes.set_xticks((5.0, 7.5, 10.0, 15.0), ("5", "7.5", "10", "15"))
             _plain(axes, "both")
-        name = {"auc": "AUC", "auc_strict": "AUC strict"}[metric]
-        line[0].set_ylabel(f"{name},\n{('without', 'with')[gate == '1']} gate")
+        line[0].set_ylabel(f"{metrics[metric]},\n{gates[gate]}")
     for axes, name in zip(grid[0], kinds.values(), strict=True):
         axes.set_title(name, loc="left")
     grid[-1][1].set_xlabel("radius of a match [m]")
