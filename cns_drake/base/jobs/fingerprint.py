@@ -95,6 +95,10 @@ class _Imports(NamedTuple):
     offered: Mapping[str, str]
 
 
+def _is_ours(name: str) -> bool:
+    return name.partition(".")[0] in _PACKAGES
+
+
 @functools.cache
 def _source(module: _Module) -> Path | None:
     """Returns the source of a module; None if there is none."""
@@ -106,10 +110,18 @@ def _source(module: _Module) -> Path | None:
 
 
 def _imported(module: _Module) -> Iterator[_Module]:
-    """Yields imported modules that are ours or beside the module."""
+    """Yields imported modules that are ours or, of a script, beside it.
+
+    Beside an installed package stand all other installed packages. Their
+    versions count (`_LIBRARIES`), not their sources.
+    """
     for home, name in _imports_of(module).names:
-        own = home.partition(".")[0] in _PACKAGES
-        package = _Module(_ROOT if own else module.root, home)
+        if _is_ours(home):
+            package = _Module(_ROOT, home)
+        elif _is_ours(module.name) and module.root == _ROOT:
+            continue
+        else:
+            package = _Module(module.root, home)
         yield package
         inner = package._replace(name=f"{home}.{name}")
         if name and _source(inner) is not None:

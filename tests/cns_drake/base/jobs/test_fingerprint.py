@@ -145,6 +145,41 @@ def test_every_import_of_a_source_is_found(start, end):
     assert sorted(found.names) == sorted(expected)
 
 
+def test_packages_of_others_beside_ours_do_not_count(packages):
+    """Installed, ours stand in `site-packages`; a script there does, too."""
+    files = {
+        "evaluation/top.py": "import others.core\nfrom alone import one\n",
+        "others/__init__.py": "",
+        "others/core.py": "from .more import one\n",
+        "others/more.py": "one = 1\n",
+        "alone.py": "one = 1\n",
+        "script.py": "import evaluation.top\nimport helper\n",
+        "helper.py": "import others\n",
+    }
+    for name, text in files.items():
+        path = packages / name
+        path.parent.mkdir(exist_ok=True)
+        path.write_text(text)
+
+    def changing(digest):
+        found = set()
+        for name, text in files.items():
+            code_digest.cache_clear()
+            before = digest()
+            (packages / name).write_text(text + "# Changed.\n")
+            code_digest.cache_clear()
+            if digest() != before:
+                found.add(name)
+            (packages / name).write_text(text)
+        return found
+
+    ours = {"evaluation/top.py"}
+    assert changing(lambda: code_digest("evaluation.top")) == ours
+    assert changing(lambda: script_digest(packages / "script.py")) == {
+        *ours, "script.py", "helper.py", "others/__init__.py"
+    }  # fmt: skip
+
+
 def test_line_ends_do_not_count(packages):
     path = packages / "evaluation" / "top.py"
     path.parent.mkdir()
