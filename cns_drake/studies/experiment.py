@@ -37,6 +37,7 @@ from cns_drake.base.yaml_files import parse_yaml, read_yaml
 from cns_drake.scenarios.scenario import Name
 from cns_drake.sensors.sensor_config import Section
 from evaluation.recognition.protocol import PROTOCOLS, RetrievalProtocol
+from evaluation.results.table import FRESH
 
 _FOLDER = Path(__file__).with_name("experiments")
 SIDES = ("both", "database", "query")
@@ -52,8 +53,6 @@ _LISTS: Mapping[str, tuple[type, ...]] = {
 }
 # A list of evenly spaced numbers.
 _SPREAD = {"from", "to", "count"}
-# The factor of the fresh versions of the shipped maps.
-FRESH = "both.fresh"
 # Factors of experiments with cases: the name of the case, and its level.
 CAUSE, LEVEL = "cause", "level"
 NO_CAUSE = "none"

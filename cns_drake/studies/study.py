@@ -1,19 +1,15 @@
-"""Runs a study: an experiment on maps, from conditions to tables and page."""
+"""Makes pairs of drives from an experiment on maps, and has them measured."""
 
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
 from cns_drake.base.errors import InputError, did_you_mean, errors_at
-from cns_drake.base.files import is_there, make_folder
+from cns_drake.base.files import is_there
 from cns_drake.base.jobs.cluster import Cluster
 from cns_drake.base.jobs.fingerprint import fingerprint
-from cns_drake.base.jobs.processes import nothing_left
-from cns_drake.base.jobs.running import Job, run_jobs
 from cns_drake.base.map_folder import MapFolder
-from cns_drake.base.process import num_cores
-from cns_drake.base.terminal import note
 from cns_drake.scenarios.scenario import Scenario
 from cns_drake.scenarios.scenario_files import load_scenario
 from cns_drake.scenarios.shipped import (
@@ -32,7 +28,6 @@ from cns_drake.studies.comparisons import (
 )
 from cns_drake.studies.experiment import (
     CAUSE,
-    FRESH,
     LEVEL,
     SIDES,
     Condition,
@@ -47,27 +42,20 @@ from cns_drake.studies.made_maps import (
     distracting_drives,
     made_map_step,
 )
+from cns_drake.studies.map_task import MapTask
 from cns_drake.studies.recording import is_recorded
 from cns_drake.studies.redrawing import draw_fresh_cities, make_maps
-from cns_drake.studies.tasks.change import ChangeTask
-from cns_drake.studies.tasks.localise import LocaliseTask
-from cns_drake.studies.tasks.place import CostTask, PlaceTask, PoseTask
-from cns_drake.studies.tasks.task import Jobs, NamedDrive, Pair, Task
-from cns_drake.studies.tasks.update import MapTask
 from evaluation.methods import optional_methods
 from evaluation.recognition.protocol import RetrievalProtocol
 from evaluation.results.charts import check
 from evaluation.results.page import write_page
 from evaluation.results.table import (
+    FRESH,
     LAST,
     OWN,
     QUERIES,
     RESULTS,
     STAGE,
-    Answers,
-    QueryRows,
-    Results,
-    Row,
 )
 from evaluation.study.chosen_methods import MethodChoice, choose_methods
 from evaluation.study.collection import (
@@ -75,7 +63,12 @@ from evaluation.study.collection import (
     find_recordings,
     group_cities,
 )
-from evaluation.study.parts import Part, StudyFiles
+from evaluation.study.engine import Comparison, Engine, made_tasks
+from evaluation.study.recorded import RecordedCondition, recorded_comparisons
+from evaluation.study.tasks.change import ChangeTask
+from evaluation.study.tasks.localise import LocaliseTask
+from evaluation.study.tasks.place import CostTask, PlaceTask, PoseTask
+from evaluation.study.tasks.task import NamedDrive, Pair, Task
 
 TASKS: Mapping[str, type[Task]] = {
     task.name: task
@@ -84,27 +77,11 @@ TASKS: Mapping[str, type[Task]] = {
         *(MapTask, ChangeTask, CostTask),
     )
 }
-# A study that takes longer is announced [s].
-_LONG = 3600.0
 # Tables that earlier versions wrote.
 _FORMER = (
     *("ladder.csv", "years.csv", "lifetimes.csv", "size.csv", "trend.csv"),
     *("map_pairs.csv", "map_update.csv", "localisation.csv"),
 )
-
-
-@dataclass(frozen=True)
-class _Measured:
-    """A pair of drives in a condition, with the files of its results."""
-
-    map_name: str
-    names: tuple[str, str]
-    condition: Condition
-    factors: Mapping[str, Any]
-    seed: int
-    pair: Pair
-    fingerprint: str = ""
-    parts: dict[str, Part] = field(default_factory=dict)
 
 
 @dataclass(frozen=True)
@@ -188,14 +165,7 @@ class Study:
     on_note: Callable[[str], None] = lambda text: None
 
     def __post_init__(self) -> None:
-        self._tasks: dict[str, Task] = {}
-        for name, settings in self.experiment.tasks.items():
-            if name not in TASKS:
-                raise InputError(
-                    f"{self.source}: tasks: no task {name!r} (there are:"
-                    f" {', '.join(TASKS)}){did_you_mean(name, TASKS)}"
-                )
-            self._tasks[name] = TASKS[name](settings, self.source)
+        self._tasks = made_tasks(self.experiment.tasks, TASKS, self.source)
         with errors_at(f"{self.source}: methods", "--method: "):
             self._variants = self._choose_methods()
         if self.experiment.frozen is not None:
@@ -231,19 +201,8 @@ class Study:
         for name in (RESULTS, QUERIES, "index.html"):
             is_there(self.output / name)  # Nothing else may have its name.
         self._made.make(self.cluster)
-        jobs, measured = self._plan(drives)
-        if not measured:
-            raise InputError(
-                f"{self.source}: no condition that can be measured"
-            )
-        make_folder(self.output)
-        self._announce(jobs)
-        run_jobs(jobs.values(), self.cluster)
-        note("writing the tables and the page")
-        results = Results.of(self._rows(measured))
-        queries = QueryRows.of(self._answers(measured))
-        results.write_csv(self.output / RESULTS)
-        queries.write_csv(self.output / QUERIES)
+        engine = self._plan(drives)
+        results, queries = engine.run()
         return write_page(
             results,
             queries,
@@ -376,65 +335,64 @@ class Study:
             pairs += [(query, one) for one, _ in pairs]
         return pairs
 
-    def _plan(
-        self, drives: Iterable[_Drives]
-    ) -> tuple[dict[str, Job], list[_Measured]]:
-        """Returns the jobs, and the pairs that they measure."""
-        jobs: dict[str, Job] = {}
-        notes: dict[str, None] = {}
-        measured: list[_Measured] = []
+    def _plan(self, drives: Iterable[_Drives]) -> Engine:
+        """Returns the engine with all pairs in all conditions.
+
+        Raises:
+            InputError: there is nothing to measure, or a drive is not the one
+                that is frozen.
+        """
+        engine = Engine(
+            self.experiment.name,
+            self._tasks,
+            self._variants,
+            self.output,
+            self.cluster,
+            self.on_note,
+        )
+        prints: dict[tuple[str, int], list[str]] = {}
         for some in drives:
-            found = list(
-                self._recorded(some.city)
-                if some.city is not None
-                else self._simulated(some)
-            )
+            found: list[Comparison] = []
+            if some.city is not None:
+                found += self._recorded(some.city)
+            else:
+                for one, drives_digest in self._simulated(some):
+                    found.append(one)
+                    place = one.map_name, one.factors.get(LEVEL, 0)
+                    prints.setdefault(place, []).append(drives_digest)
             if not found:
                 self.on_note(f"{some.map_name}: no two drives to compare")
-            planned = Jobs(
-                StudyFiles(self.output),
-                tuple(choice for choice, _ in self._variants.values()),
+            engine.add(found, self._distractors(some, found))
+        if not engine.jobs:
+            raise InputError(
+                f"{self.source}: no condition that can be measured"
             )
-            most = max((one.pair.distractors for one in found), default=0)
-            if most:
-                # The same LiDARs see all places.
-                database, _ = some.pairs[0]
-                if self.experiment.drives == "same-route":
-                    database = beside(database)
-                planned.distractors = [
-                    self._named(one)
-                    for one in distracting_drives(
-                        database,
-                        most,
-                        self._protocol.place_spacing,
-                        self.output / "cities",
-                        self.cluster,
-                        self.on_note,
-                    )
-                ]
-            if any(task.asks for task in self._tasks.values()):
-                for one in found:
-                    planned.expect(one.pair)
-            for name, task in self._tasks.items():
-                seen: set[tuple[str, str]] = set()
-                for one in found:
-                    both = one.pair.database.name, one.pair.query.name
-                    is_new = not one.pair.may_repeat or both not in seen
-                    if task.asks or is_new:
-                        one.parts[name] = task.measure(one.pair, planned)
-                    seen.add(both)
-            jobs |= planned.jobs
-            notes |= planned.notes
-            measured += found
-        for text in notes:
-            self.on_note(text)
         if self.experiment.frozen is not None:
-            prints: dict[tuple[str, int], list[str]] = {}
-            for one in measured:
-                key = one.map_name, one.factors.get(LEVEL, 0)
-                prints.setdefault(key, []).append(one.fingerprint)
             check_frozen(self.experiment.frozen, prints)
-        return jobs, measured
+        return engine
+
+    def _distractors(
+        self, some: _Drives, found: Iterable[Comparison]
+    ) -> list[NamedDrive]:
+        """Returns the drives whose places are added to databases."""
+        most = max((one.pair.distractors for one in found), default=0)
+        if not most:
+            return []
+        # The same LiDARs see all places.
+        database, _ = some.pairs[0]
+        if self.experiment.drives == "same-route":
+            database = beside(database)
+        return [
+            self._named(one)
+            for one in distracting_drives(
+                database,
+                most,
+                self._protocol.place_spacing,
+                self.output / "cities",
+                self.cluster,
+                self.on_note,
+            )
+        ]
 
     def _named(self, drive: Scenario) -> NamedDrive:
         """Returns a drive that is simulated, or read if it is recorded."""
@@ -448,10 +406,11 @@ class Study:
 
     def _simulated(
         self, some: _Drives, *, made: bool = True
-    ) -> Iterator[_Measured]:
+    ) -> Iterator[tuple[Comparison, str]]:
         """Yields the pairs of a map in all conditions that it allows.
 
-        If `made` is false, the maps that conditions need are only noted.
+        Each item is a comparison and the fingerprint of its drives. If `made`
+        is false, the maps that conditions need are only noted.
         """
         noted: dict[str, None] = {}
         age, redraw = self._made.want_age, self._made.want_redrawn
@@ -480,13 +439,16 @@ class Study:
                     key = f"{condition.factors} {compared.fingerprint()}"
                     if key not in known:
                         known.add(key)
-                        yield _Measured(
-                            some.map_name,
-                            (_base_name(database), query.name),
-                            condition,
-                            {**some.factors, **condition.factors},
-                            seed,
-                            self._pair(compared, query),
+                        yield (
+                            Comparison(
+                                some.map_name,
+                                (_base_name(database), query.name),
+                                {**some.factors, **condition.factors},
+                                seed,
+                                condition.is_baseline,
+                                self._pair(compared, query),
+                                self._protocol_of(condition),
+                            ),
                             compared.fingerprint(),
                         )
         for text in noted if made else ():
@@ -523,41 +485,24 @@ class Study:
             bool(compared.asked or compared.distractors),
         )
 
-    def _recorded(self, city: City) -> Iterator[_Measured]:
+    def _recorded(self, city: City) -> Iterator[Comparison]:
         """Yields the pairs of recordings; only their stage can vary."""
         self._check_recordable(city)
-        pairs = city.change_pairs()
-        if self.experiment.drives == "both-ways" and len(pairs) == 1:
-            pairs += [(later, earlier) for earlier, later in pairs]
-        for pair in pairs:
-            control = city.unchanged_pair(*pair)
-            for condition in self._conditions:
-                stage = condition.changes.get("both", {}).get("stage", OWN)
-                sources = pair if stage == OWN else control
-                if sources is None:
-                    self.on_note(
-                        f"{city.name}: no drive on the route of {pair[0].name}"
-                        f" in the stage of {pair[1].name}"
-                    )
-                    continue
-                database, query = (
-                    NamedDrive(r.name, r.source) for r in sources
+        return recorded_comparisons(
+            city,
+            [
+                RecordedCondition(
+                    one.factors,
+                    one.changes.get("both", {}).get("stage", OWN),
+                    one.is_baseline,
+                    self._protocol_of(one),
                 )
-                protocol = self._protocol_of(condition)
-                no_radius: dict[str, Any] = {"radius": None}
-                yield _Measured(
-                    city.name,
-                    (pair[0].name, pair[1].name),
-                    condition,
-                    condition.factors,
-                    self.experiment.seeds[0],
-                    Pair(
-                        f"{database.name} {query.name}"
-                        f" {fingerprint(protocol.to_json() | no_radius)[:8]}",
-                        *(database, query, database),
-                        protocol,
-                    ),
-                )
+                for one in self._conditions
+            ],
+            self.experiment.seeds[0],
+            self.on_note,
+            both_ways=self.experiment.drives == "both-ways",
+        )
 
     def _check_recordable(self, city: City) -> None:
         """Checks that conditions vary only the stage, as recordings require."""
@@ -582,76 +527,6 @@ class Study:
                     f" {OWN} and {LAST}"
                 )
 
-    def _announce(self, jobs: Mapping[str, Job]) -> None:
-        """Says how long a long study takes."""
-        workers = self.cluster.slots or num_cores()
-        longest = _LONG * workers
-        if sum(job.cost for job in jobs.values()) <= longest:
-            return
-        left = sum(
-            job.cost for job in jobs.values() if not nothing_left(job.step)
-        )
-        if left > longest:
-            hours = left / workers / 3600.0
-            self.on_note(
-                f"{self.experiment.name}: {len(jobs)} jobs, about {hours:.1f} h"
-                f" with {workers} side by side; the same command goes on after"
-                " an interruption"
-            )
-
-    def _rows(self, measured: Sequence[_Measured]) -> Iterator[Row]:
-        """Yields all rows of the table of results."""
-        # The values of the baseline of a map, its drives and protocol, by
-        # seed and task.
-        baselines: dict[tuple, dict[int, dict[str, Any]]] = {}
-        for one in measured:
-            if one.condition.is_baseline:
-                values = {name: self._found(one, name) for name in one.parts}
-                baselines.setdefault(_place(one), {})[one.seed] = values
-        for one in measured:
-            before = baselines.get(_place(one), {})
-            base = before.get(one.seed) or next(iter(before.values()), {})
-            for name in one.parts:
-                found = self._found(one, name)
-                for number in self._tasks[name].numbers(found, base.get(name)):
-                    key = self._key(one, name, number.method, number.gate)
-                    yield Row.of(number, **key)
-
-    def _answers(self, measured: Iterable[_Measured]) -> Iterator[Answers]:
-        """Yields the answers to all queries."""
-        for one in measured:
-            for name in one.parts:
-                for method, gate, columns in self._tasks[name].answers(
-                    self._found(one, name)
-                ):
-                    key = self._key(one, name, method, gate)
-                    yield Answers(**key, columns=columns)
-
-    def _found(self, one: _Measured, task: str) -> Any:
-        return self._tasks[task].found(one.parts[task], one.pair)
-
-    def _key(
-        self, one: _Measured, task: str, method: str, gate: bool
-    ) -> dict[str, Any]:
-        factors = dict(one.factors)
-        if method in self._variants:
-            choice, columns = self._variants[method]
-            method = choice.name
-            factors |= columns
-        database, query = one.names
-        return {
-            "experiment": self.experiment.name,
-            "map": one.map_name,
-            "database": database,
-            "query": query,
-            "seed": one.seed,
-            "factors": factors,
-            "task": task,
-            "method": method,
-            "gate": gate,
-            "protocol": self._protocol_of(one.condition).name,
-        }
-
     def _protocol_of(self, condition: Condition) -> RetrievalProtocol:
         fields = condition.changes.get("protocol", {})
         return base_protocol(fields, self.source)
@@ -659,13 +534,3 @@ class Study:
 
 def _base_name(database: Scenario) -> str:
     return database.name.removesuffix("_database")
-
-
-def _place(one: _Measured) -> tuple:
-    """Returns a key of map, drives and protocol; each key has one baseline."""
-    fixed = [
-        (name, value)
-        for name, value in one.factors.items()
-        if name == FRESH or name.startswith("protocol.")
-    ]
-    return one.map_name, one.names, *fixed

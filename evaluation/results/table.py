@@ -39,6 +39,8 @@ _MEASURED = ("metric", "value", "low", "high", "n")
 # A factor, and two of its values: a drive's own stage, or that of the query.
 STAGE = "both.stage"
 OWN, LAST = "own", "last"
+# The factor of the fresh versions of the shipped maps.
+FRESH = "both.fresh"
 # Names of other columns of `Key`, which no factor can have.
 _NAMED = frozenset(("label", *KEYS, *_MEASURED))
 # Columns of a query -> what kind of value they have.

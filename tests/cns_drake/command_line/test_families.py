@@ -9,13 +9,13 @@ import yaml
 from cns_drake.city.generation.generate import generate_city
 from cns_drake.command_line.cli import app
 from cns_drake.studies import recording
-from cns_drake.studies import study as study_module
 from evaluation.change.drive_change import compare_maps, survey
 from evaluation.drives import open_drive
 from evaluation.methods import make_method
 from evaluation.recognition.place_recognition import run as recognise
 from evaluation.recognition.protocol import FAIR_PROTOCOL
 from evaluation.results.table import Results
+from evaluation.study import engine
 
 pytestmark = pytest.mark.slow
 
@@ -26,7 +26,7 @@ def run(*arguments):
 
 
 def test_simulated_and_recorded_families_agree(tmp_path, monkeypatch):
-    studies.run_here(monkeypatch, recording, study_module)
+    studies.run_here(monkeypatch, recording, engine)
     town = write_small_city(tmp_path / "town")
     generate_city(town)
     for stage, aside in (("01", 0.4), ("02", 0.0)):

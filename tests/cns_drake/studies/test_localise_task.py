@@ -4,7 +4,6 @@ import numpy as np
 import pytest
 
 from cns_drake.base.jobs.step import Reporter
-from cns_drake.studies.tasks.localise import LocaliseTask, measure_localisation
 from evaluation.drives import open_drive
 from evaluation.localisation.estimators import (
     default_settings,
@@ -19,6 +18,7 @@ from evaluation.localisation.localise import (
     summary,
 )
 from evaluation.study.surveys import RecordedDrive
+from evaluation.study.tasks.localise import LocaliseTask, measure_localisation
 
 STARTS = (Starts(0.5, 5.0), Starts(2.0, 10.0))
 

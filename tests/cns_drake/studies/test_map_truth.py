@@ -17,6 +17,7 @@ from cns_drake.base.jobs.step import Reporter
 from cns_drake.scenarios.scenario_files import make_scenario
 from cns_drake.sensors.lidar.patterns import BeamCoverage
 from cns_drake.simulation.simulated_drive import DriveSimulation
+from cns_drake.studies.map_task import TRUTH, measure_maps
 from cns_drake.studies.map_truth import (
     NEAR,
     is_there,
@@ -24,7 +25,6 @@ from cns_drake.studies.map_truth import (
     simulate_survey,
     write_truth,
 )
-from cns_drake.studies.tasks.update import TRUTH, measure_maps
 from evaluation.map_update.scores import Labels, score
 from evaluation.map_update.sessions import Label, read_pair, read_truth
 

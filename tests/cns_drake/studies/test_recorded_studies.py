@@ -16,6 +16,7 @@ from evaluation.methods import make_method
 from evaluation.recognition.place_recognition import run
 from evaluation.recognition.protocol import FAIR_PROTOCOL, RetrievalProtocol
 from evaluation.results.table import Results
+from evaluation.study import engine
 
 
 @pytest.fixture(scope="module")
@@ -29,7 +30,7 @@ def folder(tmp_path_factory):
 
 @pytest.fixture(autouse=True)
 def in_this_process(monkeypatch):
-    studies.run_here(monkeypatch, study_module)
+    studies.run_here(monkeypatch, engine)
     monkeypatch.setattr(study_module, "write_page", lambda *_, **options: None)
 
 

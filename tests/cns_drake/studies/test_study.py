@@ -25,6 +25,7 @@ from evaluation.methods import make_method
 from evaluation.recognition.place_recognition import run
 from evaluation.recognition.protocol import FAIR_PROTOCOL, RetrievalProtocol
 from evaluation.results.table import QueryRows, Results
+from evaluation.study import engine
 
 TABLES = ("results.csv", "queries.csv")
 
@@ -41,7 +42,7 @@ def jobs_done(monkeypatch):
     """The names of the jobs of each run, which run in this process."""
     runs = []
     monkeypatch.setattr(
-        study_module,
+        engine,
         "run_jobs",
         lambda jobs, cluster: runs.append(studies.do(jobs)),
     )
@@ -66,12 +67,13 @@ def measure(wanted, output, **options):
 
 
 def planned(wanted, output, **options):
-    """The jobs of an experiment, and what they measure."""
+    """The jobs of an experiment, and the comparisons that they measure."""
     study = Study(wanted, output, "mine.yaml", Cluster(), **options)
     drives = list(study._drives(()))
     for some in drives:
         list(study._simulated(some, made=False))
-    return study._plan(drives)
+    made = study._plan(drives)
+    return made.jobs, made.measured
 
 
 def values(results, **columns):
@@ -87,7 +89,7 @@ def test_a_long_study_says_so_before_its_parts_are_there(
     town, tmp_path, jobs_done, monkeypatch
 ):
     """A job may need descriptions that another one has yet to write."""
-    monkeypatch.setattr(study_module, "_LONG", 1e-9)
+    monkeypatch.setattr(engine, "_LONG", 1e-9)
     notes = []
     wanted = experiment(
         town,
@@ -235,7 +237,7 @@ def test_an_interrupted_study_goes_on(town, tmp_path, jobs_done, monkeypatch):
             done.extend(studies.do([job]))
 
     with monkeypatch.context() as patch:
-        patch.setattr(study_module, "run_jobs", some)
+        patch.setattr(engine, "run_jobs", some)
         with pytest.raises(InterruptedHereError):
             measure(wanted, tmp_path / "parts")
     assert not (tmp_path / "parts" / "results.csv").exists()
@@ -253,7 +255,7 @@ def test_processes_change_nothing(town, tmp_path, jobs_done, capsys):
     with pytest.MonkeyPatch.context() as patch:
         from cns_drake.base.jobs.running import run_jobs
 
-        patch.setattr(study_module, "run_jobs", run_jobs)
+        patch.setattr(engine, "run_jobs", run_jobs)
         status, out, err = run_program(
             capsys,
             "cns-drake",
@@ -471,7 +473,7 @@ def test_pairs_of_maps_begin_with_the_first_drive(town, tmp_path):
 
 @pytest.mark.slow
 def test_maps_are_labelled(town, tmp_path, jobs_done, monkeypatch):
-    from cns_drake.studies.tasks import update
+    from cns_drake.studies import map_task as update
 
     monkeypatch.setattr(update, "find_spec", lambda name: None)
     notes = []
@@ -610,7 +612,7 @@ def test_maps_of_conditions_are_made_first(town, tmp_path, monkeypatch):
         runs.append([*jobs])
         raise PlannedError
 
-    monkeypatch.setattr(study_module, "run_jobs", stop)
+    monkeypatch.setattr(engine, "run_jobs", stop)
     wanted = experiment(
         town,
         database={"version": [3, 8], "years": [0, 5]},
@@ -732,7 +734,7 @@ def test_faults_before_anything_is_made(
     town, tmp_path, monkeypatch, fields, fault
 ):
     monkeypatch.setattr(
-        study_module, "run_jobs", lambda *_: pytest.fail("a job runs")
+        engine, "run_jobs", lambda *_: pytest.fail("a job runs")
     )
     with pytest.raises(InputError, match=f"^{fault}"):
         run_study(experiment(town, **fields), tmp_path / "out", Cluster())
@@ -756,7 +758,7 @@ def test_fresh_cities_have_their_numbers(tmp_path, monkeypatch, given):
 @pytest.mark.parametrize("name", ["results.csv", "queries.csv", "index.html"])
 def test_a_folder_with_the_name_of_a_result(town, tmp_path, monkeypatch, name):
     monkeypatch.setattr(
-        study_module, "run_jobs", lambda *_: pytest.fail("a job runs")
+        engine, "run_jobs", lambda *_: pytest.fail("a job runs")
     )
     (tmp_path / name).mkdir()
     with pytest.raises(InputError, match=f"{name}: Is a directory"):

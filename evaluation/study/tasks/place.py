@@ -5,7 +5,6 @@ from dataclasses import replace
 from typing import Any
 
 from cns_drake.base.jobs.step import Reporter
-from cns_drake.studies.tasks.task import Answered, Jobs, Pair, Task
 from evaluation.recognition.costs import cpu_ms, query_ms
 from evaluation.recognition.place_outcome import (
     Number,
@@ -16,6 +15,7 @@ from evaluation.recognition.place_outcome import (
 from evaluation.study.chosen_methods import MethodChoice
 from evaluation.study.measurements import TIMED, crowded, measure_places
 from evaluation.study.parts import Part
+from evaluation.study.tasks.task import Answered, Jobs, Pair, Task
 
 # Expected seconds to describe a pair and to compare it by all methods, and to
 # measure their costs.

@@ -11,13 +11,13 @@ from cns_drake.base.jobs.step import Reporter
 from cns_drake.base.progress import Track, silent
 from cns_drake.simulation.simulated_drive import DriveSimulation
 from cns_drake.studies import map_truth
-from cns_drake.studies.tasks.task import Jobs, Pair, Task, positive
 from evaluation.map_update.baselines import BASELINES, run_baseline
 from evaluation.map_update.scores import Labels, score
 from evaluation.map_update.sessions import Label, read_pair, read_truth
 from evaluation.recognition.place_outcome import Number
 from evaluation.study.parts import Part
 from evaluation.study.surveys import RecordedDrive
+from evaluation.study.tasks.task import Jobs, Pair, Task, positive
 
 _SCORES = (
     "miou",

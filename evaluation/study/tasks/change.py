@@ -7,19 +7,19 @@ from typing import Any, ClassVar
 import numpy as np
 
 from cns_drake.base.jobs.step import Reporter
-from cns_drake.studies.tasks.task import (
-    Jobs,
-    NamedDrive,
-    Pair,
-    Task,
-    positive,
-)
 from evaluation.change.drive_change import Surveyed, compare_maps
 from evaluation.drives.sampling import sample_frames
 from evaluation.maps.voxel_maps import CELL_SIZE, VoxelMap, map_drive
 from evaluation.recognition.place_outcome import Number
 from evaluation.study.parts import Part
 from evaluation.study.surveys import DriveSource
+from evaluation.study.tasks.task import (
+    Jobs,
+    NamedDrive,
+    Pair,
+    Task,
+    positive,
+)
 
 # Expected seconds to map a drive with each of its scans, or with some.
 _WHOLE_COST, _COST = 60.0, 20.0

@@ -10,18 +10,18 @@ from cns_drake.base import points as clouds
 from cns_drake.base.errors import InputError
 from cns_drake.base.files import read_bytes
 from cns_drake.base.jobs.step import Reporter
-from cns_drake.studies.tasks.task import (
+from evaluation.localisation import estimators, localise
+from evaluation.localisation.localise import Starts
+from evaluation.recognition.place_outcome import Number, kept_share
+from evaluation.study.parts import Part
+from evaluation.study.surveys import DriveSource
+from evaluation.study.tasks.task import (
     Answered,
     Jobs,
     Pair,
     Task,
     positive,
 )
-from evaluation.localisation import estimators, localise
-from evaluation.localisation.localise import Starts
-from evaluation.recognition.place_outcome import Number, kept_share
-from evaluation.study.parts import Part
-from evaluation.study.surveys import DriveSource
 
 # The methods that need no optional package.
 SHIPPED = tuple(

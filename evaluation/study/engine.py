@@ -1,0 +1,243 @@
+"""Runs pairs of drives x tasks x methods, and turns results into two tables."""
+
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+from cns_drake.base.errors import InputError, did_you_mean
+from cns_drake.base.files import make_folder
+from cns_drake.base.jobs.cluster import Cluster
+from cns_drake.base.jobs.processes import nothing_left
+from cns_drake.base.jobs.running import Job, run_jobs
+from cns_drake.base.process import num_cores
+from cns_drake.base.terminal import note
+from evaluation.recognition.protocol import RetrievalProtocol
+from evaluation.results.table import (
+    FRESH,
+    QUERIES,
+    RESULTS,
+    Answers,
+    QueryRows,
+    Results,
+    Row,
+)
+from evaluation.study.chosen_methods import MethodChoice
+from evaluation.study.parts import Part, StudyFiles
+from evaluation.study.tasks.task import Jobs, NamedDrive, Pair, Task
+
+# A study that takes longer is announced [s].
+_LONG = 3600.0
+
+
+@dataclass(frozen=True)
+class Comparison:
+    """Two drives that are compared under a condition of an experiment.
+
+    Attributes:
+        map_name: name of the map.
+        names: names of the database drive and of the query drive in tables. All
+            conditions of the same two drives share them.
+        factors: name -> value of each factor of the condition.
+        seed: seed of everything that is random.
+        is_baseline: whether other conditions are compared with this one.
+        pair: the drives as they are under the condition.
+        protocol: protocol of the experiment, before the condition changes its
+            queries.
+        parts: task -> file of its result, for the tasks that measure the pair.
+    """
+
+    map_name: str
+    names: tuple[str, str]
+    factors: Mapping[str, Any]
+    seed: int
+    is_baseline: bool
+    pair: Pair
+    protocol: RetrievalProtocol
+    parts: dict[str, Part] = field(default_factory=dict)
+
+    @property
+    def place(self) -> tuple[object, ...]:
+        """Key of map, drives and protocol; each key has one baseline."""
+        fixed = [
+            (name, value)
+            for name, value in self.factors.items()
+            if name == FRESH or name.startswith("protocol.")
+        ]
+        return self.map_name, self.names, *fixed
+
+
+@dataclass
+class Engine:
+    """Measures pairs of drives by tasks and methods.
+
+    Add all pairs of each map with `add`, then call `run`.
+
+    Attributes:
+        experiment: name of the experiment, which stands in the tables.
+        tasks: name -> task.
+        methods: key of a method -> the method, and the columns of its settings
+            that vary.
+        output: folder of the results.
+        cluster: runs the jobs.
+        on_note: is called with notes on what is left out, and on how long the
+            study takes.
+        jobs: name -> job.
+        measured: all comparisons.
+    """
+
+    experiment: str
+    tasks: Mapping[str, Task]
+    methods: Mapping[str, tuple[MethodChoice, Mapping[str, Any]]]
+    output: Path
+    cluster: Cluster
+    on_note: Callable[[str], None] = lambda text: None
+    jobs: dict[str, Job] = field(default_factory=dict)
+    measured: list[Comparison] = field(default_factory=list)
+    _notes: dict[str, None] = field(default_factory=dict)
+
+    def add(
+        self,
+        comparisons: Sequence[Comparison],
+        distractors: Sequence[NamedDrive] = (),
+    ) -> None:
+        """Adds the jobs of all comparisons on one map.
+
+        Args:
+            comparisons: the comparisons.
+            distractors: drives through other cities, whose places are added to
+                databases in this order.
+        """
+        planned = Jobs(
+            StudyFiles(self.output),
+            tuple(choice for choice, _ in self.methods.values()),
+            distractors,
+        )
+        if any(task.asks for task in self.tasks.values()):
+            for one in comparisons:
+                planned.expect(one.pair)
+        for name, task in self.tasks.items():
+            seen: set[tuple[str, str]] = set()
+            for one in comparisons:
+                both = one.pair.database.name, one.pair.query.name
+                is_new = not one.pair.may_repeat or both not in seen
+                if task.asks or is_new:
+                    one.parts[name] = task.measure(one.pair, planned)
+                seen.add(both)
+        self.jobs |= planned.jobs
+        self._notes |= planned.notes
+        self.measured += comparisons
+
+    def run(self) -> tuple[Results, QueryRows]:
+        """Runs all jobs, writes both tables, and returns them.
+
+        Raises:
+            InputError: a step failed, or a file cannot be written.
+        """
+        for text in self._notes:
+            self.on_note(text)
+        make_folder(self.output)
+        self._announce()
+        run_jobs(self.jobs.values(), self.cluster)
+        note("writing the tables and the page")
+        results = Results.of(self._rows())
+        queries = QueryRows.of(self._answers())
+        results.write_csv(self.output / RESULTS)
+        queries.write_csv(self.output / QUERIES)
+        return results, queries
+
+    def _announce(self) -> None:
+        """Says how long a long study takes."""
+        workers = self.cluster.slots or num_cores()
+        longest = _LONG * workers
+        if sum(job.cost for job in self.jobs.values()) <= longest:
+            return
+        left = sum(
+            job.cost for job in self.jobs.values() if not nothing_left(job.step)
+        )
+        if left > longest:
+            hours = left / workers / 3600.0
+            self.on_note(
+                f"{self.experiment}: {len(self.jobs)} jobs, about {hours:.1f} h"
+                f" with {workers} side by side; the same command goes on after"
+                " an interruption"
+            )
+
+    def _rows(self) -> Iterator[Row]:
+        """Yields all rows of the table of results."""
+        # The results of the baseline of a map, its drives and protocol, by
+        # seed and task.
+        baselines: dict[tuple, dict[int, dict[str, Any]]] = {}
+        for one in self.measured:
+            if one.is_baseline:
+                values = {name: self._found(one, name) for name in one.parts}
+                baselines.setdefault(one.place, {})[one.seed] = values
+        for one in self.measured:
+            before = baselines.get(one.place, {})
+            base = before.get(one.seed) or next(iter(before.values()), {})
+            for name in one.parts:
+                found = self._found(one, name)
+                for number in self.tasks[name].numbers(found, base.get(name)):
+                    key = self._key(one, name, number.method, number.gate)
+                    yield Row.of(number, **key)
+
+    def _answers(self) -> Iterator[Answers]:
+        """Yields the answers to all queries."""
+        for one in self.measured:
+            for name in one.parts:
+                for method, gate, columns in self.tasks[name].answers(
+                    self._found(one, name)
+                ):
+                    key = self._key(one, name, method, gate)
+                    yield Answers(**key, columns=columns)
+
+    def _found(self, one: Comparison, task: str) -> Any:
+        return self.tasks[task].found(one.parts[task], one.pair)
+
+    def _key(
+        self, one: Comparison, task: str, method: str, gate: bool
+    ) -> dict[str, Any]:
+        factors = dict(one.factors)
+        if method in self.methods:
+            choice, columns = self.methods[method]
+            method = choice.name
+            factors |= columns
+        database, query = one.names
+        return {
+            "experiment": self.experiment,
+            "map": one.map_name,
+            "database": database,
+            "query": query,
+            "seed": one.seed,
+            "factors": factors,
+            "task": task,
+            "method": method,
+            "gate": gate,
+            "protocol": one.protocol.name,
+        }
+
+
+def made_tasks(
+    wanted: Mapping[str, Mapping[str, Any]],
+    known: Mapping[str, type[Task]],
+    source: str,
+) -> dict[str, Task]:
+    """Returns name -> task, with its settings.
+
+    Args:
+        wanted: name of a task -> its settings.
+        known: name -> class of all tasks.
+        source: file of the experiment, for error messages.
+
+    Raises:
+        InputError: a task is unknown, or a setting is not usable.
+    """
+    tasks = {}
+    for name, settings in wanted.items():
+        if name not in known:
+            raise InputError(
+                f"{source}: tasks: no task {name!r} (there are:"
+                f" {', '.join(known)}){did_you_mean(name, known)}"
+            )
+        tasks[name] = known[name](settings, source)
+    return tasks
