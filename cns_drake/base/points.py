@@ -121,3 +121,10 @@ def encode_labels(scan: np.ndarray) -> bytes:
     """
     label = scan["label"].astype("<u4")
     return (label | scan["instance"].astype("<u4") << 16).tobytes()
+
+
+def read_only(array: np.ndarray) -> np.ndarray:
+    """Returns a view of an array, through which nothing can be written."""
+    view = array.view()
+    view.flags.writeable = False
+    return view

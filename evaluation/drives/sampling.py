@@ -173,6 +173,7 @@ def gather(
     Returns:
         (N, 3) float64 points in the sensor's frame at that frame. If fields are
         requested, a structured array (N,) of float64 x, y, z and the fields.
+        The array is read-only, since several methods may share it.
 
     Raises:
         InputError: if the scans lack a field.
@@ -196,7 +197,7 @@ def gather(
                 X_FS = X_FS0 @ X_FS
         return cropped(scan, max_range, X_FS, fields, drive.name)
 
-    return np.concatenate([seen(index) for index in range(first, end)])
+    return clouds.read_only(np.concatenate([*map(seen, range(first, end))]))
 
 
 def cropped(

@@ -65,7 +65,8 @@ class Method(abc.ABC, Generic[Descriptor, Database]):
     A cloud is (N, 3) float64, finite, in the frame of the LiDAR at the place
     [m]. If the method names `point_fields`, the cloud is a structured array
     (N,) instead. It contains `x`, `y` and `z` as float64, and these fields with
-    the types that they have in the recording.
+    the types that they have in the recording. A cloud is read-only, because all
+    methods of a run share it.
 
     Attributes:
         name: name of the method on the command line.
@@ -504,6 +505,9 @@ def _faults(path: Path) -> Iterator[None]:
             if os.path.abspath(frame.filename) == os.path.abspath(path)
         ]
         where = f"line {lines[-1]}: " if lines else ""
+        advice = ""
+        if "read-only" in str(error):
+            advice = " (all methods share a cloud; change a copy of it)"
         raise InputError(
-            f"{path}: {where}{type(error).__name__}: {error}"
+            f"{path}: {where}{type(error).__name__}: {error}{advice}"
         ) from error

@@ -155,7 +155,7 @@ def _read(
     )
     if len(cloud) == 0:
         raise InputError(f"{path}: no finite point within range")
-    return cloud, len(points) - num_finite
+    return point_arrays.read_only(cloud), len(points) - num_finite
 
 
 def _scan_files(folder: Path) -> list[Path]:

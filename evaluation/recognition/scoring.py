@@ -7,6 +7,7 @@ from typing import Any
 import numpy as np
 
 from cns_drake.base.errors import InputError
+from cns_drake.base.points import read_only
 from evaluation.methods.method import Method, check_number
 from evaluation.recognition.pose_errors import checked_pose
 
@@ -170,8 +171,9 @@ def _reranked(
     best = order[: min(method.rerank_best, num_candidates)]
     result = np.full(len(scores), np.nan)
     if len(best):
-        clouds = [places[place] for place in best]
-        found = method.rerank(query, clouds, scores[best])
+        # Later queries are compared with the same clouds.
+        clouds = [read_only(places[place]) for place in best]
+        found = method.rerank(read_only(query), clouds, scores[best])
         result[best] = _checked(method, "rerank", found, len(best))
     return result
 

@@ -136,6 +136,15 @@ class Own(Method):
             "line 10: Stop: x",
         ),
         ("return len(points)", "raise GeneratorExit", "line 10: GeneratorExit"),
+        ("return len(points)", "points -= 1.0", "change a copy of it"),
+        (
+            "    def desc",
+            "    rerank_best = 2\n"
+            "    def rerank(self, query, places, scores):\n"
+            "        places[1].sort(axis=0)\n"
+            "    def desc",
+            "line 11: ValueError: sort array is read-only (all methods share",
+        ),
     ],
 )
 @pytest.mark.parametrize("command", ["pr", "scores"])
