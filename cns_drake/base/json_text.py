@@ -5,6 +5,8 @@ import json
 import re
 from typing import Any
 
+from cns_drake.base.value_lists import repeated
+
 # The deepest nesting; real data stay far below it.
 _DEEPEST = 50
 _STRING = re.compile(rb'"(?:[^"\\]|\\.)*"', re.DOTALL)
@@ -51,9 +53,6 @@ def parse_json(data: bytes) -> Any:
 
 def _without_doubles(pairs: list[tuple[str, Any]]) -> dict[str, Any]:
     """Returns an object's pairs as a dictionary; refuses repeated keys."""
-    value = dict(pairs)
-    if len(value) < len(pairs):
-        keys = [key for key, _ in pairs]
-        twice = next(key for key in keys if keys.count(key) > 1)
-        raise ValueError(f"the key {twice[:60]!r} is there twice")
-    return value
+    for key in repeated(key for key, _ in pairs):
+        raise ValueError(f"the key {key[:60]!r} is there twice")
+    return dict(pairs)

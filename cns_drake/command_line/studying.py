@@ -78,6 +78,7 @@ def study(
     override: Annotated[
         list[str] | None, typer.Option("--set", metavar="FIELD=VALUE")
     ] = None,
+    allow_code: Annotated[bool, typer.Option("--allow-code")] = False,
     jobs: commands.Jobs = None,
     scheduler: commands.Scheduler = None,
     list_all: Annotated[bool, typer.Option("--list")] = False,
@@ -107,6 +108,8 @@ def study(
         override: Replace a field of the experiment, such as seeds=[1,2]. For a
             field inside another field, join both names by a dot, such as
             database.years=[0,5]. May be repeated.
+        allow_code: Run the Python files that the experiment names. A file that
+            you name yourself, by --method or --set, runs without this option.
         list_all: List the shipped experiments, and do nothing else.
         show: Print the file of the experiment, as a start for your own, and do
             nothing else.
@@ -114,6 +117,8 @@ def study(
     with uninterrupted():
         from cns_drake.studies.experiment import (
             load_experiment,
+            named_programs,
+            parse_override,
             shipped_experiments,
         )
 
@@ -139,6 +144,16 @@ def study(
     experiment = load_experiment(name, chosen, quick=quick)
     if output is None:
         raise InputError("--output: missing")
+    if not allow_code:
+        # Others may have written the file; the words are the user's own.
+        own = named_programs([method, *map(parse_override, overrides)])
+        for field in ("methods", "tasks"):
+            for file in named_programs(getattr(experiment, field)):
+                if file not in own:
+                    raise InputError(
+                        f"{name}: {field}: {file} is a program, and would run"
+                        " with your permissions; read it, then add --allow-code"
+                    )
     with uninterrupted():
         from cns_drake.base.jobs.cluster import choose_cluster
         from cns_drake.studies.study import run_study

@@ -14,7 +14,7 @@ from collections.abc import Callable, Mapping, Sequence, Set
 from itertools import product
 import os
 from pathlib import Path
-from typing import Annotated, Any
+from typing import Annotated
 
 import numpy as np
 from pydantic import AfterValidator, BeforeValidator, Field
@@ -23,6 +23,7 @@ import yaml
 from cns_drake.base.csv_files import read_records
 from cns_drake.base.errors import InputError, validated
 from cns_drake.base.files import make_folder, write_text
+from cns_drake.base.value_lists import repeated, spread
 from cns_drake.base.yaml_files import read_yaml
 from cns_drake.roads.network import load_road_network
 from cns_drake.roads.route import Route, draw_route
@@ -47,26 +48,10 @@ _Seed = Annotated[int, Field(ge=0)]
 Redraw = Callable[[Path, str, Sequence[int]], Mapping[int, Path]]
 
 
-def _spread(value: Any) -> Any:
-    """Turns {from, to, count} into evenly spaced numbers."""
-    if not isinstance(value, dict):
-        return value
-    steps = _Steps.model_validate(value)
-    numbers = np.linspace(steps.first, steps.last, steps.count)
-    return tuple(float(number) for number in numbers.round(4))
-
-
 def _without_doubles(seeds: tuple[int, ...]) -> tuple[int, ...]:
-    for seed in seeds:
-        if seeds.count(seed) > 1:
-            raise ValueError(f"the seed {seed} is there twice")
+    for seed in repeated(seeds):
+        raise ValueError(f"the seed {seed} is there twice")
     return seeds
-
-
-class _Steps(Section):
-    first: _Part = Field(alias="from")
-    last: _Part = Field(alias="to")
-    count: int = Field(ge=1, le=10_000)
 
 
 class DrawnRoutes(Section):
@@ -98,7 +83,8 @@ class Family(Section):
             structures that do not exist in this other stage are removed.
             Structures that are lower there keep their height.
         missing: shares of the structures to remove: numbers from 0 to 1, or
-            `{from: 0, to: 0.6, count: 20}` for evenly spaced ones.
+            `{from: 0, to: 0.6, count: 20}` for evenly spaced ones. Seeds can be
+            written like this, too.
         scattered: name of a class -> share of its structures to remove at
             random all over the map, besides those of `missing`, such as
             `{pole: 0.3}`.
@@ -117,13 +103,17 @@ class Family(Section):
     base: str
     stage: str | None = None
     towards: str | None = None
-    missing: Annotated[tuple[_Part, ...], BeforeValidator(_spread)] = Field(
+    missing: Annotated[tuple[_Part, ...], BeforeValidator(spread)] = Field(
         default=(0.0,), min_length=1
     )
     scattered: dict[str, _Part] = Field(default_factory=dict)
-    seeds: tuple[_Seed, ...] = Field(default=(0,), min_length=1)
+    seeds: Annotated[tuple[_Seed, ...], BeforeValidator(spread)] = Field(
+        default=(0,), min_length=1
+    )
     city_seeds: Annotated[
-        tuple[_Seed, ...], AfterValidator(_without_doubles)
+        tuple[_Seed, ...],
+        BeforeValidator(spread),
+        AfterValidator(_without_doubles),
     ] = Field(default=(), min_length=1)
     routes: DrawnRoutes | None = None
     lidars: tuple[str, ...] = ()

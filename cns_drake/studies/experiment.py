@@ -33,6 +33,7 @@ from cns_drake.base.errors import (
     validated,
     value_errors,
 )
+from cns_drake.base.value_lists import is_spread, repeated, spread
 from cns_drake.base.yaml_files import parse_yaml, read_yaml
 from cns_drake.scenarios.scenario import Name
 from cns_drake.sensors.sensor_config import Section
@@ -51,19 +52,17 @@ _LISTS: Mapping[str, tuple[type, ...]] = {
     "xyz": (int, float),
     "rpy_deg": (int, float),
 }
-# A list of evenly spaced numbers.
-_SPREAD = {"from", "to", "count"}
 # Factors of experiments with cases: the name of the case, and its level.
 CAUSE, LEVEL = "cause", "level"
 NO_CAUSE = "none"
 _MOST_CONDITIONS = 20_000
-_MOST_SPREAD = 1000
 
 Changes = Mapping[str, Any]
 Case = dict[str, dict[str, Any]]
 
 
 def _in_a_tuple(value: Any) -> Any:
+    value = spread(value, whole=True)
     value = [value] if isinstance(value, str | int | dict) else value
     if isinstance(value, list):
         # A map to make has a name.
@@ -77,9 +76,8 @@ def _in_a_tuple(value: Any) -> Any:
 
 
 def _check_once(values: Any) -> None:
-    for one in values if isinstance(values, list) else ():
-        if values.count(one) > 1:
-            raise ValueError(f"{one!r} is there twice")
+    for one in repeated(values) if isinstance(values, list) else ():
+        raise ValueError(f"{one!r} is there twice")
 
 
 def _by_name(value: Any) -> Any:
@@ -199,7 +197,8 @@ class Experiment(Section):
             or is a list of other cases to combine. A list of values gives the
             levels of a case, the weakest first. Each case is measured by itself
             and compared with the case `none`, in which nothing differs.
-        levels: numbers of the levels of the cases to measure; by default all.
+        levels: numbers of the levels of the cases to measure; by default all. A
+            case with fewer levels is measured at its last one.
         design: how factors are combined. `product`: each value of a factor with
             each value of all other factors. `one-at-a-time`: each value of a
             factor, while all other factors have the baseline's values.
@@ -273,7 +272,7 @@ class Experiment(Section):
         streets. The numbers come from the field `both.fresh`; without it, the
         list is empty.
         """
-        found = self.both.get("fresh", [])
+        found = spread(self.both.get("fresh", []))
         return found if isinstance(found, list) else [found]
 
     @property
@@ -287,6 +286,24 @@ class Experiment(Section):
         return yaml.safe_dump(
             values, sort_keys=False, allow_unicode=True, width=79
         )
+
+
+def named_programs(fields: Any) -> list[str]:
+    """Returns the Python files that fields of an experiment name.
+
+    A study that measures them runs these files.
+
+    Args:
+        fields: a value of any fields, such as `tasks` or `methods`, nested to
+            any depth.
+    """
+    if isinstance(fields, str):
+        return [fields] if fields.lower().endswith(".py") else []
+    if isinstance(fields, Mapping):
+        fields = [*fields, *fields.values()]
+    if not isinstance(fields, list | tuple):
+        return []
+    return [file for one in fields for file in named_programs(one)]
 
 
 def shipped_experiments() -> dict[str, Path]:
@@ -341,7 +358,7 @@ def load_experiment(
         if isinstance(one, str):
             is_nested = "." in one.partition("=")[0]
             change = merged if is_nested else _chosen_anew
-            values = change(values, _override(one))
+            values = change(values, parse_override(one))
         else:
             values = values | dict([one])
     experiment = validated(Experiment, values, path)
@@ -354,7 +371,12 @@ def load_experiment(
     return experiment
 
 
-def _override(text: str) -> dict[str, Any]:
+def parse_override(text: str) -> dict[str, Any]:
+    """Returns a text `FIELD=VALUE` as nested fields of an experiment.
+
+    Raises:
+        InputError: the text has another form, or VALUE is not YAML.
+    """
     name, equals, value = text.partition("=")
     if not (name and equals):
         raise InputError(f"--set: {text!r} is not FIELD=VALUE")
@@ -531,8 +553,11 @@ def _leaves(
     for name, value in fields.items():
         place = (*above, str(name))
         path = ".".join(place)
-        if isinstance(value, dict) and set(value) == _SPREAD:
-            yield path, _Values(_spread(path, value))
+        if is_spread(value):
+            try:
+                yield path, _Values(spread(value))
+            except ValueError as error:
+                raise ValueError(f"{path}: {error}") from None
             continue
         if isinstance(value, dict) and value:
             yield from _leaves(value, place)
@@ -553,22 +578,6 @@ def _is_single(name: str, value: Sequence[Any]) -> bool:
     """Returns whether a list is one value of a field."""
     kinds = _LISTS.get(name)
     return kinds is not None and all(isinstance(v, kinds) for v in value)
-
-
-def _spread(path: str, value: Mapping[str, Any]) -> list[float]:
-    first, last, count = (value[name] for name in ("from", "to", "count"))
-    numbers = all(
-        isinstance(one, int | float)
-        and not isinstance(one, bool)
-        and math.isfinite(one)
-        for one in (first, last)
-    )
-    if not (numbers and type(count) is int and 2 <= count <= _MOST_SPREAD):
-        raise ValueError(
-            f"{path}: from and to are numbers, count from 2 to {_MOST_SPREAD}"
-        )
-    step = (last - first) / (count - 1)
-    return [round(first + k * step, 4) for k in range(count)]
 
 
 def _nested(path: str, value: Any) -> Any:
@@ -594,17 +603,16 @@ def _cases(
     yield NO_CAUSE, 0, ()
     if experiment.levels and not experiment.cases:
         raise ValueError("levels: there are no cases")
-    for name, case in experiment.cases.items():
-        if name == NO_CAUSE:
-            raise ValueError(f"cases.{name}: the name of what has no cause")
-        members = []
-        for one in case if isinstance(case, tuple) else [name]:
-            member = experiment.cases.get(one)
-            if not isinstance(member, dict):
-                raise ValueError(f"cases.{name}: {one} is no case with fields")
-            members.append(member)
+    numbers = num_levels(experiment)
+    most = max(numbers.values(), default=0)
+    if experiment.levels and max(experiment.levels) > most:
+        raise ValueError(
+            f"levels: no case has level {max(experiment.levels)}; the greatest"
+            f" is {most}"
+        )
+    for name, most in numbers.items():
+        members = _members(experiment, name)
         lengths = [_num_levels(one, f"cases.{name}") for one in members]
-        most = max(lengths)
         wanted = experiment.levels or range(1, most + 1)
         levels = sorted({min(level, most) for level in wanted})
         for level in levels:
@@ -621,6 +629,34 @@ def _cases(
                     for one, length in zip(members, lengths, strict=True)
                 ),
             )
+
+
+def num_levels(experiment: Experiment) -> dict[str, int]:
+    """Returns the name of each case -> its number of levels.
+
+    Raises:
+        ValueError: a case has the name of the condition without a change, or
+            combines what is no case.
+    """
+    found = {}
+    for name in experiment.cases:
+        if name == NO_CAUSE:
+            raise ValueError(f"cases.{name}: the name of what has no cause")
+        members = _members(experiment, name)
+        found[name] = max(_num_levels(one, f"cases.{name}") for one in members)
+    return found
+
+
+def _members(experiment: Experiment, name: str) -> list[Case]:
+    """Returns the fields of a case, or those of each case that it combines."""
+    case = experiment.cases[name]
+    found = []
+    for one in case if isinstance(case, tuple) else [name]:
+        member = experiment.cases.get(one)
+        if not isinstance(member, dict):
+            raise ValueError(f"cases.{name}: {one} is no case with fields")
+        found.append(member)
+    return found
 
 
 def _num_levels(case: Case, place: str) -> int:

@@ -24,6 +24,7 @@ from cns_drake.base.jobs.running import Job, run_jobs
 from cns_drake.base.jobs.step import Reporter
 from cns_drake.base.points import encode_bin
 from cns_drake.base.progress import Track, silent
+from cns_drake.base.value_lists import repeated
 from cns_drake.scenarios.scenario import Scenario
 from cns_drake.scene.semantics import CLASS_IDS
 from cns_drake.simulation.simulated_drive import DriveSimulation
@@ -139,9 +140,8 @@ def export_pairs(
         raise InputError("export-pairs: no drive to learn from")
     every = [*scenarios, *held_out]
     names = [one.name for one in every]
-    for name in names:
-        if names.count(name) > 1:
-            raise InputError(f"export-pairs: two drives are named {name}")
+    for name in repeated(names):
+        raise InputError(f"export-pairs: two drives are named {name}")
     make_folder(output)
     output = output.absolute()
     parts = {name: Part(output / "parts" / f"{name}.data") for name in names}

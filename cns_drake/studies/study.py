@@ -36,6 +36,7 @@ from cns_drake.studies.experiment import (
     base_protocol,
     conditions,
     method_variants,
+    num_levels,
 )
 from cns_drake.studies.made_maps import (
     MadeMaps,
@@ -193,6 +194,14 @@ class Study:
                     f"{self.output / name}: results of an older version; give"
                     " another folder"
                 )
+        wanted = max(self.experiment.levels or (0,))
+        fewer = [
+            f"{name} ({number})"
+            for name, number in num_levels(self.experiment).items()
+            if number < wanted
+        ]
+        if fewer:
+            self.on_note(f"measured at their last level: {', '.join(fewer)}")
         drives = list(self._drives(maps))
         # Errors in the file are found before all slow work.
         for some in drives:

@@ -18,6 +18,7 @@ from cns_drake.base.files import check_regular, user_errors
 from cns_drake.base.number_rows import is_number, parse_rows
 from cns_drake.base.points import check_range, store
 from cns_drake.base.poses import FARTHEST
+from cns_drake.base.value_lists import repeated
 from evaluation.clouds.bin_columns import find_layout
 
 # Room for some tens of numbers with some tens of characters each.
@@ -197,9 +198,8 @@ def _read_pcd(path: Path, block: int, on_note: OnNote) -> Iterator[np.ndarray]:
 def _record_type(fields: list[tuple], where: str) -> np.dtype:
     """Returns a type of records; refuses a field that is there twice."""
     names = [field[0] for field in fields]
-    for name in names:
-        if names.count(name) > 1:
-            raise ValueError(f"{where} {name} is there twice")
+    for name in repeated(names):
+        raise ValueError(f"{where} {name} is there twice")
     return np.dtype(fields)
 
 

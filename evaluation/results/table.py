@@ -25,6 +25,7 @@ import numpy as np
 from cns_drake.base.csv_files import check_separator, csv_text
 from cns_drake.base.errors import InputError
 from cns_drake.base.files import read_bytes, write_text
+from cns_drake.base.value_lists import repeated
 from evaluation.recognition.place_outcome import Number
 from evaluation.recognition.protocol import PROTOCOL_NAMES
 from evaluation.recognition.query_outcomes import QueryOutcomes
@@ -700,11 +701,12 @@ class _Cells:
                 )
         if missing:
             raise InputError(f"{file}: no column '{missing[0]}'")
-        for name in names:
-            if not name or names.count(name) > 1:
-                fault = "is there twice" if name else "has no name"
-                raise InputError(f"{file}: line 1: column '{name}' {fault}")
-        factors = [n for n in names if n not in {*needed, *known}]
+        if "" in names:
+            raise InputError(f"{file}: line 1: column '' has no name")
+        for name in repeated(names):
+            raise InputError(f"{file}: line 1: column '{name}' is there twice")
+        others = {*needed, *known}
+        factors = [name for name in names if name not in others]
         if same:
             factors = [STAGE]
         for name in factors:

@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass, replace
+import os
 from pathlib import Path
 import re
 
@@ -25,6 +26,8 @@ _NAMES = (
     re.compile(r"(?P<map>.*?)-?(?P<stage>\d{4}-\d\d-\d\d.*)"),
     re.compile(r"(?P<map>.*\D)(?P<stage>\d+)"),
 )
+# A whole disk has more folders, and takes minutes to search.
+_MOST_FOLDERS = 10_000
 _UNPLACED = "map and stage are unknown: no scenario, and no name <map>_<stage>"
 
 
@@ -309,17 +312,32 @@ def group_cities(
 def _find_drives(folder: Path) -> list[Path]:
     """Returns the paths of the drives in a folder, in order."""
     paths = []
+    nested = []
     for child in sorted(folder.iterdir()):
         if _is_drive(child):
             paths.append(child)
         elif child.is_dir():
-            below = [*child.glob("*"), *child.glob("*/*")]
-            paths += [
-                path
-                for path in sorted(below)
-                if _is_drive(path) and (holds_cns(path) or holds_kitti(path))
-            ]
-    return paths
+            nested.append(child)
+    below = (path for child in nested for path in _folders(child, 2))
+    for number, path in enumerate(below):
+        if number == _MOST_FOLDERS:
+            raise InputError(
+                f"{folder}: more than {_MOST_FOLDERS} folders in it; give the"
+                " folder of the recordings"
+            )
+        if (holds_cns(path) or holds_kitti(path)) and _is_drive(path):
+            paths.append(path)
+    return sorted(paths)
+
+
+def _folders(folder: Path, levels: int) -> Iterator[Path]:
+    """Yields the folders in a folder, down to a number of levels."""
+    with os.scandir(folder) as entries:
+        found = [Path(entry) for entry in entries if entry.is_dir()]
+    for path in found:
+        yield path
+        if levels > 1:
+            yield from _folders(path, levels - 1)
 
 
 def _is_drive(path: Path) -> bool:

@@ -15,6 +15,7 @@ from pydantic import (
 )
 
 from cns_drake.base.errors import validated
+from cns_drake.base.value_lists import repeated
 from cns_drake.base.yaml_files import read_yaml
 from cns_drake.roads.road import MeshStem
 
@@ -349,10 +350,8 @@ class CityPlan(_Model):
 
     @model_validator(mode="after")
     def _names_are_unique(self) -> CityPlan:
-        names = [district.name for district in self.districts]
-        for name in names:
-            if names.count(name) > 1:
-                raise ValueError(f"district {name} is there twice")
+        for name in repeated(district.name for district in self.districts):
+            raise ValueError(f"district {name} is there twice")
         return self
 
 

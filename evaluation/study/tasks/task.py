@@ -11,6 +11,7 @@ import numpy as np
 from cns_drake.base.errors import InputError, did_you_mean
 from cns_drake.base.jobs.fingerprint import fingerprint
 from cns_drake.base.jobs.running import Job
+from cns_drake.base.value_lists import repeated
 from evaluation.recognition.description import Role
 from evaluation.recognition.place_outcome import Number
 from evaluation.recognition.protocol import RetrievalProtocol
@@ -320,10 +321,8 @@ def _names(value: Any, where: str) -> list[str]:
     found = [value] if isinstance(value, str) else value
     if not (found and isinstance(found, list)):
         raise InputError(f"{where}: {value!r} is no list of names")
-    stems = [Path(str(one)).stem for one in found]
-    for one, stem in zip(found, stems, strict=True):
-        if stems.count(stem) > 1:
-            raise InputError(f"{where}: {one!r} is there twice")
+    for stem in repeated(Path(str(one)).stem for one in found):
+        raise InputError(f"{where}: {stem!r} is there twice")
     return found
 
 

@@ -89,6 +89,54 @@ def test_options_replace_fields(capsys, tmp_path, asked):
     assert quick.seeds == (3, 4)
 
 
+@pytest.mark.parametrize(
+    ("fields", "place"),
+    [
+        ("methods: [solid, {file}]", "methods"),
+        ("methods: {{{file}: {{x: [1, 2]}}}}", "methods"),
+        ("tasks: {{localise: {{methods: [gicp, {file}]}}}}", "tasks"),
+        ("tasks: {{localise: {{methods: {file}}}}}", "tasks"),
+    ],
+)
+def test_a_program_of_an_experiment_is_asked_for(
+    capsys, tmp_path, asked, fields, place
+):
+    program = tmp_path / "theirs.py"
+    program.write_text(f"open({str(tmp_path / 'ran')!r}, 'w')\n")
+    path = tmp_path / "mine.yaml"
+    path.write_text(fields.format(file=program))
+    words = ["study", path, "--output", tmp_path / "out"]
+    status, out, err = run(capsys, *words)
+    assert (status, out) == (2, "")
+    assert err == (
+        f"cns-drake: error: {path}: {place}: {program} is a program, and would"
+        " run with your permissions; read it, then add --allow-code\n"
+    )
+    assert not asked
+    # Nor does it run where a copy of the experiment is shown.
+    assert run(capsys, "study", path, "--show")[0] == 0
+    assert not (tmp_path / "ran").exists()
+    assert run(capsys, *words, "--allow-code")[0] == 0
+    # What the user names needs no question.
+    for more in (
+        ("--method", program, "--set", f"tasks.localise.methods=[{program}]"),
+        ("--method", "solid", "--task", "place"),
+    ):
+        assert run(capsys, *words, *more)[0] == 0
+    assert len(asked) == 3
+
+
+def test_a_program_of_the_quick_section_is_asked_for(capsys, tmp_path, asked):
+    path = tmp_path / "mine.yaml"
+    path.write_text("methods: [solid]\nquick: {methods: [theirs.py]}\n")
+    words = ["study", path, "--output", tmp_path / "out"]
+    assert run(capsys, *words)[0] == 0
+    status, _, err = run(capsys, *words, "--quick")
+    assert status == 2
+    assert "methods: theirs.py is a program" in err
+    assert len(asked) == 1
+
+
 def test_an_output_is_needed(capsys, asked):
     status, out, err = run(capsys, "study", "ladder")
     assert (status, out) == (2, "")

@@ -13,6 +13,7 @@ from cns_drake.studies.experiment import (
     conditions,
     load_experiment,
     method_variants,
+    named_programs,
     shipped_experiments,
 )
 from evaluation.recognition.protocol import (
@@ -207,7 +208,8 @@ def test_cases_have_levels(read):
 @pytest.mark.parametrize(
     ("levels", "found"),
     [
-        ("[4]", {"snow": [3], "returns": [1], "driver": [3], "all": [3]}),
+        ("[3]", {"snow": [3], "returns": [1], "driver": [3], "all": [3]}),
+        ("{from: 1, to: 3, count: 2}", {"snow": [1, 3], "returns": [1]}),
         ("[1, 3]", {"snow": [1, 3], "returns": [1], "all": [1, 3]}),
         ("2", {"snow": [2], "returns": [1], "all": [2]}),
     ],
@@ -227,6 +229,35 @@ def test_cases_beside_factors(read):
     assert len(found) == 2 * 5
     assert list(found[0].factors) == ["cause", "level", "both.seed"]
     assert [one.is_baseline for one in found] == [True] + [False] * 9
+
+
+def test_lists_of_whole_numbers_can_be_spread(read):
+    experiment = read(
+        """
+        seeds: {from: 3, to: 5, count: 3}
+        both: {fresh: {from: 1, to: 5, count: 2}}
+        database: {distractors: {from: 0, to: 1000, count: 3}}
+        """
+    )
+    assert experiment.seeds == (3, 4, 5)
+    assert experiment.fresh == [1, 5]
+    assert [type(one) for one in experiment.fresh] == [int, int]
+    values = [one["database.distractors"] for one in factors(experiment)]
+    assert [(type(one), one) for one in values] == [
+        (int, 0),
+        (int, 500),
+        (int, 1000),
+    ]
+
+
+def test_programs_are_found_wherever_they_are_named():
+    assert named_programs(
+        {
+            "methods": ["solid", "a.py", ("sub/B.PY", {"x": {"y": ["c.py"]}})],
+            "d.py": {"weights": "e.pt", "radius": 3.0},
+            "f": None,
+        }
+    ) == ["d.py", "a.py", "sub/B.PY", "c.py"]
 
 
 def test_settings_of_methods_are_factors():
@@ -388,8 +419,10 @@ FAULTS = [
     ("database: {a: {from: 0, to: true, count: 3}}", "database.a: from and"),
     ("database: {a: {from: 0, to: 1, count: 1}}", "database.a: .*count"),
     ("database: {a: {from: 0, to: 1, count: 2.0}}", "database.a: .*count"),
-    ("database: {a: {from: 0, to: 1, count: 9999}}", "database.a: .*count"),
-    ("database: {a: {from: 1, to: 1, count: 2}}", "database.a: 1.0 is .*twice"),
+    ("database: {a: {from: 0, to: 1, count: 10001}}", "database.a: .*count"),
+    ("database: {a: {from: 1, to: 1, count: 2}}", "database.a: 1 is .*twice"),
+    ("seeds: {from: 0, to: 1, count: 1}", "seeds: .*from and to .* count"),
+    ("seeds: {from: 0, to: 1, count: 3}", "seeds: .*not all whole"),
     ("seeds: []", "seeds: "),
     ("seeds: [1, 1]", "seeds: 1 is there twice"),
     ("seeds: -1", "seeds.0: "),
@@ -452,6 +485,14 @@ FAULTS = [
     ("levels: [1]", "levels: there are no cases"),
     ("levels: []\ncases: {a: {query: {x: 1}}}", "levels: "),
     ("levels: [0]\ncases: {a: {query: {x: 1}}}", "levels.0: "),
+    (
+        "levels: [7]\ncases: {a: {query: {x: 1}}}",
+        "levels: no case has level 7; the greatest is 1",
+    ),
+    (
+        "levels: [1, 4]\ncases: {a: {query: {x: [1, 2, 3]}}, b: [a]}",
+        "levels: no case has level 4; the greatest is 3",
+    ),
     ("levels: [2, 2]\ncases: {a: {query: {x: 1}}}", "levels: 2 is there twice"),
     ("charts: [3]", "charts.0: "),
     ("quick: 3", "quick: "),
@@ -483,7 +524,7 @@ def test_grids_have_an_end(read):
     read(grid(50, 100, more=cases))
     for text, number in (
         (grid(59, 339), 20_001),
-        (grid(2, 2501, more=cases), None),
+        (grid(2, 10_001, more=cases), None),
         (grid(50, 101, more=cases), 20_200),
         (grid(1000, 1000, 1000, 1000), 10**12),
     ):

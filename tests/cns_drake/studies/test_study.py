@@ -741,6 +741,23 @@ def test_faults_before_anything_is_made(
     assert not (tmp_path / "out").exists()
 
 
+def test_a_case_with_fewer_levels_is_noted(town, tmp_path):
+    wanted = experiment(
+        town,
+        cases={
+            "snow": {"query": {"transient": {"snow": [0.1, 0.2]}}},
+            "returns": {"query": {"returns": "calibrated"}},
+        },
+        levels=[2],
+    )
+    notes = []
+    with pytest.raises(InputError, match="no-map"):
+        Study(wanted, tmp_path, "mine.yaml", Cluster(), notes.append).run(
+            ["no-map"]
+        )
+    assert notes == ["measured at their last level: returns (1)"]
+
+
 @pytest.mark.parametrize("given", [[3, 1], 3, [5, 4, 2]])
 def test_fresh_cities_have_their_numbers(tmp_path, monkeypatch, given):
     monkeypatch.setattr(redrawing, "run_jobs", lambda jobs, cluster: None)

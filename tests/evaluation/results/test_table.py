@@ -189,6 +189,19 @@ def test_ranges_of_metrics(tmp_path, metric, value, fits):
             Results.read(path)
 
 
+def test_a_table_may_be_wide(tmp_path):
+    """Names of columns are compared in linear time, not each with each."""
+    names = [f"query.f{k}" for k in range(32_000)]
+    header, line = HEADER.split(","), LINE.split(",")
+    header[5:6], line[5:6] = names, ["1"] * len(names)
+    path = tmp_path / "results.csv"
+    (row,) = Results.read(write(path, ",".join(header), ",".join(line))).rows
+    assert row.factors == dict.fromkeys(names, 1)
+    header[6] = header[30_000]
+    with pytest.raises(InputError, match=rf"'{header[6]}' is there twice"):
+        Results.read(write(path, ",".join(header), ",".join(line)))
+
+
 def test_a_number_twice_is_refused(tmp_path):
     again = replaced(LINE, HEADER, "value", "0.3")
     path = write(tmp_path / "r.csv", HEADER, LINE, again)

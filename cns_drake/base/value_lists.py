@@ -1,0 +1,70 @@
+"""Lists of values in input files: spread evenly, and without repetitions."""
+
+from collections.abc import Hashable, Iterable, Mapping
+import json
+import math
+from typing import Any, TypeVar
+
+_T = TypeVar("_T")
+
+_SPREAD = {"from", "to", "count"}
+_MOST_SPREAD = 10_000
+
+
+def is_spread(value: object) -> bool:
+    """Returns whether a value is {from, to, count}, short for a list."""
+    return isinstance(value, Mapping) and set(value) == _SPREAD
+
+
+def spread(value: Any, *, whole: bool = False) -> Any:
+    """Turns {from, to, count} into a list of evenly spaced numbers.
+
+    Other values are returned as they are. The numbers are rounded to four
+    decimal places. They are of type int if all of them are whole, and so are
+    both ends as written.
+
+    Args:
+        value: any value of a field.
+        whole: whether the numbers must be whole.
+
+    Raises:
+        ValueError: an end is no finite number, there are fewer than 2 or more
+            than 10,000 numbers, or they are not whole although they must be.
+    """
+    if not is_spread(value):
+        return value
+    first, last, count = (value[name] for name in ("from", "to", "count"))
+    are_numbers = all(
+        isinstance(one, int | float)
+        and not isinstance(one, bool)
+        and math.isfinite(one)
+        for one in (first, last)
+    )
+    if not (are_numbers and type(count) is int and 2 <= count <= _MOST_SPREAD):
+        raise ValueError(
+            f"from and to are numbers, count from 2 to {_MOST_SPREAD}"
+        )
+    if isinstance(first, int) and isinstance(last, int):
+        step, rest = divmod(last - first, count - 1)
+        if not rest:
+            return [first + k * step for k in range(count)]
+    if whole:
+        raise ValueError(
+            f"{count} numbers from {first} to {last} are not all whole"
+        )
+    width = (last - first) / (count - 1)
+    return [round(first + k * width, 4) for k in range(count)]
+
+
+def repeated(values: Iterable[_T]) -> list[_T]:
+    """Returns a value for each later value that equals it, in order."""
+    seen: dict[Hashable, _T] = {}
+    found = []
+    for value in values:
+        key: Hashable = value
+        if isinstance(value, dict | list):
+            key = json.dumps(value, sort_keys=True, default=str)
+        if key in seen:
+            found.append(seen[key])
+        seen.setdefault(key, value)
+    return found
