@@ -27,6 +27,8 @@ from cns_drake.base.errors import (
     shows_traceback,
 )
 from cns_drake.base.process import look_seldom
+from cns_drake.base.progress import doing
+from cns_drake.base.progress_display import shown
 from cns_drake.base.version import __version__
 
 # All errors of usage are click's UsageError. New versions of Typer contain it
@@ -156,11 +158,14 @@ def run(app: typer.Typer, program: str) -> NoReturn:
         # This option may stand anywhere.
         words = [word for word in sys.argv[1:] if word != TRACEBACK_OPTION]
         try:
-            status = app(words, prog_name=program, standalone_mode=False) or 0
+            with shown():
+                doing("loading the program")
+                status = app(words, prog_name=program, standalone_mode=False)
         except Exception:
             if shows_traceback():
                 traceback.print_exc()
             raise
+        status = status or 0
         if status == interrupts.INTERRUPTED:  # Typer has caught it already.
             message = "interrupted"
         sys.stdout.flush()
@@ -250,28 +255,6 @@ def _forget_results() -> None:
     # In a test the stream is no file.
     with contextlib.suppress(OSError):
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
-
-
-def track(items: Iterable[Any], description: str, total: int) -> Iterator[Any]:
-    """Yields items and shows progress on stderr.
-
-    On a terminal the progress is a bar; elsewhere it is printed as lines.
-
-    Args:
-        items: the items.
-        description: text that is shown before the bar.
-        total: number of items.
-    """
-    # Slow to import, and not needed to print help.
-    from cns_drake.base.progress_bars import count_progress, show_progress
-
-    with show_progress() as progress:
-        task = progress.add_task(description, total=total, note="")
-        on_item = count_progress(progress, task, "done")
-        for done, item in enumerate(items):
-            on_item(done, total)
-            yield item
-        progress.remove_task(task)
 
 
 def check_finite(values: Mapping[str, object]) -> None:

@@ -8,7 +8,7 @@ from pathlib import Path
 import sys
 from typing import TYPE_CHECKING, Literal
 
-from cns_drake.base import progress_bars, terminal
+from cns_drake.base import progress_display, terminal
 from cns_drake.base.interrupts import uninterrupted
 from cns_drake.command_line import options
 
@@ -35,10 +35,10 @@ def run_drive(
     graphviz: Path | str | None = None,
     overwrite: bool = False,
 ) -> Run:
-    """Simulates and records a drive, with a progress bar on stderr.
+    """Simulates and records a drive, and shows on stderr what it does.
 
     All cores are used. `simulate` does the same for a scenario that is already
-    loaded, without a progress bar.
+    loaded, and shows nothing.
 
     Args:
         name_or_file: name of a shipped drive, or a scenario file.
@@ -105,10 +105,7 @@ def run_drive(
     if frames is not None:
         scenario = scenario.replaced(frames=frames)
     goes_on = contextlib.nullcontext if overwrite else terminal.resumable
-    with goes_on(), progress_bars.show_progress() as progress:
-        task = progress.add_task(scenario.name, total=None, note="loading")
-        after = "writing the page" if recording else "closing the recording"
-        on_frame = progress_bars.count_progress(progress, task, after=after)
+    with goes_on(), progress_display.shown():
         run = simulate(
             scenario,
             output,
@@ -116,8 +113,7 @@ def run_drive(
             graphviz_file=graphviz,
             overwrite=overwrite,
             num_threads=num_cores(),
-            on_frame=on_frame,
-            on_note=lambda text: progress_bars.print_note(progress, text),
+            on_note=terminal.note,
         )
     print(
         f"{run.folder}: {run.num_frames} frames, {run.simulated_s:.2f} s "

@@ -92,7 +92,7 @@ def train(
     fields |= {"drawn_streets": drawn_streets, "graded": graded}
     plan = TrainingPlan.of_minutes(minutes, **fields)
     command = shlex.join(["cns-drake", *sys.argv[1:]])
-    picture = make_weights(plan, output, command, cluster, terminal.track)
+    picture = make_weights(plan, output, command, cluster)
     print(output)
     print(picture)
     terminal.next_command(
@@ -166,7 +166,7 @@ def export_pairs(
             query_spacing=spacing, max_range=max_range or 100.0
         )
         table = pair_export.write_overlap_table(
-            learned[0], learned[1], output, protocol, terminal.track
+            learned[0], learned[1], output, protocol
         )
         print(table)
         terminal.next_command(
@@ -215,7 +215,7 @@ def map_truth(
 
     check_new_folder(output)
     first, second = open_survey(a), open_survey(b)
-    counts, table = write_truth(first, second, output, spacing, terminal.track)
+    counts, table = write_truth(first, second, output, spacing)
     for side, found in counts.items():
         text = ", ".join(
             f"{count} {Label(label).name.lower().replace('_', ' ')}"

@@ -12,11 +12,7 @@ import typer
 from cns_drake.base import commands
 from cns_drake.base.errors import InputError
 from cns_drake.base.interrupts import uninterrupted
-from cns_drake.base.progress_bars import (
-    count_progress,
-    print_note,
-    show_progress,
-)
+from cns_drake.base.progress import doing
 from cns_drake.base.terminal import next_command, note
 from cns_drake.command_line import options
 
@@ -277,19 +273,14 @@ def film(
         drive = with_some_traffic(drive)
     else:
         drive = drive.with_traffic(traffic)
-    with show_progress() as progress:
-        task = progress.add_task(drive.name, total=None, note="loading")
-        number = make_film(
-            drive,
-            path,
-            seconds=seconds,
-            size=(width, height),
-            start=start,
-            on_frame=count_progress(
-                progress, task, "images", after="writing the film"
-            ),
-            on_note=lambda text: print_note(progress, text),
-        )
+    number = make_film(
+        drive,
+        path,
+        seconds=seconds,
+        size=(width, height),
+        start=start,
+        on_note=note,
+    )
     print(f"{path}: {number} images")
     words = ("--output", "drives", "--recording", "drive.html")
     next_command("cns-drake", "simulate", scenario, *words)
@@ -349,12 +340,14 @@ def scan(
     config = make_lidar_config(lidar)
     pattern = make_pattern(config)
     X_WS = RigidTransform(RollPitchYaw(*pose[3:]), pose[:3])
+    doing(f"reading {world.name}")
     loaded = load_world(world, model_paths=model_path or ())
     for text in loaded.notes:
         note(text)
     chosen, weather = choose_returns(returns, fog, rain, snowfall)
     config = config.replaced(returns=chosen or "ideal")
     model = make_returns(config, weather or WeatherConfig(), "lidar", seed)
+    doing("casting rays")
     points = scanning.scan_world(loaded, X_WS, pattern, model)
     scanning.save_scan(points, output)
     typer.echo(f"{output}: {len(points)} points")
@@ -433,18 +426,15 @@ def export(
     with uninterrupted():
         from cns_drake.export.exporting import export_drive
 
-    with show_progress() as progress:
-        task = progress.add_task(drive.name, total=None, note="reading")
-        drive = export_drive(
-            drive,
-            layout,
-            output,
-            lidar=sensor,
-            absent_in=absent_in,
-            sequence=sequence,
-            on_note=note,
-            on_frame=count_progress(progress, task),
-        )
+    drive = export_drive(
+        drive,
+        layout,
+        output,
+        lidar=sensor,
+        absent_in=absent_in,
+        sequence=sequence,
+        on_note=note,
+    )
     typer.echo(drive)
     if layout != "tum":
         next_command(
@@ -466,11 +456,7 @@ def repair(
     with uninterrupted():
         from cns_drake.recording.repair import repair_mcap
 
-    with show_progress() as progress:
-        task = progress.add_task(file.name, total=None, note="")
-        result = repair_mcap(
-            file, output, count_progress(progress, task, unit="bytes")
-        )
+    result = repair_mcap(file, output)
     typer.echo(
         f"{result.output}: {result.num_messages} messages over "
         f"{result.seconds:.2f} s recovered; "

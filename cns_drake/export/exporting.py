@@ -15,6 +15,7 @@ from cns_drake.base import files
 from cns_drake.base.drives.deskewing import deskew
 from cns_drake.base.drives.mcap_drive import McapDrive, holds_mcap
 from cns_drake.base.errors import InputError, value_errors
+from cns_drake.base.progress import doing, track
 from cns_drake.base.yaml_files import read_yaml
 from cns_drake.export.layouts import (
     CNS,
@@ -39,7 +40,6 @@ def export_drive(
     absent_in: str | None = None,
     sequence: int | None = None,
     on_note: Callable[[str], None] = lambda note: None,
-    on_frame: Callable[[int, int], None] = lambda done, total: None,
 ) -> Path:
     """Exports a recording, and returns the folder of the drive.
 
@@ -56,8 +56,6 @@ def export_drive(
         sequence: number of the drive in KITTI's layout; by default the digits
             at the end of its name.
         on_note: called with notes about how the recording was read and written.
-        on_frame: called with the number of written frames and the number of all
-            frames.
 
     Raises:
         InputError: if the recording cannot be read; if the folder has other
@@ -72,6 +70,7 @@ def export_drive(
         raise InputError(f"--sequence: {format_name} has no numbers; use kitti")
     if not holds_mcap(recording):
         raise InputError(f"{recording}: no recording (.mcap) there")
+    doing(f"opening {recording}")
     if absent_in is None:
         drive = McapDrive(recording, lidar)
     else:
@@ -105,7 +104,7 @@ def export_drive(
         try:
             for note in _notes(drive, layout):
                 on_note(note)
-            _write_drive(drive, layout, part, on_frame)
+            _write_drive(drive, layout, part)
             for path, text in outer.items():
                 files.make_folder(path.parent)
                 files.write_text(path, text)
@@ -177,7 +176,6 @@ def _write_drive(
     drive: McapDrive,
     layout: Layout,
     folder: Path,
-    on_frame: Callable[[int, int], None],
 ) -> None:
     with files.user_errors(folder):
         # An interrupted export may have left it behind.
@@ -186,9 +184,11 @@ def _write_drive(
         for name, text in layout.inner_files(drive).items():
             (folder / name).write_text(text, encoding="utf-8")
         if layout.scan_files is None:
-            on_frame(len(drive), len(drive))
             return
-        for frame, stamp_ns in enumerate(drive.stamps_ns.tolist()):
+        stamps_ns = drive.stamps_ns.tolist()
+        for frame, stamp_ns in enumerate(
+            track(stamps_ns, "writing scans", len(stamps_ns), "scans")
+        ):
             scan = (
                 drive.scan(frame)
                 if drive.distortion_note is None
@@ -201,4 +201,3 @@ def _write_drive(
                 if frame == 0:
                     path.parent.mkdir()
                 path.write_bytes(content)
-            on_frame(frame + 1, len(drive))

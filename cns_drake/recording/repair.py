@@ -1,7 +1,7 @@
 """Repair of damaged MCAP files: the readable part becomes a whole file."""
 
 from collections import Counter
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
 import itertools
 from pathlib import Path
@@ -21,14 +21,14 @@ from mcap.writer import CompressionType, Writer
 from cns_drake.base.drives.mcap_records import Fault, read_records
 from cns_drake.base.errors import InputError
 from cns_drake.base.files import check_writable, completing, user_errors
+from cns_drake.base.progress import doing
 from cns_drake.base.version import __version__
 from cns_drake.recording import rosbag2_metadata
 
 # Schemas and channels are kept in memory; more of them is no recording.
 _DEFINITIONS_LIMIT = 64 * 1024 * 1024
 _ROSBAG2 = "rosbag2"
-# Reports the number of bytes done and their total.
-BytesCallback = Callable[[int, int], None]
+_MB = 1_000_000
 
 
 @dataclass(frozen=True)
@@ -54,7 +54,6 @@ class Repair:
 def repair_mcap(
     path: Path,
     output: Path | None = None,
-    on_bytes: BytesCallback = lambda done, total: None,
 ) -> Repair:
     """Writes the readable part of an MCAP file as a whole, indexed file.
 
@@ -93,7 +92,8 @@ def repair_mcap(
         """
         with user_errors(path), open(path, "rb") as stream:
             for record in read_records(stream):
-                on_bytes(before + stream.tell(), 2 * size)
+                at = before + stream.tell()
+                doing("reading", at // _MB, 2 * size // _MB, "MB")
                 yield record
 
     check_writable(output)
@@ -105,7 +105,6 @@ def repair_mcap(
         open(part, "wb") as stream,
     ):
         repair = _copy(read(size), stream, definitions, output)
-    on_bytes(2 * size, 2 * size)
     return repair
 
 

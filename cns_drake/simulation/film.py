@@ -23,6 +23,7 @@ from cns_drake.base.jobs.processes import (
     run_process,
 )
 from cns_drake.base.jobs.step import Reporter, Step
+from cns_drake.base.progress import doing
 from cns_drake.motion.trajectory import Trajectory
 from cns_drake.pictures.meshcat_drawing import height_rgb
 from cns_drake.scenarios.planning import plan_drive
@@ -96,7 +97,6 @@ def make_film(
     seconds: float = 20.0,
     size: tuple[int, int] = (640, 360),
     start: float | None = None,
-    on_frame: Callable[[int, int], None] = lambda done, total: None,
     on_note: Callable[[str], None] = lambda text: None,
 ) -> int:
     """Films a drive, and what its LiDARs measure, in all stages of its city.
@@ -111,8 +111,6 @@ def make_film(
         size: width and height of its images [pixels].
         start: time of the drive at which the stretch begins [s]; by default the
             time at which the road ahead is straightest.
-        on_frame: called with the number of images taken and the number of all
-            images.
         on_note: called with notes for the user.
 
     Returns:
@@ -133,14 +131,22 @@ def make_film(
         else list(map_folder(scenario).stages())
     )
     of_view = max(1, round(seconds * RATE / len(stages) / len(views)))
+    doing("planning the drive")
     times = _times(plan_drive(scenario), of_view, start)
     total = of_view * len(stages) * len(views)
     with tempfile.TemporaryDirectory() as folder:
         for k, stage in enumerate(stages):
 
-            def on_message(kind: str, *values: Any, k: int = k) -> None:
-                if kind == "progress":
-                    on_frame(len(views) * (k * of_view + values[0]), total)
+            def on_message(
+                kind: str, *values: Any, k: int = k, stage: str | None = stage
+            ) -> None:
+                if kind == "doing":
+                    activity, done, number, unit = values
+                    if number:  # Of all stages.
+                        done = len(views) * (k * of_view + done)
+                        doing(activity, done, total, unit)
+                    else:
+                        doing(f"{stage}: {activity}")
                 elif kind == "note":
                     on_note(*values)
 
@@ -154,6 +160,7 @@ def make_film(
                 run_process(pickle.dumps(step), on_message, lambda: True)
             except (JobError, ProcessDiedError) as error:
                 raise InputError(str(error)) from None
+        doing("writing the film")
         _write(path, sorted(Path(folder).iterdir()))
     return total
 
@@ -190,8 +197,6 @@ class FilmStage(Step):
             else f"{map_folder(scenario).name.capitalize()}, stage "
             f"{scenario.stage}"
         )
-        if not scenario.traffic.is_off:
-            reporter.note(f"{title}: planning the traffic")
         world, traffic, trajectory = loaded_drive.load_stage_and_traffic(
             scenario, plan_drive(scenario)
         )
@@ -217,7 +222,7 @@ class FilmStage(Step):
                 _titled(pixels, title).save(
                     self.folder / f"{first + k:06d}.png", compress_level=1
                 )
-            reporter.progress(k + 1, len(self.times))
+            doing("filming", k + 1, len(self.times), "images")
 
 
 def _times(

@@ -14,6 +14,7 @@ from cns_drake.base.elementary import arctan2
 from cns_drake.base.errors import InputError
 from cns_drake.base.files import user_errors
 from cns_drake.base.map_folder import MapFolder
+from cns_drake.base.progress import doing
 from cns_drake.motion.trajectory import Trajectory
 from cns_drake.recording.schedule import FRAME_PERIOD, frames_within
 from cns_drake.roads.network import load_road_network
@@ -84,6 +85,7 @@ def load_drive(scenario: Scenario) -> LoadedDrive:
             they were being read.
     """
     scenario_files.check_files(scenario)
+    doing("planning the drive")
     watch = FileWatch()
     inputs = digest_inputs(scenario, watch)
     trajectory = plan_drive(scenario)
@@ -135,6 +137,7 @@ def load_stage_and_traffic(
     world = load_stage(scenario, trajectory=trajectory)
     if scenario.traffic.is_off:
         return world, None, trajectory
+    doing("planning the traffic")
     traffic = plan_scenario_traffic(scenario, trajectory, world)
     if traffic.positions is not None:
         # Springs depend on speeds; the path does not, and is slow to plan.
@@ -163,6 +166,7 @@ def load_stage(
     Raises:
         InputError: the scenario's files cannot be used.
     """
+    doing("reading the stage")
     in_the_way = _in_the_way(scenario)
     world = load_world(
         scenario_files.world_file(scenario),
@@ -175,6 +179,7 @@ def load_stage(
     if scenario.transient.is_off:
         return world
     trajectory = trajectory or plan_drive(scenario)
+    doing("making the temporary changes")
     times = np.arange(0.0, trajectory.duration, 0.1)
     drive = shapely.LineString(trajectory.poses(times)[1][:, :2])
     return change_world(

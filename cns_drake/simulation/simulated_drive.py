@@ -18,6 +18,7 @@ from pydrake.systems.framework import Context
 from cns_drake.base import poses
 from cns_drake.base.drives.drive import Drive, index_instances
 from cns_drake.base.jobs.fingerprint import code_digest
+from cns_drake.base.progress import doing
 from cns_drake.motion.trajectory import pose_at
 from cns_drake.ray_casting.ray_casting_scene import RayCastingScene
 from cns_drake.recording.messages import MAP_FRAME, to_quat_xyzw
@@ -80,6 +81,7 @@ class SimulatedDrive(Drive):
             InputError: the scenario cannot be run.
         """
         check_files(scenario)
+        doing("planning the drive")
         trajectory = plan_drive(scenario)
         world, traffic, trajectory = loaded_drive.load_stage_and_traffic(
             scenario, trajectory
@@ -95,6 +97,7 @@ class SimulatedDrive(Drive):
             loaded_drive.structure_list(world), self.name
         )
         self.structures = structures_in(world)
+        doing("building the diagram")
         self._diagram = make_station(
             scenario, world=world, trajectory=trajectory, traffic=traffic
         )

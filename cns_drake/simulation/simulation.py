@@ -11,6 +11,7 @@ from pydrake.systems.framework import Context, Diagram
 
 from cns_drake.base.files import check_writable, write_text
 from cns_drake.base.interrupts import interrupts_wait
+from cns_drake.base.progress import doing
 from cns_drake.base.version import __version__
 from cns_drake.pictures.drive_page import MeshcatRecorder, ShownStages
 from cns_drake.recording.bag_writer import (
@@ -127,8 +128,6 @@ def simulate(
         RecordingFolder(folder).check(overwrite)
         if scenario.cameras:
             check_renderer()
-        if not scenario.traffic.is_off:
-            on_note(f"{scenario.name}: planning the traffic")
         drive = loaded_drive.load_drive(scenario)
         for text in drive.world.notes:
             on_note(text)
@@ -141,8 +140,10 @@ def simulate(
 
             def report_frames(done: int) -> None:
                 strike()
+                doing("simulating", done, drive.num_frames, "frames")
                 on_frame(done, drive.num_frames)
 
+            doing("building the diagram")
             writer = BackgroundWriter(bag.write)
             diagram = make_station(
                 drive.scenario,
@@ -160,8 +161,10 @@ def simulate(
             simulated_s = _advance(
                 diagram, writer, drive, resumed_frames, report_frames
             )
+            doing("closing the recording")
         finished = time.perf_counter()
         if page is not None and page_file is not None:
+            doing("writing the page of the drive")
             page.save(page_file, title=scenario.name)
     return Run(
         name=scenario.name,
@@ -239,7 +242,8 @@ def _resume(
     if not bag.follows_interruption():
         return 0
     name, num_frames = drive.scenario.name, drive.num_frames
-    on_note(f"{name}: found an interrupted run, reading it")
+    on_note(f"{name}: found an interrupted run")
+    doing("reading the interrupted run")
     frames = take_over_frames(
         bag,
         recording_schedule.scenario_topics(drive.scenario),
@@ -251,6 +255,7 @@ def _resume(
         "the next one"
     )
     if frames > 0:
+        doing("simulating", frames, num_frames, "frames")
         on_frame(frames, num_frames)
     return frames
 

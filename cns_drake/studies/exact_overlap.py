@@ -21,7 +21,6 @@ import math
 import numpy as np
 from pydrake.math import RigidTransform
 
-from cns_drake.base.progress import Track, silent
 from cns_drake.ray_casting.ray_casting_scene import RayCastingScene
 from cns_drake.sensors.lidar.patterns import BeamCoverage, BeamPattern
 from cns_drake.simulation.simulated_drive import SimulatedDrive
@@ -137,7 +136,6 @@ def exact_overlaps(
     database: SimulatedDrive,
     query: Drive,
     protocol: RetrievalProtocol,
-    track: Track = silent,
 ) -> np.ndarray:
     """Returns the exact overlap of Q queries with D places, (Q, D).
 
@@ -148,7 +146,6 @@ def exact_overlaps(
         database: the drive of the places, in whose world rays are cast.
         query: the drive of the queries, through the same map.
         protocol: protocol that determines queries, places and range.
-        track: reports progress.
 
     Raises:
         InputError: the drives are through different maps.
@@ -159,6 +156,5 @@ def exact_overlaps(
         database,
         query,
         protocol,
-        track,
         lambda frame: VisibleSurfaces(look(frame), protocol.max_range),
     )

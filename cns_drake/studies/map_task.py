@@ -8,7 +8,6 @@ from typing import Any, ClassVar
 
 from cns_drake.base.errors import InputError
 from cns_drake.base.jobs.step import Reporter
-from cns_drake.base.progress import Track, silent
 from cns_drake.simulation.simulated_drive import DriveSimulation
 from cns_drake.studies import map_truth
 from evaluation.map_update.baselines import BASELINES, run_baseline
@@ -104,14 +103,12 @@ def measure_maps(
     )
     with tempfile.TemporaryDirectory() as folder:
         maps = Path(folder) / "maps"
-        map_truth.write_truth(
-            a, b, maps, spacing, reporter.track, across_maps=True
-        )
-        return score_methods(maps, methods, reporter.track)
+        map_truth.write_truth(a, b, maps, spacing, across_maps=True)
+        return score_methods(maps, methods)
 
 
 def score_methods(
-    maps: Path, methods: tuple[str, ...], track: Track = silent
+    maps: Path, methods: tuple[str, ...]
 ) -> dict[str, dict[str, float | None]]:
     """Scores the labels of change detectors against exact labels.
 
@@ -119,7 +116,6 @@ def score_methods(
         maps: folder with the maps of two drives and their exact labels.
         methods: names of change detectors. The name `TRUTH` scores the exact
             labels themselves.
-        track: reports progress.
 
     Returns:
         Method -> name of a score -> its value, or None if it is undefined.
@@ -132,7 +128,7 @@ def score_methods(
     truth = Labels(*read_truth(pair))
     found = {}
     for method in methods:
-        labels = truth if method == TRUTH else run_baseline(method, pair, track)
+        labels = truth if method == TRUTH else run_baseline(method, pair)
         scores = score(pair, truth, labels, {})
         found[method] = {
             **{name: scores[name] for name in _SCORES},

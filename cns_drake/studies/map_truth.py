@@ -36,7 +36,7 @@ from cns_drake.base.drives.mcap_drive import McapDrive, holds_mcap
 from cns_drake.base.errors import InputError, validated
 from cns_drake.base.files import draft_folder, user_errors, write_text
 from cns_drake.base.process import num_cores
-from cns_drake.base.progress import Track, silent
+from cns_drake.base.progress import track
 from cns_drake.ray_casting.ray_casting_scene import RayCastingScene
 from cns_drake.scenarios.provenance import digest_inputs
 from cns_drake.scenarios.scenario import Scenario
@@ -200,7 +200,6 @@ def write_truth(
     b: Survey,
     output: Path,
     spacing: float = SPACING,
-    track: Track = silent,
     *,
     across_maps: bool = False,
 ) -> tuple[Mapping[str, Counter[int]], list[StructureChange]]:
@@ -215,7 +214,6 @@ def write_truth(
         b: the newer drive B.
         output: the folder to write, new or empty.
         spacing: distance driven between two scans [m].
-        track: reports progress.
         across_maps: whether the drives' maps may have different names, as an
             aged map has.
 
@@ -235,15 +233,13 @@ def write_truth(
     with draft_folder(output) as draft:
         sessions, frames = [], []
         for side, survey in zip(SIDES, (a, b), strict=True):
-            session, taken = write_session(
-                survey.drive, draft / side, spacing, track
-            )
+            session, taken = write_session(survey.drive, draft / side, spacing)
             sessions.append(session)
             frames.append(taken)
         pair = Pair(*sessions)
         truth = (
-            label_points(pair.A, b, frames[1], track),
-            label_points(pair.B, a, frames[0], track),
+            label_points(pair.A, b, frames[1]),
+            label_points(pair.B, a, frames[0]),
         )
         for session, labels in zip(pair, truth, strict=True):
             write_labels(session.folder / "truth.npy", labels)
@@ -267,7 +263,7 @@ def write_truth(
 
 
 def label_points(
-    session: Session, other: Survey, frames: np.ndarray, track: Track = silent
+    session: Session, other: Survey, frames: np.ndarray
 ) -> np.ndarray:
     """Returns the exact label of each point of a drive's map, (N,) uint8.
 
@@ -279,11 +275,10 @@ def label_points(
         session: the drive whose map of N points is labelled.
         other: the other drive.
         frames: (K,) frame numbers of the scans of the other drive that count.
-        track: reports progress.
     """
     unobserved, kept, changed = SIDES[session.side]
     labels = np.full(len(session.points), unobserved, np.uint8)
-    seen = observed(session.points, other.simulated, frames, track)
+    seen = observed(session.points, other.simulated, frames)
     rows = np.flatnonzero(seen)
     there = is_there(session.points[rows], other.still())
     labels[rows] = np.where(there, kept, changed)
@@ -294,7 +289,6 @@ def observed(
     points: np.ndarray,
     drive: SimulatedDrive,
     frames: np.ndarray,
-    track: Track = silent,
 ) -> np.ndarray:
     """Returns which points a simulated drive observes, (N,) bool.
 
@@ -306,7 +300,6 @@ def observed(
         points: (N, 3) points in W [m].
         drive: the drive.
         frames: (K,) frame numbers.
-        track: reports progress.
     """
     result = np.zeros(len(points), bool)
     look = sights(drive)
@@ -314,7 +307,9 @@ def observed(
     first = sample_frames(drive.X_WS[frames, :3, 3], _FIRST_LOOKS)
     looks = np.concatenate([frames[first], np.delete(frames, first)]).tolist()
     with ThreadPoolExecutor(num_cores()) as threads:
-        for frame in track(looks, f"looking from {drive.name}", len(looks)):
+        for frame in track(
+            looks, f"looking from {drive.name}", len(looks), "scans"
+        ):
             near = tiles.near(drive.X_WS[frame, :3, 3], drive.pattern.max_range)
             if not near:
                 continue

@@ -23,7 +23,7 @@ from cns_drake.base.jobs.cluster import Cluster
 from cns_drake.base.jobs.running import Job, run_jobs
 from cns_drake.base.jobs.step import Reporter
 from cns_drake.base.points import encode_bin
-from cns_drake.base.progress import Track, silent
+from cns_drake.base.progress import track
 from cns_drake.base.value_lists import repeated
 from cns_drake.scenarios.scenario import Scenario
 from cns_drake.scene.semantics import CLASS_IDS
@@ -82,7 +82,6 @@ def write_overlap_table(
     query: Scenario,
     output: Path,
     protocol: RetrievalProtocol,
-    track: Track = silent,
 ) -> Path:
     """Writes the exact overlap of each query with each place, as CSV.
 
@@ -94,7 +93,6 @@ def write_overlap_table(
         query: the drive of the queries.
         output: the folder, which is created if it does not exist.
         protocol: protocol that determines queries, places and range.
-        track: reports progress.
 
     Raises:
         InputError: the drives are through different maps, or cannot be
@@ -103,7 +101,7 @@ def write_overlap_table(
     # Before minutes of work.
     make_folder(output)
     places, queries = (DriveSimulation(one)() for one in (database, query))
-    found = exact_overlaps(places, queries, protocol, track)
+    found = exact_overlaps(places, queries, protocol)
     path = output / "overlaps.csv"
     frames = compared_frames(places, queries, protocol)
     write_overlaps(path, *frames, found)
@@ -204,7 +202,7 @@ def export_run(
     make_folder(folder)
     before = options.scans // 2
     for number, frame in enumerate(
-        reporter.track(frames, drive.name, len(frames))
+        track(frames, f"writing {drive.name}", len(frames), "scans")
     ):
         if options.format == "overlap":
             data = encode_bin(drive.scan(int(frame)))
@@ -261,7 +259,7 @@ def compare_runs(
         place_spacing=options.spacing,
         max_range=options.max_range,
     )
-    return exact_overlaps(database(), query(), protocol, reporter.track)
+    return exact_overlaps(database(), query(), protocol)
 
 
 @dataclass(frozen=True)

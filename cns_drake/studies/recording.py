@@ -150,7 +150,6 @@ class Record(Step):
                 folder,
                 page_file=self.page,
                 overwrite=overwrite,
-                on_frame=reporter.progress,
                 on_note=reporter.note,
             )
         if shown is not None:

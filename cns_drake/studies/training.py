@@ -22,7 +22,7 @@ from cns_drake.base.files import check_writable, completing, make_folder
 from cns_drake.base.jobs.cluster import Cluster
 from cns_drake.base.jobs.fingerprint import fingerprint
 from cns_drake.base.jobs.running import Job, run_jobs
-from cns_drake.base.progress import Track, silent
+from cns_drake.base.progress import track
 from cns_drake.base.terminal import resumable
 from cns_drake.base.version import __version__
 from cns_drake.studies.training_drives import (
@@ -339,7 +339,6 @@ def train(
     seed: int,
     state: Path,
     digest: str = "",
-    track: Track = silent,
     on_step: Callable[[int, Parameters], None] = lambda step, values: None,
 ) -> tuple[Parameters, np.ndarray]:
     """Trains the network of the method `learned`; can continue a training.
@@ -351,7 +350,6 @@ def train(
         state: file with the state of the training. If it exists, the training
             continues from there.
         digest: digest of the scans.
-        track: reports progress.
         on_step: is called with the number of each step and the weights.
 
     Returns:
@@ -444,7 +442,7 @@ def train(
             )
         moments, curve = kept.read()
     begin = len(curve)
-    for step in track(range(begin, steps), "training", steps - begin):
+    for step in track(range(begin, steps), "training", steps - begin, "steps"):
         batch = sampler.batch(step)
         *new, value, right = update(
             *moments,
@@ -549,7 +547,6 @@ def make_weights(
     output: Path,
     command: str,
     cluster: Cluster,
-    track: Track = silent,
 ) -> Path:
     """Trains the method `learned` on random cities; writes its weights.
 
@@ -561,7 +558,6 @@ def make_weights(
         output: file of weights.
         command: command line that is stored in the file.
         cluster: runs the jobs.
-        track: reports progress.
 
     Returns:
         Path of the picture of the training curve: `output` with the ending
@@ -600,7 +596,7 @@ def make_weights(
     digest = fingerprint({"cities": [part.identity() for part in parts]})
     with resumable():
         values, curve = train(
-            scans, plan.steps, plan.seed, work / "state.data", digest, track
+            scans, plan.steps, plan.seed, work / "state.data", digest
         )
     seen = scans.images.any(axis=(1, 3)).mean(axis=1)
     least = float(seen.min()) * (1.0 - _HIDDEN_DEG[1] / 360.0)

@@ -19,6 +19,7 @@ from cns_drake.base.errors import InputError
 from cns_drake.base.files import draft_folder
 from cns_drake.base.jobs.step import Reporter
 from cns_drake.base.map_folder import STAGES_NAME, MapFolder
+from cns_drake.base.progress import track
 from cns_drake.city.generation.city_structures import City, make_city
 from cns_drake.city.generation.generate import generate_city
 from cns_drake.city.generation.starter import start_city
@@ -196,7 +197,9 @@ def scan_city(
                 continue
             frames = sample_frames(drive.X_WS[:, :3, 3], _SPACING)
             height = next(iter(scenario.lidars.values())).xyz[2]
-            for frame in reporter.track(frames, scenario.name, len(frames)):
+            for frame in track(
+                frames, f"simulating {scenario.name}", len(frames), "scans"
+            ):
                 points = gather(drive, int(frame), 1, _MAX_RANGE)
                 images.append(polar_image(points, height))
                 xy.append(drive.X_WS[frame, :2, 3])
@@ -237,7 +240,7 @@ def _overlaps(scans: Sequence[_Taken], reporter: Reporter) -> np.ndarray:
     """
     result = np.zeros((len(scans), len(scans)), np.float16)
     X_WSs = np.stack([one.drive.X_WS[one.frame] for one in scans])
-    places = reporter.track(enumerate(scans), "overlaps", len(scans))
+    places = track(enumerate(scans), "comparing scans", len(scans), "scans")
     for column, place in places:
         seen = VisibleSurfaces(sights(place.drive)(place.frame), _MAX_RANGE)
         X_PW = poses.inverse(X_WSs[column])

@@ -25,7 +25,6 @@ import numpy as np
 from cns_drake.base import poses
 from cns_drake.base.drives.drive import Drive, check_same_map
 from cns_drake.base.errors import InputError
-from cns_drake.base.progress import Track, silent
 from evaluation.alignment.anchor_search import (
     agreeing,
     find_candidates,
@@ -152,7 +151,6 @@ def in_one_world(
     first: Drive,
     second: Drive,
     when: When,
-    track: Track = silent,
     *,
     hold_first: bool = False,
     across_maps: bool = False,
@@ -163,7 +161,6 @@ def in_one_world(
         first, second: the drives.
         when: `auto` to align the drives only if the names of their world frames
             differ, `always` or `never`.
-        track: reports progress.
         hold_first: whether the first drive must stay where it is, see `align`.
         across_maps: whether the drives may be from maps with different names.
 
@@ -178,13 +175,12 @@ def in_one_world(
     differ = first.world_frame != second.world_frame
     if when == "never" or (when == "auto" and not differ):
         return None
-    return align(first, second, track, hold_first=hold_first)
+    return align(first, second, hold_first=hold_first)
 
 
 def align(
     first: Drive,
     second: Drive,
-    track: Track = silent,
     *,
     hold_first: bool = False,
 ) -> Alignment:
@@ -194,7 +190,6 @@ def align(
         first: a drive, which stays fixed unless it has drifted more than the
             other.
         second: another drive.
-        track: reports progress.
         hold_first: whether the first drive must stay unchanged in any case,
             because other drives are already aligned to it.
 
@@ -208,13 +203,13 @@ def align(
     if hold_first:
         target, held = Submaps(first), 0.0
     else:
-        target, held = make_consistent(first, track)
-    source, moving = make_consistent(second, track)
+        target, held = make_consistent(first)
+    source, moving = make_consistent(second)
     swapped = held > moving and not hold_first
     if swapped:
         target, held, source, moving = source, moving, target, held
-    search, guess, num_candidates = _start(source, target, track)
-    search.grow(track)
+    search, guess, num_candidates = _start(source, target)
+    search.grow()
     X_TK, model = _fit(search)
     for _ in range(_ROUNDS):
         if not search.retry(_doubtful(search, X_TK), X_TK):
@@ -266,7 +261,7 @@ def align(
 
 
 def _start(
-    source: Submaps, target: Submaps, track: Track
+    source: Submaps, target: Submaps
 ) -> tuple[LoopSearch, str, int | None]:
     """Finds a guess that holds, and the first loops.
 
@@ -288,7 +283,7 @@ def _start(
         )
         if holds:
             return search, known, None
-    candidates = find_candidates(source, target, track)
+    candidates = find_candidates(source, target)
     best = LoopSearch(source, target)
     for guess in find_guesses(candidates):
         seen = np.unique(candidates.source[guess.pairs])
@@ -387,7 +382,7 @@ def _motion(X_WS: np.ndarray, X_TS: np.ndarray) -> dict:
     }
 
 
-def make_consistent(drive: Drive, track: Track) -> tuple[Submaps, float]:
+def make_consistent(drive: Drive) -> tuple[Submaps, float]:
     """Returns a drive's submaps, with poses that are corrected for drift.
 
     The poses of a drive that has drifted are corrected so that they agree at
@@ -405,7 +400,7 @@ def make_consistent(drive: Drive, track: Track) -> tuple[Submaps, float]:
     # Places that are near by come first: their loops bring the others within
     # reach.
     for _ in range(_STRAIGHTENINGS):
-        loops = find_self_loops(submaps, _MOST_SELF_LOOPS, track)
+        loops = find_self_loops(submaps, _MOST_SELF_LOOPS)
         if len(loops) < _FEWEST_SELF_LOOPS:
             break
         distances, _ = loop_errors(loops, submaps.X_WK, submaps.X_WK)

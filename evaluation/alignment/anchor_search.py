@@ -16,7 +16,7 @@ from scipy.spatial.transform import Rotation
 
 from cns_drake.base import poses
 from cns_drake.base.angles import wrapped
-from cns_drake.base.progress import Track
+from cns_drake.base.progress import track
 from evaluation.alignment.loop_search import Loop, implied_poses, loop_errors
 from evaluation.alignment.submaps import Submaps
 from evaluation.drives.sampling import gather
@@ -200,21 +200,19 @@ class Guess:
     pairs: np.ndarray
 
 
-def find_candidates(
-    source: Submaps, target: Submaps, track: Track
-) -> Candidates:
+def find_candidates(source: Submaps, target: Submaps) -> Candidates:
     """Returns pairs of keyframes of two drives that look alike."""
     method = ScanContext()
     places = [
         method.describe_place(gather(target.drive, frame, 1, _MAX_RANGE))
         for frame in track(
-            target.frames, f"describing {target.name}", len(target)
+            target.frames, f"describing {target.name}", len(target), "scans"
         )
     ]
     database = method.build_database(places)
     found = []
     for k in track(
-        range(len(source)), f"recognising {source.name}", len(source)
+        range(len(source)), f"recognising {source.name}", len(source), "scans"
     ):
         frame = int(source.frames[k])
         query = method.describe(gather(source.drive, frame, 1, _MAX_RANGE))
@@ -231,12 +229,12 @@ def find_candidates(
             )
             found.append((k, int(place), turn))
     rows = np.array(found).reshape(-1, 3)
-    k, place = rows[:, 0].astype(np.int64), rows[:, 1].astype(np.int64)
+    sources, targets = rows[:, :2].astype(np.int64).T
     return Candidates(
-        source=k,
-        target=place,
-        p_S=source.X_WK[k, :3, 3],
-        p_T=target.X_WK[place, :3, 3],
+        source=sources,
+        target=targets,
+        p_S=source.X_WK[sources, :3, 3],
+        p_T=target.X_WK[targets, :3, 3],
         turn=rows[:, 2],
     )
 

@@ -6,7 +6,7 @@ import numpy as np
 from scipy.spatial.transform import Rotation
 
 from cns_drake.base import poses
-from cns_drake.base.progress import Track
+from cns_drake.base.progress import track
 from evaluation.alignment.registration import register
 from evaluation.alignment.submaps import Submaps
 
@@ -163,7 +163,7 @@ class LoopSearch:
         self.loops[k] = loop
         return True
 
-    def grow(self, track: Track) -> None:
+    def grow(self) -> None:
         """Tries to register all keyframes, starting next to known loops.
 
         The initial guess for a keyframe is computed from the nearest registered
@@ -184,7 +184,7 @@ class LoopSearch:
             learn(k)
         remaining = int(is_open.sum())
         description = f"aligning {self.source.name}"
-        for _ in track(range(remaining), description, remaining):
+        for _ in track(range(remaining), description, remaining, "loops"):
             k = int(np.where(is_open, away, np.inf).argmin())
             is_open[k] = False
             if self.attempt(k, self._moved_like(teacher[k], k)):
@@ -225,7 +225,7 @@ class LoopSearch:
         return nearest if away[nearest] <= SAME_PLACE else None
 
 
-def find_self_loops(drive: Submaps, most: int, track: Track) -> list[Loop]:
+def find_self_loops(drive: Submaps, most: int) -> list[Loop]:
     """Returns the loops between keyframes of the same drive.
 
     A loop connects a keyframe with an earlier one that is at most 10 m away,
@@ -243,7 +243,9 @@ def find_self_loops(drive: Submaps, most: int, track: Track) -> list[Loop]:
             pairs.append((k, int(away.argmin())))
     chosen = [pairs[index] for index in evenly(len(pairs), most)]
     loops = []
-    for k, place in track(chosen, f"checking {drive.name}", len(chosen)):
+    for k, place in track(
+        chosen, f"checking {drive.name}", len(chosen), "places"
+    ):
         X_LK = poses.inverse(drive.X_WK[place]) @ drive.X_WK[k]
         loop = close(drive, drive, k, place, X_LK)
         if loop is not None:

@@ -17,7 +17,6 @@ from scipy.spatial import cKDTree
 
 from cns_drake.base.errors import InputError
 from cns_drake.base.json_text import json_values
-from cns_drake.base.progress import Track, silent
 from evaluation.change.tcr import (
     COVERAGE_RADIUS,
     GRIDS,
@@ -136,19 +135,18 @@ class ChangeReport:
         return json_values(values)
 
 
-def survey(path: Path, track: Track = silent) -> Surveyed:
+def survey(path: Path) -> Surveyed:
     """Reads a drive or map file, and returns its voxel map.
 
     Raises:
         InputError: if the path can be read neither as a drive nor as a map.
     """
-    return _survey(open_source(path), track)
+    return _survey(open_source(path))
 
 
 def survey_in_one_world(
     paths: list[Path],
     when: When,
-    track: Track = silent,
     lidar: str | None = None,
     columns: int | None = None,
 ) -> tuple[list[Surveyed], list[AlignmentReport]]:
@@ -159,7 +157,6 @@ def survey_in_one_world(
             world.
         when: whether all other drives are aligned with the first one: `auto`
             (if their world frames differ), `always` or `never`.
-        track: reports progress.
         lidar: name of the LiDAR, for recordings with several.
         columns: number of columns of `.bin` files; by default guessed from the
             values.
@@ -185,15 +182,13 @@ def survey_in_one_world(
                 drives[first],
                 drives[other],
                 when,
-                track,
                 hold_first=number > 0,
             )
             if alignment is not None:
                 drives[first], drives[other] = alignment.first, alignment.second
                 reports.append(alignment.report)
     return [
-        _survey(drives.get(i, one), track, columns)
-        for i, one in enumerate(opened)
+        _survey(drives.get(i, one), columns) for i, one in enumerate(opened)
     ], reports
 
 
@@ -273,11 +268,9 @@ def open_source(
     return open_drive(path, lidar, columns)
 
 
-def _survey(
-    source: Drive | Path, track: Track, columns: int | None = None
-) -> Surveyed:
+def _survey(source: Drive | Path, columns: int | None = None) -> Surveyed:
     if isinstance(source, Drive):
-        voxels = map_drive(source, CELL_SIZE, track)
+        voxels = map_drive(source, CELL_SIZE)
         positions = source.X_WS[:, :3, 3]
         return Surveyed(source.name, voxels, positions, source, source.notes)
     accumulator = VoxelAccumulator(CELL_SIZE)

@@ -84,7 +84,7 @@ def tcr(
 
     paths = [path for path in (source, target, control) if path is not None]
     surveys, alignments = change.survey_in_one_world(
-        paths, align, terminal.track, lidar, columns
+        paths, align, lidar, columns
     )
     report = change.compare_maps(
         surveys[0],
@@ -225,7 +225,6 @@ def pr(
         chosen,
         mode,
         protocol,
-        terminal.track,
         across_maps=across_maps,
         overlaps=exact,
     )
@@ -298,7 +297,6 @@ def scores(
         database,
         query,
         output,
-        terminal.track,
         gate_radius=protocol.gate_radius,
         columns=columns,
         on_note=terminal.note,

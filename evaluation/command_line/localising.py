@@ -116,9 +116,7 @@ def localise(
         check_same_world(source, drive)
     if output is not None:
         make_folder(output)
-    surroundings = estimators.make_map(
-        source, settings, terminal.track, columns, terminal.note
-    )
+    surroundings = estimators.make_map(source, settings, columns, terminal.note)
     is_mapped = queries.mapped_frames(source, surroundings, drive)
     localiser = queries.Localiser(surroundings, estimator, settings)
     values: dict = {
@@ -131,7 +129,7 @@ def localise(
     }
     if track:
         rows = tracking.track_drive(
-            localiser, drive, is_mapped, starts, odometry_drift, terminal.track
+            localiser, drive, is_mapped, starts, odometry_drift
         )
         values |= {"odometry_drift": odometry_drift}
         values |= tracking.summary(rows)
@@ -143,7 +141,6 @@ def localise(
             frames,
             starts,
             num_jobs,
-            terminal.track,
         )
     if all(map(math.isnan, rows["unmapped"])):
         raise InputError(

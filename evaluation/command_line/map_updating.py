@@ -75,7 +75,7 @@ def map_update(
         )
     else:
         name = (baseline or BaselineName.FREE_SPACE).value
-        found = run_baseline(name, pair, terminal.track)
+        found = run_baseline(name, pair)
     if output is not None:
         for session, labels in zip(pair, found, strict=True):
             sessions.write_labels(output / f"{session.side}.npy", labels)
@@ -113,7 +113,7 @@ def map_sessions(
     check_same_world(*drives)
     with draft_folder(output) as draft:
         for side, drive in zip(SIDES, drives, strict=True):
-            write_session(drive, draft / side, spacing, terminal.track)
+            write_session(drive, draft / side, spacing)
     print(output)
 
 

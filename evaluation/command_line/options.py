@@ -106,9 +106,7 @@ def aligned(
     from evaluation.alignment import in_one_world
 
     first, second = drives
-    alignment = in_one_world(
-        first, second, when, terminal.track, across_maps=across_maps
-    )
+    alignment = in_one_world(first, second, when, across_maps=across_maps)
     if alignment is None:
         return first, second
     terminal.note(alignment.report.to_text())

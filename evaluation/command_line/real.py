@@ -40,7 +40,7 @@ def real(
     from evaluation.real.measuring import Measuring
     from evaluation.results.table import QUERIES, RESULTS
 
-    measuring = Measuring(method or (), terminal.track, terminal.note)
+    measuring = Measuring(method or (), terminal.note)
     make_folder(output)
     measuring.run(folder, simulated)
     if not measuring.rows:

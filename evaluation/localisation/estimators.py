@@ -27,7 +27,7 @@ from cns_drake.base import points as clouds
 from cns_drake.base import poses
 from cns_drake.base.drives.drive import Drive
 from cns_drake.base.errors import InputError, did_you_mean
-from cns_drake.base.progress import Track, silent
+from cns_drake.base.progress import track
 from evaluation.alignment.registration import (
     Surface,
     covariances,
@@ -192,7 +192,6 @@ def _voxel_shift(resolution: float) -> np.ndarray:
 def make_map(
     source: Drive | Path,
     settings: Settings,
-    track: Track = silent,
     columns: int | None = None,
     on_note: OnNote = no_note,
 ) -> LocalisationMap:
@@ -203,7 +202,6 @@ def make_map(
     Args:
         source: the drive, or the cloud's file.
         settings: settings for thinning and for normals.
-        track: reports progress.
         columns: number of columns of a `.bin` file; by default guessed from the
             values.
         on_note: is called with notes on how a cloud's file was read.
@@ -212,7 +210,7 @@ def make_map(
         InputError: the source cannot be read, or has too few points.
     """
     if isinstance(source, Drive):
-        blocks = _scans(source, track)
+        blocks = _scans(source)
     else:
         parts = read_blocks(source, columns, on_note)
         blocks = ((part, None) for part in parts)
@@ -228,12 +226,10 @@ def make_map(
     return map_of(points, source.name, settings)
 
 
-def _scans(
-    drive: Drive, track: Track
-) -> Iterator[tuple[np.ndarray, np.ndarray | None]]:
+def _scans(drive: Drive) -> Iterator[tuple[np.ndarray, np.ndarray | None]]:
     """Yields the cropped scans of which a map is made, each with its X_WS."""
     frames = sample_frames(drive.X_WS[:, :3, 3], _MAP_SPACING).tolist()
-    for frame in track(frames, f"mapping {drive.name}", len(frames)):
+    for frame in track(frames, f"mapping {drive.name}", len(frames), "scans"):
         scan = drive.scan(frame)
         near = within_range(clouds.xyz(scan), MAX_RANGE)
         yield scan[near], drive.X_WS[frame]

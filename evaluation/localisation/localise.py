@@ -22,7 +22,7 @@ from cns_drake.base.csv_files import write_csv
 from cns_drake.base.drives.drive import Drive
 from cns_drake.base.errors import InputError, errors_at
 from cns_drake.base.json_text import json_values
-from cns_drake.base.progress import Track, silent
+from cns_drake.base.progress import track
 from evaluation.clouds.cloud_files import OnNote, read_cloud
 from evaluation.drives.sampling import cropped, sample_frames
 from evaluation.drives.scan_files import FileDrive
@@ -318,7 +318,6 @@ def localise(
     frames: Sequence[int],
     starts: Starts,
     jobs: int = 1,
-    track: Track = silent,
 ) -> np.ndarray:
     """Localises scans of a drive, each independently of the others.
 
@@ -328,7 +327,6 @@ def localise(
         frames: frames of the scans, in any order.
         starts: how the initial poses are drawn.
         jobs: number of processes, where the system can fork.
-        track: reports progress.
 
     Returns:
         (K,) records of `QUERY`, in the order of the frames.
@@ -364,7 +362,9 @@ def localise(
 
     _localiser = localiser
     with errors_at(query.name):
-        done = list(track(rows(), f"localising {query.name}", len(frames)))
+        done = list(
+            track(rows(), f"localising {query.name}", len(frames), "scans")
+        )
     return np.array(done, QUERY)
 
 

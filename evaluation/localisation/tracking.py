@@ -6,7 +6,7 @@ from scipy.spatial.transform import Rotation
 from cns_drake.base import poses
 from cns_drake.base.drives.drive import Drive
 from cns_drake.base.errors import InputError
-from cns_drake.base.progress import Track, silent
+from cns_drake.base.progress import track
 from evaluation.drives.sampling import sample_frames, travelled
 from evaluation.localisation.localise import (
     COLUMNS,
@@ -78,7 +78,6 @@ def track_drive(
     is_mapped: np.ndarray,
     starts: Starts,
     drift: float,
-    track: Track = silent,
 ) -> np.ndarray:
     """Tracks a drive along each section of its path that the map covers.
 
@@ -91,7 +90,6 @@ def track_drive(
         is_mapped: (N,) bool, which frames lie within the map.
         starts: how the initial pose of a section's first scan is drawn.
         drift: see `drifting_steps`.
-        track: reports progress.
 
     Returns:
         (K,) records of `TRACKED`. Before the fields of `QUERY`, each contains
@@ -119,7 +117,9 @@ def track_drive(
     steps = drifting_steps(X_WS[frames], way[frames], drift, starts.seed)
     rows = np.zeros(len(frames), TRACKED)
     last: np.ndarray | None = None
-    for k in track(range(len(frames)), f"tracking {query.name}", len(frames)):
+    for k in track(
+        range(len(frames)), f"tracking {query.name}", len(frames), "scans"
+    ):
         frame = int(frames[k])
         is_first = k == 0 or stretches[k] != stretches[k - 1]
         offset = turn = np.zeros(3)

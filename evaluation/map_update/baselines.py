@@ -27,7 +27,7 @@ import numpy as np
 
 from cns_drake.base.errors import InputError
 from cns_drake.base.process import num_cores
-from cns_drake.base.progress import Track, silent
+from cns_drake.base.progress import track
 from evaluation.drives.sampling import sample_frames
 from evaluation.map_update.scores import Labels, nearest
 from evaluation.map_update.sessions import SIDES, Pair, Session
@@ -65,13 +65,12 @@ _SHOWN, _ENOUGH = 0.05, 2
 _BLOCK, _PART, _AT = 1.0, 0.2, 0.12
 
 
-def run_baseline(name: str, pair: Pair, track: Track = silent) -> Labels:
+def run_baseline(name: str, pair: Pair) -> Labels:
     """Returns the labels of both maps by a shipped change detector.
 
     Args:
         name: name of the detector, a key of `BASELINES`.
         pair: the two sessions.
-        track: reports progress.
 
     Raises:
         InputError: the sessions lack data that the detector needs, or its
@@ -79,16 +78,11 @@ def run_baseline(name: str, pair: Pair, track: Track = silent) -> Labels:
     """
     label = BASELINES[name]
     return Labels(
-        *(
-            label(mine, theirs, track)
-            for mine, theirs in (pair, (pair.B, pair.A))
-        )
+        *(label(mine, theirs) for mine, theirs in (pair, (pair.B, pair.A)))
     )
 
 
-def by_distance(
-    mine: Session, theirs: Session, track: Track = silent
-) -> np.ndarray:
+def by_distance(mine: Session, theirs: Session) -> np.ndarray:
     """Returns the labels (N,) uint8 of a map by the baseline `distance`.
 
     A point is kept if the other map has a point within 0.5 m. Otherwise it is
@@ -98,16 +92,13 @@ def by_distance(
     Args:
         mine: the map with N points, and its drive.
         theirs: the map of the other drive.
-        track: reports progress.
     """
     _, kept, changed = SIDES[mine.side]
     far = np.isinf(nearest(mine.points, theirs.points, _APART))
     return np.where(far, changed, kept).astype(np.uint8)
 
 
-def by_free_space(
-    mine: Session, theirs: Session, track: Track = silent
-) -> np.ndarray:
+def by_free_space(mine: Session, theirs: Session) -> np.ndarray:
     """Returns a label for each point of a map, by the baseline `free-space`.
 
     The labels state whether the other drive finds the point unchanged or
@@ -116,7 +107,6 @@ def by_free_space(
     Args:
         mine: the drive whose map of N points is labelled.
         theirs: the other drive, with its map and scans.
-        track: reports progress.
 
     Returns:
         (N,) uint8, values of `evaluation.map_update.sessions.Label`.
@@ -131,7 +121,7 @@ def by_free_space(
     _, first, cell_of = np.unique(
         cells, axis=0, return_index=True, return_inverse=True
     )
-    past, shown, hidden = _count_views(points[first], theirs, track)
+    past, shown, hidden = _count_views(points[first], theirs)
     needed = np.minimum(_SHOWN * hidden, _ENOUGH)
     is_shown = (shown > 0) & (shown >= needed)
     found = np.where(is_shown, kept, unobserved)
@@ -152,9 +142,7 @@ def by_free_space(
     return labels
 
 
-def _count_views(
-    points: np.ndarray, other: Session, track: Track
-) -> np.ndarray:
+def _count_views(points: np.ndarray, other: Session) -> np.ndarray:
     """Returns how many scans see past each point, show it, or hide it.
 
     The module's text on `free-space` defines the first two. A scan hides a
@@ -196,7 +184,7 @@ def _count_views(
     with ThreadPoolExecutor(num_cores()) as threads:
         found = threads.map(look, chosen)
         what = f"free space of {other.side}"
-        for kinds in track(found, what, len(chosen)):
+        for kinds in track(found, what, len(chosen), "views"):
             for count, rows in zip(counts, kinds, strict=True):
                 count[rows] += 1
     return counts
@@ -206,9 +194,7 @@ def _slopes(p_S: np.ndarray) -> np.ndarray:
     return p_S[:, 2] / np.maximum(np.hypot(p_S[:, 0], p_S[:, 1]), 1e-9)
 
 
-def by_m3c2(
-    mine: Session, theirs: Session, track: Track = silent
-) -> np.ndarray:
+def by_m3c2(mine: Session, theirs: Session) -> np.ndarray:
     """Returns the labels (N,) uint8 of a map by the baseline `m3c2`.
 
     A point is gone (older map) or new (newer map) if the M3C2 distance of the
@@ -219,7 +205,6 @@ def by_m3c2(
     Args:
         mine: the map with N points, and its drive.
         theirs: the map of the other drive.
-        track: reports progress.
     """
     py4dgeo = _py4dgeo()
     unobserved, kept, changed = SIDES[mine.side]
@@ -233,7 +218,7 @@ def by_m3c2(
             cyl_radius=_CYLINDER,
             max_distance=_FARTHEST,
         ).run()
-        for chunk in track(chunks, f"m3c2 of {mine.side}", len(chunks))
+        for chunk in track(chunks, f"m3c2 of {mine.side}", len(chunks), "parts")
     ]
     distances = np.concatenate([each[0] for each in found])
     detectable = np.concatenate([each[1]["lodetection"] for each in found])
@@ -243,7 +228,7 @@ def by_m3c2(
     return labels.astype(np.uint8)
 
 
-BASELINES: dict[str, Callable[[Session, Session, Track], np.ndarray]] = {
+BASELINES: dict[str, Callable[[Session, Session], np.ndarray]] = {
     "free-space": by_free_space,
     "distance": by_distance,
     "m3c2": by_m3c2,

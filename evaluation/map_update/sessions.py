@@ -28,7 +28,7 @@ from cns_drake.base.drives.drive import Drive
 from cns_drake.base.errors import InputError
 from cns_drake.base.files import completing, is_there, user_errors
 from cns_drake.base.points import encode_pcd, xyz
-from cns_drake.base.progress import Track, silent
+from cns_drake.base.progress import track
 from evaluation.clouds.cloud_files import read_blocks, read_cloud, read_npy
 from evaluation.drives.sampling import sample_frames
 from evaluation.drives.text_tables import read_poses
@@ -180,7 +180,6 @@ def write_session(
     drive: Drive,
     folder: Path,
     spacing: float = SPACING,
-    track: Track = silent,
 ) -> tuple[Session, np.ndarray]:
     """Writes the map, scans and poses of a drive to a folder.
 
@@ -188,7 +187,6 @@ def write_session(
         drive: the drive.
         folder: folder to create for the session.
         spacing: distance driven between two scans [m].
-        track: reports progress.
 
     Returns:
         The session, and the frames (K,) of the drive that are its scans.
@@ -202,7 +200,9 @@ def write_session(
     with user_errors(folder):
         (folder / "Scans").mkdir(parents=True)
         for number, frame in enumerate(
-            track(frames.tolist(), f"mapping {drive.name}", len(frames))
+            track(
+                frames.tolist(), f"mapping {drive.name}", len(frames), "scans"
+            )
         ):
             scan = drive.scan(frame)
             builder.add(scan, X_WS[number])

@@ -16,7 +16,7 @@ import numpy as np
 from cns_drake.base.compiled import compiled
 from cns_drake.base.drives.drive import Drive
 from cns_drake.base.points import from_xyz
-from cns_drake.base.progress import Track, silent
+from cns_drake.base.progress import track
 
 # One slot of the hash table of voxels: the number of a voxel, how many points
 # it has (0: the slot is free), and their sum relative to its corner [m]. A slot
@@ -419,7 +419,6 @@ def voxelise(
 def map_drive(
     drive: Drive,
     voxel_size: float = VOXEL_SIZE,
-    track: Track = silent,
     frames: Sequence[int] | None = None,
 ) -> VoxelMap:
     """Returns the voxel map of scans of a drive, in the world frame.
@@ -438,7 +437,7 @@ def map_drive(
     accumulator = VoxelAccumulator(voxel_size)
     X_WS = drive.X_WS
     frames = range(len(drive)) if frames is None else frames
-    for frame in track(frames, f"mapping {drive.name}", len(frames)):
+    for frame in track(frames, f"mapping {drive.name}", len(frames), "scans"):
         accumulator.add(drive.scan(frame), X_WS[frame])
     return accumulator.to_map()
 

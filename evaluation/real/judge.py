@@ -26,7 +26,7 @@ from sklearn.ensemble import HistGradientBoostingClassifier
 from sklearn.model_selection import PredefinedSplit, cross_val_score
 from threadpoolctl import threadpool_limits
 
-from cns_drake.base.progress import Track, silent
+from cns_drake.base.progress import track
 from evaluation.drives import Drive
 
 _PATCHES = 16
@@ -406,7 +406,6 @@ def judge_draws(
     real: list[list[np.ndarray]],
     simulated: list[list[np.ndarray]],
     draws: int,
-    track: Track = silent,
 ) -> dict:
     """Returns how well a classifier tells real from simulated scans.
 
@@ -416,10 +415,9 @@ def judge_draws(
     Args:
         real, simulated: scans by place, see `places_of`.
         draws: number of random draws of patches.
-        track: reports progress.
     """
     results = []
-    for seed in track(range(draws), "judging", draws):
+    for seed in track(range(draws), "judging", draws, "draws"):
         sets = Features(real, seed), Features(simulated, seed)
         results.append(aucs_by_group(*sets))
     for key in ("auc", "control"):

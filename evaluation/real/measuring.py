@@ -19,7 +19,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from cns_drake.base.errors import InputError
-from cns_drake.base.progress import Track
+from cns_drake.base.progress import track
 from evaluation.clouds.cloud_files import OnNote
 from evaluation.drives import Drive
 from evaluation.localisation import estimators, localise
@@ -82,14 +82,13 @@ class Measuring:
         answers: the results for each query.
     """
 
-    def __init__(self, names: Sequence[str], track: Track, on_note: OnNote):
+    def __init__(self, names: Sequence[str], on_note: OnNote):
         """Chooses the methods and estimators to measure.
 
         Args:
             names: names of methods and estimators, or Python files with your
                 own; if empty, all shipped ones. A file of an estimator defines
                 a function `localise`.
-            track: reports progress.
             on_note: is called with each note for the user.
 
         Raises:
@@ -98,7 +97,6 @@ class Measuring:
         """
         self.rows: list[Row] = []
         self.answers: list[Answers] = []
-        self._track = track
         self._note = on_note
         chosen = names or (*shipped_methods(), *_ESTIMATORS)
         aligning = {
@@ -223,7 +221,6 @@ class Measuring:
             methods,
             {"places", "queries"} if protocol is _REAL else {"places"},
             protocol,
-            self._track,
             visit=lambda _, cloud: scans.append(cloud),
         )
         return _Part(name, world, described, scans)
@@ -249,7 +246,7 @@ class Measuring:
         shown = [_REAL.query_scan(drive, k) for k in range(len(drive))]
         overlaps = None
         for k, method in enumerate(
-            self._track(methods, one.name, len(methods))
+            track(methods, f"comparing {one.name}", len(methods), "methods")
         ):
             own = parts[0].described[k]
             places = joined_scans(
@@ -298,7 +295,7 @@ class Measuring:
         R_WT = localise.way_axes(X_WS[:, :3, 3], X_WS)
         found: dict[str, list[np.ndarray]] = {n: [] for n in self._estimators}
         frames = range(len(drive)) if found else ()
-        for k in self._track(frames, f"localising {one.name}", len(frames)):
+        for k in track(frames, f"localising {one.name}", len(frames), "scans"):
             apart = np.linalg.norm(X_WS[:, :3, 3] - X_WS[k, :3, 3], axis=1)
             apart[k] = math.inf
             if apart.min() > localise.NEAR:
@@ -349,9 +346,7 @@ class Measuring:
         if len(places) < 2:
             self._note(f"{one.name}: one place, not judged")
             return
-        found = judge.judge_draws(
-            places, judge.places_of(made), _DRAWS, self._track
-        )
+        found = judge.judge_draws(places, judge.places_of(made), _DRAWS)
         for group, auc in found["auc"].items():
             values = {"auc": auc, "auc_control": found["control"][group]}
             known = [

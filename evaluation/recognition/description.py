@@ -8,7 +8,7 @@ import numpy as np
 
 from cns_drake.base.drives.drive import Drive
 from cns_drake.base.errors import InputError
-from cns_drake.base.progress import Track, silent
+from cns_drake.base.progress import track
 from evaluation.drives.sampling import QuerySensor, gather, sample_frames
 from evaluation.methods.method import Method, check_number
 from evaluation.recognition.metrics import route_blocks
@@ -104,7 +104,6 @@ def describe_drive(
     methods: Iterable[Method],
     roles: Set[Role],
     protocol: RetrievalProtocol = RECORDED_PROTOCOL,
-    track: Track = silent,
     visit: Callable[[int, np.ndarray], None] | None = None,
     further: Iterable[Request] = (),
 ) -> list[DescribedDrive]:
@@ -120,7 +119,6 @@ def describe_drive(
         roles: whether the drive has places, queries or both.
         protocol: protocol by which frames of places and queries are chosen, and
             their clouds made.
-        track: reports progress.
         visit: function that is called with the frame number and the scan (N, 3)
             of each place and query that `protocol` chooses. The scan is cropped
             to the protocol's range, in the sensor's frame. If the drive has
@@ -144,7 +142,9 @@ def describe_drive(
     )
     wanted = sorted(visited.union(*(one.frames for one in describing)))
     num_points = 0
-    for frame in track(wanted, f"describing {drive.name}", len(wanted)):
+    for frame in track(
+        wanted, f"describing {drive.name}", len(wanted), "scans"
+    ):
         seen = _Seen(drive, frame)
         if visit is not None and frame in visited:
             of_query = "places" not in roles

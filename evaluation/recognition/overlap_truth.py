@@ -20,7 +20,7 @@ from cns_drake.base import poses
 from cns_drake.base.csv_files import read_records, write_csv
 from cns_drake.base.drives.drive import Drive
 from cns_drake.base.errors import InputError
-from cns_drake.base.progress import Track, silent
+from cns_drake.base.progress import track
 from evaluation.drives.sampling import gather, sample_frames
 from evaluation.recognition.protocol import RetrievalProtocol
 from evaluation.recognition.seen_surfaces import TOLERANCE, SeenSurfaces
@@ -53,7 +53,6 @@ def overlap_matrix(
     database: Drive,
     query: Drive,
     protocol: RetrievalProtocol,
-    track: Track = silent,
     see: Callable[[int], Seen] | None = None,
 ) -> np.ndarray:
     """Returns the overlap of every query with every place, (Q, D) float64.
@@ -65,7 +64,6 @@ def overlap_matrix(
         database: the drive of the places.
         query: the drive of the queries, in the same world frame.
         protocol: protocol by which frames of queries and places are chosen.
-        track: reports progress.
         see: function that returns the surfaces seen at a frame of the database.
             By default these are the surfaces of the frame's scan, and at most
             8192 points of a query are compared.
@@ -84,6 +82,7 @@ def overlap_matrix(
             query_frames.tolist(),
             f"overlap: reading {query.name}",
             len(query_frames),
+            "scans",
         )
     ]
     if see is None:
@@ -96,7 +95,10 @@ def overlap_matrix(
     result = np.zeros((len(query_frames), len(placed)))
     result[[len(points) == 0 for points in clouds]] = math.nan
     columns = track(
-        range(len(placed)), f"overlap: seeing {database.name}", len(placed)
+        range(len(placed)),
+        f"overlap: seeing {database.name}",
+        len(placed),
+        "places",
     )
     for column in columns:
         seen = see(int(placed[column]))

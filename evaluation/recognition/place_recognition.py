@@ -9,7 +9,6 @@ import numpy as np
 from cns_drake.base.drives.drive import Drive
 from cns_drake.base.errors import InputError
 from cns_drake.base.json_text import json_values
-from cns_drake.base.progress import Track, silent
 from evaluation.methods.method import Method
 from evaluation.recognition.metrics import (
     MODES,
@@ -129,7 +128,6 @@ def run(
     method: Method,
     mode: Mode = "all",
     protocol: RetrievalProtocol = RECORDED_PROTOCOL,
-    track: Track = silent,
     *,
     across_maps: bool = False,
     overlaps: np.ndarray | None = None,
@@ -142,7 +140,6 @@ def run(
         mode: which queries count: `all`, or only those with a match
             (`filtered`).
         protocol: protocol of the comparison.
-        track: reports progress.
         across_maps: whether the drives may be from maps with different names.
         overlaps: (Q, D) share of each query's scan that each place's scan
             shows; by default computed from the scans. Used only for matches by
@@ -158,7 +155,6 @@ def run(
         query,
         method,
         protocol,
-        track,
         across_maps=across_maps,
         overlaps=overlaps,
     )

@@ -10,7 +10,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from cns_drake.base.drives.drive import Drive, check_same_world
-from cns_drake.base.progress import Track, silent
+from cns_drake.base.progress import track
 from evaluation.methods.method import Method
 from evaluation.recognition.description import DescribedDrive, describe_drive
 from evaluation.recognition.overlap_truth import overlap_matrix
@@ -93,7 +93,6 @@ def retrieve(
     query: Drive,
     method: Method,
     protocol: RetrievalProtocol = RECORDED_PROTOCOL,
-    track: Track = silent,
     *,
     across_maps: bool = False,
     overlaps: np.ndarray | None = None,
@@ -105,7 +104,6 @@ def retrieve(
         query: the drive of the queries, in the same world frame.
         method: method that describes and compares the scans.
         protocol: protocol of the comparison.
-        track: called with the progress.
         across_maps: whether the drives may be from maps with different names.
         overlaps: (Q, D) share of each query's scan that each place's scan
             shows; by default computed from the scans. Used only for matches by
@@ -123,12 +121,12 @@ def retrieve(
     """
     check_same_world(database, query, across_maps=across_maps)
     if protocol.overlap is not None and overlaps is None:
-        overlaps = overlap_matrix(database, query, protocol, track)
-    (places,) = describe_drive(database, [method], {"places"}, protocol, track)
-    (queries,) = describe_drive(query, [method], {"queries"}, protocol, track)
+        overlaps = overlap_matrix(database, query, protocol)
+    (places,) = describe_drive(database, [method], {"places"}, protocol)
+    (queries,) = describe_drive(query, [method], {"queries"}, protocol)
     radii = [protocol.gate_radius]
     (found,) = compare_with_gates(
-        method, places, queries, protocol, radii, track, overlaps
+        method, places, queries, protocol, radii, overlaps
     )
     return found
 
@@ -139,7 +137,6 @@ def compare_with_gates(
     query: DescribedDrive,
     protocol: RetrievalProtocol,
     gate_radii: Collection[float | None],
-    track: Track = silent,
     overlaps: np.ndarray | None = None,
     is_known: np.ndarray | None = None,
 ) -> list[Retrieval]:
@@ -155,7 +152,6 @@ def compare_with_gates(
         protocol: protocol by which both drives were described; its own gate
             does not matter.
         gate_radii: radius of each gate [m]; None stands for no gate.
-        track: reports progress.
         overlaps: (Q, D) share of each query's scan that each place's scan
             shows; needed for matches by overlap.
         is_known: (Q, D) bool, which places are allowed for each query; by
@@ -176,6 +172,7 @@ def compare_with_gates(
         range(len(queries.frames)),
         f"querying {query.name}",
         len(queries.frames),
+        "queries",
     )
     for row in rows:
         alone[row] = score_places(

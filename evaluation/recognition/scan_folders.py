@@ -8,7 +8,7 @@ import numpy as np
 from cns_drake.base import points as point_arrays
 from cns_drake.base.errors import InputError
 from cns_drake.base.files import completing
-from cns_drake.base.progress import Track, silent
+from cns_drake.base.progress import track
 from evaluation.clouds.bin_columns import find_layout
 from evaluation.clouds.cloud_files import (
     OnNote,
@@ -27,7 +27,6 @@ def write_scores(
     database: Path,
     query: Path,
     output: Path,
-    track: Track = silent,
     *,
     gate_radius: float | None = None,
     columns: int | None = None,
@@ -46,7 +45,6 @@ def write_scores(
         database: folder of the scans of places, one file each.
         query: folder of the scans of queries, one file each.
         output: the file to write.
-        track: reports progress.
         gate_radius: radius of the gate [m], see
             `evaluation.recognition.scoring.gated`; None for no gate.
         columns: number of columns of `.bin` files; by default guessed for each
@@ -75,7 +73,9 @@ def write_scores(
     on_note = _first_of_each_kind(on_note)
     num_ignored = 0
     descriptors, clouds = [], []
-    for path in track(place_files, "describing places", len(place_files)):
+    for path in track(
+        place_files, "describing places", len(place_files), "scans"
+    ):
         cloud, ignored = _read(path, method, place_columns, on_note)
         descriptors.append(method.describe_place(cloud))
         if method.rerank_best:
@@ -90,7 +90,7 @@ def write_scores(
     ):
         writer = csv.writer(stream, lineterminator="\n")
         writer.writerow(["query", "database", "score"])
-        for path in track(query_files, "querying", len(query_files)):
+        for path in track(query_files, "querying", len(query_files), "scans"):
             cloud, ignored = _read(path, method, query_columns, on_note)
             num_ignored += ignored
             queries.append(method.describe(cloud))

@@ -15,7 +15,7 @@ from cns_drake.base.drives.drive import Drive
 from cns_drake.base.jobs.step import Reporter
 from cns_drake.base.points import xyz
 from cns_drake.base.poses import inverse, transform
-from cns_drake.base.progress import Track, silent
+from cns_drake.base.progress import track
 from evaluation.drives.sampling import within_range
 from evaluation.maps.voxel_maps import thin
 from evaluation.methods import MethodConfig
@@ -65,7 +65,7 @@ def explain_faults(
     if None in found or not found:
         return None
     database, query = (part.read() for part in drives)
-    return find_evidence(database, query, found, protocol, reporter.track)
+    return find_evidence(database, query, found, protocol)
 
 
 def find_evidence(
@@ -73,7 +73,6 @@ def find_evidence(
     query: Drive | KeptDrive,
     results: Sequence[PlaceRecognition],
     protocol: RetrievalProtocol,
-    track: Track = silent,
 ) -> PairEvidence:
     """Returns evidence on why the best places of queries are wrong.
 
@@ -85,7 +84,6 @@ def find_evidence(
         query: drive of the queries.
         results: results of methods on this pair.
         protocol: protocol of the results.
-        track: reports progress.
 
     Raises:
         InputError: a scan cannot be read.
@@ -100,6 +98,7 @@ def find_evidence(
         np.flatnonzero(is_needed).tolist(),
         f"why: seeing {database.name}",
         int(is_needed.sum()),
+        "places",
     ):
         frame = int(first.database_frames[place])
         shown[place] = _Shown.of(database, frame, protocol.max_range)
@@ -114,7 +113,9 @@ def find_evidence(
     )
     changed_classes = [""] * number
     fits = {method: np.full(number, math.nan) for method in wrong}
-    for row in track(range(number), f"why: comparing {query.name}", number):
+    for row in track(
+        range(number), f"why: comparing {query.name}", number, "queries"
+    ):
         frame = int(first.query_frames[row])
         query_scan = _Shown.of(query, frame, protocol.max_range)
         matches = np.flatnonzero(first.matches[row]).tolist()

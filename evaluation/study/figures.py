@@ -4,6 +4,7 @@ from pathlib import Path
 
 from cns_drake.base.files import file_name, make_folder
 from cns_drake.base.jobs.step import Reporter
+from cns_drake.base.progress import doing
 from evaluation.change.drive_change import ChangeResult, Surveyed, compare_maps
 from evaluation.recognition.metrics import MODES
 from evaluation.report import figures
@@ -47,7 +48,7 @@ def draw_city(
     """
     names, views, routes, drives = [], [], [], {}
     for done, (name, surveyed, fine, source) in enumerate(stages):
-        reporter.progress(done, len(stages) + 1)
+        doing("drawing the maps", done, len(stages), "drives")
         drive = surveyed.read()
         view = figures.top_view(fine.read(), drive.positions)
         names.append(name)
@@ -60,7 +61,7 @@ def draw_city(
         drives[drive.name] = make_drive(
             drive.name, view, drive.X_WS, drive.frames, drive.thumbnails, images
         )
-    reporter.progress(len(stages), len(stages) + 1)
+    doing("drawing the routes")
     make_folder(stem.parent)
     figures.draw_routes(map_name, names, views, routes, stem)
     return drives
@@ -87,6 +88,7 @@ def compare_stages(
             what changed, the second figure shows the sets of points from which
             TCR is computed.
     """
+    doing("comparing the maps")
     read: list[SurveyedDrive] = [part.read() for part in drives]
     earlier, later, *controls = (
         Surveyed(one.name, one.coarse, one.positions, one.placed)
@@ -95,6 +97,7 @@ def compare_stages(
     control = controls[0] if controls else None
     report = compare_maps(earlier, later, control)
     result = ChangeResult(map_name, stages, report)
+    doing("drawing the change")
     make_folder(stems[0].parent)
     figures.draw_change(
         result,

@@ -8,6 +8,7 @@ import numpy as np
 from threadpoolctl import threadpool_limits
 
 from cns_drake.base.jobs.step import Reporter
+from cns_drake.base.progress import track
 from evaluation.drives import check_same_world
 from evaluation.drives.drive_views import MovedDrive
 from evaluation.drives.sampling import gather
@@ -73,9 +74,7 @@ def recognise_places(
     (placed, database), (placed_query, query) = (p.read() for p in described)
     check_same_world(placed, placed_query)
     radii = [protocol.gate_radius]
-    (retrieval,) = compare_with_gates(
-        method, database, query, protocol, radii, reporter.track
-    )
+    (retrieval,) = compare_with_gates(method, database, query, protocol, radii)
     if database.name == query.name and not retrieval.matches.any():
         # A route need not close a loop.
         reporter.note(f"{query.name}: it never comes back to where it was")
@@ -110,8 +109,11 @@ def measure_costs(
     drive = MovedDrive(drive, known.X_WS, drive.world_frame, drive.datum)
     costs = []
     with threadpool_limits(limits=1):
-        for choice, parts in reporter.track(
-            zip(methods, described, strict=True), "", len(methods)
+        for choice, parts in track(
+            zip(methods, described, strict=True),
+            "measuring costs",
+            len(methods),
+            "methods",
         ):
             method = choice.make()
             number = protocol.scans(method)
@@ -184,7 +186,7 @@ def measure_places(
     overlaps: dict[float, np.ndarray] = {}
     outcomes = []
     for k, choice in enumerate(
-        reporter.track(methods, "comparing", len(methods))
+        track(methods, "comparing", len(methods), "methods")
     ):
         method = choice.make()
         mapped, asked = places(k), queries(k)
@@ -249,7 +251,7 @@ def _describe(
         scans, *parts = drive
         return scans.read(), lambda k: parts[k].read()[1]
     asked = {one.key: (one.make(), {role}, protocol) for one in methods}
-    found = describe_recording(drive(), {role}, asked, protocol, reporter.track)
+    found = describe_recording(drive(), {role}, asked, protocol)
     assert isinstance(found.scans, list)
     return found.scans, lambda k: found.described.pop(methods[k].key)
 

@@ -18,7 +18,7 @@ from cns_drake.base.errors import InputError
 from cns_drake.base.files import read_bytes, user_errors
 from cns_drake.base.jobs.step import Reporter, Step
 from cns_drake.base.points import xyz
-from cns_drake.base.progress import Track, silent
+from cns_drake.base.progress import track
 from evaluation.drives import Drive, PlacedDrive, open_drive
 from evaluation.drives.drive_views import RecentScans
 from evaluation.drives.sampling import cropped, within_range
@@ -57,7 +57,7 @@ class MappedDrive(RecentScans):
             self._map_next()
         return super().scan(index)
 
-    def finish(self, track: Track = silent) -> tuple[VoxelMap, np.ndarray]:
+    def finish(self) -> tuple[VoxelMap, np.ndarray]:
         """Reads the remaining scans, so that the map is complete.
 
         Returns:
@@ -65,7 +65,7 @@ class MappedDrive(RecentScans):
             (TCR) is computed; and a finer cloud (K, 3) for pictures, in W [m].
         """
         left = range(self._num_mapped, len(self))
-        for _ in track(left, f"mapping {self.name}", len(left)):
+        for _ in track(left, f"mapping {self.name}", len(left), "scans"):
             self._map_next()
         return self._accumulator.to_map(), self._accumulator.samples()
 
@@ -265,7 +265,6 @@ def survey_recording(
     roles: Set[description.Role],
     asked: Mapping[str, description.Request],
     protocol: RetrievalProtocol = FAIR_PROTOCOL,
-    track: Track = silent,
     *,
     with_scans: bool = False,
 ) -> RecordingSurvey:
@@ -281,7 +280,6 @@ def survey_recording(
             description; empty if the drive has neither places nor queries.
         protocol: protocol that chooses the frames whose scans are shown as
             thumbnails and, if `with_scans` is set, kept.
-        track: reports progress.
         with_scans: whether the result contains the scans of the places and
             queries.
 
@@ -308,8 +306,8 @@ def survey_recording(
 
     described = {}
     if roles:
-        described = _described(mapped, roles, asked, protocol, track, keep)
-    coarse, fine = mapped.finish(track)
+        described = _described(mapped, roles, asked, protocol, keep)
+    coarse, fine = mapped.finish()
     if len(coarse) == 0:
         raise InputError(f"{mapped.name}: no scan holds a point")
     placed = PlacedDrive.of(recording)
@@ -329,7 +327,6 @@ def describe_recording(
     roles: Set[description.Role],
     asked: Mapping[str, description.Request],
     protocol: RetrievalProtocol = FAIR_PROTOCOL,
-    track: Track = silent,
 ) -> RecordingSurvey:
     """Describes the places or queries of a recording, and keeps their scans.
 
@@ -342,7 +339,7 @@ def describe_recording(
     def keep(frame: int, cloud: np.ndarray) -> None:
         seen.append(cloud.astype(np.float32))
 
-    described = _described(drive, roles, asked, protocol, track, keep)
+    described = _described(drive, roles, asked, protocol, keep)
     return RecordingSurvey(PlacedDrive.of(recording), described, seen)
 
 
@@ -356,11 +353,10 @@ def _described(
     roles: Set[description.Role],
     asked: Mapping[str, description.Request],
     protocol: RetrievalProtocol,
-    track: Track,
     visit: Callable[[int, np.ndarray], None],
 ) -> dict[str, description.DescribedDrive]:
     found = description.describe_drive(
-        drive, (), roles, protocol, track, visit, asked.values()
+        drive, (), roles, protocol, visit, asked.values()
     )
     return dict(zip(asked, found, strict=True))
 
@@ -409,7 +405,7 @@ class Survey(Step):
         }
         arguments = (
             *(self.source(), self.roles, asked),
-            *(self.protocol, reporter.track),
+            self.protocol,
         )
         if self.with_map:
             found = survey_recording(*arguments, with_scans=self.with_scans)

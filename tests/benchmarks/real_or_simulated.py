@@ -18,7 +18,6 @@ from pathlib import Path
 import numpy as np
 from sklearn.metrics import roc_auc_score
 
-from cns_drake.base import terminal
 from cns_drake.base.errors import InputError
 from evaluation.drives import Drive, open_drive
 from evaluation.real.judge import (
@@ -94,7 +93,7 @@ def main() -> None:
         sets = read_places(arguments.real), read_places(arguments.simulated)
     except InputError as error:
         raise SystemExit(f"error: {error}") from None
-    result = judge_draws(*sets, arguments.draws, terminal.track)
+    result = judge_draws(*sets, arguments.draws)
     first = Features(sets[0]), Features(sets[1])
     result["features"] = strongest(*first, common_names([*first]))
     if arguments.json:

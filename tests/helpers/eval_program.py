@@ -7,7 +7,7 @@ import sys
 import numpy as np
 import pytest
 
-from cns_drake.base import progress_bars
+from cns_drake.base import progress_display
 from cns_drake.base.interrupts import SIGNALS
 from evaluation.command_line import cli
 from helpers.drive_files import make_scan, write_recording, yaw_pose
@@ -56,7 +56,7 @@ def run_program(capture, name, main, *arguments):
     try:
         with pytest.MonkeyPatch.context() as patch:
             # No lines of progress appear, even on a slow machine.
-            patch.setattr(progress_bars, "LINE_INTERVAL", math.inf)
+            patch.setattr(progress_display, "PATIENCE", math.inf)
             with pytest.raises(SystemExit) as info:
                 main()
     finally:

@@ -36,7 +36,7 @@ class Call(Step):
 def join(inputs, path, reporter):
     """Writes the contents of files, one after the other."""
     for done, file in enumerate(inputs):
-        reporter.progress(done, len(inputs))
+        reporter.doing("joining", done, len(inputs))
         assert file.is_file()
     path.write_text("+".join(file.read_text() for file in inputs) or path.name)
 

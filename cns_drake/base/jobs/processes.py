@@ -32,6 +32,7 @@ from cns_drake.base.jobs.fingerprint import code_digest
 from cns_drake.base.jobs.step import Reporter, Step
 from cns_drake.base.own_packages import leave_out_folder
 from cns_drake.base.process import look_seldom
+from cns_drake.base.progress import heard_by
 
 # How long a process may take to close its files after SIGTERM [s].
 PATIENCE = 30.0
@@ -229,7 +230,8 @@ def _run(job: bytes, reporter: Reporter) -> tuple[str, str]:
         alone = exclusive(place, note_waiting) if place else nullcontext()
         with alone:
             if not nothing_left(step):
-                step.run(reporter)
+                with heard_by(reporter):
+                    step.run(reporter)
     except MemoryError:
         # At another time, or on another machine, there may be enough memory.
         return "died", "not enough memory"

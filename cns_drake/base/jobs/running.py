@@ -9,21 +9,18 @@ import graphlib
 import pickle
 import queue
 import time
-from typing import TYPE_CHECKING
 
 from cns_drake.base.errors import FailedJobsError, InputError, one_line
 from cns_drake.base.jobs import processes
 from cns_drake.base.jobs.cluster import Cluster, LostSchedulerError, Workers
 from cns_drake.base.jobs.step import Step
-from cns_drake.base.terminal import resumable
-
-if TYPE_CHECKING:
-    from cns_drake.base.jobs.job_progress import JobProgress
+from cns_drake.base.progress import JobsListener, listener
+from cns_drake.base.terminal import note, resumable
 
 # How often a job is started again after its process has died.
 _RETRIES = 2
-# How often the display is redrawn [s].
-_REFRESH_INTERVAL = 0.5
+# How long to wait for a message before a signal is looked for [s].
+_LOOK_INTERVAL = 0.5
 
 
 @dataclass(frozen=True)
@@ -45,11 +42,16 @@ class Job:
     cost: float = 1.0
 
 
-def run_jobs(jobs: Iterable[Job], cluster: Cluster) -> None:
+def run_jobs(jobs: Iterable[Job], cluster: Cluster, unit: str = "jobs") -> None:
     """Runs jobs on a cluster, the longest chains of dependent jobs first.
 
-    Shows progress on stderr. A job whose process or worker dies is started
-    again. A job that fails stops only the jobs that need it.
+    Notes of the jobs are printed on stderr. A job whose process or worker dies
+    is started again. A job that fails stops only the jobs that need it.
+
+    Args:
+        jobs: the jobs.
+        cluster: runs them.
+        unit: what the jobs are, such as `cities`.
 
     Raises:
         FailedJobsError: if some could not be done; all are named.
@@ -73,13 +75,11 @@ def run_jobs(jobs: Iterable[Job], cluster: Cluster) -> None:
     left = {name: by_name[name] for name in by_name if name not in done}
     if not left:
         return
-    from cns_drake.base.jobs.job_progress import JobProgress
-
     messages: queue.SimpleQueue = queue.SimpleQueue()
     costs = {name: job.cost for name, job in left.items()}
     with (
         resumable(),
-        JobProgress(costs, num_done=len(done)) as shown,
+        listener().jobs(costs, len(done), unit) as shown,
         cluster.connect(lambda *message: messages.put(message)) as workers,
     ):
         run = _Run(left, done, urgency, workers, messages, shown, cluster.slots)
@@ -109,7 +109,7 @@ class _Run:
     _urgency: Mapping[str, float]
     _workers: Workers
     _messages: queue.SimpleQueue
-    _shown: JobProgress
+    _shown: JobsListener
     _slots: int | None
 
     def __post_init__(self) -> None:
@@ -126,7 +126,7 @@ class _Run:
         self._submit_ready()
         try:
             while self._submitted:
-                self._take_in(_REFRESH_INTERVAL)
+                self._take_in(_LOOK_INTERVAL)
         except KeyboardInterrupt:
             self._stop()
             raise
@@ -171,7 +171,6 @@ class _Run:
         try:
             kind, name, *values = self._messages.get(timeout=timeout)
         except queue.Empty:
-            self._shown.refresh()
             return
         if kind == "result":
             # Cancelled jobs are not reported.
@@ -183,10 +182,10 @@ class _Run:
             self._shown.start(name)
         elif kind == "ended":
             self._running.discard(name)
-        elif kind == "progress":
-            self._shown.progress(name, *values)
+        elif kind == "doing":
+            self._shown.doing(name, *values)
         else:
-            self._shown.note(*values)
+            note(*values)
 
     def _take_result(self, name: str, error: Exception | None) -> None:
         self._running.discard(name)
@@ -202,7 +201,7 @@ class _Run:
             and self._deaths[name] < _RETRIES
         ):
             self._deaths[name] += 1
-            self._shown.note(f"{name}: {error}; it starts again")
+            note(f"{name}: {error}; it starts again")
             self._submit(name)
             return
         fault = str(error)
@@ -214,7 +213,7 @@ class _Run:
         self._shown.end(name, fault=True)
         self._submit_ready()
         if self._submitted:
-            self._shown.note(f"{name}: failed: {fault}")
+            note(f"{name}: failed: {fault}")
 
     def _stop(self) -> None:
         """Ends running jobs, and waits until they have closed their files."""
@@ -222,4 +221,4 @@ class _Run:
         self._workers.stop()
         deadline = time.monotonic() + processes.PATIENCE
         while self._running and (left := deadline - time.monotonic()) > 0:
-            self._take_in(min(left, _REFRESH_INTERVAL))
+            self._take_in(min(left, _LOOK_INTERVAL))

@@ -5,59 +5,47 @@ same steps again, on any machine: finished steps are skipped.
 """
 
 import abc
-from collections.abc import Callable, Iterable, Iterator, Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 import time
-from typing import Any
 
 from cns_drake.base.jobs.fingerprint import code_digest
+from cns_drake.base.progress import Listener
 
 # How often a step reports its progress at most [s].
 _REPORT_INTERVAL = 0.5
 
 
-class Reporter:
-    """Reports the progress of a step, and notes for the user."""
+class Reporter(Listener):
+    """Sends what a step does, and notes for the user."""
 
     def __init__(self, send: Callable[..., None] = lambda *message: None):
         """Makes a reporter.
 
         Args:
-            send: called with the kind of each message ("progress" or "note")
-                and the values of the message. By default nothing is sent.
+            send: called with the kind of each message ("doing" or "note") and
+                the values of the message. By default nothing is sent.
         """
         self._send = send
-        self._reported: float | None = None
+        self._activity: str | None = None
+        self._reported = 0.0
 
-    def progress(self, done: int, total: int) -> None:
-        """Reports progress: `done` of `total`, in any unit."""
+    def doing(
+        self, activity: str, done: int = 0, total: int = 0, unit: str = ""
+    ) -> None:
         now = time.monotonic()
         if (
             done >= total
-            or self._reported is None
+            or activity != self._activity
             or now - self._reported >= _REPORT_INTERVAL
         ):
-            self._reported = now
-            self._send("progress", int(done), int(total))
+            self._activity, self._reported = activity, now
+            self._send("doing", activity, int(done), int(total), unit)
 
     def note(self, text: str) -> None:
         """Reports a note for the user."""
         self._send("note", str(text))
-
-    def track(
-        self, items: Iterable, description: str, total: int
-    ) -> Iterator[Any]:
-        """Yields the items of a loop, and reports its progress.
-
-        Args:
-            items: the items.
-            description: not used.
-            total: number of items.
-        """
-        for done, item in enumerate(items):
-            self.progress(done, total)
-            yield item
 
 
 class Step(abc.ABC):

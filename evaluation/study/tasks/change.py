@@ -82,7 +82,7 @@ def map_city(
     frames = None
     if spacing is not None:
         frames = sample_frames(positions, spacing).tolist()
-    return map_drive(drive, CELL_SIZE, reporter.track, frames), positions
+    return map_drive(drive, CELL_SIZE, frames), positions
 
 
 def measure_change(

@@ -10,6 +10,7 @@ from cns_drake.base import points as clouds
 from cns_drake.base.errors import InputError
 from cns_drake.base.files import read_bytes
 from cns_drake.base.jobs.step import Reporter
+from cns_drake.base.progress import track
 from evaluation.localisation import estimators, localise
 from evaluation.localisation.localise import Starts
 from evaluation.recognition.place_outcome import Number, kept_share
@@ -156,7 +157,7 @@ def measure_localisation(
         if key not in maps:
             # The drive is opened anew for each other map.
             source = mapped if not maps else database()
-            maps[key] = estimators.make_map(source, settings, reporter.track)
+            maps[key] = estimators.make_map(source, settings)
         estimator = estimators.make_estimator(str(method), settings)
         localisers.append(localise.Localiser(maps[key], estimator, settings))
     try:
@@ -172,7 +173,7 @@ def measure_localisation(
     found: list[list[np.ndarray]] = [
         [] for _ in range(len(methods) * len(starts))
     ]
-    for frame in reporter.track(frames, "localising", len(frames)):
+    for frame in track(frames, "localising", len(frames), "scans"):
         scan = clouds.from_xyz(clouds.xyz(asked.scan(frame)))
         ends = iter(found)
         for localiser in localisers:

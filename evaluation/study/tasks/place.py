@@ -5,6 +5,7 @@ from dataclasses import replace
 from typing import Any
 
 from cns_drake.base.jobs.step import Reporter
+from cns_drake.base.progress import track
 from evaluation.recognition.costs import cpu_ms, query_ms
 from evaluation.recognition.place_outcome import (
     Number,
@@ -126,7 +127,9 @@ def measure_costs(
         descriptions.
     """
     found = {}
-    for k, choice in enumerate(reporter.track(methods, "", len(methods))):
+    for k, choice in enumerate(
+        track(methods, "measuring methods", len(methods), "methods")
+    ):
         method = choice.make()
         mapped = database[k].read()[1]
         places = crowded(mapped, distractors, k, num_distractors)[0].places

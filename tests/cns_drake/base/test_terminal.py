@@ -1,17 +1,15 @@
-"""Commands show one line for each task in a terminal of any width."""
+"""Results, notes and faults of the command line."""
 
 import errno
-import io
 import math
 import subprocess
 import sys
 
 from helpers.eval_program import run_program
 import pytest
-from rich.console import Console
 import typer
 
-from cns_drake.base import progress_bars, terminal
+from cns_drake.base import terminal
 from cns_drake.base.errors import FailedJobsError, InputError
 
 
@@ -73,72 +71,6 @@ def test_a_renamed_command_names_the_new_one(capsys, rest):
     _, out, _ = run_program(capsys, "program", main, "--help")
     assert "study" in out
     assert "years" not in out
-
-
-@pytest.mark.parametrize("width", [30, 40, 60, 80, 200])
-def test_a_task_is_one_line_on_any_terminal(width):
-    screen = Console(file=io.StringIO(), width=width, force_terminal=True)
-    names = ["metropolis_01", "metropolis_01_stage_04", "suburbia_02"]
-    with progress_bars.show_progress(screen) as progress:
-        for name in names:
-            task = progress.add_task(name, total=2400, note="loading")
-            on_frame = progress_bars.count_progress(progress, task)
-            on_frame(1, 2400)
-            on_frame(2400, 2400)
-        paper = Console(file=io.StringIO(), width=width)
-        paper.print(progress.get_renderable())
-    lines = paper.file.getvalue().splitlines()
-    assert len(lines) == len(names)
-    for name, line in zip(names, lines, strict=True):
-        assert len(line) <= width
-        assert line.startswith(name[:10])
-        if width >= 80:
-            assert "100 %" in line
-            assert "loading" not in line
-
-
-def test_without_a_terminal_progress_is_whole_lines():
-    paper = Console(file=io.StringIO(), width=40)
-    with progress_bars.show_progress(paper) as progress:
-        task = progress.add_task("metropolis_01_stage_04", note="loading")
-        on_frame = progress_bars.count_progress(progress, task, after="writing")
-        on_frame(2400, 2400)
-        on_frame(2400, 2400)
-        progress_bars.print_note(progress, "[bold] " + "word " * 30)
-    lines = paper.file.getvalue().splitlines()
-    assert lines[0].endswith("2400/2400 frames, elapsed 0:00; writing")
-    assert lines[1].split() == ["[bold]"] + 30 * ["word"]
-
-
-def test_without_a_terminal_a_failure_shows_no_bar():
-    paper = Console(file=io.StringIO(), width=40)
-    with progress_bars.show_progress(paper) as progress:
-        progress.add_task("metropolis_01", total=None, note="loading")
-    assert paper.file.getvalue() == ""
-
-
-def test_what_an_earlier_run_did_is_no_speed(monkeypatch):
-    now = [100.0]
-    monkeypatch.setattr(progress_bars.time, "monotonic", lambda: now[0])
-    paper = Console(file=io.StringIO(), width=40)
-    with progress_bars.show_progress(paper) as progress:
-        task = progress.add_task("drive", total=None, note="")
-        on_frame = progress_bars.count_progress(progress, task)
-        on_frame(1001, 1200)
-        now[0] = 110.0  # 99 frames in 10 s.
-        on_frame(1100, 1200)
-    (line,) = paper.file.getvalue().splitlines()
-    assert line == "drive: 1100/1200 frames, elapsed 0:00, about 0:10 left"
-
-
-@pytest.mark.parametrize(
-    ("seconds", "text"),
-    [(16.4, "0:16"), (59.6, "1:00"), (725, "12:05"), (36_001, "10:00:01")],
-)
-def test_durations_are_labelled(seconds, text):
-    shown = progress_bars.shown_times
-    assert shown(seconds, None) == f"elapsed {text}"
-    assert shown(0.0, seconds) == f"elapsed 0:00, about {text} left"
 
 
 def test_terminals_break_messages_between_words(monkeypatch, capsys):

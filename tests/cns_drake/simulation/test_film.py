@@ -3,6 +3,7 @@
 import os
 import re
 
+from helpers.listening import listening
 from helpers.small_map import box_visual, scenario_values, write_small_map
 from helpers.tiny_drive import tiny_scenario
 import numpy as np
@@ -51,21 +52,18 @@ def test_stages_come_in_turn_from_both_views(tmp_path):
     scenario = make_scenario(
         scenario_values(folder) | {"lidars": LIDARS}, "test"
     )
-    path, done = tmp_path / "a.webp", []
-    number = make_film(
-        scenario,
-        path,
-        seconds=1.0,
-        size=SIZE,
-        on_frame=lambda *counts: done.append(counts),
-    )
+    path = tmp_path / "a.webp"
+    with listening() as heard:
+        number = make_film(scenario, path, seconds=1.0, size=SIZE)
     images, times = frames_of(path)
     # Two images of each of two stages, behind the car and above.
     assert number == len(images) == 8
     assert images.shape[1:] == (54, 96, 3)
     assert set(times) == {100}
+    done = heard.counts("filming")
     assert done == sorted(done)
     assert done[-1] == (8, 8)
+    assert heard.activities[-1] == "writing the film"
     assert [file.name for file in tmp_path.iterdir()] == ["town", "a.webp"]
     street, above = images[:4], images[4:]
     # Clouds and sky are behind the car only.

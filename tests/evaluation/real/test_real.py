@@ -10,7 +10,6 @@ import numpy as np
 import pytest
 
 from cns_drake.base.errors import InputError
-from cns_drake.base.progress import silent
 from evaluation.real import data_sets
 from evaluation.real.measuring import Measuring
 from evaluation.results.table import QueryRows, Results
@@ -53,7 +52,7 @@ def ask(capsys, folder, output, *words, methods=METHODS):
 def measured(tmp_path_factory):
     """Both tables, and the notes."""
     notes = []
-    measuring = Measuring(METHODS, silent, notes.append)
+    measuring = Measuring(METHODS, notes.append)
     measuring.run(fill(tmp_path_factory.mktemp("real")), None)
     return measuring.results(), measuring.queries(), notes
 
@@ -95,7 +94,7 @@ def test_an_own_registration_function(tmp_path):
     for name in ("mine", "icp"):
         (tmp_path / f"{name}.py").write_text(text)
     mine = str(tmp_path / "mine.py")
-    measuring = Measuring((mine,), silent, lambda note: None)
+    measuring = Measuring((mine,), lambda note: None)
     measuring.run(fill(tmp_path / "scans"), None)
     found = values(measuring.results(), task="localise", method="mine")
     # The start is 2 m off.
@@ -103,7 +102,7 @@ def test_an_own_registration_function(tmp_path):
     assert {row.task for row in measuring.rows} == {"localise"}
     both = ("icp", str(tmp_path / "icp.py"))
     with pytest.raises(InputError, match="two registration methods"):
-        Measuring(both, silent, lambda note: None)
+        Measuring(both, lambda note: None)
 
 
 def test_scans_that_are_alone_are_counted(tmp_path):
@@ -113,7 +112,7 @@ def test_scans_that_are_alone_are_counted(tmp_path):
         "004481": (1, 0.0, 2.0, 8.51),
     }
     notes = []
-    measuring = Measuring(("icp",), silent, notes.append)
+    measuring = Measuring(("icp",), notes.append)
     measuring.run(fill(tmp_path, alone), None)
     (note,) = (one for one in notes if "localised" in one)
     assert note.startswith("kitti_00_revisits: 2 of 3 scans localised")
@@ -236,7 +235,7 @@ def test_other_formats_without_poses(tmp_path, capsys):
     np.testing.assert_allclose(z, [-0.2 - 0.957, 3.0, 4.0], atol=1e-5)
     assert [len(one.drive) for one in found] == [1, 3, 3]
     # Nothing is asked of scans without poses.
-    measuring = Measuring(("solid",), silent, lambda note: None)
+    measuring = Measuring(("solid",), lambda note: None)
     measuring.run(tmp_path, None)
     assert measuring.rows == []
     status, _, err = ask(capsys, tmp_path, tmp_path / "out", methods=["solid"])
@@ -269,7 +268,7 @@ def test_the_judge_tells_boxes_from_noise(tmp_path, monkeypatch):
         attachments={"scenario.json": scenario},
     )
     notes = []
-    measuring = Measuring(("icp",), silent, notes.append)
+    measuring = Measuring(("icp",), notes.append)
     measuring.run(tmp_path / "scans", tmp_path / "drives")
     found = measuring.results().where(task="judge")
     (row,) = found.where(method="all", metric="auc").rows

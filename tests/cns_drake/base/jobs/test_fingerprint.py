@@ -223,7 +223,7 @@ def test_of_our_own_code_the_right_modules_count(packages):
         ("evaluation/report/page_template/page.css", False, SURVEY),
         ("evaluation/report/page_template/page.css", True, "evaluation.*"),
         ("cns_drake/pictures/page_template/drive.css", True, SIMULATION),
-        ("cns_drake/base/jobs/job_progress.py", False, SURVEY),
+        ("cns_drake/base/progress_display.py", False, SURVEY),
     ):
         assert differs(packages / path, module) == counts, (path, module)
 

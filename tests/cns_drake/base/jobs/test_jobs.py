@@ -30,6 +30,7 @@ from cns_drake.base.jobs.processes import (
 from cns_drake.base.jobs.running import Job, run_jobs
 from cns_drake.base.jobs.step import Reporter
 from cns_drake.base.process import num_cores
+from cns_drake.base.progress_display import shown
 
 pytestmark = pytest.mark.slow
 
@@ -68,7 +69,8 @@ def test_finished_steps_start_no_process(tmp_path, monkeypatch, capsys):
         "unknown", job_functions.join, [], tmp_path / "unknown",
         is_done=job_functions.cannot_check,
     )  # fmt: skip
-    run_jobs([done, new, again, unknown], Cluster(num_workers=1))
+    with shown():
+        run_jobs([done, new, again, unknown], Cluster(num_workers=1))
     assert (tmp_path / "unknown").is_file()
     assert path.read_text() == "path"
     # The number is that of all jobs, however many were done before.
@@ -134,7 +136,7 @@ def test_needs_come_first_and_faults_stay_alone(tmp_path, capsys):
         job("orphan", job_functions.join, [], tmp_path / "o", needs=["dies"]),
         job("orphan 2", job_functions.join, [], last, needs=["orphan"]),
     ]
-    with pytest.raises(FailedJobsError) as raised:
+    with pytest.raises(FailedJobsError) as raised, shown():
         run_jobs(jobs, Cluster(num_workers=2))
     assert raised.value.exit_status == 1
     *faults, left_out = str(raised.value).split("; ")
@@ -453,13 +455,13 @@ def test_progress_is_reported_now_and_then(monkeypatch):
     reports = []
     reporter = Reporter(lambda *message: reports.append(message))
     for done in range(11):
-        reporter.progress(done, 10)
+        reporter.doing("reading", done, 10)
         now[0] += 0.2
     # The first and the last one are shown, and one in half a second.
-    assert [done for _, done, _ in reports] == [0, 3, 6, 9, 10]
+    assert [report[2] for report in reports] == [0, 3, 6, 9, 10]
     reporter.note(3)
     assert reports[-1] == ("note", "3")
-    Reporter().progress(1, 2)
+    Reporter().doing("reading", 1, 2)
 
 
 def test_where_jobs_run(monkeypatch):

@@ -1,0 +1,366 @@
+"""What a program does, on stderr: bars on a terminal, lines in a log."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Mapping
+import contextlib
+from dataclasses import dataclass, field
+import datetime
+import shutil
+import sys
+import threading
+import time
+from typing import Any, TextIO
+
+from cns_drake.base.errors import printable
+from cns_drake.base.pace import Pace, TimeLeft
+from cns_drake.base.progress import (
+    JobsListener,
+    Listener,
+    heard_by,
+    listener,
+)
+
+# What takes less time than this is not mentioned [s].
+PATIENCE = 0.8
+# In a log, another activity gets a line at once, but not many lines a second
+# [s]. The same activity gets one again after a while, which grows with the time
+# since the start: a long run should not fill its log.
+_CHANGE_INTERVAL = 1.0
+_INTERVAL = 1.8
+_GROWTH = 1 / 30
+# How often it is checked whether something must be shown [s].
+_TICK = 0.25
+# Length of a bar [characters].
+_BAR = 20
+
+
+@dataclass
+class _Task:
+    """What the program, or one of its jobs, does.
+
+    Attributes:
+        name: name of the job; empty for the program itself.
+        activity: what it does.
+        done: how much of it is done.
+        total: how much there is to do; 0 if that is not known.
+        unit: what `done` and `total` count.
+        since: when the activity was counted for the first time [s].
+        first: how much was done then, for example in an earlier run.
+        pace: pace of the activity.
+    """
+
+    name: str = ""
+    activity: str = ""
+    done: int = 0
+    total: int = 0
+    unit: str = ""
+    since: float = 0.0
+    first: int = 0
+    pace: Pace = field(default_factory=Pace)
+
+    def update(
+        self, activity: str, done: int, total: int, unit: str, now: float
+    ) -> bool:
+        """Records what is done; returns whether it is something else."""
+        is_new = activity != self.activity
+        if is_new or not self.total or done < self.done:
+            self.since, self.first, self.pace = now, done, Pace()
+        self.activity, self.done = activity, done
+        self.total, self.unit = total, unit
+        self.pace.measure(done - self.first, now - self.since)
+        return is_new
+
+    def text(self) -> str:
+        """Returns what is done, and how far it is."""
+        counted = ""
+        if self.total:
+            counted = f"{self.done} of {self.total} {self.unit}".rstrip()
+        what = ", ".join(filter(None, (self.activity, counted)))
+        return ": ".join(filter(None, (self.name, what)))
+
+    def left(self) -> float | None:
+        """Returns the time left for this activity [s], if it can be told."""
+        if not 0 < self.done < self.total:
+            return None
+        pace = self.pace.steady(self.total - self.first)
+        return None if pace is None else pace * (self.total - self.done)
+
+
+def shown_times(elapsed: float, left: float | None) -> str:
+    """Returns elapsed time and time left as text, both given in [s].
+
+    The time left is omitted if it is None.
+    """
+    text = f"elapsed {_clock(elapsed)}"
+    return text if left is None else f"{text}, about {_clock(left)} left"
+
+
+def _clock(seconds: float) -> str:
+    text = str(datetime.timedelta(seconds=round(seconds)))
+    return text.removeprefix("0:").removeprefix("0")
+
+
+class Display(Listener):
+    """Shows on a stream what the program does, while the `with` block runs.
+
+    On a terminal, the last lines show it, one for the program or all of its
+    jobs and one for each running job. Elsewhere whole lines are printed: when
+    the activity changes, and after growing intervals. Nothing is shown of work
+    that ends at once.
+    """
+
+    def __init__(
+        self,
+        stream: TextIO | None = None,
+        clock: Callable[[], float] = time.monotonic,
+    ):
+        """Makes a display.
+
+        Args:
+            stream: where it is shown; stderr by default.
+            clock: returns the present time [s].
+        """
+        self._stream = sys.stderr if stream is None else stream
+        self._is_terminal = self._stream.isatty()
+        self._now = clock
+        self._start = clock()
+        self._own = _Task()
+        self._jobs: _JobsDisplay | None = None
+        # When a line was printed last, and whether something changed since.
+        self._printed: float | None = None
+        self._has_changed = False
+        # Number of lines at the bottom of the terminal that are ours.
+        self._num_drawn = 0
+        self._ends_line = True
+        self._lock = threading.RLock()
+        self._ended = threading.Event()
+
+    def __enter__(self) -> Display:
+        self._streams = sys.stdout, sys.stderr
+        if self._is_terminal:
+            if sys.stdout is not None and sys.stdout.isatty():
+                sys.stdout = _Above(sys.stdout, self)
+            sys.stderr = _Above(sys.stderr, self)
+        threading.Thread(target=self._keep_telling, daemon=True).start()
+        return self
+
+    def __exit__(self, *error: object) -> None:
+        self._ended.set()
+        with self._lock:
+            self._erase()
+        sys.stdout, sys.stderr = self._streams
+
+    def doing(
+        self, activity: str, done: int = 0, total: int = 0, unit: str = ""
+    ) -> None:
+        with self._lock:
+            self._has_changed |= self._own.update(
+                activity, done, total, unit, self._now()
+            )
+        if not self._is_terminal:
+            self.refresh()
+
+    @contextlib.contextmanager
+    def jobs(
+        self, costs: Mapping[str, float], num_done: int, unit: str
+    ) -> Iterator[_JobsDisplay]:
+        shown = _JobsDisplay(self, costs, num_done, unit, self._now)
+        with self._lock:
+            before, self._jobs = self._jobs, shown
+        try:
+            yield shown
+        finally:
+            with self._lock:
+                self._jobs = before
+
+    def refresh(self) -> None:
+        """Shows what is done, if that is due."""
+        with self._lock:
+            now = self._now()
+            if self._ended.is_set() or now < self._start + PATIENCE:
+                return
+            if self._is_terminal:
+                self._draw(now)
+            elif self._printed is None or now >= self._printed + self._wait(
+                now
+            ):
+                self._print("; ".join(self._lines(now)), now)
+
+    def print(self, text: str) -> None:
+        """Prints a line in a log; a terminal shows what it is about."""
+        with self._lock:
+            if not self._is_terminal:
+                self._print(text, self._now())
+
+    @contextlib.contextmanager
+    def erased(self) -> Iterator[None]:
+        """Lets something else write on the terminal."""
+        with self._lock:
+            self._erase()
+            yield
+
+    def note_end(self, text: str) -> None:
+        """Notes what else was written on the terminal at last."""
+        self._ends_line = text.endswith("\n")
+
+    def _keep_telling(self) -> None:
+        while not self._ended.wait(_TICK):
+            self.refresh()
+
+    def _wait(self, now: float) -> float:
+        """Returns how long after a line the next one comes [s]."""
+        if self._has_changed:
+            return _CHANGE_INTERVAL
+        return max(_INTERVAL, _GROWTH * (now - self._start))
+
+    def _lines(self, now: float) -> list[str]:
+        if self._jobs is not None:
+            return self._jobs.lines(now)
+        if not self._own.activity:
+            return []
+        return [_shown(self._own, now - self._start)]
+
+    def _print(self, text: str, now: float) -> None:
+        if text:
+            self._printed, self._has_changed = now, False
+            self._write(f"{printable(text)}\n")
+
+    def _erase(self) -> None:
+        if self._num_drawn:
+            # Up by as many lines, to their begin; then clear what is below.
+            self._write(f"\x1b[{self._num_drawn}F\x1b[J")
+            self._num_drawn = 0
+
+    def _write(self, text: str) -> None:
+        # That the stream takes no text is no fault of the work.
+        with contextlib.suppress(OSError, ValueError):
+            self._stream.write(text)
+            self._stream.flush()
+
+    def _draw(self, now: float) -> None:
+        if not self._ends_line:
+            return
+        columns, rows = shutil.get_terminal_size()
+        lines = self._bars(now)[: max(rows - 1, 1)]
+        self._erase()
+        # A terminal may wrap a line that ends at its edge.
+        shown = [f"{printable(line)[: columns - 1]}\n" for line in lines]
+        self._write("".join(shown))
+        self._num_drawn = len(lines)
+
+    def _bars(self, now: float) -> list[str]:
+        lines = self._lines(now)
+        if self._jobs is not None:
+            shares = self._jobs.shares()
+        else:
+            shares = [_share(self._own)]
+        return [
+            line if share is None else f"{line}  {_bar(share)}"
+            for line, share in zip(lines, shares, strict=False)
+        ]
+
+
+def _shown(task: _Task, elapsed: float) -> str:
+    return f"{task.text()}, {shown_times(elapsed, task.left())}"
+
+
+def _share(task: _Task) -> float | None:
+    return task.done / task.total if task.total else None
+
+
+def _bar(share: float) -> str:
+    """Returns a bar of constant length, for a share from 0 to 1."""
+    full = round(_BAR * min(share, 1.0))
+    return f"[{'#' * full}{'.' * (_BAR - full)}] {100 * share:.0f} %"
+
+
+@contextlib.contextmanager
+def shown() -> Iterator[None]:
+    """Shows on stderr what the block does, unless it is shown already."""
+    if isinstance(listener(), Display):
+        yield
+        return
+    with Display() as display, heard_by(display):
+        yield
+
+
+class _JobsDisplay(JobsListener):
+    """What jobs do that run side by side: a line for all, and one for each."""
+
+    def __init__(
+        self,
+        display: Display,
+        costs: Mapping[str, float],
+        num_done: int,
+        unit: str,
+        clock: Callable[[], float],
+    ):
+        self._display = display
+        self._left = TimeLeft(costs)
+        self._tasks: dict[str, _Task] = {}
+        self._num_ended = num_done
+        self._num_jobs = num_done + len(costs)
+        self._unit = unit
+        self._now = clock
+        self._start = clock()
+
+    def start(self, name: str) -> None:
+        self._left.start(name, self._now())
+        self._tasks[name] = _Task(name, "starting")
+        self._display.refresh()
+
+    def doing(
+        self,
+        name: str,
+        activity: str,
+        done: int = 0,
+        total: int = 0,
+        unit: str = "",
+    ) -> None:
+        if name not in self._tasks:
+            return
+        if total:
+            self._left.found(name, done / total)
+        task = self._tasks[name]
+        task.update(activity, done, total, unit, self._now())
+        self._display.refresh()
+
+    def end(self, name: str, fault: bool = False) -> None:
+        self._left.end(name, self._now())
+        self._num_ended += 1
+        self._tasks.pop(name, None)
+        if not fault:
+            self._display.print(f"{name}: done, {self._summary()}")
+        self._display.refresh()
+
+    def lines(self, now: float) -> list[str]:
+        """Returns a line for all jobs, and one for each running job."""
+        times = shown_times(now - self._start, self._left.seconds(now))
+        tasks = list(self._tasks.values())
+        return [f"{self._summary()}, {times}", *(one.text() for one in tasks)]
+
+    def shares(self) -> list[float | None]:
+        """Returns the share that is done of each line, if it is known."""
+        return [self._left.share(), *map(_share, list(self._tasks.values()))]
+
+    def _summary(self) -> str:
+        return f"{self._num_ended} of {self._num_jobs} {self._unit} done"
+
+
+class _Above:
+    """A stream to the terminal whose text appears above the display."""
+
+    def __init__(self, stream: TextIO, display: Display):
+        self._stream = stream
+        self._display = display
+
+    def write(self, text: str) -> int:
+        with self._display.erased():
+            self._display.note_end(text)
+            written = self._stream.write(text)
+            self._stream.flush()
+            return written
+
+    def __getattr__(self, name: str) -> Any:
+        return getattr(self._stream, name)

@@ -1,0 +1,103 @@
+"""The remaining time is told only from a steady pace."""
+
+import pytest
+
+from cns_drake.base.pace import Pace, TimeLeft
+
+
+def steps(*seconds):
+    """Returns a pace that was measured at steps of one unit of work."""
+    pace = Pace()
+    total = 0.0
+    for done, taken in enumerate(seconds, 1):
+        total += taken
+        pace.measure(done, total)
+    return pace
+
+
+def test_a_steady_pace():
+    assert steps(*10 * [2.0]).steady(40) == pytest.approx(2.0)
+    # A quarter more in the second half, and a little more than that.
+    assert steps(*5 * [2.0], *5 * [2.5]).steady(40) == pytest.approx(2.25)
+    assert steps(*5 * [2.0], *5 * [2.51]).steady(40) is None
+
+
+@pytest.mark.parametrize(
+    ("number", "seconds", "total"),
+    [
+        (0, 1.0, 10),
+        (1, 10.0, 10),  # It has no halves.
+        (9, 1.0, 91),  # Less than a tenth.
+        (9, 0.33, 10),  # Less than three seconds.
+    ],
+)
+def test_too_little_is_no_measure(number, seconds, total):
+    assert steps(*number * [seconds]).steady(total) is None
+    assert steps(*(number + 10) * [seconds]).steady(10) is not None
+
+
+def test_a_slow_begin_is_no_measure():
+    pace = steps(20.0, *9 * [1.0])
+    assert pace.steady(100) is None
+    # It is, once it hardly counts.
+    pace = steps(5.0, *39 * [1.0])
+    assert pace.steady(100) == pytest.approx(1.1)
+
+
+def ended(left, names, now, seconds):
+    """Runs jobs one after the other; returns when they have ended."""
+    for name in names:
+        left.start(name, now)
+        now += seconds
+        left.end(name, now)
+    return now
+
+
+def test_nothing_is_told_before_jobs_have_ended():
+    left = TimeLeft(dict.fromkeys("abcdefgh", 10.0))
+    assert left.seconds(0.0) is None
+    assert left.share() == 0.0
+    now = ended(left, "a", 0.0, 20.0)
+    assert left.seconds(now) is None
+    now = ended(left, "b", now, 20.0)
+    assert left.seconds(now) == pytest.approx(6 * 20.0)
+    assert left.share() == pytest.approx(0.25)
+    now = ended(left, "cdefgh", now, 20.0)
+    assert left.seconds(now) == 0.0
+
+
+def test_jobs_of_another_pace():
+    left = TimeLeft(dict.fromkeys("abcdefgh", 10.0))
+    now = ended(left, "a", 0.0, 20.0)
+    now = ended(left, "b", now, 30.0)
+    assert left.seconds(now) is None
+
+
+def test_jobs_side_by_side():
+    left = TimeLeft(dict.fromkeys("abcdef", 10.0))
+    for name in "abcd":
+        left.start(name, now=0.0)
+    left.end("a", now=10.0)
+    left.end("b", now=10.0)
+    left.start("e", now=10.0)
+    left.end("c", now=10.0)
+    # d is late and soon ends; e has begun; f waits; four run at a time.
+    assert left.seconds(10.0) == pytest.approx(10.0)
+    assert left.seconds(16.0) == pytest.approx((1.0 + 4.0 + 10.0) / 3)
+
+
+def test_what_was_done_before_gives_no_pace():
+    left = TimeLeft(dict.fromkeys("abcd", 100.0))
+    now = ended(left, "ab", 0.0, 1.0)
+    assert left.seconds(now) is None
+    # Half of these two was done by an earlier run.
+    for name in "cd":
+        left.start(name, now)
+        left.found(name, 0.5)
+        left.found(name, 0.9)
+        left.end(name, now + 60.0)
+    assert left.seconds(now + 60.0) == 0.0
+    left.start("c", now)
+    left.found("c", 0.5)
+    # 120 s for 100 s of work; 50 s of it is left.
+    assert left.seconds(now) == pytest.approx(60.0)
