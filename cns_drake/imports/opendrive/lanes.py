@@ -133,7 +133,9 @@ def lane_bands(road: ImportedRoad) -> Iterator[LaneBand]:
             fault.
     """
     for k, section in enumerate(road.sections):
-        s, inside = _stations(road, section)
+        s, inside = stations(
+            road, section.start, section.end, _cubics_of(section)
+        )
         _, _, _, heading, roll = road.reference(s, inside).T
         grade = road.elevation.at(s, inside, is_slope=True)
         offset = road.lane_offset.at(s, inside)
@@ -232,34 +234,58 @@ def _kind(road: ImportedRoad, section: LaneSection, lane: Lane) -> str:
     return "enclosed" if any(kind != "none" for kind in beyond) else "none"
 
 
-def _stations(
-    road: ImportedRoad, section: LaneSection
-) -> tuple[np.ndarray, np.ndarray]:
-    """Returns distances along a section, and where cubic pieces begin there.
+def _cubics_of(section: LaneSection) -> list[Cubics]:
+    return [
+        one
+        for lane in section.lanes.values()
+        for one in (lane.width, lane.border, lane.inner_height)
+    ]
 
-    A joint is there twice, once for each side.
+
+def stations(
+    road: ImportedRoad,
+    start: float,
+    end: float,
+    more: Sequence[Cubics] = (),
+) -> tuple[np.ndarray, np.ndarray]:
+    """Returns the places along a road that its shape needs.
+
+    Between two places the road is nearly straight. A joint of two pieces of the
+    road is there twice, once for each side.
+
+    Args:
+        road: the road.
+        start: where the first place is [m].
+        end: where the last place is [m].
+        more: functions along the road whose shape matters, besides the road's
+            own.
+
+    Returns:
+        (N,) distances along the road, and (N,) distances that select the piece
+        of the road (see `ImportedRoad.reference`) [m].
+
+    Raises:
+        ValueError: there are too many places.
     """
     cubics: list[Cubics] = [
         road.elevation,
         road.superelevation,
         road.lane_offset,
+        *more,
     ]
-    for lane in section.lanes.values():
-        cubics += [lane.width, lane.border, lane.inner_height]
     joints = np.concatenate(
         [
-            [section.start, section.end],
+            [start, end],
             [piece.s for piece in road.pieces],
             *(one.starts for one in cubics),
         ]
     )
-    joints = np.unique(np.clip(joints, section.start, section.end))
+    joints = np.unique(np.clip(joints, start, end))
     between = joints[
-        (joints > section.start + 4.0 * _INWARDS)
-        & (joints < section.end - 4.0 * _INWARDS)
+        (joints > start + 4.0 * _INWARDS) & (joints < end - 4.0 * _INWARDS)
     ]
     between = between[np.diff(between, prepend=-math.inf) > 4.0 * _INWARDS]
-    ends = np.concatenate([[section.start], between, [section.end]])
+    ends = np.concatenate([[start], between, [end]])
     starts = np.array([piece.s for piece in road.pieces])
     places, inside = [], []
     total = 0

@@ -372,6 +372,9 @@ class Thing(NamedTuple):
         road_outline: (N, 4) corners as s, t, height of the foot above the road,
             and height above this foot [m]; None if not in the file.
         is_open: whether the outline is a line, not the edge of an area.
+        swept: (2, 5) s, t, height of the foot above the road, width and height
+            [m] at both ends of an object without gaps along the road, such as a
+            wall; None for other objects.
         is_dynamic: whether its state can change, as that of a traffic light.
         faces_back: whether it is for traffic against the direction of the road.
     """
@@ -387,6 +390,7 @@ class Thing(NamedTuple):
     outline: np.ndarray | None = None
     road_outline: np.ndarray | None = None
     is_open: bool = False
+    swept: np.ndarray | None = None
     is_dynamic: bool = False
     faces_back: bool = False
 

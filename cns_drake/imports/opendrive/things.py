@@ -16,20 +16,21 @@ from cns_drake.city.placement.objects import OBJECTS
 from cns_drake.city.plants.vegetation import tree
 from cns_drake.imports.faces import extruded
 from cns_drake.imports.foreign_city import make_imported
-from cns_drake.imports.opendrive.lanes import TYPES
+from cns_drake.imports.opendrive.lanes import TYPES, stations
 from cns_drake.imports.opendrive.road_model import ImportedRoad, Thing
 from cns_drake.imports.options import ImportFaults
 
 _MOST_REPEATS = 10_000
-# An object that is repeated without a distance is divided into pieces of this
-# length [m].
-_PIECE = 4.0
+# Distance of trees that are repeated without a distance [m].
+_TREES = 4.0
 _LARGEST = 1000.0  # [m]
 # Things of these types are painted, or flat on the ground.
 _FLAT = ("crosswalk", "roadmark", "patch", "parkingspace", "none.flat")
 _LEAST_HEIGHT = 0.05
 _LEAST_SIDE = 0.05
 _LEAST_AREA = 1e-4
+# Places that are closer than this are one place [m].
+_SAME = 1e-4
 _HALF_TURN = math.pi
 
 
@@ -122,42 +123,53 @@ def _repeated(
 ) -> Iterator[Thing]:
     start, length = repeat.number("s"), repeat.number("length")
     distance = repeat.number("distance", 0.0)
-    step = distance if distance > 0.0 else _PIECE
-    count = math.floor(length / step + 1e-9) + (distance > 0.0)
-    if distance <= 0.0:
-        count = math.ceil(length / step)
+    _, width, height = thing.size
+    if thing.outline is not None:
+        width = width or float(np.ptp(thing.outline[:, 1]))
+        height = height or float(thing.outline[:, 3].max())
+
+    def ends(name: str, default: float) -> tuple[float, float]:
+        first = repeat.number(f"{name}Start", default)
+        return first, repeat.number(f"{name}End", first)
+
+    if distance <= 0.0 < length and not thing.kind.startswith("tree"):
+        yield thing._replace(
+            name=f"{thing.name}_{number}",
+            s=start,
+            swept=np.array(
+                [
+                    (start, start + length),
+                    ends("t", thing.t),
+                    ends("zOffset", thing.z),
+                    ends("width", width),
+                    ends("height", height),
+                ]
+            ).T,
+        )
+        return
+    step = distance if distance > 0.0 else _TREES
+    count = max(math.floor(length / step + 1e-9), 0) + 1
     if count > _MOST_REPEATS:
         faults.add(
             f"object repeated more than {_MOST_REPEATS} times, left out",
             thing.name,
         )
         return
-    for k in range(max(count, 1)):
-        # A wall becomes pieces, each with the origin in its middle.
-        at = k * step if distance > 0.0 else (k + 0.5) * length / max(count, 1)
+    for k in range(count):
+        at = k * step
         part = min(1.0, at / length) if length > 0.0 else 0.0
-
-        def ends(name: str, default: float) -> tuple[float, float]:
-            first = repeat.number(f"{name}Start", default)
-            return first, repeat.number(f"{name}End", first)
 
         def value(name: str, default: float, part: float = part) -> float:
             first, last = ends(name, default)
             return first + part * (last - first)
 
         own, width, height = thing.size
-        heading = thing.heading
-        if distance <= 0.0 and length > 0.0:
-            first, last = ends("t", thing.t)
-            own = math.hypot(length, last - first) / count
-            heading += math.atan2(last - first, length)
         size = (own, value("width", width), value("height", height))
         yield thing._replace(
             name=f"{thing.name}_{number}_{k}",
             s=start + at,
             t=value("t", thing.t),
             z=value("zOffset", thing.z),
-            heading=heading,
             size=size,
             road_outline=None,
         )
@@ -213,6 +225,10 @@ def thing_structures(
             yield Structure(
                 name, "vegetation", model, (x, y, z), 0.0, ("object",)
             )
+        elif thing.swept is not None:
+            solid = _swept(road, thing, thing.swept, faults)
+            if solid is not None:
+                yield solid
         else:
             solid = _solid(road, thing, name, (x, y, z, heading), faults)
             if solid is not None:
@@ -305,15 +321,90 @@ def _solid(
     _, nearest = cKDTree(places).query(triangles[..., :2])
     is_top = triangles[..., 2] > foot
     triangles[..., 2] = low[nearest] + is_top * heights[nearest]
+    return _structure(thing, triangles, shapely.union_all(pieces))
+
+
+def _swept(
+    road: ImportedRoad, thing: Thing, ends: np.ndarray, faults: ImportFaults
+) -> Structure | None:
+    """Returns an object without gaps along a road, such as a wall.
+
+    Its middle line is parallel to the reference line, or leads away from it,
+    and its foot follows the road. `ends` is the thing's `swept`.
+    """
+    start, end = ends[:, 0]
+    if end > road.length + 1.0:
+        faults.add("object beyond the end of its road, cut", thing.name)
+    s, inside = stations(road, start, min(end, road.length))
+    t, rise, width, height = (
+        np.interp(s, ends[:, 0], column) for column in ends.T[1:]
+    )
+    if height.max() < _LEAST_HEIGHT:
+        faults.add("object without a height, left out", thing.name)
+        return None
+    middle = road.points(s, inside, t)
+    # Joints of the road are there twice.
+    is_new = np.linalg.norm(np.diff(middle[:, :2], axis=0), axis=1) > _SAME
+    kept = np.append(True, is_new)
+    middle, rise, width, height = (
+        one[kept] for one in (middle, rise, width, height)
+    )
+    if len(middle) < 2:
+        faults.add("object without an area, left out", thing.name)
+        return None
+    half = np.maximum(width, _LEAST_SIDE)[:, None] / 2.0
+    to_left = half * _to_left(middle[:, :2])
+    edges = [middle[:, :2] - to_left, middle[:, :2] + to_left]
+    low = middle[:, 2] + rise
+    high = low + np.maximum(height, 0.0)
+    # Corners around a cross-section, seen along the road.
+    corners = np.stack(
+        [
+            np.c_[np.round(edges[side], 3), z]
+            for side, z in ((0, low), (0, high), (1, high), (1, low))
+        ],
+        axis=1,
+    )
+    before, after = corners[:-1], corners[1:]
+    quads = [
+        np.stack([before[:, k], after[:, k], after[:, m], before[:, m]], axis=1)
+        for k, m in ((0, 1), (1, 2), (2, 3), (3, 0))
+    ]
+    quads += [corners[:1], corners[-1:, ::-1]]
+    around = np.concatenate(quads)
+    triangles = np.concatenate([around[:, [0, 1, 2]], around[:, [0, 2, 3]]])
+    below = np.concatenate([before[:, [0, 3]], after[:, [3, 0]]], axis=1)
+    area = shapely.make_valid(shapely.polygons(below[..., :2]))
+    return _structure(thing, triangles, shapely.union_all(area))
+
+
+def _to_left(places: np.ndarray) -> np.ndarray:
+    """Returns vectors (N, 2) from a line to a line 1 m on its left."""
+    along = np.diff(places, axis=0)
+    along /= np.linalg.norm(along, axis=1, keepdims=True)
+    left = np.stack([-along[:, 1], along[:, 0]], axis=1)
+    left = np.concatenate([left[:1], left[:-1] + left[1:], left[-1:]])
+    # The corner of a mitre is farther away, but at most twice as far.
+    left[1:-1] /= np.maximum(
+        (left[1:-1] ** 2).sum(axis=1, keepdims=True) / 2.0, 1.0
+    )
+    return left
+
+
+def _structure(
+    thing: Thing, triangles: np.ndarray, footprint: BaseGeometry
+) -> Structure:
     one = make_imported(
-        name,
+        thing.name,
         _by_type(thing.kind, "objects", "other-object"),
         "Object",
         {"body": triangles},
         {},
     ).structure
-    model = Model(one.model.parts, one.model.meshes, shapely.union_all(pieces))
-    return Structure(name, one.semantic_class, model, one.xyz, 0.0, ("object",))
+    model = Model(one.model.parts, one.model.meshes, footprint)
+    return Structure(
+        thing.name, one.semantic_class, model, one.xyz, 0.0, ("object",)
+    )
 
 
 def _rng(name: str) -> np.random.Generator:

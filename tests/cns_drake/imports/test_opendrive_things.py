@@ -153,6 +153,121 @@ def test_a_wall_leads_from_one_side_to_the_other(tmp_path):
     assert footprint.area == pytest.approx(10.0 * 0.2, rel=0.01)
 
 
+WALL = (
+    '<object id="1" type="barrier" s="5" t="{t0}" zOffset="0.1" hdg="0"'
+    ' orientation="none" length="1" width="0.3" height="1.2"><repeat s="5"'
+    ' length="{length}" distance="0" tStart="{t0}" tEnd="{t1}"'
+    ' heightStart="1.2" heightEnd="{high}"/></object>'
+)
+RADIUS, START, LENGTH = 25.0, 5.0, 60.0
+
+
+def bent_road(path, curve, objects, elevation=""):
+    """Writes and reads a road of 70 m with one curve; returns its objects."""
+    write_roads(
+        path,
+        straight(
+            "1",
+            0,
+            0,
+            70,
+            0,
+            elevation=elevation,
+            more=f"<objects>{objects}</objects>",
+        ),
+    )
+    text = path.read_text().replace("<line/>", curve, 1)
+    path.write_text(text)
+    faults = ImportFaults()
+    (road,) = read_roads(path, faults).roads
+    return list(thing_structures(road, box(0, 0, 0, 0), faults)), faults
+
+
+def triangles_of(structure):
+    (mesh,) = structure.model.meshes.values()
+    return mesh.vertices[mesh.triangles()]
+
+
+@pytest.mark.parametrize(
+    ("curvature", "t0", "t1"),
+    [
+        (1 / RADIUS, -8.0, -8.0),
+        (1 / RADIUS, 8.0, 8.0),
+        (-1 / RADIUS, 8.0, 8.0),
+        (1 / RADIUS, -6.5, -10.0),
+        (-1 / RADIUS, -5.0, 12.0),
+    ],
+)
+def test_a_wall_without_gaps_follows_the_curve(tmp_path, curvature, t0, t1):
+    """Beside an arc its middle line is a circle, or a spiral of Archimedes."""
+    wall = WALL.format(t0=t0, t1=t1, length=LENGTH, high=1.2)
+    (found,), faults = bent_road(
+        tmp_path / "a.xodr", f'<arc curvature="{curvature!r}"/>', wall
+    )
+    assert not list(faults.rows())
+    assert (found.name, found.semantic_class) == ("object_1_0_0", "fence")
+    s = np.linspace(START, START + LENGTH, 2000)
+    t = t0 + (t1 - t0) * (s - START) / LENGTH
+    angle, radius = s * curvature, 1 / curvature - t
+    middle = np.stack(
+        [radius * np.sin(angle), 1 / curvature - radius * np.cos(angle)], axis=1
+    )
+    ideal = LineString(middle).buffer(0.15, cap_style="flat")
+    footprint = found.footprint_W
+    assert footprint.symmetric_difference(ideal).area < 0.02 * ideal.area
+    assert footprint.buffer(0.02).covers(LineString(middle))
+    # It is closed, its faces point outwards, and it holds its volume.
+    a, b, c = np.moveaxis(triangles_of(found), 1, 0)
+    volume = np.einsum("ij,ij->i", a, np.cross(b, c)).sum() / 6.0
+    assert volume == pytest.approx(1.2 * ideal.area, rel=0.02)
+    edges = np.concatenate([np.c_[a, b], np.c_[b, c], np.c_[c, a]]).round(6)
+    forward = sorted(map(tuple, edges))
+    assert forward == sorted(map(tuple, np.roll(edges, 3, axis=1)))
+
+
+@pytest.mark.parametrize(
+    "coefficients", [(0.0, 0.1, 0.0, 0.0), (3.0, -0.08, 0.004, 0.0)]
+)
+def test_a_wall_without_gaps_follows_the_slope(tmp_path, coefficients):
+    elevation = cubic("elevation", 0, *coefficients, "s")
+    wall = WALL.format(t0=-8, t1=-8, length=LENGTH, high=3.2)
+    (found,), _ = bent_road(
+        tmp_path / "a.xodr", "<line/>", wall, elevation=elevation
+    )
+    vertices = triangles_of(found).reshape(-1, 3)
+    for s in np.unique(vertices[:, 0]):
+        z = vertices[vertices[:, 0] == s, 2]
+        foot = np.polyval(coefficients[::-1], s) + 0.1
+        height = 1.2 + 2.0 * (s - START) / LENGTH
+        # Places are whole millimetres.
+        assert z.min() == pytest.approx(foot, abs=5e-4)
+        assert z.max() == pytest.approx(foot + height, abs=5e-4)
+    # Between its corners, too.
+    s = np.unique(vertices[:, 0])
+    middle = (s[:-1] + s[1:]) / 2.0
+    foot = np.polyval(coefficients[::-1], s)
+    between = (foot[:-1] + foot[1:]) / 2.0
+    ideal = np.polyval(coefficients[::-1], middle)
+    np.testing.assert_allclose(between, ideal, atol=0.005)
+
+
+def test_a_wall_ends_with_its_road(tmp_path):
+    wall = WALL.format(t0=6, t1=6, length=500, high=1.2)
+    (found,), faults = bent_road(tmp_path / "a.xodr", "<line/>", wall)
+    assert found.footprint_W.bounds == pytest.approx((5, 5.85, 70, 6.15))
+    ((kind, number, _),) = faults.rows()
+    assert (kind, number) == ("object beyond the end of its road, cut", 1)
+
+
+def test_trees_without_a_distance_stay_trees(tmp_path):
+    trees = WALL.replace("barrier", "tree").format(
+        t0=6, t1=6, length=12, high=5
+    )
+    found, _ = bent_road(tmp_path / "a.xodr", "<line/>", trees)
+    assert [one.xyz[0] for one in found] == [5.0, 9.0, 13.0, 17.0]
+    assert {one.semantic_class for one in found} == {"vegetation"}
+
+
 @pytest.mark.slow
 def test_a_road_over_another_is_a_bridge(tmp_path):
     rise = cubic("elevation", 0, 6.0, 0, 0, 0, "s")
