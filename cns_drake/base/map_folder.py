@@ -6,6 +6,7 @@ import re
 
 from cns_drake.base.errors import InputError
 from cns_drake.base.files import check_regular
+from cns_drake.base.listing import listed
 
 ROADS_NAME = "roads.yaml"
 PLAN_NAME = "city.yaml"
@@ -73,10 +74,10 @@ class MapFolder:
         return self.path / stage_name(stage)
 
     def stages(self) -> dict[str, Path]:
-        """Returns stage -> SDF file of all existing stages, sorted."""
+        """Returns stage -> SDF file of all existing stages, in order."""
         return {
             path.stem.removeprefix("stage_"): path
-            for path in sorted(self.path.glob(stage_name("*")))
+            for path in listed(self.path, stage_name("*"))
         }
 
     def drive(self, number: str) -> Path:
@@ -85,7 +86,7 @@ class MapFolder:
 
     def drives(self) -> list[Path]:
         """Returns the scenario files of the drives, in order."""
-        return sorted(self.path.glob(self.drive("*").name))
+        return listed(self.path, self.drive("*").name)
 
     def recordable_drives(self) -> list[Path]:
         """Returns the scenario files of drives whose stage exists.

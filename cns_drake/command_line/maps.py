@@ -14,6 +14,7 @@ import typer
 from cns_drake.base.csv_files import whole_number
 from cns_drake.base.errors import InputError, did_you_mean
 from cns_drake.base.interrupts import uninterrupted
+from cns_drake.base.listing import natural_key
 from cns_drake.base.terminal import next_command, note, print_rows
 from cns_drake.imports.options import (
     REPORT_NAME,
@@ -295,7 +296,9 @@ def _report_rows(
     if len(report.stages) > 1:
         words = ["reproduce", str(output), "--output", "study"]
     else:
-        drive = str(output / f"sequence_{min(report.stages)}.yaml")
+        drive = str(
+            output / f"sequence_{min(report.stages, key=natural_key)}.yaml"
+        )
         words = ["simulate", drive, "--output", "recordings"]
     yield "next", shlex.join(["cns-drake", *words])
 

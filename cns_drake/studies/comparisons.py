@@ -10,6 +10,7 @@ from typing import Any
 from cns_drake.base.csv_files import read_records, whole_number
 from cns_drake.base.errors import InputError, errors_at, validated
 from cns_drake.base.jobs.fingerprint import fingerprint
+from cns_drake.base.listing import natural_key
 from cns_drake.scenarios.planning import count_frames, plan_drive
 from cns_drake.scenarios.scenario import Scenario
 from cns_drake.scenarios.scenario_files import (
@@ -145,7 +146,8 @@ class PairOfDrives:
                 driver = drive.driver.replaced(seed=drive.name)
                 self._unchanged[side] = drive.replaced(driver=driver)
         self._last_stage = max(
-            str(one.stage) for one in (self.database, self.query)
+            (str(one.stage) for one in (self.database, self.query)),
+            key=natural_key,
         )
         self._plain = dict(self._unchanged)
         if self.same_route:
@@ -405,13 +407,15 @@ class PairOfDrives:
     def _stage(self, side: str, drive: Scenario, wanted: Any) -> str:
         """Returns the stage for a stage's name or for a word such as `last`."""
         own, last = str(drive.stage), self._last_stage
-        stages = sorted(map_folder(drive).stages())
+        stages = list(map_folder(drive).stages())
         if wanted in (OWN, LAST, FIRST):
-            return {OWN: own, LAST: last, FIRST: min(stages, default=own)}[
+            return {OWN: own, LAST: last, FIRST: next(iter(stages), own)}[
                 wanted
             ]
         if isinstance(wanted, str) and wanted.startswith(EARLIER):
-            before = [one for one in stages if one < last]
+            before = [
+                one for one in stages if natural_key(one) < natural_key(last)
+            ]
             number = min(_STEPS, len(before))
             step = wanted.removeprefix(EARLIER)
             back = _STEPS - int(step) if step in ("1", "2", "3", "4") else -1

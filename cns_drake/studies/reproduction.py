@@ -9,6 +9,7 @@ from cns_drake.base.errors import InputError
 from cns_drake.base.files import make_folder
 from cns_drake.base.jobs.cluster import Cluster
 from cns_drake.base.jobs.running import run_jobs
+from cns_drake.base.listing import natural_key
 from cns_drake.base.map_folder import MapFolder
 from cns_drake.scenarios import scenario_files
 from cns_drake.scenarios.scenario import Scenario
@@ -129,7 +130,7 @@ def control_drives(drives: Sequence[Scenario]) -> list[Scenario]:
     drive and the last drive see the same city, so a comparison of these two
     shows the effect of the route alone.
     """
-    last = max(drives, key=lambda drive: drive.stage or "")
+    last = max(drives, key=lambda drive: natural_key(drive.stage or ""))
     return [
         control_drive(drive, str(last.stage))
         for drive in drives

@@ -9,6 +9,7 @@ from cns_drake.base.errors import InputError, did_you_mean, errors_at
 from cns_drake.base.files import is_there
 from cns_drake.base.jobs.cluster import Cluster
 from cns_drake.base.jobs.fingerprint import fingerprint
+from cns_drake.base.listing import listed, natural_key
 from cns_drake.base.map_folder import MapFolder
 from cns_drake.scenarios.scenario import Scenario
 from cns_drake.scenarios.scenario_files import load_scenario
@@ -324,10 +325,10 @@ class Study:
         files = MapFolder(folder).recordable_drives()
         kind = self.experiment.drives
         if kind == "first-and-last":
-            stages = sorted(MapFolder(folder).stages())
+            stages = list(MapFolder(folder).stages())
             # In an imported city, the drives of the stages have different
             # routes.
-            last = (sorted(folder.glob("other_*.yaml")) or files)[-1]
+            last = (listed(folder, "other_*.yaml") or files)[-1]
             return [
                 (
                     load_scenario(files[0]).replaced(stage=stages[0]),
@@ -338,7 +339,7 @@ class Study:
         if kind == "same-route":
             query = drives[-1]
             return [(query.replaced(name=f"{query.name}_database"), query)]
-        query = max(drives, key=lambda drive: drive.stage or "")
+        query = max(drives, key=lambda drive: natural_key(drive.stage or ""))
         pairs = [(one, query) for one in drives if one is not query]
         if kind == "both-ways" and len(drives) == 2:
             pairs += [(query, one) for one, _ in pairs]

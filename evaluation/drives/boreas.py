@@ -70,6 +70,7 @@ class BoreasDrive(FileDrive):
             stamps_ns=stamps_ns[spanned],
             X_WS=X_WS,
             read=_read,
+            tables=[trajectory.path],
             notes=unknown + notes,
             unit="alpha-prime",
         )

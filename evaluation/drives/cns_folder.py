@@ -20,7 +20,7 @@ import numpy as np
 import yaml
 
 from cns_drake.base import poses
-from cns_drake.base.drives.drive import IMU_DTYPE, read_scenario
+from cns_drake.base.drives.drive import IMU_DTYPE, SCENARIO, read_scenario
 from cns_drake.base.errors import InputError, value_errors
 from cns_drake.base.files import is_there, read_text
 from cns_drake.base.yaml_files import parse_yaml
@@ -90,6 +90,10 @@ class CnsFolderDrive(FileDrive):
             stamps_ns=stamps_ns,
             X_WS=X_WB @ _read_mount(mount),
             read=lambda path, stamp_ns: read_cloud(path),
+            tables=[
+                *(trajectory.path, self._imu_path, path / SCENARIO),
+                *([] if mount is None else [mount]),
+            ],
             scenario=scenario,
             unit="cns",
         )

@@ -107,6 +107,7 @@ class HeliprDrive(FileDrive):
             stamps_ns=stamps_ns[spanned],
             X_WS=X_WS,
             read=partial(read_scan, lidar),
+            tables=[trajectory.path],
             notes=notes,
             datum=DATUM if in_utm else None,
             unit=_UNITS.get(lidar),

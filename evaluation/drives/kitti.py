@@ -31,10 +31,15 @@ import numpy as np
 from numpy.lib.recfunctions import append_fields
 
 from cns_drake.base import poses
-from cns_drake.base.drives.drive import index_instances, read_scenario
+from cns_drake.base.drives.drive import (
+    SCENARIO,
+    index_instances,
+    read_scenario,
+)
 from cns_drake.base.errors import InputError, value_errors
 from cns_drake.base.files import is_there, read_bytes, read_text
 from cns_drake.base.json_text import parse_json
+from cns_drake.base.listing import listed
 from cns_drake.base.number_rows import parse_rows
 from evaluation.drives.scan_files import BinDrive, read_packed
 from evaluation.drives.text_tables import (
@@ -134,10 +139,21 @@ class KittiDrive(BinDrive):
             files=files,
             stamps_ns=stamps_ns,
             X_WS=X_WS,
+            tables=[
+                *(times_path, poses_path, calibration, first_pose),
+                *(path / _FRAMES, path / SCENARIO, self._structures),
+            ],
             notes=tuple(notes),
             scenario=scenario,
             unit=unit,
         )
+
+    @property
+    def files(self) -> tuple[Path, ...]:
+        if self._labels is None:
+            return super().files
+        labels = (_label_path(self._labels, one) for one in self._files)
+        return (*super().files, *labels)
 
     @property
     def instances(self) -> Mapping[int, Mapping] | None:
@@ -152,7 +168,7 @@ class KittiDrive(BinDrive):
         stored = super()._read_bin(path, stamp_ns)
         if self._labels is None:
             return stored
-        labels_path = self._labels / f"{path.stem}.label"
+        labels_path = _label_path(self._labels, path)
         labels = read_packed(labels_path, _LABEL)
         if len(labels) != len(stored):
             raise ValueError(
@@ -163,6 +179,10 @@ class KittiDrive(BinDrive):
         return append_fields(stored, names, columns, usemask=False)
 
 
+def _label_path(labels: Path, scan: Path) -> Path:
+    return labels / f"{scan.stem}.label"
+
+
 def holds_kitti(path: Path) -> bool:
     """Returns whether a folder looks like a drive in KITTI's layout."""
     return (path / _SCANS).is_dir()
@@ -171,7 +191,7 @@ def holds_kitti(path: Path) -> bool:
 def _numbered_files(path: Path) -> tuple[list[Path], list[int]]:
     """Returns the scans of a drive in order, and the number of each."""
     folder = path / _SCANS
-    files = sorted(folder.glob("*.bin"))
+    files = listed(folder, "*.bin")
     if not files:
         raise InputError(f"{folder}: no scan (*.bin) in it")
     for file in files:
@@ -181,15 +201,15 @@ def _numbered_files(path: Path) -> tuple[list[Path], list[int]]:
     frames = path / _FRAMES
     if not is_there(frames):
         return files, numbers
-    listed = read_numbers(frames, [("number", "U40")])["number"]
-    if len(listed) != len(files):
-        raise InputError(f"{frames}: {len(listed)} rows for {len(files)} scans")
-    for row, text in enumerate(listed.tolist()):
+    rows = read_numbers(frames, [("number", "U40")])["number"]
+    if len(rows) != len(files):
+        raise InputError(f"{frames}: {len(rows)} rows for {len(files)} scans")
+    for row, text in enumerate(rows.tolist()):
         # No drive has a frame whose number has ten digits.
         if re.fullmatch("[0-9]{1,9}", text) is None:
             raise InputError(f"{frames}: row {row + 1}: {text!r} is no number")
     renumbered = numbers == list(range(len(files)))
-    found, numbers = numbers, list(map(int, listed))
+    found, numbers = numbers, list(map(int, rows))
     for row, (before, number) in enumerate(itertools.pairwise(numbers)):
         if number <= before:
             raise InputError(

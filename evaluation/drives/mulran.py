@@ -11,7 +11,7 @@ from pathlib import Path
 
 import numpy as np
 
-from cns_drake.base.drives.drive import read_scenario
+from cns_drake.base.drives.drive import SCENARIO, read_scenario
 from cns_drake.base.drives.mulran_frames import X_BS
 from cns_drake.base.errors import InputError
 from evaluation.drives.scan_files import (
@@ -86,6 +86,7 @@ class MulranDrive(BinDrive):
             files=kept,
             stamps_ns=stamps_ns[spanned],
             X_WS=X_UB @ X_BS,
+            tables=[trajectory.path, path / SCENARIO],
             notes=notes,
             datum=None if local else DATUM,
             scenario=scenario,

@@ -84,6 +84,7 @@ class NcltDrive(FileDrive):
             stamps_ns=stamps_ns[spanned],
             X_WS=_X_WN @ X_NB @ _X_BS,
             read=lambda path, stamp_ns: read_scan(path),
+            tables=[trajectory.path],
             notes=unknown + notes,
             unit="hdl-32e-upside-down",
         )

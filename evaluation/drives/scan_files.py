@@ -1,6 +1,6 @@
 """Drives that are stored as one file for each scan."""
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from functools import cached_property
 from pathlib import Path
 from typing import Any
@@ -12,6 +12,7 @@ from cns_drake.base.drives.lidar_fields import LidarField, lidar_field
 from cns_drake.base.drives.mulran_frames import ORIGIN
 from cns_drake.base.errors import InputError, value_errors
 from cns_drake.base.files import read_bytes, user_errors
+from cns_drake.base.listing import listed
 from cns_drake.base.points import FARTHEST_RETURN, check_range
 from evaluation.clouds.bin_columns import BinLayout, find_layout
 from evaluation.clouds.cloud_files import SCAN_LIMIT_BYTES
@@ -70,6 +71,7 @@ class FileDrive(Drive):
         stamps_ns: np.ndarray,
         X_WS: np.ndarray,
         read: Callable[[Path, int], np.ndarray],
+        tables: Iterable[Path] = (),
         notes: tuple[str, ...] = (),
         datum: str | None = None,
         scenario: Mapping | None = None,
@@ -86,6 +88,8 @@ class FileDrive(Drive):
             read: function that returns the points in the file of a scan,
                 unchanged. Its arguments are the file and the time of the scan
                 [ns]. It raises ValueError if the file has another format.
+            tables: all other files that are read, such as poses. A path where
+                there is no file is left out.
             notes: notes for the user on how the drive was read.
             datum: name of the survey grid in which W lies; None if there is
                 none.
@@ -98,6 +102,7 @@ class FileDrive(Drive):
         self._stamps_ns = stamps_ns
         self._X_WS = X_WS
         self._read = read
+        self._tables = tuple(one for one in tables if one.is_file())
         self._notes = notes
         self._datum = datum
         self._scenario = scenario
@@ -113,6 +118,10 @@ class FileDrive(Drive):
     @property
     def X_WS(self) -> np.ndarray:
         return self._X_WS
+
+    @property
+    def files(self) -> tuple[Path, ...]:
+        return (*self._tables, *self._files)
 
     @property
     def notes(self) -> tuple[str, ...]:
@@ -183,11 +192,7 @@ def list_stamped(
     Raises:
         InputError: if there is no file, or a name is no time.
     """
-    files = [
-        path
-        for path in folder.glob(f"*{suffix}")
-        if not path.name.startswith(".")
-    ]
+    files = listed(folder, f"*{suffix}")
     if not files:
         raise InputError(f"{folder}: no scan (*{suffix}) in it")
     stems = [path.name.removesuffix(suffix) for path in files]

@@ -16,9 +16,10 @@ import numpy as np
 from cns_drake.base.drives.lidar_fields import lidar_field
 from cns_drake.base.errors import InputError
 from cns_drake.base.files import read_bytes
+from cns_drake.base.listing import listed
 from evaluation.clouds.cloud_files import OnNote, read_cloud
 from evaluation.drives import Drive, helipr, nclt, open_drive
-from evaluation.drives.scan_files import FileDrive
+from evaluation.drives.scan_files import BinDrive, FileDrive
 from evaluation.drives.text_tables import read_poses, read_quaternions
 
 # Distance put between scans without poses [m]; no scan reaches so far.
@@ -42,8 +43,11 @@ class DataSet(NamedTuple):
             `poses.txt` with the upper 3 x 4 part of X_WS in each row; `named`
             for a `poses.txt` with a scan's name, x y z and quat_xyzw in each
             row; "" for a data set without poses.
-        read: function that reads a scan.
+        read: function that reads a scan; None for files with an ending that
+            `evaluation.clouds.cloud_files.read_cloud` knows.
         whole: whether the scans contain all points that the LiDAR measured.
+        columns: number of columns of its `.bin` files; in files with another
+            digest, it is found from the values.
     """
 
     folder: str
@@ -55,8 +59,9 @@ class DataSet(NamedTuple):
     licence: str
     digest: str
     poses: str = ""
-    read: Callable[[Path], np.ndarray] = read_cloud
+    read: Callable[[Path], np.ndarray] | None = None
     whole: bool = True
+    columns: int | None = None
 
 
 _NC = "CC BY-NC-SA 3.0"
@@ -94,7 +99,7 @@ DATA_SETS = (
         "nuScenes, non-commercial",
         "8a5a58f5e799eafab56ebf9a7d25c1aa23b1510a26e3a164dce0e8901b6df890",
         "matrices",
-        partial(read_cloud, columns=4),
+        columns=4,
     ),
     DataSet(
         "newer_06",
@@ -106,7 +111,7 @@ DATA_SETS = (
         "CC BY-NC-SA 4.0",
         "2980972897a68256b3ecd15cd4d4ca1e2960bc932d648fbac88a047806d68fe1",
         "",
-        partial(read_cloud, columns=3),
+        columns=3,
     ),
     DataSet(
         "nclt",
@@ -175,7 +180,7 @@ def open_data_sets(folder: Path, on_note: OnNote) -> list[RealScans]:
     if not folder.is_dir():
         raise InputError(f"{folder}: no such folder")
     known = {one.folder for one in DATA_SETS}
-    scans = [sorted((folder / one.folder).glob(one.scans)) for one in DATA_SETS]
+    scans = [listed(folder / one.folder, one.scans) for one in DATA_SETS]
     if not any(scans):
         names = ", ".join(sorted(known))
         raise InputError(f"{folder}: no data set that is known ({names})")
@@ -187,18 +192,25 @@ def open_data_sets(folder: Path, on_note: OnNote) -> list[RealScans]:
         digest = hashlib.sha256()
         for file in files:
             digest.update(read_bytes(file))
+        columns = one.columns
         if digest.hexdigest() != one.digest:
+            columns = None
             on_note(
                 f"{folder / one.folder}: other scans than known, still used"
             )
-        found.append(RealScans(one, _open(folder / one.folder, one, files)))
-    for path in sorted(folder.iterdir()):
+        drive = _open(folder / one.folder, one, files, columns)
+        for note in drive.notes:
+            on_note(note)
+        found.append(RealScans(one, drive))
+    for path in listed(folder):
         if path.is_dir() and path.name not in known:
             on_note(f"{path}: not known, left out")
     return found
 
 
-def _open(folder: Path, one: DataSet, files: Sequence[Path]) -> Drive:
+def _open(
+    folder: Path, one: DataSet, files: Sequence[Path], columns: int | None
+) -> Drive:
     if one.poses == "drive":
         return open_drive(folder)
     number = len(files)
@@ -211,14 +223,24 @@ def _open(folder: Path, one: DataSet, files: Sequence[Path]) -> Drive:
             raise InputError(f"{table}: {len(X_WS)} rows for {number} scans")
     elif one.poses:
         X_WS = _named_poses(table, files)
+    options: dict = {
+        "name": one.folder,
+        "world_frame": one.world,
+        "files": list(files),
+        "stamps_ns": np.arange(number),
+        "X_WS": X_WS,
+        "tables": [table],
+        "unit": one.unit,
+    }
+    if one.read is None and files[0].suffix == ".bin":
+        return BinDrive(columns, **options)
+    read = one.read
+    notes: list[str] = []
+    if read is None:
+        read = read_cloud
+        read_cloud(files[0], on_note=notes.append)
     return FileDrive(
-        name=one.folder,
-        world_frame=one.world,
-        files=list(files),
-        stamps_ns=np.arange(number),
-        X_WS=X_WS,
-        read=lambda path, stamp_ns: one.read(path),
-        unit=one.unit,
+        read=lambda path, stamp_ns: read(path), notes=tuple(notes), **options
     )
 
 
@@ -233,20 +255,24 @@ def _named_poses(table: Path, files: Sequence[Path]) -> np.ndarray:
     return read_quaternions(table, None).at(numbers, 0)
 
 
-def simulated_drives(folder: Path, unit: str) -> list[Drive]:
+def simulated_drives(folder: Path, unit: str, on_note: OnNote) -> list[Drive]:
     """Returns the drives in a folder whose LiDAR is like a real one.
 
     Args:
         folder: folder of simulated drives.
         unit: name of a LiDAR preset, such as `hdl-64e`. Only drives with the
             same rows and columns of rays are returned.
+        on_note: is called with notes on how these drives are read.
 
     Raises:
         InputError: a drive cannot be opened.
     """
     if not folder.is_dir():
         raise InputError(f"{folder}: no such folder")
-    paths = sorted(one for one in folder.iterdir() if one.is_dir())
+    paths = [one for one in listed(folder) if one.is_dir()]
     drives = [open_drive(path) for path in paths]
     field = lidar_field(unit)
-    return [one for one in drives if field and one.lidar_field == field]
+    alike = [one for one in drives if field and one.lidar_field == field]
+    for note in (note for one in alike for note in one.notes):
+        on_note(note)
+    return alike

@@ -145,7 +145,11 @@ class Measuring:
         found = open_data_sets(folder, self._note)
         for unit in dict.fromkeys(one.data_set.unit for one in found):
             sets = [one for one in found if one.data_set.unit == unit]
-            made = simulated_drives(simulated, unit) if simulated else []
+            made = (
+                simulated_drives(simulated, unit, self._note)
+                if simulated
+                else []
+            )
             self._recognise(sets, made)
             for one in sets:
                 if one.data_set.poses:

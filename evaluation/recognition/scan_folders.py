@@ -8,6 +8,7 @@ import numpy as np
 from cns_drake.base import points as point_arrays
 from cns_drake.base.errors import InputError
 from cns_drake.base.files import completing
+from cns_drake.base.listing import listed
 from cns_drake.base.progress import track
 from evaluation.clouds.bin_columns import find_layout
 from evaluation.clouds.cloud_files import (
@@ -161,7 +162,7 @@ def _read(
 def _scan_files(folder: Path) -> list[Path]:
     if not folder.is_dir():
         raise InputError(f"{folder}: no such folder")
-    files = sorted(path for path in folder.iterdir() if is_cloud(path))
+    files = [path for path in listed(folder) if is_cloud(path)]
     if not files:
         raise InputError(f"{folder}: no scan in it (.bin .pcd .npy .ply)")
     stems = set()

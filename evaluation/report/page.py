@@ -22,6 +22,7 @@ import numpy as np
 
 from cns_drake.base.errors import InputError
 from cns_drake.base.files import write_text
+from cns_drake.base.listing import natural_key
 from evaluation.change.drive_change import ChangeResult, symmetric_changes
 from evaluation.recognition.costs import Cost
 from evaluation.recognition.fault_kinds import FAULT_KINDS, PairEvidence
@@ -383,7 +384,7 @@ def _drives_of_maps(report: Report) -> dict[str, list[str]]:
             zip(result.pair[1:], names, strict=True)
         )
     groups = {
-        map_name: [stages[stage] for stage in sorted(stages)]
+        map_name: [stages[stage] for stage in sorted(stages, key=natural_key)]
         for map_name, stages in found.items()
     }
     placed = {name for names in groups.values() for name in names}

@@ -1,10 +1,12 @@
 """Chooses the methods that a study runs: shipped ones and your own."""
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Iterator, Mapping, Sequence, Set
 from dataclasses import dataclass, replace
+import os
 from pathlib import Path
 
 from cns_drake.base.errors import InputError, did_you_mean
+from cns_drake.base.jobs.file_digests import file_digests
 from cns_drake.base.jobs.fingerprint import script_digest
 from evaluation.methods import (
     Method,
@@ -61,13 +63,36 @@ class MethodChoice:
         Raises:
             InputError: if its file cannot be used.
         """
-        values = {
+        config = self.make().config
+        values: dict = {
             "name": self.name,
-            "parameters": self.make().config.model_dump(mode="json"),
+            "parameters": config.model_dump(mode="json"),
+            "files": dict(_digests(config.model_dump())),
         }
         if self.file is not None:
             values["file"] = script_digest(self.file)
         return values
+
+
+def _digests(value: object) -> Iterator[tuple[str, list[str]]]:
+    """Yields the files and folders that settings name, with their digests.
+
+    Settings can be lists, or settings of their own. A text counts as a path
+    only if there is such a file.
+    """
+    if isinstance(value, Mapping):
+        value = list(value.values())
+    if isinstance(value, Sequence | Set) and not isinstance(value, str | bytes):
+        for one in value:
+            yield from _digests(one)
+    elif isinstance(value, str | Path):
+        path = Path(value)
+        files = [path]
+        if isinstance(value, Path) and path.is_dir():
+            files = sorted(one for one in path.rglob("*") if one.is_file())
+        elif not os.path.isfile(value):
+            return
+        yield str(value), file_digests(files)
 
 
 def parse_setting(text: str, form: str = "NAME=VALUE") -> tuple[str, Setting]:

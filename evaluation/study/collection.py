@@ -11,6 +11,7 @@ import re
 from cns_drake.base.drives.drive import driven_way
 from cns_drake.base.drives.lidar_fields import LidarField
 from cns_drake.base.errors import InputError, one_line
+from cns_drake.base.listing import listed, natural_key
 from evaluation.drives import find_readers, open_drive
 from evaluation.drives.cns_folder import holds_cns
 from evaluation.drives.kitti import holds_kitti
@@ -39,7 +40,7 @@ class RecordingInfo:
         name: name of the recording.
         path: file or folder of the recording.
         map_name: name of the map.
-        stage: name of the stage; a map's stages, sorted by name, are in the
+        stage: name of the stage; a map's stages, in natural order, are in the
             order of time.
         way: fields of the scenario that determine the path of the drive; None
             if unknown.
@@ -133,7 +134,9 @@ class City:
 
         Each drive of an earlier stage is paired with that of the last stage.
         """
-        *earlier, last = (self.stages[key] for key in sorted(self.stages))
+        *earlier, last = (
+            self.stages[key] for key in sorted(self.stages, key=natural_key)
+        )
         return [(recording, last) for recording in earlier]
 
     def recognition_pairs(self, *, with_itself: bool = False) -> list[Pair]:
@@ -313,7 +316,7 @@ def _find_drives(folder: Path) -> list[Path]:
     """Returns the paths of the drives in a folder, in order."""
     paths = []
     nested = []
-    for child in sorted(folder.iterdir()):
+    for child in listed(folder):
         if _is_drive(child):
             paths.append(child)
         elif child.is_dir():
@@ -327,13 +330,17 @@ def _find_drives(folder: Path) -> list[Path]:
             )
         if (holds_cns(path) or holds_kitti(path)) and _is_drive(path):
             paths.append(path)
-    return sorted(paths)
+    return sorted(paths, key=lambda path: natural_key(str(path)))
 
 
 def _folders(folder: Path, levels: int) -> Iterator[Path]:
     """Yields the folders in a folder, down to a number of levels."""
     with os.scandir(folder) as entries:
-        found = [Path(entry) for entry in entries if entry.is_dir()]
+        found = [
+            Path(entry)
+            for entry in entries
+            if entry.is_dir() and not entry.name.startswith(".")
+        ]
     for path in found:
         yield path
         if levels > 1:
@@ -386,7 +393,8 @@ def _make_city(
     name: str, recordings: list[RecordingInfo], reference: Reference
 ) -> City:
     stages = {}
-    for stage in sorted({recording.stage for recording in recordings}):
+    stages_there = {recording.stage for recording in recordings}
+    for stage in sorted(stages_there, key=natural_key):
         candidates = [r for r in recordings if r.stage == stage]
         named = [r for r in candidates if r.name == f"{name}_{stage}"]
         if len(candidates) > 1 and len(named) != 1:

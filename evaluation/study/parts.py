@@ -419,7 +419,8 @@ class MakePart(Step):
     def is_done(self) -> bool:
         hint = _hints(self.function).get("return", Any)
         return (
-            self.part.is_current(self._inputs())
+            self.part.path.is_file()
+            and self.part.is_current(self._inputs())
             and all(file.is_file() for file in self.figures)
             and self.part.fits(hint)
         )

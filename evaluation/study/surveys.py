@@ -7,7 +7,6 @@ drive, a function that opens the drive, instead of the drive.
 
 from collections.abc import Callable, Mapping, Set
 from dataclasses import dataclass, field
-import os
 from pathlib import Path
 from typing import Protocol, TypeAlias
 
@@ -15,7 +14,7 @@ import numpy as np
 from numpy.lib.recfunctions import repack_fields
 
 from cns_drake.base.errors import InputError
-from cns_drake.base.files import read_bytes, user_errors
+from cns_drake.base.jobs.file_digests import file_digests
 from cns_drake.base.jobs.step import Reporter, Step
 from cns_drake.base.points import xyz
 from cns_drake.base.progress import track
@@ -125,32 +124,13 @@ class RecordedDrive:
     def identity(self) -> list[list]:
         """Returns what identifies the recording: its options and its files.
 
-        Each file counts by its name, its size and the time of its last change.
-        In a recording of cns-drake, a fingerprint takes the place of the times,
-        so that a copy is the same recording.
+        Its reader names the files. Each counts by its name and its content.
         """
-        with user_errors(self.path):
-            path = self.path.resolve(strict=True)
-            files = [path]
-            if path.is_dir():
-                files = sorted(p for p in path.rglob("*") if p.is_file())
-            stats = [os.stat(file) for file in files]
-            folder = path if path.is_dir() else path.parent
-            known = None
-            if (folder / "fingerprint.txt").is_file():
-                content = read_bytes(folder / "fingerprint.txt")
-                known = content.decode("utf-8", "replace")
-        chosen: list[list] = [
-            [one] for one in (self.lidar, self.columns) if one is not None
-        ]
-        return chosen + [
-            [
-                path.name,
-                file.relative_to(path).as_posix(),
-                stat.st_size,
-                stat.st_mtime_ns if known is None else known,
-            ]
-            for file, stat in zip(files, stats, strict=True)
+        drive = self()
+        names = [file.name for file in drive.files]
+        return [
+            [drive.name, drive.world_frame, self.lidar, self.columns],
+            *map(list, zip(names, file_digests(drive.files), strict=True)),
         ]
 
 
@@ -394,7 +374,9 @@ class Survey(Step):
         return self.files.folder
 
     def is_done(self) -> bool:
-        return not self._missing()
+        # A drive that is surveyed for the first time is not read for this.
+        asked = map(self.files.described, self._asked)
+        return all(one.path.is_file() for one in asked) and not self._missing()
 
     def run(self, reporter: Reporter) -> None:
         missing = self._missing()

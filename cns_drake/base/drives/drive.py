@@ -37,6 +37,8 @@ IMU_DTYPE = np.dtype(
         ("specific_force", "<f8", 3),
     ]
 )
+# File of a drive's folder with the scenario of an exported drive.
+SCENARIO = "scenario.yaml"
 # Fields of a scenario that give the vehicle's path.
 _PATHS = ("route", "waypoints")
 # Fields that move the vehicle beside its path, or turn it round.
@@ -94,7 +96,7 @@ def read_scenario(folder: Path) -> Mapping | None:
         InputError: the file is not a mapping in YAML, or its field `name` is
             not a valid name of a drive.
     """
-    path = folder / "scenario.yaml"
+    path = folder / SCENARIO
     if not is_there(path):
         return None
     scenario = read_yaml(path)
@@ -213,6 +215,15 @@ class Drive(abc.ABC):
         by the positioning error of the drives, about ten metres.
         """
         return None
+
+    @property
+    def files(self) -> tuple[Path, ...]:
+        """All files that are read, also when a scan or its labels are asked.
+
+        Results of the drive are kept until one of these files changes. A drive
+        that is not read from files has none.
+        """
+        return ()
 
     @property
     def notes(self) -> tuple[str, ...]:

@@ -188,6 +188,10 @@ class McapDrive(Drive):
         return (*notes, *filter(None, [self.distortion_note]))
 
     @property
+    def files(self) -> tuple[Path, ...]:
+        return (self._path,)
+
+    @property
     def distortion_note(self) -> str | None:
         """A note for the user if the scans contain motion distortion.
 

@@ -13,17 +13,18 @@ def test_existing_files(tmp_path):
     folder.path.mkdir()
     assert folder.name == "town"
     assert (folder.stages(), folder.drives()) == ({}, [])
-    for name in ("10", "02", "new"):
+    for name in ("10", "02", "9", "new"):
         folder.stage(name).touch()
-    for number in ("10", "03"):
+    for number in ("10", "9", "03"):
         folder.drive(number).touch()
     (folder.path / "stage_01.yaml").touch()
     (folder.path / "other_02.yaml").touch()
     stages = folder.stages()
-    assert list(stages) == ["02", "10", "new"]
+    assert list(stages) == ["02", "9", "10", "new"]
     assert stages["10"] == folder.path / "stage_10.sdf"
-    assert folder.drives() == [folder.drive("03"), folder.drive("10")]
-    assert folder.recordable_drives() == [folder.drive("10")]
+    drives = [folder.drive(number) for number in ("03", "9", "10")]
+    assert folder.drives() == drives
+    assert folder.recordable_drives() == drives[1:]
 
 
 def test_what_editors_leave_is_no_file_of_a_map(tmp_path):

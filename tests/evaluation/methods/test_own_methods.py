@@ -10,6 +10,7 @@ import pytest
 
 from evaluation.methods import method
 from evaluation.methods.method import load_method
+from evaluation.study.chosen_methods import choose_methods
 
 
 def shown_method(folder):
@@ -263,3 +264,36 @@ def test_results_of_the_other_functions(
     )
     words = ["pr", towns / "town_01", towns / "town_02", "--method", path]
     assert_refused(capsys, words, fault)
+
+
+def test_a_file_in_a_setting_counts_by_its_content(tmp_path, monkeypatch):
+    """Weights beside the method, as a text, in a list, and in a folder."""
+    monkeypatch.setattr(method, "_METHODS", dict(method._METHODS))
+    text = _WHOLE.replace("{number}", "weights").replace(
+        "    def desc",
+        "    class Config(MethodConfig):\n"
+        "        beside: Path = Path(__file__).with_name('beside.npy')\n"
+        "        more: list[Path] = []\n"
+        "        text: str = 'none'\n"
+        "    def desc",
+        1,
+    )
+    text = text.replace("import Method,", "import Method, MethodConfig,")
+    path = tmp_path / "own.py"
+    path.write_text(f"from pathlib import Path\n{text}")
+    files = [tmp_path / name for name in ("beside.npy", "b.npy", "c.npy")]
+    files.append(tmp_path / "net" / "layers" / "d.npy")
+    files[3].parent.mkdir(parents=True)
+    for file in files:
+        file.write_bytes(b"weights")
+    settings = [
+        f"own_weights.more={files[1]},{tmp_path / 'net'}",
+        f"own_weights.text={files[2]}",
+    ]
+    chosen = choose_methods([path], settings)[-1]
+    known = [chosen.identity()]
+    assert known[0] == chosen.identity()
+    for file in files:
+        file.write_bytes(b"trained")
+        known.append(chosen.identity())
+        assert known[-1] not in known[:-1]

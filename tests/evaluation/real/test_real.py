@@ -173,7 +173,7 @@ def test_the_digest_is_that_of_all_scans(tmp_path, monkeypatch):
     X_WS = found.drive.X_WS[3]
     np.testing.assert_allclose(X_WS[:3, 3], [401.0, 2.0, 1.6])
     np.testing.assert_allclose(X_WS[:3, :3], matrix(1.2), atol=1e-12)
-    files[0].write_bytes(whole)
+    files[0].write_bytes(files[1].read_bytes())
     (folder / "more").mkdir()
     data_sets.open_data_sets(folder, notes.append)
     assert [note.rpartition(": ")[2] for note in notes] == [
@@ -278,3 +278,37 @@ def test_the_judge_tells_boxes_from_noise(tmp_path, monkeypatch):
     assert control.value < row.value
     # No scan is within 7.5 m of another one.
     assert {one.task for one in measuring.rows} == {"judge"}
+
+
+def test_scans_are_in_the_order_of_their_numbers(tmp_path):
+    """0.bin to 11.bin, beside files that macOS leaves."""
+    folder = tmp_path / "nuscenes_1072"
+    (folder / "velodyne").mkdir(parents=True)
+    rows = []
+    for k in range(12):
+        scan = np.c_[town(1)[: 500 + k], np.full(500 + k, 17.0)]
+        scan.astype("<f4").tofile(folder / "velodyne" / f"{k}.bin")
+        (folder / "velodyne" / f"._{k}.bin").write_bytes(b"apple")
+        rows.append(f"1 0 0 {4 * k} 0 1 0 0 0 0 1 1.84")
+    (folder / "poses.txt").write_text("\n".join(rows))
+    (one,) = data_sets.open_data_sets(tmp_path, lambda note: None)
+    for k in range(12):
+        assert len(one.drive.scan(k)) == 500 + k
+        assert one.drive.X_WS[k, 0, 3] == 4.0 * k
+
+
+def test_columns_of_other_scans_are_found(tmp_path):
+    """nuScenes' own .bin files have a fifth column."""
+    folder = tmp_path / "nuscenes_1072" / "velodyne"
+    folder.mkdir(parents=True)
+    scan = town(1)
+    rings = np.arange(len(scan)) % 32
+    points = np.c_[scan, rings * 0.0 + 17.0, 100.0 + rings]
+    points.astype("<f4").tofile(folder / "0.bin")
+    (folder.parent / "poses.txt").write_text("1 0 0 0 0 1 0 0 0 0 1 0")
+    notes = []
+    (one,) = data_sets.open_data_sets(tmp_path, notes.append)
+    np.testing.assert_array_equal(
+        one.drive.scan(0)["z"], scan[:, 2].astype("f4")
+    )
+    assert any("show 5 columns" in note for note in notes)

@@ -32,6 +32,19 @@ def test_a_drive_beside_the_way_is_no_control(tmp_path, more):
     assert city.unchanged_pair(*pair) is None
 
 
+@pytest.mark.parametrize(
+    "stages",
+    [("2", "9", "10"), ("v9", "v10"), ("2012-2-4", "2012-10-28")],
+)
+def test_the_last_stage_is_that_with_the_greatest_number(tmp_path, stages):
+    for stage in stages:
+        drive(tmp_path / f"town_{stage}", stage, "a", city="town")
+    (found,) = group_cities(find_recordings(tmp_path))
+    *earlier, last = stages
+    pairs = [(a.stage, b.stage) for a, b in found.recognition_pairs()]
+    assert pairs == [(one, last) for one in earlier]
+
+
 def test_fields_without_effect_make_no_other_way():
     way = driven_way({"route": LEGS})
     assert way is not None

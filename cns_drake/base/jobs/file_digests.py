@@ -1,0 +1,84 @@
+"""Digests of files, which are computed again only if a file has changed.
+
+A digest of the content, and not the time of the last change, identifies a file:
+a copy is the same, and a corrected file of the same size is another one. To
+read large files only once, the digests are kept in the cache folder of the
+user, each with what the file system says about its file.
+"""
+
+from collections.abc import Sequence
+import contextlib
+import hashlib
+import json
+import os
+from pathlib import Path
+import time
+
+from cns_drake.base.files import (
+    cache_folder,
+    check_regular,
+    user_errors,
+    write_text,
+)
+
+_BLOCK_BYTES = 1 << 20
+# A file that was changed so recently may change again without another time:
+# some file systems count whole seconds [ns].
+_SETTLED_NS = 2_000_000_000
+
+
+def file_digests(files: Sequence[Path]) -> list[str]:
+    """Returns the SHA-256 digests of the contents of files.
+
+    Raises:
+        InputError: a file cannot be read, or is no regular file.
+    """
+    paths = [os.path.realpath(file) for file in files]
+    name = hashlib.sha256("\0".join(paths).encode(errors="surrogateescape"))
+    kept = cache_folder() / "digests" / f"{name.hexdigest()[:32]}.json"
+    known: dict[str, list] = {}
+    # A cache that cannot be read or written only costs time.
+    with contextlib.suppress(Exception):
+        known = dict(json.loads(kept.read_bytes()))
+    found = {path: _digest(path, known.get(path)) for path in paths}
+    settled = {path: one for path, one in found.items() if one[0] is not None}
+    if settled != known:
+        with contextlib.suppress(Exception):
+            kept.parent.mkdir(parents=True, exist_ok=True)
+            write_text(kept, json.dumps(settled))
+    return [found[path][1] for path in paths]
+
+
+def _digest(path: str, known: list | None) -> list:
+    """Returns the state of a file, and its digest.
+
+    The state is what the file system says about the file. It is None if the
+    file may change without a change of its state.
+    """
+    check_regular(Path(path))
+    with user_errors(path):
+        state = _state(path)
+        if known is not None and known[0] == state:
+            return known
+        digest = hashlib.sha256()
+        with open(path, "rb") as stream:
+            while block := stream.read(_BLOCK_BYTES):
+                digest.update(block)
+        is_settled = (
+            time.time_ns() - max(state[1:3]) > _SETTLED_NS
+            and _state(path) == state
+        )
+    return [state if is_settled else None, digest.hexdigest()]
+
+
+def _state(path: str) -> list[int]:
+    """Returns size, times and number of a file.
+
+    The time of the last change of the inode cannot be set back, unlike that of
+    the content.
+    """
+    stat = os.stat(path)
+    return [
+        *(stat.st_size, stat.st_mtime_ns, stat.st_ctime_ns),
+        *(stat.st_ino, stat.st_dev),
+    ]

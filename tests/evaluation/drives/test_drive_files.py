@@ -1,0 +1,197 @@
+"""The files that a reader names are those that it opens."""
+
+import hashlib
+import os
+from pathlib import Path
+import struct
+import sys
+
+from helpers import helipr_drive, mulran_drive
+from helpers.dataset_folders import (
+    make_points,
+    make_poses,
+    write_bytes,
+    write_matrices,
+    write_quaternions,
+    xyzi,
+)
+from helpers.drive_files import make_scan, write_recording
+import numpy as np
+import pytest
+
+from cns_drake.base.errors import InputError
+from cns_drake.base.jobs.file_digests import file_digests
+from evaluation.drives import open_drive
+from evaluation.study.surveys import RecordedDrive
+
+MATRIX = "matrix: [1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 1.6, 0, 0, 0, 1]\n"
+_opened: list[str] | None = None
+
+
+def _listen(event, arguments):
+    if event == "open" and _opened is not None:
+        _opened.append(str(arguments[0]))
+
+
+sys.addaudithook(_listen)
+
+
+def mcap(root):
+    folder = root / "town_01"
+    scan = make_scan(np.full((4, 3), 2.0))
+    write_recording(folder, [scan] * 2, [np.eye(4)] * 2)
+    return folder
+
+
+def mulran(root):
+    mulran_drive.write_drive(root / "KAIST01")
+    return root / "KAIST01"
+
+
+def helipr(root):
+    helipr_drive.write_drive(root / "KAIST05")
+    return root / "KAIST05"
+
+
+def nclt(root):
+    folder = root / "2012-01-08"
+    rows = []
+    for k in range(3):
+        hit = struct.pack("<HHHBB", 20400, 19800, 20040, 31, 0)
+        write_bytes(folder / "velodyne_sync" / f"{1000 + k}.bin", hit)
+        rows.append(f"{1000 + k},{k}.0,0.0,-3.0,0.0,0.0,0.1")
+    table = root / "ground_truth" / "groundtruth_2012-01-08.csv"
+    write_bytes(table, "\n".join(rows).encode())
+    return folder
+
+
+def boreas(root):
+    folder = root / "boreas-2021-08-05-13-34"
+    rows = []
+    for k in range(3):
+        point = struct.pack("<6f", 3.0, 4.0, 1.0, 0.5, 7.0, 0.0)
+        write_bytes(folder / "lidar" / f"{1000 + k}.bin", point)
+        cells = (1000 + k, 0.8 * k, *[0.0] * 7, 0.1, 0, 0, 0)
+        rows.append(",".join(map(str, cells)))
+    table = folder / "applanix" / "lidar_poses.csv"
+    write_bytes(table, "\n".join(rows).encode())
+    return folder
+
+
+def kitti(root):
+    folder = root / "sequences" / "07"
+    for k in range(3):
+        points = make_points(5, seed=k)
+        write_bytes(folder / "velodyne" / f"{k:06d}.bin", xyzi(points))
+        write_bytes(folder / "labels" / f"{k:06d}.label", bytes(range(20)))
+    (folder / "times.txt").write_text("0\n1\n2\n")
+    (folder / "frames.txt").write_text("0\n1\n2\n")
+    (folder / "calib.txt").write_text("Tr: 1 0 0 0 0 1 0 0 0 0 1 0\n")
+    (folder / "scenario.yaml").write_text("map: town\nstage: '01'\n")
+    (folder / "structures.json").write_text("[]")
+    write_matrices(folder / "first_pose.txt", None, make_poses(1), " ")
+    write_matrices(root / "poses" / "07.txt", None, make_poses(3), " ")
+    return folder
+
+
+def cns(root):
+    folder = root / "Metropolis" / "01"
+    stamps = [1000, 2000, 3000]
+    header = "FIELDS x y z\nSIZE 4 4 4\nTYPE F F F\nWIDTH 1\nHEIGHT 1\n"
+    pcd = f"{header}POINTS 1\nDATA ascii\n1 2 3\n".encode()
+    for stamp in stamps:
+        write_bytes(folder / "pcd" / f"{stamp}.pcd", pcd)
+    write_quaternions(folder / "gt.csv", stamps, make_poses(3), ",")
+    (folder / "imu.csv").write_text("1000,0,0,0,1,0,0,0,0,0,9.81\n")
+    (folder / "scenario.yaml").write_text("map: town\nstage: '01'\n")
+    (root / "transformation_lidar.yaml").write_text(MATRIX)
+    return folder
+
+
+EVERY = (mcap, mulran, helipr, nclt, boreas, kitti, cns)
+
+
+def opened_by(action):
+    """Returns the real paths of the files that a function opens."""
+    global _opened
+    _opened = []
+    try:
+        action()
+        return {os.path.realpath(path) for path in _opened}
+    finally:
+        _opened = None
+
+
+@pytest.mark.parametrize("write", EVERY, ids=lambda write: write.__name__)
+def test_every_file_that_is_opened_is_named(tmp_path, write):
+    folder = write(tmp_path)
+
+    def use():
+        drive = open_drive(folder)
+        assert sum(map(len, drive)) > 0
+        for name in ("notes", "scenario", "instances", "imu", "motion"):
+            getattr(drive, name)
+
+    inside = os.path.realpath(tmp_path)
+    opened = {path for path in opened_by(use) if path.startswith(inside)}
+    files = open_drive(folder).files
+    assert opened == {os.path.realpath(path) for path in files}
+    first = RecordedDrive(folder).identity()
+    files[-1].write_bytes(files[-1].read_bytes()[::-1])
+    try:
+        assert RecordedDrive(folder).identity() != first
+    except InputError:  # A recording that is written backwards.
+        assert write is mcap
+
+
+def digest(data):
+    return hashlib.sha256(data).hexdigest()
+
+
+def test_corrected_poses_are_another_drive(tmp_path):
+    folder = kitti(tmp_path)
+    first = RecordedDrive(folder).identity()
+    table = tmp_path / "poses" / "07.txt"
+    table.write_text(table.read_text().replace("0", "00", 1))
+    second = RecordedDrive(folder).identity()
+    assert second != first
+    # The LiDAR's mount lies two folders above the drive.
+    folder = cns(tmp_path / "cns")
+    first = RecordedDrive(folder).identity()
+    mount = tmp_path / "cns" / "transformation_lidar.yaml"
+    mount.write_text(MATRIX.replace("1.6", "1.7"))
+    assert RecordedDrive(folder).identity() != first
+
+
+def test_a_link_stands_for_its_target(tmp_path):
+    folder = kitti(tmp_path)
+    scans = folder / "velodyne"
+    scans.rename(tmp_path / "elsewhere")
+    scans.symlink_to(tmp_path / "elsewhere")
+    first = RecordedDrive(folder).identity()
+    (tmp_path / "elsewhere" / "000001.bin").write_bytes(xyzi(make_points(5, 9)))
+    assert RecordedDrive(folder).identity() != first
+
+
+def test_digests_are_kept_until_a_file_changes(tmp_path, monkeypatch):
+    monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path / "cache"))
+    path = tmp_path / "scan.bin"
+    path.write_bytes(b"points")
+    expected = [digest(b"points")]
+    # A file that was just written is read each time.
+    assert file_digests([path]) == expected
+    assert str(path) in opened_by(lambda: file_digests([path]))
+    monkeypatch.setattr("time.time_ns", lambda: path.stat().st_ctime_ns + 3e9)
+    assert file_digests([path]) == expected
+    assert str(path) not in opened_by(lambda: file_digests([path]))
+    # The time of the content can be set back, that of the inode cannot.
+    stat = path.stat()
+    path.write_bytes(b"pointz")
+    os.utime(path, ns=(stat.st_atime_ns, stat.st_mtime_ns))
+    assert file_digests([path]) == [digest(b"pointz")]
+    # A damaged cache, or none, costs time only.
+    for kept in Path(tmp_path / "cache").rglob("*.json"):
+        kept.write_text('{"a": 1}')
+    assert file_digests([path]) == [digest(b"pointz")]
+    monkeypatch.setenv("XDG_CACHE_HOME", "/proc/nowhere")
+    assert file_digests([path]) == [digest(b"pointz")]
