@@ -123,7 +123,7 @@ def read_xml(path: Path) -> Element:
 _SIGNS = (
     "include", "light", "plugin", "actor", "scene", "gui", "state", "sensor",
     "road", "population", "submesh", "transparency", "visibility_flags",
-    "cone", "heightmap", "image", "polyline",
+    "cone", "heightmap", "image", "polyline", "initial_position",
 )  # fmt: skip
 _ENDLESS_COLLISION = ".//collision/geometry/plane"
 _SIZED_PLANE = ".//visual/geometry/plane/size"
@@ -285,12 +285,18 @@ class _Simplifier:
         self._note_references(root)
         saved = world.findall("state//model/pose")
         self.skip("saved places of models (state)", len(saved))
+        angles = world.findall("state//joint/angle")
+        self.skip("saved positions of joints (state)", len(angles))
         for tag in ("insertions", "deletions"):
             for _ in world.iterfind(f"state/{tag}/*"):
                 self.skip(f"saved {tag} (state)")
         self._add_children(world, target, self._path.absolute().parent, 0)
 
     def _note_references(self, root: Element) -> None:
+        begins = [*root.iterfind(".//joint/axis/initial_position")]
+        begins += root.iterfind(".//joint/axis2/initial_position")
+        moved = [one for one in begins if float(one.text or "nan") != 0.0]
+        self.skip("initial positions of joints", len(moved))
         for element in root.iter():
             for key in ("relative_to", "attached_to", "placement_frame"):
                 self._referred.add(element.get(key, "").split("::")[-1])

@@ -34,6 +34,8 @@ SIZES = {
 _OTHER_SHAPES = ("mesh", "heightmap", "polyline", "cone", "empty")
 _OTHER_NUMBERS = {
     ("mesh", "scale"),
+    ("axis", "initial_position"),
+    ("axis2", "initial_position"),
     *(
         ("material", colour)
         for colour in ("ambient", "diffuse", "specular", "emissive")

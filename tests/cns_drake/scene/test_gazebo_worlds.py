@@ -422,6 +422,65 @@ def test_valid_worlds_are_read(tmp_path, body, notes, suffix):
     assert [note.split(": ")[1] for note in world.notes] == notes
 
 
+def door(position, axis="axis", more=""):
+    """A model with a joint that begins elsewhere than at zero."""
+    begins = f"<initial_position>{position}</initial_position>"
+    return (
+        f"<model name='door'><link name='frame'/>{link()}<joint name='hinge'"
+        " type='universal'><parent>frame</parent><child>l</child>"
+        f"<axis><xyz>0 0 1</xyz>{begins if axis == 'axis' else ''}</axis>"
+        f"<axis2><xyz>1 0 0</xyz>{begins if axis == 'axis2' else ''}</axis2>"
+        f"</joint>{more}</model>"
+    )
+
+
+@pytest.mark.parametrize("suffix", [".world", ".sdf"])
+@pytest.mark.parametrize(
+    ("model", "number"),
+    [
+        (door("1.2"), 1),
+        (door("-1e-3", "axis2"), 1),
+        (door("0.0"), 0),
+        (door("+0", "axis2"), 0),
+        # Controllers are plugins, which are noted as such.
+        (
+            door(
+                "0",
+                more="<plugin name='p' filename='f'><initial_position>1"
+                "</initial_position></plugin>",
+            ),
+            0,
+        ),
+    ],
+)
+def test_joints_that_do_not_begin_at_zero_are_noted(
+    tmp_path, model, number, suffix
+):
+    path = write(tmp_path, model)
+    path = path.rename(path.with_suffix(suffix))
+    notes = [one for one in load_world(path).notes if "of joints" in one]
+    assert notes == [
+        f"{path}: {number} initial positions of joints ignored"
+    ] * bool(number)
+
+
+def test_joints_of_included_models_are_noted(tmp_path, models):
+    text = door("0.5").replace("'door'", "'gate'")
+    (models / "crate" / "model.sdf").write_text(
+        f"<sdf version='1.6'>{text}</sdf>"
+    )
+    saved = (
+        "<state world_name='default'><model name='gate'><joint name='hinge'>"
+        "<angle axis='0'>0.5</angle></joint></model></state>"
+    )
+    path = write(tmp_path, include("model://crate"), saved)
+    notes = load_world(path, model_paths=[models]).notes
+    assert [one.split(": ")[1] for one in notes if "of joints" in one] == [
+        "1 initial positions of joints ignored",
+        "1 saved positions of joints (state) ignored",
+    ]
+
+
 def test_a_world_with_blanks_before_its_declaration(tmp_path):
     model = f"<model name='m'><pose>5 0 1 0 0 0</pose>{link()}</model>"
     path = write(tmp_path, model)
