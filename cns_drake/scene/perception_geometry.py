@@ -1,12 +1,14 @@
 """Reads the geometry with a given Drake role, as a LiDAR sees it."""
 
-from collections.abc import Callable, Collection, Iterable, Sequence
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
-import itertools
+from typing import NamedTuple
 
 import numpy as np
 from pydrake import geometry as shapes
-from pydrake.common.value import Value
+from pydrake.common.value import AbstractValue, Value
 from pydrake.geometry import (
     FrameId,
     GeometryId,
@@ -17,7 +19,11 @@ from pydrake.geometry import (
 )
 from pydrake.math import RigidTransform
 from pydrake.multibody.plant import MultibodyPlant
-from pydrake.systems.framework import AbstractParameterIndex, OutputPort
+from pydrake.systems.framework import (
+    AbstractParameterIndex,
+    Context,
+    OutputPort,
+)
 
 from cns_drake.base.errors import InputError
 from cns_drake.scene import surfaces
@@ -122,14 +128,10 @@ def read_perception_geometry(
         InputError: a geometry cannot be read; see
             `cns_drake.scene.perception_geometry.GeometryReader.read`.
     """
-    reader = GeometryReader(Role.kPerception)
-    hidden = {
-        geometry_id
-        for frame_id in inspector.GetAllFrameIds()
-        if not keep_frame(frame_id)
-        for geometry_id in inspector.GetGeometries(frame_id, Role.kPerception)
-    }
-    return reader.read(inspector, hidden)
+    records = list_geometry(inspector, Role.kPerception)
+    return GeometryReader().read(
+        one for one in records if keep_frame(one.frame_id)
+    )
 
 
 def merge_surfaces(
@@ -155,88 +157,140 @@ def merge_surfaces(
     return surfaces.merge_triangles(members)[0]
 
 
+class GeometryRecord(NamedTuple):
+    """What a SceneGraph says of one geometry; mesh files are not read.
+
+    Attributes:
+        geometry_id: id of the geometry.
+        name: scoped name.
+        frame_id: the frame F to which the geometry is fixed.
+        X_FG: pose of the geometry G in F.
+        shape: the shape.
+        is_deformable: whether the geometry is deformable.
+        rgb: diffuse colour; None if the geometry has none.
+        reflectivity: the property ("lidar", "reflectivity"); None if the
+            geometry does not have it.
+    """
+
+    geometry_id: GeometryId
+    name: str
+    frame_id: FrameId
+    X_FG: RigidTransform
+    shape: Shape
+    is_deformable: bool
+    rgb: tuple[float, float, float] | None
+    reflectivity: float | None
+
+
+class GeometryList(tuple[GeometryRecord, ...]):
+    """The records of all geometry with a role, in the order of the SceneGraph.
+
+    The order is that of `GetAllGeometryIds`, which Drake documents as stable,
+    so the list depends only on the SceneGraph.
+    """
+
+    def __deepcopy__(self, memo: dict) -> GeometryList:
+        # A Context is cloned together with this value. It never changes, and
+        # ids cannot be copied.
+        return self
+
+
+def list_geometry(inspector: SceneGraphInspector, role: Role) -> GeometryList:
+    """Returns the records of all geometry with a role."""
+    return GeometryList(
+        GeometryRecord(
+            geometry_id,
+            inspector.GetName(geometry_id),
+            inspector.GetFrameId(geometry_id),
+            # Copies, because Drake returns references.
+            RigidTransform(inspector.GetPoseInFrame(geometry_id)),
+            inspector.GetShape(geometry_id).Clone(),
+            inspector.IsDeformableGeometry(geometry_id),
+            *_appearance(inspector, geometry_id, role),
+        )
+        for geometry_id in inspector.GetAllGeometryIds(role)
+    )
+
+
+def _appearance(
+    inspector: SceneGraphInspector, geometry_id: GeometryId, role: Role
+) -> tuple[tuple[float, float, float] | None, float | None]:
+    """Returns colour and reflectivity, each None if the model has none."""
+    properties = inspector.GetProperties(geometry_id, role)
+    rgb = reflectivity = None
+    if properties.HasProperty("lidar", "reflectivity"):
+        reflectivity = float(properties.GetProperty("lidar", "reflectivity"))
+    if properties.HasProperty("phong", "diffuse"):
+        rgba = properties.GetProperty("phong", "diffuse")
+        rgb = rgba.r(), rgba.g(), rgba.b()
+    return rgb, reflectivity
+
+
 class GeometryReader:
-    """Reads all geometry with a given Drake role from a SceneGraph.
+    """Reads the shapes of recorded geometry.
 
     The first call of `read` reads everything. Each later call reads only the
     geometry that has changed since the previous call.
     """
 
-    def __init__(self, role: Role):
-        """Makes a reader of the geometry with a role; nothing is read yet."""
-        self._role = role
+    def __init__(self) -> None:
+        """Makes a reader; nothing is read yet."""
         self._known: dict[GeometryId, tuple[tuple, PerceptionGeometry]] = {}
 
     def read(
-        self,
-        inspector: SceneGraphInspector,
-        hidden: Collection[GeometryId] = frozenset(),
+        self, records: Iterable[GeometryRecord]
     ) -> tuple[PerceptionGeometry, ...]:
-        """Returns all geometry with the reader's role, except hidden geometry.
+        """Returns recorded geometry, in the same order.
 
-        The order is that of `GetAllGeometryIds`, which Drake documents as
-        stable, so the result depends only on the SceneGraph. For a geometry
-        that has not changed since the last call, the same object is returned.
+        For a geometry that has not changed since the last call, the same object
+        is returned.
 
         Args:
-            inspector: inspector of the SceneGraph.
-            hidden: geometries to leave out.
+            records: records of the geometry; see `list_geometry`.
 
         Raises:
-            InputError: a geometry is deformable, a mesh file is missing or
-                cannot be read, or a size is too large; the message names the
-                geometry.
+            InputError: a geometry is deformable, its reflectivity is not within
+                0 to 1, a mesh file is missing or cannot be read, or a size is
+                too large; the message names the geometry.
         """
         known, self._known = self._known, {}
         with ForeignMeshes() as foreign:
             meshes = MeshFiles(foreign)
-            for geometry_id in inspector.GetAllGeometryIds(self._role):
-                if geometry_id in hidden:
-                    continue
-                name = inspector.GetName(geometry_id)
-                if inspector.IsDeformableGeometry(geometry_id):
-                    raise InputError(
-                        f"geometry '{name}': a LiDAR cannot see deformable "
-                        "geometry; hide it, or remove its role"
-                    )
-                shape = inspector.GetShape(geometry_id)
-                frame_id = inspector.GetFrameId(geometry_id)
-                # A copy, because Drake returns references.
-                X_FG = RigidTransform(inspector.GetPoseInFrame(geometry_id))
-                look = self._appearance(name, inspector, geometry_id)
+            for record in records:
+                name, X_FG, shape = record.name, record.X_FG, record.shape
+                look = record.rgb, record.reflectivity
+                _check_record(record)
                 pose = X_FG.GetAsMatrix34().tobytes()
-                record = name, frame_id, pose, _shape_key(shape), look
-                entry = known.get(geometry_id)
-                if entry is None or entry[0] != record:
+                key = name, record.frame_id, pose, _shape_key(shape), look
+                entry = known.get(record.geometry_id)
+                if entry is None or entry[0] != key:
                     surface = _surface(name, shape, meshes)
                     entry = (
-                        record,
+                        key,
                         PerceptionGeometry(
-                            geometry_id, name, frame_id, X_FG, surface, *look
+                            record.geometry_id,
+                            name,
+                            record.frame_id,
+                            X_FG,
+                            surface,
+                            *look,
                         ),
                     )
-                self._known[geometry_id] = entry
+                self._known[record.geometry_id] = entry
         return tuple(geometry for _, geometry in self._known.values())
 
-    def _appearance(
-        self, name: str, inspector: SceneGraphInspector, geometry_id: GeometryId
-    ) -> tuple[tuple[float, float, float] | None, float | None]:
-        """Returns colour and reflectivity, each None if the model has none."""
-        properties = inspector.GetProperties(geometry_id, self._role)
-        rgb = reflectivity = None
-        if properties.HasProperty("lidar", "reflectivity"):
-            reflectivity = float(
-                properties.GetProperty("lidar", "reflectivity")
-            )
-            if not 0.0 <= reflectivity <= 1.0:
-                raise InputError(
-                    f"geometry '{name}': lidar/reflectivity: {reflectivity} "
-                    "is not within 0 to 1"
-                )
-        if properties.HasProperty("phong", "diffuse"):
-            rgba = properties.GetProperty("phong", "diffuse")
-            rgb = rgba.r(), rgba.g(), rgba.b()
-        return rgb, reflectivity
+
+def _check_record(record: GeometryRecord) -> None:
+    where, reflectivity = f"geometry '{record.name}'", record.reflectivity
+    if record.is_deformable:
+        raise InputError(
+            f"{where}: a LiDAR cannot see deformable geometry; hide it, or "
+            "remove its role"
+        )
+    if reflectivity is not None and not 0.0 <= reflectivity <= 1.0:
+        raise InputError(
+            f"{where}: lidar/reflectivity: {reflectivity} is not within 0 to 1"
+        )
 
 
 def _shape_key(shape: Shape) -> tuple:
@@ -301,33 +355,32 @@ def _cone(shape: shapes.MeshcatCone) -> TriangleSurface:
     )
 
 
-_PORT = "geometry_revision"
-_revisions = itertools.count(1)
+def geometry_port(scene_graph: SceneGraph, role: Role) -> OutputPort:
+    """Returns a port whose value is the geometry with a role, `GeometryList`.
 
+    It is a function of the Context, and is computed anew only after geometry
+    has been added, removed, replaced, reshaped, or given another role. A new
+    pose of a frame does not count. Drake's own `geometry_version` is not
+    enough: it does not change with all perception geometry.
 
-def geometry_revision_port(scene_graph: SceneGraph) -> OutputPort:
-    """Returns a port whose value changes when, and only when, geometry does.
-
-    Geometry changes if it is added, removed, replaced, reshaped, renamed or
-    given another role. A new pose of a frame does not count.
-
-    The first call adds the port to the SceneGraph, and must come before a
-    Diagram is built from it.
-
-    Returns:
-        An abstract port with an int as its value. Within this process, two
-        values are equal only if the geometry is the same, even in different
-        Contexts.
+    The first call with a role adds the port to the SceneGraph, and must come
+    before a Diagram is built from it.
 
     Raises:
         RuntimeError: the SceneGraph is already part of a Diagram.
     """
-    if scene_graph.HasOutputPort(_PORT):
-        return scene_graph.GetOutputPort(_PORT)
+    name = f"{role.name.removeprefix('k').lower()}_geometry"
+    if scene_graph.HasOutputPort(name):
+        return scene_graph.GetOutputPort(name)
+
+    def calc(context: Context, output: AbstractValue) -> None:
+        query_object = scene_graph.get_query_output_port().Eval(context)
+        output.set_value(list_geometry(query_object.inspector(), role))
+
     return scene_graph.DeclareAbstractOutputPort(
-        _PORT,
+        name,
         lambda: Value(object()),
-        lambda context, output: output.set_value(next(_revisions)),
+        calc,
         # The first parameter is the geometry. The second, the configuration,
         # concerns only proximity.
         {scene_graph.abstract_parameter_ticket(AbstractParameterIndex(0))},

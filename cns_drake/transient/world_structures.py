@@ -26,6 +26,7 @@ from cns_drake.scene import surfaces
 from cns_drake.scene.perception_geometry import (
     GeometryReader,
     PerceptionGeometry,
+    list_geometry,
     structure_name,
 )
 from cns_drake.scene.world import World
@@ -151,15 +152,15 @@ def read_structures(
         for frame in world.anchored_frames()
     }
     X_WFs[world.scene_graph.world_frame_id()] = RigidTransform()
-    inspector = world.scene_graph.model_inspector()
-    hidden = {
-        geometry
-        for geometry in inspector.GetAllGeometryIds(Role.kPerception)
-        if inspector.GetFrameId(geometry) not in X_WFs
-        or not wanted(structure_name(inspector.GetName(geometry)))
-    }
+    records = list_geometry(
+        world.scene_graph.model_inspector(), Role.kPerception
+    )
     found = defaultdict(list)
-    for geometry in GeometryReader(Role.kPerception).read(inspector, hidden):
+    for geometry in GeometryReader().read(
+        one
+        for one in records
+        if one.frame_id in X_WFs and wanted(structure_name(one.name))
+    ):
         X_WG = X_WFs[geometry.frame_id] @ geometry.X_FG
         found[geometry.structure].append(StructurePart(geometry, X_WG))
     return {

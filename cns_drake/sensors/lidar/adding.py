@@ -15,7 +15,7 @@ from pydrake.systems.framework import DiagramBuilder, System
 
 from cns_drake.scene.perception_geometry import (
     anchored_frames,
-    geometry_revision_port,
+    geometry_port,
 )
 from cns_drake.sensors.carriers import body_and_pose, connect_motion
 from cns_drake.sensors.lidar.config import (
@@ -328,8 +328,8 @@ def connect_lidar(
     """Connects a LiDAR's inputs to a SceneGraph."""
     query = scene_graph.get_query_output_port()
     builder.Connect(query, lidar.query_object_input_port())
-    revision = geometry_revision_port(scene_graph)
-    builder.Connect(revision, lidar.GetInputPort("geometry_revision"))
+    listed = geometry_port(scene_graph, lidar.role)
+    builder.Connect(listed, lidar.GetInputPort("geometry"))
 
 
 def _welded_to(body: RigidBody) -> list[RigidBody]:

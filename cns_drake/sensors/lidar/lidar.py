@@ -14,12 +14,12 @@ from pydrake.geometry import (
     GeometryId,
     QueryObject,
     Role,
-    SceneGraphInspector,
 )
 from pydrake.math import RigidTransform, RotationMatrix
 from pydrake.multibody.math import SpatialVelocity
 from pydrake.perception import BaseField, Fields, PointCloud
 from pydrake.systems.framework import (
+    CacheEntry,
     Context,
     InputPort,
     LeafSystem,
@@ -34,8 +34,10 @@ from cns_drake.ray_casting.ray_casting_scene import RayCastingScene
 from cns_drake.ray_casting.ray_groups import Motion
 from cns_drake.scene.labels import MAX_INSTANCE, Labels, number_structures
 from cns_drake.scene.perception_geometry import (
+    GeometryList,
     GeometryReader,
     PerceptionGeometry,
+    list_geometry,
     structure_name,
 )
 from cns_drake.sensors.lidar.measurement import IDEAL, MeasurementModel, Returns
@@ -89,7 +91,7 @@ class Lidar(LeafSystem):
         name: Lidar
         input_ports:
         - geometry_query
-        - geometry_revision (optional)
+        - geometry (optional)
         - sweep (optional)
         - frame_poses (optional)
         - moving_instances (optional)
@@ -145,9 +147,9 @@ class Lidar(LeafSystem):
 
     Drake cannot cast rays. The system therefore reads shapes and poses from the
     QueryObject and casts rays on a hierarchy of its own. It rebuilds the parts
-    of this hierarchy that have changed. `geometry_revision` (from
-    `geometry_revision_port`) shows when geometry has changed. Without it, the
-    LiDAR compares all geometry at every scan, which in a world of thousands of
+    of this hierarchy that have changed. `geometry` (from `geometry_port`) lists
+    the geometry, and is computed only after a change. Without it, the LiDAR
+    lists all geometry at every scan, which in a world of thousands of
     geometries takes longer than the scan.
 
     Attributes:
@@ -241,7 +243,7 @@ class Lidar(LeafSystem):
 
         declare = self.DeclareAbstractInputPort
         self._geometry_query = declare("geometry_query", Value(QueryObject()))
-        self._revision = declare("geometry_revision", Value(object()))
+        self._geometry = declare("geometry", Value(object()))
         self._moving = declare(
             "moving_instances", Value(np.zeros(0, np.uint16))
         )
@@ -255,16 +257,25 @@ class Lidar(LeafSystem):
                 AbstractValue.Make([SpatialVelocity()]),
             )
         inputs = {self.all_input_ports_ticket()}
-        # Kept until the SceneGraph changes.
-        self._seen = self.DeclareCacheEntry(
-            description="ray-casting scene",
-            value_producer=ValueProducer(
-                allocate=lambda: Value(SeenGeometry(self)),
-                calc=lambda context, seen: self._update(
-                    context, seen.get_value()
+        # Kept until the SceneGraph changes. Beams of a scan cannot meet what is
+        # out of their reach, so the scene of scans may leave that where it was.
+        self._near, self._all = (
+            self.DeclareCacheEntry(
+                description=f"ray-casting scene, {what}",
+                value_producer=ValueProducer(
+                    allocate=lambda: Value(SeenGeometry(self)),
+                    calc=lambda context, seen, calc_ball=calc_ball: (
+                        self._update(
+                            context, seen.get_value(), calc_ball(context)
+                        )
+                    ),
                 ),
-            ),
-            prerequisites_of_calc=inputs,
+                prerequisites_of_calc=inputs,
+            )
+            for what, calc_ball in (
+                ("within reach of the beams", self._calc_ball),
+                ("complete", lambda context: moving_groups.EVERYWHERE),
+            )
         )
         changes = (
             measurement.is_random or returns is not None or not pattern.repeats
@@ -343,8 +354,11 @@ class Lidar(LeafSystem):
         """Returns the scene of all geometry that the LiDAR sees in a Context.
 
         Rays can be cast on it.
+
+        Raises:
+            RuntimeError: the Context is not the one of this LiDAR.
         """
-        scene = self._eval_seen(context).scene
+        scene = self._eval_all(context).scene
         assert scene is not None
         return scene
 
@@ -354,7 +368,11 @@ class Lidar(LeafSystem):
         The geometry is None for a point without a surface, such as rain. To
         find the body of a geometry, ask the SceneGraph's inspector for its
         frame and the plant for the frame's body.
+
+        Raises:
+            RuntimeError: the Context is not the one of this LiDAR.
         """
+        self._check_context(context)
         _, met, geometries = self._measured.Eval(context)
         return _ids_of(geometries, met)
 
@@ -363,13 +381,17 @@ class Lidar(LeafSystem):
     ) -> dict[int, tuple[GeometryId, ...]]:
         """Returns instance id -> visible geometries of this structure.
 
+        Raises:
+            RuntimeError: the Context is not the one of this LiDAR.
+
         Example:
             gids = lidar.EvalInstances(lidar_context)[scan["instance"][0]]
             frame_id = scene_graph.model_inspector().GetFrameId(gids[0])
             body = plant.GetBodyFromFrameId(frame_id)
             print(plant.GetModelInstanceName(body.model_instance()))
         """
-        seen = self._eval_seen(context)
+        self._check_context(context)
+        seen = _eval_seen(self._near, context)
         found: dict[int, tuple[GeometryId, ...]] = {}
         for instance, one in zip(
             seen.instance.tolist(), seen.built, strict=True
@@ -396,6 +418,7 @@ class Lidar(LeafSystem):
             max_range: greatest range [m], one for all or (N,).
 
         Raises:
+            RuntimeError: the Context is not the one of this LiDAR.
             ValueError: shapes do not match, a direction has another length than
                 1, or a number is not finite (ranges may be infinite).
         """
@@ -415,7 +438,7 @@ class Lidar(LeafSystem):
             raise ValueError("d_W: a direction does not have the length 1")
         if not (np.isfinite(p_W).all() and (ranges >= 0.0).all()):
             raise ValueError("p_WR, max_range: not finite, or negative")
-        seen = self._eval_seen(context)
+        seen = self._eval_all(context)
         assert seen.scene is not None
         hits = seen.scene.cast_rays(
             p_W,
@@ -428,25 +451,42 @@ class Lidar(LeafSystem):
             hits.ranges, _ids_of(seen.built, hits.geometry), hits.normals_W
         )
 
-    def _eval_seen(self, context: Context) -> SeenGeometry:
-        seen = self._seen.Eval(context)
-        if seen.scene is None:
-            # In a cloned Context, whose entry Drake holds to be up to date. It
-            # is filled here, although outside of its calc, with what that would
-            # have computed.
-            self._update(context, seen)
-        return seen
+    def _check_context(self, context: Context) -> None:
+        """Checks that a Context is the one of this LiDAR.
 
-    def _update(self, context: Context, seen: SeenGeometry) -> None:
-        known, ball = self._known_poses(context), moving_groups.EVERYWHERE
-        if known is not moving_groups.NOTHING_KNOWN:
-            # Geometry out of sight is not moved.
-            ball = self._calc_ball(context)
+        With any other Context, the cache entries of another system would be
+        read, or memory that does not exist.
+
+        Raises:
+            RuntimeError: it is not.
+        """
+        try:
+            self.ValidateContext(context)
+        except RuntimeError:
+            name = self.get_name()
+            raise RuntimeError(
+                f"context: not the Context of the LiDAR '{name}'; give "
+                "lidar.GetMyContextFromRoot(context of the Diagram)"
+            ) from None
+
+    def _eval_all(self, context: Context) -> SeenGeometry:
+        """Returns all that the LiDAR sees, at the poses of a Context.
+
+        Raises:
+            RuntimeError: the Context is not the one of this LiDAR.
+        """
+        self._check_context(context)
+        is_limited = self._frame_poses.HasValue(context)
+        return _eval_seen(self._all if is_limited else self._near, context)
+
+    def _update(
+        self, context: Context, seen: SeenGeometry, ball: moving_groups.Ball
+    ) -> None:
         seen.update(
             self._geometry_query.Eval(context),
-            _value(self._revision, context),
+            _value(self._geometry, context),
             self._calc_motions(context),
-            known,
+            self._known_poses(context),
             ball,
             self._calc_pose(context).translation(),
         )
@@ -455,7 +495,12 @@ class Lidar(LeafSystem):
         return _value(self._frame_poses, context, moving_groups.NOTHING_KNOWN)
 
     def _calc_ball(self, context: Context) -> moving_groups.Ball:
-        """Returns the ball in which beams can meet geometry."""
+        """Returns the ball in which beams can meet geometry.
+
+        It is everywhere if poses have to be asked of the SceneGraph anyway.
+        """
+        if not self._frame_poses.HasValue(context):
+            return moving_groups.EVERYWHERE
         model = self._returns or self._measurement
         reach = model.reach(self.pattern.max_range)
         p_WSset, _ = self._calc_poses(context)
@@ -485,7 +530,7 @@ class Lidar(LeafSystem):
         return {f: m for f, m in motions.items() if m.w.any() or m.v.any()}
 
     def _calc_measured(self, context: Context, output: AbstractValue) -> None:
-        seen = self._eval_seen(context)
+        seen = _eval_seen(self._near, context)
         frame, turn = self._turn_at(context.get_time())
         p_WSset, R_WSset = self._calc_poses(context)
         columns = turn.beams.cast_columns
@@ -632,6 +677,19 @@ def _value(port: InputPort, context: Context, default: Any = None) -> Any:
     return port.Eval(context) if port.HasValue(context) else default
 
 
+def _eval_seen(entry: CacheEntry, context: Context) -> SeenGeometry:
+    """Returns the geometry of a cache entry in a Context."""
+    seen = entry.Eval(context)
+    if seen.scene is not None:
+        return seen
+    # In a cloned Context, whose entry Drake holds to be up to date.
+    entry.disable_caching(context)
+    try:
+        return entry.Eval(context)
+    finally:
+        entry.enable_caching(context)
+
+
 def _ids_of(
     geometries: Sequence[PerceptionGeometry], met: np.ndarray
 ) -> list[GeometryId | None]:
@@ -672,9 +730,9 @@ class SeenGeometry:
 
     def __init__(self, lidar: Lidar):
         self._lidar = lidar
-        self._reader = GeometryReader(lidar.role)
+        self._reader = GeometryReader()
         self._geometries: tuple[PerceptionGeometry, ...] = ()
-        self._revision: int | None = None
+        self._records: GeometryList | None = None
         self.built: tuple[PerceptionGeometry, ...] = ()
         self._X_WAs: dict[FrameId, RigidTransform] = {}
         self.scene: RayCastingScene | None = None
@@ -686,7 +744,7 @@ class SeenGeometry:
     def update(
         self,
         query_object: QueryObject,
-        revision: int | None,
+        records: GeometryList | None,
         motions: Mapping[FrameId, Motion],
         known: moving_groups.KnownPoses,
         seen: moving_groups.Ball,
@@ -697,8 +755,8 @@ class SeenGeometry:
         Args:
             query_object: query object of the SceneGraph, with geometry and
                 poses.
-            revision: value of the port `geometry_revision`; if None, all
-                geometries are compared with those of the last update.
+            records: all geometry with the LiDAR's role; if None, it is listed
+                here.
             motions: motions of frames that move during the turn.
             known: frame poses that are read instead of querying the SceneGraph.
             seen: the ball within which beams can hit geometry.
@@ -713,8 +771,10 @@ class SeenGeometry:
         def calc_X_WF(frame: FrameId) -> RigidTransform:
             return known.find(frame, query_object.GetPoseInWorld)
 
-        if self.scene is None or revision is None or revision != self._revision:
-            self._read(inspector)
+        if records is None:
+            records = list_geometry(inspector, self._lidar.role)
+        if self.scene is None or records is not self._records:
+            self._read(records, inspector.world_frame_id())
         try:
             if self.scene is None or not (
                 self._is_built(calc_X_WF) and self.scene.serves(p_WS)
@@ -726,7 +786,7 @@ class SeenGeometry:
             # Some of its geometry may have moved already.
             self.scene = None
             raise
-        self._revision = revision
+        self._records = records
 
     def labels(self, moving: np.ndarray) -> np.ndarray:
         """Returns the present class of each geometry, (num_geometries,) uint16.
@@ -746,18 +806,15 @@ class SeenGeometry:
             )
         return self._materials
 
-    def _read(self, inspector: SceneGraphInspector) -> None:
+    def _read(self, records: GeometryList, world: FrameId) -> None:
         unseen = self._lidar.unseen
         if unseen is None:
-            unseen = frozenset([self._lidar.parent_frame_id])
-            unseen -= {inspector.world_frame_id()}
-        hidden = set(unseen)
-        for frame_id in inspector.GetAllFrameIds():
-            if frame_id in unseen:
-                hidden |= set(
-                    inspector.GetGeometries(frame_id, self._lidar.role)
-                )
-        self._geometries = self._reader.read(inspector, hidden)
+            unseen = frozenset([self._lidar.parent_frame_id]) - {world}
+        self._geometries = self._reader.read(
+            one
+            for one in records
+            if one.frame_id not in unseen and one.geometry_id not in unseen
+        )
 
     def _is_built(self, calc_X_WF: Callable[[FrameId], RigidTransform]) -> bool:
         """Returns whether the scene is up to date."""

@@ -23,7 +23,7 @@ from pydrake.math import RigidTransform, RollPitchYaw
 import pytest
 
 from cns_drake.ray_casting import embree_hierarchy
-from cns_drake.scene.perception_geometry import geometry_revision_port
+from cns_drake.scene.perception_geometry import geometry_port
 from cns_drake.sensors.lidar.lidar import Lidar
 from cns_drake.sensors.lidar.presets import make_beam_pattern
 
@@ -189,21 +189,74 @@ def test_an_anchored_frame_may_move_after_all():
     assert ahead(stage.eval()) == pytest.approx(12.0, abs=1e-5)
 
 
-def test_the_revision_counts_geometry_only():
+def content(listed):
+    return [
+        (one.geometry_id, one.name, one.frame_id, repr(one.shape), one.rgb)
+        for one in listed
+    ]
+
+
+def test_the_port_of_geometry_is_a_function_of_the_context():
     site = Site(True)
-    port = geometry_revision_port(site.stage.scene_graph)
+    graph = site.stage.scene_graph
+    port = geometry_port(graph, Role.kPerception)
+    assert graph.num_output_ports() == 2
     first = port.Eval(site.context)
+    assert [one.name for one in first] == ["crate", "wall"]
+    # Poses and time do not count: the very same list is kept.
     site.stage.context.SetTime(3.0)
     site.stage.poses[site.frame] = RigidTransform([30, 0, 0])
     site.stage.set_poses()
     site.ahead()
-    assert port.Eval(site.context) == first
+    assert port.Eval(site.context) is first
     clone = site.stage.context.Clone()
+    assert port.Eval(graph.GetMyContextFromRoot(clone)) is first
+    for _ in range(2):
+        fresh = site.stage.diagram.CreateDefaultContext()
+        fresh.DisableCaching()
+        for _ in range(2):
+            again = port.Eval(graph.GetMyContextFromRoot(fresh))
+            assert content(again) == content(first)
     reshape(site)
-    assert port.Eval(site.context) != first
+    assert content(port.Eval(site.context)) != content(first)
     site.stage.context.SetTimeStateAndParametersFrom(clone)
-    assert port.Eval(site.context) != first
-    assert site.stage.scene_graph.num_output_ports() == 2
+    assert content(port.Eval(site.context)) == content(first)
+
+
+def test_each_role_has_a_port_of_its_geometry():
+    stage = Stage()
+    for name, roles in (
+        ("a", ("perception",)),
+        ("b", ("illustration", "proximity")),
+    ):
+        stage.scene_graph.RegisterAnchoredGeometry(
+            stage.source, instance(name, Sphere(1.0), roles=roles)
+        )
+    ports = {
+        role: geometry_port(stage.scene_graph, role)
+        for role in (Role.kPerception, Role.kProximity)
+    }
+    stage.finish()
+    context = stage.scene_graph.GetMyContextFromRoot(stage.context)
+    names = {
+        role: [one.name for one in port.Eval(context)]
+        for role, port in ports.items()
+    }
+    assert names == {Role.kPerception: ["a"], Role.kProximity: ["b"]}
+
+
+@pytest.mark.parametrize("caching", [True, False])
+def test_a_clone_of_a_context_is_scanned_like_it(caching):
+    site = Site(True)
+    if not caching:
+        site.stage.context.DisableCaching()
+    scan = site.stage.eval()
+    for _ in range(2):
+        site.stage.context = site.stage.context.Clone()
+        own = site.stage.lidar.GetMyContextFromRoot(site.stage.context)
+        hits = site.stage.lidar.CastRays(own, np.zeros(3), np.eye(3)[:1])
+        assert hits.ranges == pytest.approx([9.0], abs=1e-5)
+        np.testing.assert_array_equal(site.stage.eval(), scan)
 
 
 class Storm:
