@@ -28,13 +28,12 @@ from evaluation.report.reference import (
     Reference,
 )
 from evaluation.report.result_tables import recognition_table
+from evaluation.results.summaries import LEAST_POINTS
 from evaluation.results.table_forms import Cell, in_table_order, title
 
 _TITLE = "the paper “The City that Never Settles”"
 # Drives through a real city in the paper's tables.
 _KAIST = ("kaist", "01", "06")
-# Least number of pairs from which a trend is judged.
-_FEWEST_PAIRS = 5
 _SIGNIFICANCE = 0.05
 _RING = title("ring++")
 
@@ -186,7 +185,7 @@ def findings(
         number = len({result.pair for result in known})
         too_few = (
             f"{number} pair{'s' if number > 1 else ''} of drives;"
-            f" a trend needs {_FEWEST_PAIRS} or more."
+            f" a trend needs {LEAST_POINTS} or more."
         )
         found.append(_falls(trends, too_few))
         if "btc" in methods and len(methods) > 1:
@@ -241,7 +240,7 @@ def _trends(
             for r in results
             if r.method == method
         ]
-        if len(points) >= _FEWEST_PAIRS:
+        if len(points) >= LEAST_POINTS:
             trends[method] = trend(*zip(*points, strict=True))
     return trends
 

@@ -39,7 +39,7 @@ from evaluation.report.page_data import (
 from evaluation.report.reference import NO_REFERENCE, Reference
 from evaluation.results.charts import draw, styles
 from evaluation.results.drawing import save
-from evaluation.results.table import RESULTS, STAGE, Results
+from evaluation.results.table import OWN, RESULTS, STAGE, Results
 from evaluation.results.table_forms import (
     MISSING,
     Table,
@@ -70,6 +70,8 @@ _MARK = 0.016
 # Length of the scale bar [m].
 _BAR_LENGTH = 50.0
 _SCATTER = {"kind": "scatter", "x": "tcr_sym", "y": "auc"}
+# Controls, in which nothing changes, show no trend.
+_CHANGED: dict[str, str] = {**_SCATTER, STAGE: OWN}
 _DUMBBELL = {"kind": "dumbbell", "over": STAGE, "metric": "auc"}
 _SURVIVAL = (
     "AUC without the change (hollow) and with it (filled), and the share that"
@@ -167,7 +169,7 @@ def chart_illustrations(report: Report, folder: Path) -> list[Illustration]:
     """
     name = "AUC against TCR_sym"
     charts: list[tuple[str, str, Section, dict[str, str], Results]] = [
-        ("auc_over_tcr", name, "figures", _SCATTER, report.results)
+        ("auc_over_tcr", name, "figures", _CHANGED, report.results)
     ]
     if report.compared:
         published = report.reference.to_results()
@@ -183,10 +185,10 @@ def chart_illustrations(report: Report, folder: Path) -> list[Illustration]:
         gates = {"gate": tuple(results.distinct("gate"))}
         try:
             drawn = draw({**chart, **gates}, results, _WIDTH, alone=True)
+            save(drawn.figure, folder / stem)
         except InputError as error:
             report.notes = [*report.notes, f"{words}: left out: {error}"]
             continue
-        save(drawn.figure, folder / stem)
         legend = []
         for label, (colour, *_) in drawn.legend.items():
             red, green, blue = (round(255 * part) for part in to_rgb(colour))
@@ -353,7 +355,7 @@ def _content(
     report: Report, tables: Mapping[str, Sequence[Table]]
 ) -> dict[str, object]:
     """Returns the values for the templates of the text and of the page."""
-    ranked, headline = rows.ranked_methods(report.results)
+    ranked, headline = rows.ranked_methods(report.results, report.differences)
     return {
         "report": report,
         "tables": tables,

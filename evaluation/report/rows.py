@@ -22,8 +22,10 @@ from evaluation.recognition.place_outcome import (
     pose_numbers,
 )
 from evaluation.recognition.place_recognition import PlaceRecognition
+from evaluation.report.result_tables import MethodDifference
 from evaluation.results import table_forms as tables
-from evaluation.results.summaries import Ranked, ranking
+from evaluation.results.headlines import listed, told_apart
+from evaluation.results.summaries import Ranked, median_kept, ranking
 from evaluation.results.table import LAST, OWN, STAGE, Results, Row
 
 EXPERIMENT = "stages"
@@ -133,12 +135,15 @@ def change_rows(
                 )
 
 
-def ranked_methods(results: Results) -> tuple[list[Ranked], str]:
+def ranked_methods(
+    results: Results, differences: Iterable[MethodDifference] = ()
+) -> tuple[list[Ranked], str]:
     """Returns the methods ranked by mean AUC, and a sentence on the ranking.
 
     The means are over the pairs of drives with results of all methods, without
     the controls, in which the city does not change. If there is no such pair,
-    no method is returned, and the sentence says so.
+    no method is returned, and the sentence says so. It also says which methods
+    the tests of `differences` tell apart from the first one.
     """
     rows = results.where({STAGE: OWN}, task="place", metric="auc").rows
     ranked, _ = ranking(rows)
@@ -146,7 +151,11 @@ def ranked_methods(results: Results) -> tuple[list[Ranked], str]:
         row.but("method") for row in rows if not math.isnan(row.value)
     )
     num_pairs = sum(n == len(ranked) for n in measured.values())
-    return ranked, _headline(ranked, num_pairs)
+    of_pair: dict[object, dict[tuple[str, str], float]] = {}
+    for one in differences:
+        key = one.result.method, one.other.method
+        of_pair.setdefault(one.result.pair, {})[key] = one.p_value
+    return ranked, _headline(ranked, num_pairs, of_pair.values())
 
 
 def beside(results: Results) -> dict[str, dict[str, float]]:
@@ -169,7 +178,11 @@ def beside(results: Results) -> dict[str, dict[str, float]]:
     return {"R@1": r1, "only too far": far, "right pose": pose}
 
 
-def _headline(ranked: Sequence[Ranked], num_pairs: int) -> str:
+def _headline(
+    ranked: Sequence[Ranked],
+    num_pairs: int,
+    p_values: Iterable[Mapping[tuple[str, str], float]],
+) -> str:
     if not ranked:
         return "No pair of drives has an AUC of every method to rank."
     over = f"{num_pairs} pairs of drives" if num_pairs > 1 else "one pair"
@@ -180,14 +193,33 @@ def _headline(ranked: Sequence[Ranked], num_pairs: int) -> str:
         return f"{best[0]} has a mean AUC of {best[1]} over {over}."
     ties = [name for name, value in others if value == best[1]]
     if ties:
-        names = ", ".join([best[0], *ties[:-1]])
-        return (
-            f"{names} and {ties[-1]} tie at a mean AUC of {best[1]} ({over})."
-        )
-    return (
-        f"{best[0]} ranks first of {len(ranked)} methods, with a mean AUC of"
-        f" {best[1]} over {over}; {others[0][0]} follows with {others[0][1]}."
+        names = listed([best[0], *ties])
+        return f"{names} tie at a mean AUC of {best[1]} ({over})."
+    text = (
+        f"{best[0]} has the greatest mean AUC of {len(ranked)} methods,"
+        f" {best[1]} over {over}"
     )
+    # The pairs on which tests tell the first method from another one.
+    apart = Counter(
+        name
+        for of_pair in p_values
+        for name in told_apart(ranked[0].method, of_pair)[0]
+    )
+    never = [f"{name} ({auc})" for name, auc in others if not apart[name]]
+    partly = [
+        f"{name} ({apart[name]} of {num_pairs})"
+        for name, _ in others
+        if 0 < apart[name] < num_pairs
+    ]
+    if not never and not partly:
+        return f"{text}; it is told apart from all others on each pair."
+    if not never:
+        names = listed(partly)
+        return f"{text}; it is on some pairs only told apart from {names}."
+    text += f"; it is not told apart from {listed(never)} on any pair"
+    if partly:
+        text += f", and only on some from {listed(partly)}"
+    return f"{text}."
 
 
 class Survival(NamedTuple):
@@ -347,10 +379,11 @@ def survival_summary(survivals: Sequence[Survival]) -> str:
     without = len(groups) - len(tables.by_pair(known))
     shares: dict[str, list[float]] = {}
     for one in known:
-        if not math.isnan(share := one.number("after", "kept")):
-            shares.setdefault(one.method, []).append(share)
+        shares.setdefault(one.method, []).append(one.number("after", "kept"))
     medians = {
-        m: float(np.median(shares[m])) for m in tables.in_table_order(shares)
+        method: share
+        for method in tables.in_table_order(shares)
+        if not math.isnan(share := median_kept(shares[method]))
     }
     parts = []
     if medians:

@@ -8,19 +8,21 @@
   of a factor. With `strips`, each cell is divided by the values of a second
   factor.
 - `scatter` (`x`, `y`): a metric over a metric or a numeric factor, with a
-  smooth line and its 95 % band.
+  smooth curve and its 95 % band where there are points enough.
 
 The names in brackets are keys of the mapping; `kind` names the kind of chart.
 All other keys select rows: each is a column of the table with the values to
 show. By default, the task is `place`, or else the only task with the metric,
 and the gate is 0. Each method has the same colour in all charts. The title says
-in words what the chart shows.
+in words what the chart shows. Where the answers to all queries are known, it
+also says which methods differ by the test of `evaluation.recognition.metrics`.
 """
 
 from collections import Counter
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 import math
+import re
 import textwrap
 from typing import Any
 
@@ -35,8 +37,19 @@ import numpy as np
 from cns_drake.base.errors import InputError
 from evaluation.recognition.place_outcome import kept_share
 from evaluation.results.drawing import METHOD_STYLES, plain
-from evaluation.results.summaries import correlations, means, paired_values
-from evaluation.results.table import Results, Row
+from evaluation.results.headlines import (
+    from_least_to_greatest,
+    greatest_auc,
+    listed,
+)
+from evaluation.results.smoothing import curves
+from evaluation.results.summaries import (
+    correlations,
+    means,
+    median_kept,
+    paired_values,
+)
+from evaluation.results.table import LAST, OWN, QueryRows, Results, Row
 from evaluation.results.table_forms import in_table_order, title
 
 # Widths [px] on a screen and on a phone.
@@ -67,16 +80,14 @@ _METRICS = {
     "visible_change_added": "visible change less the baseline's",
     "query_ms": "time of a query [ms]",
 }
+# Values of the factor `both.stage`, in words.
+_STAGES = {LAST: "without the change", OWN: "with the change"}
 # Told apart by all kinds of colour vision, and light enough for letters.
 _COLOURS = LinearSegmentedColormap.from_list(
     "shares", colormaps["RdYlBu"](np.linspace(0.15, 0.8, 64))
 )
-_BANDWIDTH = 0.15
-_RESAMPLES = 1000
-_LEAST_POINTS = 5
 # Columns that say which drives are compared.
 _PAIR = ("map", "database", "query")
-_GRID = 60
 # Beyond this ratio of its values, an axis is logarithmic.
 _WIDE_RANGE = 50.0
 
@@ -106,6 +117,15 @@ class _Chart:
     rows: Sequence[Row]
     styles: Mapping[str, tuple[str, str, str]]
     width: int
+    queries: QueryRows | None
+
+    def tested(self, message: str, last: object) -> str:
+        """Adds to a message what tests tell apart at the last value."""
+        if self.metric != "auc":
+            return message
+        rows = [row for row in self.rows if row[self.keys["over"]] == last]
+        clause = greatest_auc(rows, self.queries)
+        return f"{message}; {clause}" if clause else message
 
     @property
     def metric(self) -> str:
@@ -148,6 +168,7 @@ def draw(
     width: int = WIDE,
     *,
     alone: bool = False,
+    queries: QueryRows | None = None,
 ) -> Drawn:
     """Returns a chart, drawn from a table of results.
 
@@ -157,6 +178,8 @@ def draw(
         width: width of the drawing [px].
         alone: whether the drawing stands alone and therefore includes its
             message and legend.
+        queries: the answers behind the table, from which the message says what
+            is told apart; None if they are unknown.
 
     Raises:
         InputError: the chart has an unknown kind or column, or selects no rows.
@@ -176,7 +199,7 @@ def draw(
     if not rows:
         raise InputError(f"charts: {kind}: the table has no {metric} like that")
     names = in_table_order(row.label for row in rows)
-    drawn = _Chart(keys, results, rows, styles(names), width)
+    drawn = _Chart(keys, results, rows, styles(names), width, queries)
     legend = drawn.styles if kind in ("lines", "scatter") else {}
     with rc_context({"font.size": _FONT, "axes.titlesize": "medium"}):
         message, figure = _KINDS[kind][0](drawn)
@@ -258,6 +281,7 @@ def _dumbbell(chart: _Chart) -> tuple[str, Figure]:
     pairs = [pair for pair in ends_of[0] if pair in ends_of[1]]
     of_map = Counter(name for name, *_ in pairs)
     places: list[tuple[str, float]] = []
+    kept: dict[str, list[float]] = {}
     figure = chart.figure((len(chart.styles) * (len(pairs) + 1) + 3) * _ROW)
     axes = figure.subplots()
     for name, (colour, _, marker) in chart.styles.items():
@@ -275,52 +299,33 @@ def _dumbbell(chart: _Chart) -> tuple[str, Figure]:
             axes.plot(ends, [y, y], color=colour, lw=2.5, alpha=0.5)
             axes.plot(ends[0], y, marker, color=colour, mfc="white", ms=7)
             axes.plot(ends[1], y, marker, color=colour, ms=7)
-            if ends[0] > 0.0 and not math.isnan(ends[1]):
-                share = f"{100.0 * ends[1] / ends[0]:.0f} %"
+            share = float(kept_share(ends[1], ends[0]))
+            kept.setdefault(name, []).append(share)
+            if not math.isnan(share):
                 side = axes.get_yaxis_transform()
-                axes.text(1.02, y, share, transform=side, va="center")
+                text = f"{100.0 * share:.0f} %"
+                axes.text(1.02, y, text, transform=side, va="center")
     axes.set_yticks([y for _, y in places], [plain(one) for one, _ in places])
     for label in axes.get_yticklabels():
         if label.get_text() in map(plain, chart.styles):
             label.set_fontweight("bold")
     axes.set_ylim(len(places) - 0.4, -0.7)
-    text = f"{words(chart.metric)}; {words(over)} {before} (hollow), {after}"
-    figure.supxlabel(plain(f"{text} (filled)"), fontsize=_FONT)
+    first, last = (
+        _STAGES.get(str(v), f"at {words(over)} {value_words(v)}")
+        for v in (before, after)
+    )
+    text = f"{words(chart.metric)} {first} (hollow) and {last} (filled)"
+    text = textwrap.fill(text, chart.width // 9)
+    figure.supxlabel(plain(text), fontsize=_FONT)
     axes.grid(axis="x", alpha=0.3)
     axes.tick_params(length=0)
-    shares = {}
-    for name in chart.styles:
-        both = [
-            np.mean([found.get((name, *pair, v), math.nan) for pair in pairs])
-            for v in (before, after)
-        ]
-        shares[name] = (
-            float(kept_share(float(both[1]), float(both[0]))),
-            f"{both[1]:.2f} of {both[0]:.2f}",
-        )
-    best, worst = _ends(shares)
-    if best[1] == worst[1]:
-        return f"{words(chart.metric)} kept: {best[1]}", figure
-    return (
-        f"{best[0]} keeps most of its {words(chart.metric)} ({best[1]}),"
-        f" {worst[0]} least ({worst[1]})",
-        figure,
+    shares = {name: 100.0 * median_kept(kept[name]) for name in kept}
+    number = f"median of {len(pairs)} pairs" if len(pairs) > 1 else "one pair"
+    message = (
+        f"Share of the {words(chart.metric)} that is kept, {number}:"
+        f" {from_least_to_greatest(shares, '{:.0f} %')}"
     )
-
-
-def _ends(found: Mapping[str, tuple[float, str]]) -> list[tuple[str, str]]:
-    """Returns the methods with the greatest and the least number.
-
-    Each is a pair of name and number as text.
-
-    Args:
-        found: method -> its number, and this number as text.
-    """
-    order = sorted(
-        found.items(), key=lambda one: (math.isnan(one[1][0]), -one[1][0])
-    )
-    known = [one for one in order if not math.isnan(one[1][0])] or order
-    return [(name, text) for name, (_, text) in (known[0], known[-1])]
+    return chart.tested(message, after), figure
 
 
 def _lines(chart: _Chart) -> tuple[str, Figure]:
@@ -350,18 +355,12 @@ def _lines(chart: _Chart) -> tuple[str, Figure]:
         # A label of the whole figure would lie below its legend.
         axes.set_xlabel(plain(words(over)))
     figure.supylabel(plain(words(chart.metric)), fontsize=_FONT)
-    found = {
-        n: (float(np.mean(v)), f"{np.mean(v):.2f}") for n, v in last.items()
-    }
-    best, worst = _ends(found)
-    message = f"At {at[-1]:g} {words(over)}, the {words(chart.metric)} is"
-    if best[1] == worst[1]:
-        return f"{message} {best[1]}", figure
-    return (
-        f"{message} greatest with {best[0]} ({best[1]}) and least with"
-        f" {worst[0]} ({worst[1]})",
-        figure,
+    found = {name: float(np.mean(some)) for name, some in last.items()}
+    message = (
+        f"{words(chart.metric)} at {at[-1]:g} {words(over)}:"
+        f" {from_least_to_greatest(found)}"
     )
+    return chart.tested(message, at[-1]), figure
 
 
 def _number(row: Row, column: str) -> float:
@@ -407,7 +406,7 @@ def _matrix(chart: _Chart) -> tuple[str, Figure]:
                 )
             text = f"{100.0 * shares[-1]:.0f}"
             axes.text(x + 0.5, y + 0.5, text, ha="center", va="center")
-            worst = _word(values[y])
+            worst = value_words(values[y])
             if not isinstance(values[y], str):
                 worst = f"{words(over)} {worst}"
             weakest.append((shares[-1], names[x], worst))
@@ -417,7 +416,8 @@ def _matrix(chart: _Chart) -> tuple[str, Figure]:
         for label in axes.get_xticklabels():
             label.set_rotation_mode("anchor")
         axes.set_yticks(
-            np.arange(len(values)) + 0.5, [plain(_word(v)) for v in values]
+            np.arange(len(values)) + 0.5,
+            [plain(value_words(v)) for v in values],
         )
         axes.tick_params(length=0)
         axes.vlines(range(1, len(names)), 0, len(values), "white", lw=2)
@@ -430,8 +430,8 @@ def _matrix(chart: _Chart) -> tuple[str, Figure]:
     figure.supxlabel(plain(text), fontsize=_FONT)
     share, name, worst = min(weakest)
     return (
-        f"The worst case is {name} under {worst}: {words(chart.metric)}"
-        f" {share:.2f}",
+        f"Least {words(chart.metric)} of all cells: {share:.2f}, {name} with"
+        f" {worst}",
         figure,
     )
 
@@ -440,8 +440,12 @@ def _level(cell: tuple[Any, float]) -> tuple[bool, Any]:
     return isinstance(cell[0], str), cell[0]
 
 
-def _word(value: object) -> str:
-    return str(value).replace("_", " ")
+def value_words(value: object) -> str:
+    """Returns the value of a factor in words; lists have no brackets."""
+    if isinstance(value, float):
+        return f"{value:g}"
+    text = re.sub(r"[\[\]]", "", str(value).replace("_", " "))
+    return re.sub(r",(?! )", ", ", text)
 
 
 def _scatter(chart: _Chart) -> tuple[str, Figure]:
@@ -464,13 +468,11 @@ def _scatter(chart: _Chart) -> tuple[str, Figure]:
             continue
         x, y = np.array(known).T
         axes.plot(x, y, marker, color=colour, ms=5, alpha=0.55, mew=0)
-        if len(x) < _LEAST_POINTS or np.ptp(x) == 0.0:
-            axes.plot(x, y, style, color=colour)
-            continue
-        grid = np.linspace(x[0], x[-1], _GRID)
-        low, high = smooth_band(x, y, grid)
-        axes.fill_between(grid, low, high, color=colour, alpha=0.18, lw=0)
-        axes.plot(grid, smooth(x, y, grid), style, color=colour)
+        for one in curves(x, y):
+            axes.fill_between(
+                one.x, one.low, one.high, color=colour, alpha=0.18, lw=0
+            )
+            axes.plot(one.x, one.y, style, color=colour)
     axes.set(xlabel=plain(words(x_name)), ylabel=plain(words(y_name)))
     axes.grid(alpha=0.3)
     # The sign of a correlation with the metric itself, not with its failure.
@@ -478,73 +480,23 @@ def _scatter(chart: _Chart) -> tuple[str, Figure]:
         [row for row in chart.results.rows if row.metric != y_name]
         + list(chart.rows)
     )
-    found = {
-        title(one.method): (-one.value, f"{-one.value:+.2f}")
+    found = [
+        one._replace(value=-one.value, low=-one.high, high=-one.low)
         for one in correlations(selected, x_name, y_name)
-    }
+        if not math.isnan(one.value)
+    ]
     message = f"{words(y_name)} over {words(x_name)}"
-    if not all(math.isnan(rho) for rho, _ in found.values()):
-        best, worst = _ends(found)
-        span = f"from {worst[1]} ({worst[0]}) to {best[1]} ({best[0]})"
-        message = (
-            f"Rank correlation of {words(y_name)} with {words(x_name)}:"
-            f" {best[1] if best[1] == worst[1] else span}"
-        )
+    if not found:
+        return message, figure
+    shares = {title(one.method): one.value for one in found}
+    text = from_least_to_greatest(shares, "{:+.2f}")
+    message = (
+        f"Rank correlation of {words(y_name)} with {words(x_name)}: {text}"
+    )
+    doubtful = [title(one.method) for one in found if one.low <= 0 <= one.high]
+    if doubtful:
+        message += f"; not told from 0 with {listed(doubtful)}"
     return message, figure
-
-
-def smooth(
-    x: np.ndarray,
-    y: np.ndarray,
-    grid: np.ndarray,
-    counts: np.ndarray | None = None,
-) -> np.ndarray:
-    """Returns the local linear regression of y over x, with Gaussian weights.
-
-    Source: Fan and Gijbels, Local Polynomial Modelling, 1996, equation 3.1 with
-    p = 1.
-
-    Args:
-        x, y: (N,) coordinates of the points; not all x may be equal.
-        grid: (M,) values of x at which the regression is computed.
-        counts: (B, N) how often each point counts in each of B samples; None if
-            each point counts once.
-
-    Returns:
-        (M,) values of the regression; with `counts`, (B, M).
-    """
-    counts = np.ones(len(x)) if counts is None else counts
-    width = _BANDWIDTH * max(np.ptp(grid), 1e-12)
-    offset = x[:, None] - grid[None, :]
-    weight = np.exp(-0.5 * (offset / width) ** 2)
-    s0, s1, s2 = (counts @ (weight * offset**power) for power in (0, 1, 2))
-    t0, t1 = ((counts * y) @ (weight * offset**power) for power in (0, 1))
-    determinant = s0 * s2 - s1**2
-    # One distinct value of x has no slope, only a mean.
-    flat = determinant <= 1e-12 * s0 * width**2 * s0
-    safe = np.where(flat, 1.0, determinant)
-    return np.where(flat, t0 / s0, (s2 * t0 - s1 * t1) / safe)
-
-
-def smooth_band(
-    x: np.ndarray, y: np.ndarray, grid: np.ndarray
-) -> tuple[np.ndarray, np.ndarray]:
-    """Returns the 95 % band of the regression of y over x, by bootstrap.
-
-    The bootstrap draws points with replacement.
-
-    Args:
-        x, y: (N,) coordinates of the points.
-        grid: (M,) values of x at which the band is computed.
-
-    Returns:
-        Lower and upper limit of the band, each (M,).
-    """
-    draws = np.random.default_rng(0).integers(len(x), size=(_RESAMPLES, len(x)))
-    counts = np.stack([np.bincount(d, minlength=len(x)) for d in draws])
-    curves = smooth(x, y, grid, counts)
-    low, high = np.percentile(curves, [2.5, 97.5], axis=0)
-    return low, high
 
 
 # Kind -> how it is drawn, names that it needs, and others.

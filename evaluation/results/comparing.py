@@ -8,7 +8,6 @@ from pathlib import Path
 import re
 from typing import Any, NamedTuple
 import warnings
-import zlib
 
 import numpy as np
 from scipy.stats import kendalltau
@@ -28,6 +27,7 @@ from evaluation.recognition.protocol import PROTOCOL_NAMES
 from evaluation.results.summaries import (
     Ranked,
     check_same_queries,
+    drive_number,
     ranking,
 )
 from evaluation.results.table import (
@@ -432,7 +432,7 @@ def _differences(
             check_same_queries(one, other)
     compared = compared_by_auc(
         {name: [a.outcomes for a in some] for name, some in asked.items()},
-        [_drive(a) for a in next(iter(asked.values()), ())],
+        [drive_number(a) for a in next(iter(asked.values()), ())],
     )
     return [Compared(*two, *found) for two, found in compared.items()]
 
@@ -497,7 +497,7 @@ def _values(
             check_same_queries(some[0], answers)
     drawn = weights_by_drive(
         [some[0].outcomes.own_blocks for some in asked],
-        [_drive(some[0]) for some in asked],
+        [drive_number(some[0]) for some in asked],
     )
     of_condition = [
         [
@@ -507,11 +507,6 @@ def _values(
         for some, (_, weights) in zip(asked, drawn, strict=True)
     ]
     return means, np.mean(of_condition, axis=0).T
-
-
-def _drive(queries: Answers) -> int:
-    """Returns a number of the drive of queries, equal in all tables."""
-    return zlib.crc32(f"{queries.map} {queries.query}".encode())
 
 
 def _tau(first: np.ndarray, second: np.ndarray) -> float:

@@ -4,10 +4,16 @@ from collections.abc import Sequence
 from pathlib import Path
 
 import matplotlib
+from matplotlib.axes import Axes
 from matplotlib.backends.backend_agg import FigureCanvasAgg
+from matplotlib.collections import Collection, PathCollection
 from matplotlib.figure import Figure
+from matplotlib.lines import Line2D
+from matplotlib.patches import Patch
+import numpy as np
 
 from cns_drake.base.files import completing
+from evaluation.results.ranges import check_all
 
 # Okabe and Ito's colours, distinct for all kinds of colour vision; line
 # styles and markers for prints without colour.
@@ -64,8 +70,10 @@ def save(figure: Figure, stem: Path, kinds: Sequence[str] = LINES) -> None:
         kinds: endings of the files, such as `pdf`.
 
     Raises:
-        InputError: if a file cannot be written.
+        InputError: if a file cannot be written, or the figure shows a value
+            that its axis cannot have, see `evaluation.results.ranges`.
     """
+    _check(figure)
     FigureCanvasAgg(figure)
     # The layout is computed once for all formats.
     figure.draw_without_rendering()
@@ -95,3 +103,40 @@ def save(figure: Figure, stem: Path, kinds: Sequence[str] = LINES) -> None:
             ),
         ):
             figure.savefig(part, format=kind, **options)
+
+
+def _check(figure: Figure) -> None:
+    """Raises an error unless each axis shows values in its label's range."""
+    for axes in figure.axes:
+        of_figure = figure.get_supxlabel(), figure.get_supylabel()
+        labels = axes.get_xlabel(), axes.get_ylabel()
+        drawn = _in_data(axes)
+        for k, label in enumerate(labels):
+            check_all(label or of_figure[k], drawn[k])
+
+
+def _in_data(axes: Axes) -> tuple[list[float], list[float]]:
+    """Returns all x and all y that are drawn in coordinates of the data."""
+    found: tuple[list[float], list[float]] = ([], [])
+    # All that is drawn, without the frame.
+    for one in (*axes.lines, *axes.collections, *axes.patches):
+        transform = one.get_transform()
+        if isinstance(one, Line2D):
+            corners = [np.column_stack(one.get_data())]
+        elif isinstance(one, Patch):
+            path = one.get_path().transformed(one.get_patch_transform())
+            corners = [np.asarray(path.vertices)]
+            transform = one.get_data_transform()
+        elif isinstance(one, PathCollection):
+            # The markers of a scatter plot, whose paths have no position.
+            corners = [np.ma.filled(one.get_offsets(), np.nan)]
+            transform = one.get_offset_transform()
+        elif isinstance(one, Collection):
+            corners = [np.asarray(path.vertices) for path in one.get_paths()]
+        else:
+            continue
+        of_data = transform.contains_branch_seperately(axes.transData)
+        for values, is_data, column in zip(found, of_data, (0, 1), strict=True):
+            for some in corners if is_data else ():
+                values.extend(np.asarray(some, dtype=float)[:, column])
+    return found

@@ -18,7 +18,14 @@ from cns_drake.base.files import make_folder, write_text
 from cns_drake.base.version import __version__
 from evaluation.results import charts as drawing
 from evaluation.results.drawing import save
-from evaluation.results.summaries import Summary, means, summarised
+from evaluation.results.ranges import check_all
+from evaluation.results.summaries import (
+    CAUSE,
+    LEVEL,
+    Summary,
+    means,
+    summarised,
+)
 from evaluation.results.table import KEYS, SETTINGS, QueryRows, Results
 from evaluation.results.table_forms import in_table_order
 from evaluation.results.table_forms import title as title_of
@@ -88,23 +95,27 @@ def write_page(
     shown, notes = [], list(notes)
     for number, chart in enumerate(charts, start=1):
         try:
-            alone = drawing.draw(chart, results, alone=True)
+            alone = drawing.draw(chart, results, alone=True, queries=queries)
+            save(alone.figure, folder / f"chart_{number}", ("pdf", "png"))
+            svgs = {
+                name: _svg(
+                    drawing.draw(chart, results, width), f"{name}{number}"
+                )
+                for name, width in (
+                    ("wide", drawing.WIDE),
+                    ("narrow", drawing.NARROW),
+                )
+            }
         except InputError as error:
             # What was measured does not depend on it.
             notes.append(f"Chart {number} is left out: {error}.")
             on_note(notes[-1])
             continue
-        save(alone.figure, folder / f"chart_{number}", ("pdf", "png"))
-        svgs = {
-            name: _svg(drawing.draw(chart, results, width), f"{name}{number}")
-            for name, width in (
-                ("wide", drawing.WIDE),
-                ("narrow", drawing.NARROW),
-            )
-        }
         shown.append({"message": alone.message, "legend": alone.legend, **svgs})
     numbers = summarised(results, queries, charts)
     if numbers:
+        for one in numbers:
+            check_all(one.what, (one.value, one.low, one.high))
         write_csv(folder / _SUMMARIES, Summary._fields, numbers)
     environment = jinja2.Environment(
         loader=jinja2.FileSystemLoader(Path(__file__).parent),
@@ -165,7 +176,7 @@ def _summary(results: Results, task: str) -> dict[str, Any]:
     rows = results.where(task=task).rows
     known = dict.fromkeys(row.metric for row in rows)
     metrics = [m for m in _HEADLINES.get(task, known) if m in known] or [*known]
-    factors = [f for f in results.factors if not f.startswith(SETTINGS)]
+    factors = _told_factors(results.where(task=task))
     cells = dict.fromkeys(tuple(row[f] for f in factors) for row in rows)
     by_condition = 1 < len(cells) <= _MOST_COLUMNS
     if by_condition:
@@ -198,13 +209,23 @@ def _summary(results: Results, task: str) -> dict[str, Any]:
         title += f": {heads[0]}"
         if factors:
             title += f" by {', '.join(map(drawing.words, factors))}"
-        heads = [
-            ", ".join(
-                f"{v:g}" if isinstance(v, float) else _shown(v) for v in c
-            )
-            for _, *c in columns
-        ]
+        heads = [", ".join(map(drawing.value_words, c)) for _, *c in columns]
     return {"name": title, "metrics": heads, "rows": lines}
+
+
+def _told_factors(results: Results) -> list[str]:
+    """Returns the factors that tell apart the conditions of a task.
+
+    Settings of methods stand beside the names of the methods.
+    """
+    if CAUSE in results.factors:
+        # All other factors follow from the cause and its level.
+        names = [CAUSE, LEVEL]
+    else:
+        names = [f for f in results.factors if not f.startswith(SETTINGS)]
+    return [
+        name for name in names if len({row[name] for row in results.rows}) > 1
+    ]
 
 
 def _wide_table(results: Results) -> dict[str, Any]:

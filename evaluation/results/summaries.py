@@ -14,6 +14,7 @@ import itertools
 import math
 from operator import itemgetter
 from typing import Any, NamedTuple
+import zlib
 
 import numpy as np
 from scipy.special import stdtrit
@@ -29,19 +30,23 @@ from evaluation.recognition.metrics import (
     resampled_weights,
 )
 from evaluation.recognition.place_outcome import kept_share
+from evaluation.results.ranges import Range, range_of
 from evaluation.results.table import (
     Answers,
     Key,
     QueryRows,
     Results,
     Row,
-    metric_range,
 )
 
 CAUSE, LEVEL, NO_CAUSE = "cause", "level", "none"
 # Joins the names of causes that come together.
 _AND = "+"
 _SAMPLES = 1000
+# Least number of points that show a trend.
+LEAST_POINTS = 5
+# Least number of maps or conditions whose spread gives a mean an interval.
+_LEAST_UNITS = 4
 
 
 class Mean(NamedTuple):
@@ -203,6 +208,15 @@ def excesses(queries: QueryRows) -> list[Summary]:
     return found
 
 
+def median_kept(shares: Iterable[float]) -> float:
+    """Returns what is kept over several pairs: the median of known shares.
+
+    It is NaN if no share is known.
+    """
+    known = [share for share in shares if not math.isnan(share)]
+    return float(np.median(known)) if known else math.nan
+
+
 def lifetime(
     times: Sequence[float], kept: Sequence[float], left: float
 ) -> float:
@@ -362,8 +376,7 @@ def correlations(
     For each method, the value is Spearman's rank correlation of `x` with
     1 - `metric`, over the conditions in which `x` and `metric` are known. Its
     interval is by bootstrap over these conditions. Methods with fewer than
-    three such conditions are left out, as the correlation of two points is 1 or
-    -1 whatever they show.
+    five such conditions are left out, since so few points show no trend.
 
     Args:
         results: the table of results. Its rows must be either all measured with
@@ -377,7 +390,7 @@ def correlations(
         points.setdefault(row.label, []).append((1.0 - row.value, at))
     found = []
     for method, rows in points.items():
-        if len(rows) < 3:
+        if len(rows) < LEAST_POINTS:
             continue
         known = np.array(rows)
         rng = np.random.default_rng(0)
@@ -402,7 +415,8 @@ def _spearman(values: np.ndarray) -> np.ndarray:
     ranks -= ranks.mean(axis=-2, keepdims=True)
     with np.errstate(invalid="ignore", divide="ignore"):
         ranks /= np.linalg.norm(ranks, axis=-2, keepdims=True)
-    return ranks.prod(axis=-1).sum(axis=-1)
+    # Without the error of the sums, by which the result may leave its range.
+    return np.round(ranks.prod(axis=-1).sum(axis=-1), 12)
 
 
 def check_same_queries(one: Answers, other: Answers) -> None:
@@ -417,6 +431,11 @@ def check_same_queries(one: Answers, other: Answers) -> None:
             f"{one.experiment}: {one.database}, {one.query}: {one.label} and"
             f" {other.label} answered different queries"
         )
+
+
+def drive_number(queries: Answers) -> int:
+    """Returns a number of the drive of queries, equal in all tables."""
+    return zlib.crc32(f"{queries.map} {queries.query}".encode())
 
 
 class Ranked(NamedTuple):
@@ -434,8 +453,9 @@ def ranking(
 
     Only conditions count that were measured with all methods. The intervals of
     the means are t intervals with maps as independent units if there are
-    several, and conditions otherwise. They stay within the metric's range. The
-    samples are those of a bootstrap that draws these units, the same for all
+    several, and conditions otherwise. They stay within the metric's range, and
+    are unknown for two or three units, which say next to nothing. The samples
+    are those of a bootstrap that draws these units, the same for all
     methods. For a single condition, the intervals are those in the rows.
 
     Args:
@@ -468,13 +488,15 @@ def ranking(
     intervals = [Interval(first[n].low, first[n].high) for n in names]
     number = int(numbered.max()) + 1
     if number > 1:
+        intervals = [UNKNOWN] * len(names)
+    if number >= _LEAST_UNITS:
         is_in = numbered == np.arange(number)[:, None]
         squares = ((is_in @ (values - means)) ** 2).sum(axis=0)
         spreads = np.sqrt(number / (number - 1) * squares) / len(common)
         margins = stdtrit(number - 1, 0.975) * spreads
         ends = np.clip(
             [means - margins, means + margins],
-            *metric_range(first[names[0]].metric),
+            *(range_of(first[names[0]].metric) or Range())[:2],
         )
         intervals = [Interval(*pair) for pair in ends.T.tolist()]
     found = [

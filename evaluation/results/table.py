@@ -12,7 +12,7 @@ from __future__ import annotations
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 import csv
 from dataclasses import dataclass
-from functools import cache, cached_property
+from functools import cached_property
 import io
 import math
 from operator import itemgetter
@@ -23,12 +23,13 @@ from typing import Any
 import numpy as np
 
 from cns_drake.base.csv_files import check_separator, csv_text
-from cns_drake.base.errors import InputError
+from cns_drake.base.errors import InputError, errors_at
 from cns_drake.base.files import read_bytes, write_text
 from cns_drake.base.value_lists import repeated
 from evaluation.recognition.place_outcome import Number
 from evaluation.recognition.protocol import PROTOCOL_NAMES
 from evaluation.recognition.query_outcomes import QueryOutcomes
+from evaluation.results.ranges import Range, checked, range_of
 
 RESULTS, QUERIES = "results.csv", "queries.csv"
 # The beginning of a factor that is a setting of a method.
@@ -87,22 +88,6 @@ _NUMBER = re.compile(
 # Leading zeros belong to names, as in the stage 01.
 _NAME_OF_DIGITS = re.compile(r"0\d+")
 _TRUTH = {"0": False, "1": True, "false": False, "true": True}
-# Metrics, and the values that they can have; others have any.
-_RANGES = (
-    (
-        r"auc|auc_strict|r1|pose_success|success_\w+|auroc\w*|m?iou\w*"
-        r"|precision_\w+|recall_\w+|tcr_\w+",
-        0.0,
-        1.0,
-    ),
-    (r"visible_change\w*", -1.0, 1.0),
-    (
-        r"kept\w*|with_match|places|no_\w+|other_city|too_far|elsewhere|lost"
-        r"|found|translation_\w+|rotation_\w+|\w+_ms",
-        0.0,
-        math.inf,
-    ),
-)
 # Metrics whose intervals come from resampled queries, and may miss the value
 # itself by a little.
 _RESAMPLED = ("auc", "auc_strict", "r1")
@@ -319,16 +304,13 @@ class Results:
         """Writes the table as CSV; equal tables give equal bytes.
 
         Raises:
-            InputError: the file cannot be written.
+            InputError: the file cannot be written, or a value cannot be.
         """
-        lines = (
-            (
-                *_key_cells(row, self.factors),
-                row.metric,
-                *map(_cell, (float(row.value), row.low, row.high, row.n)),
-            )
-            for row in self.rows
-        )
+        with errors_at(str(path)):
+            lines = [
+                (*_key_cells(row, self.factors), *_measured_cells(row))
+                for row in self.rows
+            ]
         header = (*_BEFORE, *self.factors, *_BEHIND, *_MEASURED)
         write_text(path, csv_text(header, lines))
 
@@ -454,6 +436,14 @@ def _key_cells(key: Key, factors: Sequence[str]) -> list[str]:
     return cells
 
 
+def _measured_cells(row: Row) -> list[str]:
+    values = [
+        checked(row.metric, float(one))
+        for one in (row.value, row.low, row.high)
+    ]
+    return [row.metric, *map(_cell, (*values, row.n))]
+
+
 def _cell(value: object) -> str:
     """Returns a value as the table has it, with all its digits."""
     if isinstance(value, bool | np.bool_):
@@ -504,15 +494,6 @@ def _answered(
     return columns
 
 
-@cache
-def metric_range(metric: str) -> tuple[float, float]:
-    """Returns the least and the greatest value of a metric."""
-    for pattern, *ends in _RANGES:
-        if re.fullmatch(pattern, metric):
-            return ends[0], ends[1]
-    return -math.inf, math.inf
-
-
 def _measured(one: _Line) -> dict[str, Any]:
     """Returns a row's values in the columns after those of its key."""
     metric = one.text("metric")
@@ -521,7 +502,7 @@ def _measured(one: _Line) -> dict[str, Any]:
     )
     if math.isnan(value) and metric in _ALWAYS_KNOWN:
         raise one.fault("value", f"{metric} needs a number")
-    least, greatest = metric_range(metric)
+    least, greatest, _ = range_of(metric) or Range()
     if value < least or value > greatest:
         limits = f"from {least:g} to {greatest:g}"
         if math.isinf(greatest):

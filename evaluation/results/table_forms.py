@@ -18,6 +18,7 @@ from cns_drake.base.csv_files import csv_text
 from cns_drake.base.files import write_text
 from cns_drake.base.yaml_files import read_yaml
 from evaluation.recognition.protocol import PROTOCOL_COLUMNS
+from evaluation.results.ranges import checked, range_of
 
 _Item = TypeVar("_Item")
 _Key = TypeVar("_Key")
@@ -86,7 +87,8 @@ class Table:
     """Rows under a header; numbers stay numbers until they are written.
 
     A missing value is written as an empty cell in CSV, and as a dash in other
-    formats. Truth values are written as 0 or 1.
+    formats. Truth values are written as 0 or 1. A table cannot contain a value
+    outside of its column's range, see `evaluation.results.ranges`.
 
     Attributes:
         header: name of each column.
@@ -102,6 +104,18 @@ class Table:
     rows: tuple[tuple[object, ...], ...]
     groups: tuple[tuple[str, int], ...] = ()
     caption: str = ""
+
+    def __post_init__(self) -> None:
+        groups = [name for name, span in self.groups for _ in range(span)]
+        # The metric is in the column's own head or in that of its group.
+        names = [
+            head if range_of(head) else group
+            for head, group in zip(
+                self.header, groups or [""] * len(self.header), strict=True
+            )
+        ]
+        rows = tuple(tuple(map(_checked, names, row)) for row in self.rows)
+        object.__setattr__(self, "rows", rows)
 
     @classmethod
     def of(
@@ -227,6 +241,18 @@ class Table:
                 groups or [""] * len(self.header), self.header, strict=True
             )
         ]
+
+
+def _checked(name: str, value: object) -> object:
+    """Returns a cell of a column, checked by `evaluation.results.ranges`."""
+    if isinstance(value, Cell):
+        if value.value is None:
+            return value
+        return replace(value, value=checked(name, value.value))
+    # Text and truth values have no range.
+    if isinstance(value, bool) or not isinstance(value, int | float):
+        return value
+    return checked(name, value)
 
 
 def keyed(

@@ -4,6 +4,7 @@ import itertools
 import math
 from math import nan
 import re
+from types import SimpleNamespace
 
 from helpers.small_page import make_content
 import numpy as np
@@ -12,7 +13,10 @@ import pytest
 from evaluation.recognition.fault_kinds import FAULT_KINDS
 from evaluation.report.page import route_picture, write_page
 from evaluation.report.page_data import browser_data
-from evaluation.report.result_tables import recognition_table
+from evaluation.report.result_tables import (
+    MethodDifference,
+    recognition_table,
+)
 from evaluation.report.rows import beside, ranked_methods
 from evaluation.results.table import LAST, OWN, STAGE, Results, Row
 
@@ -67,8 +71,8 @@ def test_the_ranking_comes_first(text):
     ]
     (_, first, *_), (_, second, *_) = rows
     assert (
-        f"RING++ ranks first of 2 methods, with a mean AUC of {first} over one"
-        f" pair; Scan Context++ follows with {second}."
+        f"RING++ has the greatest mean AUC of 2 methods, {first} over one pair;"
+        f" it is not told apart from Scan Context++ ({second}) on any pair."
     ) in section
     assert "<details" not in section
     # Its colour in all pictures.
@@ -87,12 +91,12 @@ def test_the_ranking_comes_first(text):
         ),
         (
             {"btc": [0.9, nan], "solid": [0.2, 0.9]},
-            "BTC ranks first of 2 methods, with a mean AUC of 0.900 over one"
-            " pair; SOLiD follows with 0.200.",
+            "BTC has the greatest mean AUC of 2 methods, 0.900 over one pair;"
+            " it is not told apart from SOLiD (0.200) on any pair.",
         ),
         (
             {"btc": [0.9, 0.8], "solid": [0.2, 0.1]},
-            "2 pairs of drives; SOLiD follows with 0.150.",
+            "2 pairs of drives; it is not told apart from SOLiD (0.150) on any",
         ),
     ],
 )
@@ -126,8 +130,63 @@ def test_a_headline_is_true(aucs, words):
     )
     _, headline = ranked_methods(Results.of(rows))
     assert words in headline
-    # Tests of differences are in `differences.csv`.
-    assert "significant" not in headline
+
+
+@pytest.mark.parametrize(
+    ("p_values", "words"),
+    [
+        # On each of two pairs: BTC and SOLiD, BTC and x, SOLiD and x.
+        (
+            ((0.01, 0.02, 0.9), (0.04, 0.049, 0.9)),
+            "it is told apart from all others on each pair.",
+        ),
+        (
+            ((0.11, 0.98, 0.42), (0.05, nan, 0.01)),
+            "it is not told apart from SOLiD (0.150) and x (0.100) on any"
+            " pair.",
+        ),
+        (
+            ((0.11, 0.01, 0.42), (0.05, 0.01, 0.01)),
+            "it is not told apart from SOLiD (0.150) on any pair.",
+        ),
+        (
+            ((0.11, 0.01, 0.42), (0.01, 0.06, 0.01)),
+            "it is on some pairs only told apart from SOLiD (1 of 2) and x (1"
+            " of 2).",
+        ),
+        (
+            ((0.11, 0.06, 0.42), (0.01, 0.06, 0.01)),
+            "it is not told apart from x (0.100) on any pair, and only on some"
+            " from SOLiD (1 of 2).",
+        ),
+    ],
+)
+def test_a_headline_says_what_is_told_apart(p_values, words):
+    aucs = {"btc": (0.9, 0.8), "solid": (0.2, 0.1), "x": (0.1, 0.1)}
+    place = ("stages", "town", "a")
+    rest = (1, {STAGE: OWN}, "place")
+    rows = [
+        Row(*place, str(k), *rest, method, False, "fair", "auc", value)
+        for method, values in aucs.items()
+        for k, value in enumerate(values)
+    ]
+    differences = [
+        MethodDifference(
+            *(
+                SimpleNamespace(method=method, pair=("town", "a", str(k)))
+                for method in both
+            ),
+            None,
+            p,
+        )
+        for k, some in enumerate(p_values)
+        for both, p in zip(itertools.combinations(aucs, 2), some, strict=True)
+    ]
+    _, headline = ranked_methods(Results.of(rows), differences)
+    assert headline == (
+        "BTC has the greatest mean AUC of 3 methods, 0.850 over 2 pairs of"
+        f" drives; {words}"
+    )
 
 
 def test_answers_that_are_only_too_far_stand_beside_the_ranking():

@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 
 from cns_drake.base.errors import InputError
+from evaluation.report.rows import Survival, survival_summary
 from evaluation.results import charts
 from evaluation.results import page as page_module
 from evaluation.results.page import write_page
@@ -84,8 +85,7 @@ def test_lines_have_means_and_bands():
     edges = axes.collections[0].get_paths()[0].vertices[:, 1]
     assert edges.max() == pytest.approx(0.5 + 0.02)
     assert drawn.message == (
-        "At 30 years, the AUC is greatest with RING++ (0.61) and least with"
-        " SOLiD (0.21)"
+        "AUC at 30 years: from 0.21 (SOLiD) to 0.61 (RING++)"
     )
     assert list(drawn.legend) == ["SOLiD", "RING++", "mine"]
     assert len({colour for colour, _, _ in drawn.legend.values()}) == 3
@@ -128,7 +128,7 @@ def test_a_matrix_has_strips_and_the_last_number():
         "parked cars",
     ]
     assert drawn.message == (
-        "The worst case is SOLiD under parked cars: kept share 0.60"
+        "Least kept share of all cells: 0.60, SOLiD with parked cars"
     )
     assert not drawn.legend
 
@@ -149,35 +149,61 @@ def test_a_dumbbell_joins_both_ends():
     labels = [label.get_text() for label in axes.get_yticklabels()]
     assert labels == ["SOLiD", "x", "y", "RING++", "x", "y"]
     assert drawn.message == (
-        "RING++ keeps most of its AUC (0.60 of 0.80), SOLiD least (0.10 of"
-        " 0.50)"
+        "Share of the AUC that is kept, median of 2 pairs: from 20 % (SOLiD) to"
+        " 75 % (RING++)"
+    )
+    assert drawn.figure.get_supxlabel() == (
+        "AUC without the change (hollow) and with the change (filled)"
     )
 
 
-@pytest.mark.parametrize("number", [3, 8])
+def test_texts_and_charts_have_one_definition_of_what_is_kept():
+    """Medians of shares: means would rank the two methods the other way."""
+    both = {
+        "ring++": ((0.9, 0.9), (0.1, 0.09), (0.1, 0.09)),
+        "solid": ((0.9, 0.1), (0.1, 0.1), (0.1, 0.1)),
+    }
+    rows = [
+        row(value, {"both.stage": stage}, name, town=town)
+        for name, pairs in both.items()
+        for town, ends in zip("xyz", pairs, strict=True)
+        for stage, value in zip(("last", "own"), ends, strict=True)
+    ]
+    chart = {"kind": "dumbbell", "over": "both.stage", "metric": "auc"}
+    message = charts.draw(chart, Results.of(rows)).message
+    assert message.endswith("from 90 % (RING++) to 100 % (SOLiD)")
+    text = survival_summary(
+        [
+            Survival(
+                (town, "01", "02"),
+                name,
+                {"auc": None},
+                {"kept": row(after / before, {}, name, "kept")},
+            )
+            for name, pairs in both.items()
+            for town, (before, after) in zip("xyz", pairs, strict=True)
+        ]
+    )
+    assert text.endswith("(median of 3 pairs): SOLiD 100 %, RING++ 90 %.")
+
+
+@pytest.mark.parametrize("number", [1, 4, 5, 8])
 def test_a_scatter_of_points_on_a_line(number):
     drawn = charts.draw(
         {"kind": "scatter", "x": "tcr_sym", "y": "auc"}, scattered(number)
     )
     (axes,) = drawn.figure.axes
-    points, line, *_ = axes.get_lines()
-    np.testing.assert_allclose(
-        points.get_ydata(), 0.9 - np.asarray(points.get_xdata())
-    )
     # A local linear regression of a line is that line.
-    np.testing.assert_allclose(
-        line.get_ydata(), 0.9 - np.asarray(line.get_xdata())
-    )
-    assert bool(axes.collections) == (number == 8)
-    assert drawn.message == "Rank correlation of AUC with TCR_sym: -1.00"
-
-
-@pytest.mark.parametrize("number", [1, 2])
-def test_a_single_point_or_two_have_no_correlation(number):
-    drawn = charts.draw(
-        {"kind": "scatter", "x": "tcr_sym", "y": "auc"}, scattered(number)
-    )
-    assert drawn.message == "AUC over TCR_sym"
+    for line in axes.get_lines():
+        np.testing.assert_allclose(
+            line.get_ydata(), 0.9 - np.asarray(line.get_xdata())
+        )
+    # Of two methods: points and, if they are enough, a curve with its band.
+    has_curve = number >= 5
+    assert len(axes.get_lines()) == 2 + 2 * has_curve
+    assert len(axes.collections) == 2 * has_curve
+    words = "Rank correlation of AUC with TCR_sym: -1.00"
+    assert drawn.message == (words if has_curve else "AUC over TCR_sym")
 
 
 def test_other_keys_select_rows():
@@ -200,7 +226,7 @@ def test_maps_may_be_the_lines_of_a_matrix():
     (axes,) = drawn.figure.axes
     assert [t.get_text() for t in axes.get_yticklabels()] == ["x", "y"]
     assert drawn.message == (
-        "The worst case is distance under y: mean IoU 0.25"
+        "Least mean IoU of all cells: 0.25, distance with y"
     )
 
 
@@ -368,12 +394,12 @@ def test_a_picture_for_print_has_its_legend(tmp_path):
         (
             {"kind": "lines", "over": YEARS, "metric": "auc"},
             aged().where(method="solid", seed=0),
-            "At 30 years, the AUC is {last:.2f}",
+            "AUC at 30 years: {last:.2f}",
         ),
         (
             {"kind": "dumbbell", "over": YEARS, "metric": "auc"},
             aged().where(method="solid", seed=0),
-            "AUC kept: {last:.2f} of {first:.2f}",
+            "Share of the AUC that is kept, one pair: 40 %",
         ),
     ],
 )
@@ -432,7 +458,7 @@ def test_a_page_stands_alone(tmp_path):
     )
     assert note in text
     assert "Age &amp; &lt;years&gt;" in text
-    assert "At 30 years, the AUC" in text[text.index("<h1>") :][:100]
+    assert "AUC at 30 years" in text[text.index("<h1>") :][:100]
     summary, whole = page.tables
     header, *lines = summary
     assert header == ["method", "0", "10", "30"]

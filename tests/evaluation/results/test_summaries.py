@@ -158,6 +158,23 @@ def test_rank_correlations_are_those_of_scipy():
         assert one.n == 25
 
 
+@pytest.mark.parametrize(("number", "is_shown"), [(4, False), (5, True)])
+@pytest.mark.parametrize("sign", [-1.0, 1.0])
+def test_a_trend_needs_five_points(number, is_shown, sign):
+    rows = [row(0.5 + 0.1 * sign * k, {YEARS: k}) for k in range(number)]
+    found = summaries.correlations(Results.of(rows), YEARS)
+    assert bool(found) == is_shown
+    for one in found:
+        # Not 1.0000000000000002, which rounding would make of it.
+        assert (one.value, one.low, one.high) == (-sign, -sign, -sign)
+
+
+def test_what_is_kept_is_the_median_of_what_is_known():
+    assert summaries.median_kept([0.9, math.nan, 0.1, 0.5]) == 0.5
+    assert summaries.median_kept([0.25, 0.75]) == 0.5
+    assert math.isnan(summaries.median_kept([math.nan]))
+
+
 def test_summaries_of_charts():
     rows = [
         *(
@@ -168,7 +185,7 @@ def test_summaries_of_charts():
             row(10.0 ** (k * 2), {YEARS: 10**k}, metric="query_ms", task="cost")
             for k in (0, 1)
         ),
-        *(row(0.9 - 0.1 * k, {YEARS: k, "query.nth": k}) for k in range(4)),
+        *(row(0.9 - 0.1 * k, {YEARS: k, "query.nth": k}) for k in range(5)),
     ]
     causes = {"none": (20, 0), "a": (10, 1), "b": (16, 1), "a+b": (4, 1)}
     queries = QueryRows.of(
@@ -218,9 +235,9 @@ def test_a_ranking_counts_what_all_methods_have():
     assert [one.value for one in found] == pytest.approx([0.6, 0.5])
     # Maps are drawn: both, or one of them twice.
     assert set(np.round(samples[:, 0], 9)) == {0.2, 0.6, 0.8}
-    # Two maps say next to nothing, except that an AUC is from 0 to 1.
-    assert found[0].interval == Interval(0.0, 1.0)
-    assert found[1].interval == Interval(0.5, 0.5)
+    # Two maps say next to nothing.
+    assert np.isnan([one.interval.low for one in found]).all()
+    assert np.isnan([one.interval.high for one in found]).all()
 
 
 @pytest.mark.parametrize("metric", ["auc", "query_ms"])
@@ -238,12 +255,22 @@ def test_the_interval_of_a_mean_over_maps(metric):
         0.95, 3, np.mean(values), scipy.stats.sem(values)
     )
     assert (found.interval.low, found.interval.high) == pytest.approx(expected)
-    # Only conditions, if there is one map.
-    (found,), _ = summaries.ranking(rows[::4])
-    high = 0.5 + scipy.stats.t.ppf(0.975, 1) * 0.1
+    # Only conditions, if there is one map: four of them, and not three.
+    some = [
+        Row(**key({SNOW: snow}), metric=metric, value=value)
+        for snow, value in enumerate((0.1, 0.5, 0.9, 0.9))
+    ]
+    (found,), _ = summaries.ranking(some)
+    values = [one.value for one in some]
+    _, high = scipy.stats.t.interval(
+        0.95, 3, np.mean(values), scipy.stats.sem(values)
+    )
+    assert high > 1.0
     assert found.interval.high == pytest.approx(
         1.0 if metric == "auc" else high
     )
+    (found,), _ = summaries.ranking(some[:3])
+    assert math.isnan(found.interval.high)
 
 
 def test_a_ranking_of_one_condition_has_its_intervals():
