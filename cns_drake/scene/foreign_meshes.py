@@ -7,16 +7,26 @@ meshes.
 
 from __future__ import annotations
 
+import ctypes
 import os
 from pathlib import Path
 import pickle
+import re
 import subprocess
 import sys
+import tempfile
 from types import ModuleType
+from typing import IO
 
 import numpy as np
 
 from cns_drake.base.errors import missing_library
+
+# Open3D returns what it has read before a fault, and warns.
+_FAULT = re.compile(
+    r"WARNING\] (?:Read \w+ failed|Unable to load file .* with ASSIMP): (.*)"
+)
+_COLOUR = re.compile(r"\x1b\[[\d;]*m")
 
 
 class ForeignMeshes:
@@ -39,7 +49,8 @@ class ForeignMeshes:
             no triangles if the file is not a mesh.
 
         Raises:
-            ValueError: if Open3D crashes on the file, or cannot be loaded.
+            ValueError: if Open3D crashes on the file, reads only a part of it,
+                or cannot be loaded.
         """
         if self._process is None:
             self._process = subprocess.Popen(
@@ -73,7 +84,9 @@ def _serve() -> None:
     """Reads requested meshes until there are no more requests."""
     # Messages of a parser must not mix with the answers.
     answers = os.fdopen(os.dup(1), "wb")
-    os.dup2(2, 1)
+    messages = tempfile.TemporaryFile()  # noqa: SIM115  # For the whole process.
+    os.dup2(messages.fileno(), 1)
+    os.dup2(messages.fileno(), 2)
     # Left out: Open3D's machine learning, which no mesh needs. Its import takes
     # longer than all the rest.
     sys.modules["open3d.ml"] = ModuleType("open3d.ml")
@@ -87,6 +100,8 @@ def _serve() -> None:
             path = pickle.load(sys.stdin.buffer)
         except EOFError:
             return
+        messages.seek(0)
+        messages.truncate()
         if path.lower().endswith(".dae"):
             # Only Open3D's reader of models supports the format.
             parts = open3d.io.read_triangle_model(path).meshes
@@ -96,8 +111,23 @@ def _serve() -> None:
         else:
             mesh = open3d.io.read_triangle_mesh(path)
         triangles = np.asarray(mesh.triangles, np.int32)
-        pickle.dump((np.asarray(mesh.vertices), triangles), answers)
+        answer: object = np.asarray(mesh.vertices), triangles
+        if fault := _fault(messages, path):
+            answer = fault
+        pickle.dump(answer, answers)
         answers.flush()
+
+
+def _fault(messages: IO[bytes], path: str) -> str:
+    """Returns the fault that a parser has printed, or "" without one."""
+    ctypes.CDLL(None).fflush(None)  # The parsers print through C.
+    messages.seek(0)
+    text = _COLOUR.sub("", messages.read().decode("utf-8", "replace"))
+    found = _FAULT.search(text)
+    if found is None:
+        return ""
+    fault = found[1].replace(path, Path(path).name)
+    return f"Open3D cannot read it: {fault}"
 
 
 if __name__ == "__main__":

@@ -1,19 +1,10 @@
-"""Reads the surfaces of meshes, from files or from memory.
+"""Reads the surfaces of meshes, from files or from memory."""
 
-Open3D reads glTF and COLLADA files. They are first checked for content that
-Open3D would misread. Specification of glTF:
-https://registry.khronos.org/glTF/specs/2.0/glTF-2.0.html
-"""
-
-from collections import Counter
 from collections.abc import Sequence
 import functools
 from itertools import pairwise
 from pathlib import Path
-import re
-import struct
 import tempfile
-from typing import Any
 
 import numpy as np
 from pydrake.geometry import (
@@ -25,181 +16,10 @@ from pydrake.geometry import (
 )
 
 from cns_drake.base.errors import InputError
-from cns_drake.base.files import read_bytes
-from cns_drake.base.json_text import parse_json
 from cns_drake.scene.drake_errors import PARSER_ERRORS, collected_errors
 from cns_drake.scene.foreign_meshes import ForeignMeshes
+from cns_drake.scene.mesh_contents import GLTF, check_obj, unread_parts
 from cns_drake.scene.surfaces import LARGEST_SIZE, TriangleSurface
-
-# File name extensions of glTF.
-GLTF = (".gltf", ".glb")
-# Prefixes of glTF extensions that do not change shapes.
-_HARMLESS = (
-    "KHR_materials_", "KHR_texture_", "EXT_texture_", "MSFT_texture_",
-    "ADOBE_materials_", "KHR_lights_", "EXT_lights_", "KHR_techniques_",
-    "KHR_xmp", "KHR_audio", "KHR_animation_pointer", "MSFT_packing_",
-    "EXT_mesh_features", "EXT_structural_metadata", "EXT_feature_metadata",
-    "EXT_mesh_manifold", "KHR_physics", "KHR_implicit_shapes",
-)  # fmt: skip
-# glTF extensions that change shapes even where they are not required.
-_CHANGING = (
-    "EXT_mesh_gpu_instancing", "EXT_instance_features", "KHR_node_visibility",
-    "KHR_mesh_quantization",
-)  # fmt: skip
-# Elements of COLLADA that would move or add shapes, and are not read.
-_COLLADA = {
-    re.compile(rb"<instance_controller\b"): "skins or morphs of COLLADA",
-    re.compile(rb"<animation\b"): "animations of COLLADA",
-    re.compile(rb"<(?:lines|linestrips)\b"): "lines of COLLADA",
-}
-_FLOAT = 5126
-# Modes of primitives below this number (points and lines) have no triangles.
-_FIRST_TRIANGLES = 4
-_JSON = 0x4E4F534A
-
-
-def unread_parts(path: Path) -> tuple[str, ...]:
-    """Returns notes on what is not read from a mesh file, such as lines.
-
-    There is one note for each kind of content that is not read. The tuple is
-    empty if everything is read.
-
-    Raises:
-        ValueError: the shapes in the file would be misread.
-        InputError: the file cannot be read.
-    """
-    ending = path.suffix.lower()
-    if ending in GLTF:
-        return check_gltf(path)
-    if ending != ".dae":
-        return ()
-    content = read_bytes(path, _LIMIT_BYTES)
-    counts = {what: len(one.findall(content)) for one, what in _COLLADA.items()}
-    return tuple(f"{n} {what} ignored" for what, n in counts.items() if n)
-
-
-def check_gltf(path: Path) -> tuple[str, ...]:
-    """Returns notes on ignored content of a glTF file, one for each kind.
-
-    The file can be text (`.gltf`) or binary (`.glb`).
-
-    Raises:
-        ValueError: the file is not glTF, or its shapes would be misread; the
-            message names the required features.
-        InputError: the file cannot be read.
-    """
-    content = read_bytes(path, _LIMIT_BYTES)
-    try:
-        if content[:4] == b"glTF":
-            length, kind = struct.unpack_from("<II", content, 12)
-            if kind != _JSON:
-                raise ValueError("no JSON at its beginning")
-            content = content[20 : 20 + length]
-        top = parse_json(content)
-        required = _names(top, "extensionsRequired")
-        used = _names(top, "extensionsUsed")
-        primitives = [p for m in top.get("meshes", []) for p in m["primitives"]]
-        accessors = top.get("accessors", [])
-        positions = [
-            accessors[p["attributes"]["POSITION"]]
-            for p in primitives
-            if "POSITION" in p["attributes"]
-        ]
-        nodes = top.get("nodes", [])
-        counts = _unread(top, nodes, primitives)
-        are_floats = all(one["componentType"] == _FLOAT for one in positions)
-    except (
-        AttributeError, LookupError, RecursionError, TypeError, struct.error
-    ) as error:  # fmt: skip
-        raise ValueError(f"no valid glTF ({type(error).__name__})") from error
-    unread = [name for name in required if not name.startswith(_HARMLESS)]
-    unread += [name for name in used if name in _CHANGING]
-    if unread:
-        raise ValueError(
-            f"needs the extension {unread[0]} of glTF, which is not read;"
-            " export it without"
-        )
-    if not are_floats:
-        raise ValueError(
-            "has vertices that are no floats (KHR_mesh_quantization), which"
-            " are not read; export it without"
-        )
-    return tuple(f"{number} {what}" for what, number in counts.items())
-
-
-def _names(top: Any, key: str) -> list[str]:
-    return [str(name) for name in top.get(key, [])]
-
-
-def _unread(top: Any, nodes: list[Any], primitives: list[Any]) -> Counter[str]:
-    """Counts what would move or add shapes, but is not read."""
-    meshes = top.get("meshes", [])
-    counts = Counter(
-        {
-            "skins of glTF ignored": sum("skin" in one for one in nodes),
-            "weights of morph targets in glTF ignored": sum(
-                any(one.get("weights", [])) for one in [*nodes, *meshes]
-            ),
-            "animations of glTF ignored": len(top.get("animations", [])),
-            "points or lines of glTF ignored": sum(
-                p.get("mode", _FIRST_TRIANGLES) < _FIRST_TRIANGLES
-                for p in primitives
-            ),
-            "see-through materials of glTF taken as solid": sum(
-                one.get("alphaMode", "OPAQUE") != "OPAQUE"
-                for one in top.get("materials", [])
-            ),
-            "further scenes of glTF ignored": len(top.get("scenes", [0])) - 1,
-        }
-    )
-    return +counts
-
-
-_LIMIT_BYTES = 1 << 28
-# If a face refers to a missing vertex, Drake's reader reads outside its memory
-# and may end the process.
-_VERTEX = re.compile(rb"^[ \t]*v[ \t]", re.MULTILINE)
-_FACE = re.compile(rb"^[ \t]*f[ \t]([^\n#]*)", re.MULTILINE)
-# A ray caster needs neither texture coordinates nor normals, but Drake checks
-# them.
-_OTHER_INDICES = re.compile(rb"/[^\s]*")
-_NO_INDICES = re.compile(rb"[^-\d\s]|\d-|\d{10}")
-
-
-def check_obj(path: Path) -> None:
-    """Checks that faces of an OBJ file only use vertices that exist.
-
-    Raises:
-        ValueError: a vertex does not exist; the message names the line.
-        InputError: the file cannot be read.
-    """
-    # Drake accepts both as line ends.
-    content = read_bytes(path, _LIMIT_BYTES).replace(b"\r", b"\n")
-    num_vertices = len(_VERTEX.findall(content))
-    faces = b" \n".join(_FACE.findall(content))
-    if b"/" in faces:
-        faces = _OTHER_INDICES.sub(b"", faces)
-    if _are_indices(faces, num_vertices):
-        return
-    for number, line in enumerate(content.split(b"\n"), start=1):
-        face = _FACE.match(line)
-        indices = _OTHER_INDICES.sub(b"", face[1]) if face else b""
-        if not _are_indices(indices, num_vertices):
-            raise ValueError(
-                f"line {number}: a face has a vertex that is not there (of"
-                f" {num_vertices})"
-            )
-
-
-def _are_indices(text: bytes, num_vertices: int) -> bool:
-    """Returns whether a text has valid vertex indices, from 1 or from -1."""
-    if not text.strip():
-        return True
-    if _NO_INDICES.search(text):
-        return False
-    values = np.fromstring(text, dtype=np.int64, sep=" ")
-    return bool(((values != 0) & (np.abs(values) <= num_vertices)).all())
-
 
 # The faces of a tetrahedron, counter-clockwise seen from outside. This holds if
 # its first three vertices are counter-clockwise, seen from the fourth.
@@ -322,8 +142,7 @@ class MeshFiles:
         if not path.is_file():
             raise ValueError("no such mesh file")
         ending = path.suffix.lower()
-        if ending in GLTF:
-            check_gltf(path)
+        unread_parts(path)
         p_GVset, triangles = _READERS.get(ending, self._foreign.read)(path)
         if len(triangles) == 0:
             raise ValueError("holds no triangles")
@@ -359,8 +178,8 @@ def _source_key(source: MeshSource) -> object:
 def _read_hull(shape: Convex) -> TriangleSurface:
     """Returns Drake's convex hull, with the scale applied."""
     source = shape.source()
-    if source.is_path() and source.extension() in GLTF:
-        check_gltf(Path(source.path()))
+    if source.is_path():
+        unread_parts(Path(source.path()))
     hull = shape.GetConvexHull()
     vertices = [hull.vertex(k) for k in range(hull.num_vertices())]
     triangles = []

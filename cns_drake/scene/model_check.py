@@ -13,7 +13,7 @@ from xml.etree import ElementTree
 
 from cns_drake.base.errors import InputError, value_errors
 from cns_drake.base.xml_elements import Element, read_elements
-from cns_drake.scene.mesh_files import check_obj
+from cns_drake.scene.mesh_contents import check_obj
 from cns_drake.scene.surfaces import LARGEST_SIZE
 
 _MODELS = (".sdf", ".world", ".urdf")

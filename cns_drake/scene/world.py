@@ -27,7 +27,7 @@ from cns_drake.scene.gazebo_worlds import (
     read_xml,
     simplify_world,
 )
-from cns_drake.scene.mesh_files import unread_parts
+from cns_drake.scene.mesh_contents import unread_parts
 from cns_drake.scene.model_check import check_model
 from cns_drake.scene.perception_geometry import (
     anchored_frames,

@@ -29,12 +29,42 @@ def test_a_crash_is_reported_and_the_next_mesh_read(tmp_path, capfd):
     with ForeignMeshes() as meshes:
         with pytest.raises(ValueError, match="cannot read it"):
             meshes.read(tmp_path / "deadly.ply")
-        _, triangles = meshes.read(tmp_path / "torn.ply")
-        assert len(triangles) < 4
+        # Open3D itself returns the faces before the end.
+        fault = r"cannot read it: unable to read file: torn\.ply"
+        with pytest.raises(ValueError, match=fault):
+            meshes.read(tmp_path / "torn.ply")
         vertices, triangles = meshes.read(tmp_path / "good.ply")
     np.testing.assert_array_equal(vertices, VERTICES)
     np.testing.assert_array_equal(triangles, TRIANGLES)
     assert capfd.readouterr() == ("", "")
+
+
+OFF = "OFF\n4 4 0\n" + PLY.partition("end_header\n")[2]
+MODEL = """<COLLADA xmlns="http://www.collada.org/2005/11/COLLADASchema"
+version="1.4.1"><library_geometries><geometry id="g"><mesh><source id="p">
+<float_array id="a" count="9">0 0 0 1 0 0 0 1 0</float_array>
+<technique_common><accessor source="#a" count="3" stride="3"/>
+</technique_common></source><vertices id="v"><input semantic="POSITION"
+source="#p"/></vertices><triangles count="2"><input semantic="VERTEX"
+source="#v" offset="0"/><p>0 1 2</p></triangles></mesh></geometry>
+</library_geometries></COLLADA>"""
+
+
+@pytest.mark.slow
+def test_what_is_read_in_part_is_refused_in_every_format(tmp_path):
+    cut = OFF.rsplit("\n", 2)[0] + "\n"
+    with ForeignMeshes() as meshes:
+        for name, text, fault in (
+            ("rock.off", cut, "could not read all vertex indices"),
+            ("rock.dae", MODEL, "Expected different index count"),
+            ("rock.gltf", '{"asset": {"version": "2.0"}}', "GLTF: No scene"),
+        ):
+            (tmp_path / name).write_text(text)
+            with pytest.raises(ValueError, match=f"cannot read it: {fault}"):
+                meshes.read(tmp_path / name)
+        # No message of an earlier file is left.
+        (tmp_path / "rock.off").write_text(OFF)
+        assert len(meshes.read(tmp_path / "rock.off")[1]) == 4
 
 
 @pytest.mark.slow

@@ -8,7 +8,11 @@ from helpers.small_map import world_text
 import pytest
 
 from cns_drake.base.errors import InputError
-from cns_drake.scene.mesh_files import check_gltf, unread_parts
+from cns_drake.scene.mesh_contents import (
+    check_gltf,
+    check_obj,
+    unread_parts,
+)
 from cns_drake.scene.world import load_world
 
 
@@ -134,6 +138,7 @@ def test_a_world_names_the_file_and_the_extension(tmp_path):
         ("<instance_controller url='#c'/>", "1 skins or morphs of COLLADA"),
         ("<animation/><animation/>", "2 animations of COLLADA"),
         ("<lines count='1'/><linestrips/>", "2 lines of COLLADA"),
+        ("<geometry><spline closed='1'/></geometry>", "1 lines of COLLADA"),
         ("<instance_geometry url='#g'/>", None),
     ],
 )
@@ -142,3 +147,149 @@ def test_what_is_not_read_of_collada_is_named(tmp_path, element, note):
     path.write_text(f"<COLLADA>{element}</COLLADA>")
     expected = () if note is None else (f"{note} ignored",)
     assert unread_parts(path) == expected
+
+
+SQUARE = "0 0 0\n1 0 0\n1 1 0\n0 1 0\n"
+FACES = "element face 1\nproperty list uchar int {}\n"
+LIST = "property list int int vertex_indices\n"
+
+
+def ply(elements, rows):
+    """A PLY file with four vertices and further elements."""
+    return (
+        "ply\nformat ascii 1.0\nelement vertex 4\nproperty float x\n"
+        f"property float y\nproperty float z\n{elements}end_header\n"
+        f"{SQUARE}{rows}"
+    )
+
+
+def facet(*corners):
+    rows = "".join("vertex {} {} {}\n".format(*p) for p in corners)
+    return f"facet normal 0 0 1\nouter loop\n{rows}endloop\nendfacet\n"
+
+
+def stl(*facets):
+    return f"solid a\n{''.join(facet(*one) for one in facets)}endsolid a\n"
+
+
+A, B, C, D = (0, 0, 0), (1, 0, 0), (1, 1, 0), (0, 1, 0)
+BY_INDEX = FACES.format("vertex_index")
+VERTICES = "".join(f"v {row}\n" for row in SQUARE.splitlines())
+
+
+@pytest.mark.parametrize(
+    ("name", "text", "fault"),
+    [
+        (
+            "strip.ply",
+            ply(
+                BY_INDEX + "element tristrips 1\n" + LIST, "3 0 1 2\n3 0 2 3\n"
+            ),
+            "surfaces in the element tristrips of PLY",
+        ),
+        (
+            "polygon.ply",
+            ply("element polygon 1\n" + LIST + BY_INDEX, "3 0 1 2\n3 0 2 3\n"),
+            "surfaces in the element polygon of PLY",
+        ),
+        (
+            "again.ply",
+            ply(2 * BY_INDEX, "3 0 1 2\n3 0 2 3\n"),
+            "the element face of PLY twice",
+        ),
+        (
+            "lists.ply",
+            ply(BY_INDEX + LIST, "3 0 1 2 3 0 2 3\n"),
+            "two lists of vertices in each face, vertex_index and vertex_ind",
+        ),
+        ("quad.stl", stl((A, B, C), (A, B, C, D)), "7 vertices in 2 facets"),
+        ("torn.stl", stl((A, B, C))[:-11], "ends within a solid of STL"),
+        ("TORN.STL", stl((A, B, C), (A, C, D))[:-40].upper(), "ends within"),
+        ("brep.dae", "<COLLADA><brep/></COLLADA>", "has <brep> of COLLADA"),
+        (
+            "hull.dae",
+            "<COLLADA><convex_mesh/></COLLADA>",
+            "has <convex_mesh> of COLLADA",
+        ),
+    ],
+)
+def test_surfaces_that_would_be_missing_are_refused(
+    tmp_path, name, text, fault
+):
+    (tmp_path / name).write_text(text)
+    with pytest.raises(ValueError, match=fault):
+        unread_parts(tmp_path / name)
+
+
+@pytest.mark.parametrize(
+    ("name", "text", "notes"),
+    [
+        ("plain.ply", ply(BY_INDEX, "4 0 1 2 3\n"), ()),
+        (
+            "none.ply",
+            ply(BY_INDEX + "element tristrips 0\n" + LIST, "4 0 1 2 3\n"),
+            (),
+        ),
+        (
+            "uv.ply",
+            ply(
+                BY_INDEX + "property list uchar float texcoord\n",
+                "3 0 1 2 6 0 0 1 0 1 1\n",
+            ),
+            (),
+        ),
+        (
+            "edge.ply",
+            ply(
+                BY_INDEX + "element edge 2\nproperty int vertex1\n"
+                "property int vertex2\n",
+                "3 0 1 2\n0 1\n1 2\n",
+            ),
+            ("2 elements edge of PLY ignored",),
+        ),
+        ("whole.stl", stl((A, B, C), (A, C, D)), ()),
+        ("two.stl", stl((A, B, C)) + stl((A, C, D)), ()),
+    ],
+)
+def test_what_is_read_as_a_whole_is_not_refused(tmp_path, name, text, notes):
+    (tmp_path / name).write_text(text)
+    assert unread_parts(tmp_path / name) == notes
+
+
+def test_a_binary_stl_may_begin_like_a_text(tmp_path):
+    path = tmp_path / "solid.stl"
+    facets = [struct.pack("<12fH", *(0.0,) * 3, *A, *B, *C, 0)] * 2
+    head = b"solid made by a program".ljust(80)
+    path.write_bytes(head + struct.pack("<I", len(facets)) + b"".join(facets))
+    assert unread_parts(path) == ()
+
+
+def test_a_mode_that_is_none_of_gltf_is_refused(tmp_path):
+    def change(top):
+        top["meshes"][0]["primitives"].append(
+            {"attributes": {"POSITION": 0}, "mode": 7}
+        )
+
+    with pytest.raises(ValueError, match="mode is none of glTF"):
+        check_gltf(write(tmp_path, change))
+
+
+@pytest.mark.parametrize(
+    ("lines", "fault"),
+    [
+        ("fo 1 2 3 4\n", "statement 'fo' of OBJ"),
+        ("cstype bezier\ndeg 1 1\n  surf 0 1 0 1 1 2 4 3\nend", "'surf'"),
+        ("call other.obj\n", "statement 'call'"),
+        ("f 1 2 \\\n3 4\n", "line 6: a face that goes on"),
+    ],
+)
+def test_surfaces_of_obj_that_would_be_missing_are_refused(
+    tmp_path, lines, fault
+):
+    path = tmp_path / "thing.obj"
+    path.write_text(f"{VERTICES}f 1 2 3\n{lines}")
+    with pytest.raises(ValueError, match=fault):
+        check_obj(path)
+    # Lines and points have no surface, and names are no statements.
+    path.write_text(f"{VERTICES}o surf\ng call me\nf 1 2 3\nl 1 2\np 1\n")
+    check_obj(path)
