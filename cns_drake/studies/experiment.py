@@ -725,8 +725,8 @@ class MethodVariant(NamedTuple):
     Attributes:
         name: name of the method, or its Python file.
         settings: (name, value) of each setting, as text.
-        columns: path of each varied setting, such as `methods.solid.ranges` ->
-            its value in a table.
+        columns: path of each setting, such as `methods.solid.ranges` -> its
+            value in a table.
     """
 
     name: str
@@ -756,7 +756,8 @@ def method_variants(
                 (path.removeprefix(f"{place}."), _setting(one))
                 for path, one in {**fixed, **chosen}.items()
             )
-            columns = {path: _shown(one) for path, one in chosen.items()}
+            # Fixed ones stand in tables, too: a row says how it was made.
+            columns = {n: _shown(one) for n, one in {**fixed, **chosen}.items()}
             found.append(MethodVariant(name, given, columns))
     return found
 

@@ -228,7 +228,7 @@ class Study:
     def _choose_methods(
         self,
     ) -> Mapping[str, tuple[MethodChoice, Mapping[str, Any]]]:
-        """Returns key -> method, with columns of its varied settings."""
+        """Returns key -> method, with columns of its settings."""
         wanted = self.experiment.methods
         files = [Path(one) for one in wanted or () if one.endswith(".py")]
         known = {one.name: one for one in choose_methods(files)}
@@ -236,7 +236,7 @@ class Study:
             wanted = {name: {} for name in known}
         known |= {name: MethodChoice(name) for name in optional_methods()}
         found = {}
-        for name, settings, varied in method_variants(wanted):
+        for name, settings, given in method_variants(wanted):
             place = f"methods.{name}."
             if name.endswith(".py"):
                 path = Path(name).absolute()
@@ -250,7 +250,7 @@ class Study:
             choice.make()  # A wrong setting is found before anything slow.
             columns = {
                 f"methods.{name}.{column.removeprefix(place)}": one
-                for column, one in varied.items()
+                for column, one in given.items()
             }
             found[choice.key] = choice, columns
         return found

@@ -140,6 +140,7 @@ def pr(
     tilt_queries: Annotated[float | None, typer.Option(metavar="DEG")] = None,
     hide_sector: Annotated[float, typer.Option(metavar="DEG")] = 0.0,
     seed: int = 0,
+    output: Annotated[Path | None, typer.Option(metavar="DIR")] = None,
     json: options.Json = False,
     *,
     protocol: RetrievalProtocol,
@@ -174,6 +175,8 @@ def pr(
         hide_sector: Hide a random sector of this angle from each query [deg],
             as a truck beside the car would.
         seed: Seed of the random turns, tilts and hidden sectors of the queries.
+        output: Folder to write results.csv and queries.csv to, in the same form
+            as those of a study; created if it does not exist.
     """
     from cns_drake.base import files
     from cns_drake.base.errors import InputError
@@ -207,6 +210,8 @@ def pr(
         files.check_writable(overlaps)
     if exact_overlaps is not None:
         files.check_regular(exact_overlaps)
+    if output is not None:
+        files.make_folder(output)
     chosen = _chosen_method(method, parameter, sensor_height)
     places, query_drive = options.aligned(
         options.open_noted(database, query, lidar=lidar, columns=columns),
@@ -248,6 +253,23 @@ def pr(
             f"{query}: every scan finds itself (--exclude-recent leaves out "
             "recent places)"
         )
+    if output is not None:
+        from evaluation.methods import MethodConfig
+        from evaluation.results.table import QUERIES, RESULTS
+        from evaluation.study.chosen_methods import parse_setting
+        from evaluation.study.one_pair import pair_tables
+
+        results, queries = pair_tables(
+            result,
+            query_drive,
+            dict(map(parse_setting, parameter or [])),
+            None
+            if sensor_height == MethodConfig().sensor_height
+            else sensor_height,
+        )
+        results.write_csv(output / RESULTS)
+        queries.write_csv(output / QUERIES)
+        terminal.note(f"wrote {output / RESULTS} and {QUERIES}")
     options.show(result.to_json(), _recognition_rows(result), json=json)
 
 

@@ -283,7 +283,7 @@ def _ring_is_best(
         f" method with the greatest AUC on {len(best)} pairs is"
         f" {_listed(best)}. {_counted_alike(results)}"
     )
-    asked = shown[0].protocol.name
+    asked = shown[0].protocol_name
     if asked != "paper":
         words = f"With the protocol {asked}, as in the other tables"
         evidence += f" {_counted_alike(shown, words)}"

@@ -24,7 +24,12 @@ from evaluation.clouds.cloud_files import OnNote
 from evaluation.drives import Drive
 from evaluation.localisation import estimators, localise
 from evaluation.maps.voxel_maps import map_drive
-from evaluation.methods import Method, make_method, shipped_methods
+from evaluation.methods import (
+    Method,
+    MethodConfig,
+    make_method,
+    shipped_methods,
+)
 from evaluation.methods.method import load_method, run_module
 from evaluation.real.data_sets import (
     RealScans,
@@ -45,7 +50,13 @@ from evaluation.recognition.place_outcome import (
 )
 from evaluation.recognition.protocol import FAIR_PROTOCOL, RetrievalProtocol
 from evaluation.recognition.retrieval import compare_with_gates
-from evaluation.results.table import Answers, QueryRows, Results, Row
+from evaluation.results.table import (
+    Answers,
+    QueryRows,
+    Results,
+    Row,
+    made_by,
+)
 
 _SIMULATED = replace(FAIR_PROTOCOL, scans_per_place=1)
 # Every real scan is a query and a place.
@@ -69,6 +80,13 @@ class _Part(NamedTuple):
     world: str
     described: list[DescribedDrive]
     scans: list[np.ndarray]
+
+
+def _height_of(one: RealScans) -> dict[str, float]:
+    """Returns the height of a LiDAR that differs from the methods' default."""
+    height = one.data_set.height
+    usual = MethodConfig().sensor_height
+    return {} if height == usual else {"sensor_height": height}
 
 
 class Measuring:
@@ -187,7 +205,7 @@ class Measuring:
             "task": task,
             "method": method,
             "gate": gate,
-            "protocol": _REAL.name,
+            **made_by(_REAL, _height_of(one)),
         }
         self.rows += [Row.of(number, **key) for number in numbers]
         if columns is not None:

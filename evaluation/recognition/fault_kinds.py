@@ -1,27 +1,27 @@
-"""Finds why the best place of a query is wrong, from both drives' scans."""
+"""Tells wrong best places elsewhere apart, by both drives' scans."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass
-import math
 
 import numpy as np
 
+from evaluation.recognition.place_outcome import (
+    ELSEWHERE,
+    FAULTS,
+    faults,
+    mean_visible_change,
+    visible_change_added,
+)
 from evaluation.recognition.place_recognition import PlaceRecognition
 
-# The reasons in order of precedence: a wrong answer gets the first that fits.
+# The kinds of the reason `elsewhere`, which evidence from scans tells apart, in
+# order of precedence: a wrong answer gets the first that fits.
+ELSEWHERE_KINDS = ("occluded", "no_overlap", "changed", "twin", "unexplained")
+# All reasons between two drives through one city.
 FAULT_KINDS = (
-    "no_place",
-    "no_candidate",
-    "too_far",
-    "hidden",
-    "no_overlap",
-    "changed",
-    "twin",
-    "elsewhere",
+    *(one for one in FAULTS if one not in ("other_city", ELSEWHERE)),
+    *ELSEWHERE_KINDS,
 )
-# Up to this multiple of the radius, a wrong place is `too_far`; beyond it,
-# `elsewhere`.
-NEARLY = 2.0
 # Overlap below which two scans show different surroundings.
 _ENOUGH = 0.5
 # Share of the surroundings that must have changed for the reason `changed`.
@@ -90,47 +90,6 @@ class PairEvidence:
         return visible_change_added(self.overlaps, self.unchanged)
 
 
-def visible_change_added(now: np.ndarray, before: np.ndarray | None) -> float:
-    """Returns the mean visible change minus that of a baseline.
-
-    The visible change also contains parts of a scan that are hidden only
-    because the viewpoints differ (parallax). Subtracting the baseline removes
-    this share.
-
-    Args:
-        now: (Q,) overlaps, see `PairEvidence`.
-        before: (Q,) overlaps of the same queries in the baseline.
-
-    Returns:
-        The difference; NaN if no query has both values, or the queries differ.
-    """
-    if before is None or len(before) != len(now):
-        return math.nan
-    added = before - now
-    known = added[~np.isnan(added)]
-    return float(known.mean()) if len(known) else math.nan
-
-
-def mean_visible_change(overlaps: np.ndarray) -> tuple[float, int]:
-    """Returns the mean visible change, and the number of queries.
-
-    The visible change of a query is the share of its scan that the best of its
-    matches does not show.
-
-    Args:
-        overlaps: (Q,) `PairEvidence.overlaps`; NaN for queries that have no
-            match, which do not count.
-
-    Returns:
-        The mean and the number of queries with a match; NaN and 0 if there are
-        none.
-    """
-    known = overlaps[~np.isnan(overlaps)]
-    if len(known) == 0:
-        return math.nan, 0
-    return float(1.0 - known.mean()), len(known)
-
-
 def fault_kinds(result: PlaceRecognition, evidence: PairEvidence) -> list[str]:
     """Returns, for each query, why its best place is wrong.
 
@@ -139,35 +98,31 @@ def fault_kinds(result: PlaceRecognition, evidence: PairEvidence) -> list[str]:
 
     Returns:
         For each of Q queries, "" if the best place is a match, and otherwise
-        the first of these reasons that applies:
+        the reason as `evaluation.recognition.place_outcome.faults` finds it.
+        In place of `elsewhere` stands the first of these kinds that applies:
 
-        - `no_place`: the query has no match.
-        - `no_candidate`: the method finds no place, or rejects all places.
-        - `too_far`: the best place is just beyond the radius of a match: at
-          most twice that radius away.
-        - `hidden`: the right place's scan shows less than half of the query's
+        - `occluded`: the right place's scan shows less than half of the query's
           scan, and at least half of the rest is hidden from its sensor.
         - `no_overlap`: the right place's scan shows less than half of the
           query's scan, for another reason.
         - `changed`: at least a quarter of the surroundings is new or gone.
         - `twin`: the best place fits the query as well as the right place does.
-        - `elsewhere`: no other reason applies.
+        - `unexplained`: no other kind applies.
     """
     retrieval = result.retrieval
+    reasons = faults(
+        result.outcomes,
+        retrieval.best_frames,
+        retrieval.best_distances,
+        result.protocol.radius,
+    )
     little = evidence.overlaps < _ENOUGH
     unseen = 1.0 - evidence.overlaps
-    is_hidden = little & (evidence.hidden_shares >= 0.5 * unseen)
     conditions = [
-        ~result.outcomes.has_match,
-        retrieval.best_places < 0,
-        retrieval.best_distances <= NEARLY * result.protocol.radius,
-        is_hidden,
+        little & (evidence.hidden_shares >= 0.5 * unseen),
         little,
         evidence.changed >= MUCH_CHANGED,
         evidence.fits[result.method] >= evidence.right_fits,
     ]
-    return np.where(
-        result.outcomes.is_right,
-        "",
-        np.select(conditions, FAULT_KINDS[:-1], FAULT_KINDS[-1]),
-    ).tolist()
+    kinds = np.select(conditions, ELSEWHERE_KINDS[:-1], ELSEWHERE_KINDS[-1])
+    return np.where(reasons == ELSEWHERE, kinds, reasons).tolist()

@@ -9,11 +9,6 @@ from typing import NamedTuple
 
 import numpy as np
 
-from evaluation.recognition.fault_kinds import (
-    NEARLY,
-    mean_visible_change,
-    visible_change_added,
-)
 from evaluation.recognition.metrics import (
     UNKNOWN,
     Interval,
@@ -30,8 +25,13 @@ from evaluation.recognition.pose_errors import (
 from evaluation.recognition.query_outcomes import QueryOutcomes, judge
 from evaluation.recognition.retrieval import Retrieval
 
+# The reason for a wrong best place to which no other one applies.
+ELSEWHERE = "elsewhere"
 # Reasons for wrong best places, in order of precedence.
-FAULTS = ("no_place", "no_candidate", "other_city", "too_far", "elsewhere")
+FAULTS = ("no_place", "no_candidate", "other_city", "too_far", ELSEWHERE)
+# Up to this multiple of the radius, a wrong place is `too_far`; beyond it,
+# `elsewhere`.
+NEARLY = 2.0
 _HALF = 0.5
 
 
@@ -170,6 +170,47 @@ def faults(
     return np.where(outcomes.is_right, "", kinds)
 
 
+def visible_change_added(now: np.ndarray, before: np.ndarray | None) -> float:
+    """Returns the mean visible change minus that of a baseline.
+
+    The visible change also contains parts of a scan that are hidden only
+    because the viewpoints differ (parallax). Subtracting the baseline removes
+    this share.
+
+    Args:
+        now: (Q,) overlaps, see `PlaceOutcome.of`.
+        before: (Q,) overlaps of the same queries in the baseline.
+
+    Returns:
+        The difference; NaN if no query has both values, or the queries differ.
+    """
+    if before is None or len(before) != len(now):
+        return math.nan
+    added = before - now
+    known = added[~np.isnan(added)]
+    return float(known.mean()) if len(known) else math.nan
+
+
+def mean_visible_change(overlaps: np.ndarray) -> tuple[float, int]:
+    """Returns the mean visible change, and the number of queries.
+
+    The visible change of a query is the share of its scan that the best of its
+    matches does not show.
+
+    Args:
+        overlaps: (Q,) see `PlaceOutcome.of`; NaN for queries that have no
+            match, which do not count.
+
+    Returns:
+        The mean and the number of queries with a match; NaN and 0 if there are
+        none.
+    """
+    known = overlaps[~np.isnan(overlaps)]
+    if len(known) == 0:
+        return math.nan, 0
+    return float(1.0 - known.mean()), len(known)
+
+
 class Number(NamedTuple):
     """A result of a task.
 
@@ -209,11 +250,10 @@ def place_numbers(
             condition, divided by those in the baseline. `lost` is the number of
             queries that are right in the baseline only, and `found` the number
             of those that are right in the condition only. For
-            `visible_change_added`, see the function in
-            `evaluation.recognition.fault_kinds`.
+            `visible_change_added`, see the function.
     """
     outcomes = now.outcomes
-    values = _areas(outcomes)
+    values = areas(outcomes)
     samples = own_samples(outcomes)
     for (name, value), drawn in zip(values.items(), samples, strict=True):
         yield now.number(name, value, percentile_interval(drawn))
@@ -223,7 +263,7 @@ def place_numbers(
             drawn_then = paired_samples(before.outcomes, outcomes)
         for name, then, today, drawn, other in zip(
             ("kept", "kept_r1", "kept_strict"),
-            _areas(before.outcomes).values(),
+            areas(before.outcomes).values(),
             values.values(),
             samples,
             drawn_then,
@@ -298,7 +338,7 @@ def kept_share(
     return np.where(np.asarray(unchanged) > 0.0, share, math.nan)
 
 
-def _areas(outcomes: QueryOutcomes) -> dict[str, float]:
+def areas(outcomes: QueryOutcomes) -> dict[str, float]:
     """Returns AUC, R@1 and strict AUC, by their names in tables."""
     curve = pr_curve(outcomes)
     return {

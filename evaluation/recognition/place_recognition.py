@@ -39,8 +39,9 @@ class PlaceRecognition:
         outcomes: outcomes of the queries.
         by_mode: mode -> metrics.
         pose: errors of the estimated poses.
-        protocol: protocol of the run, including the choices that are the
-            method's own.
+        asked: protocol of the run.
+        protocol: `asked`, with the choices that are the method's own.
+        protocol_name: name of the protocol in tables.
         mode: mode of `metrics`: whether all queries count (`all`), or only
             queries with a match (`filtered`).
         pair: names of the map and of the stages of database and query, if the
@@ -55,7 +56,9 @@ class PlaceRecognition:
     outcomes: QueryOutcomes
     by_mode: Mapping[Mode, PlaceRecognitionMetrics]
     pose: PoseMetrics
+    asked: RetrievalProtocol
     protocol: RetrievalProtocol
+    protocol_name: str
     mode: Mode = "all"
     pair: tuple[str, str, str] = ("", "", "")
 
@@ -216,7 +219,9 @@ def judge_retrieval(
         outcomes=outcomes,
         by_mode=by_mode,
         pose=pose_metrics(retrieval.pose_errors, outcomes),
+        asked=protocol,
         protocol=protocol.of(method),
+        protocol_name=protocol.name_with(method),
         mode=mode,
         pair=pair,
     )

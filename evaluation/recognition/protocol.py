@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable
 from dataclasses import asdict, dataclass, fields, replace
 import math
 from typing import TYPE_CHECKING, Any
@@ -21,6 +21,8 @@ _POSITIVE = (
     *("radius", "query_spacing", "place_spacing", "max_range"),
     *("scans_per_place", "exclude_recent", "overlap"),
 )
+# Number of hexadecimal digits of a protocol's digest.
+_DIGEST_LENGTH = 12
 _QUERY_CHANGES = ("turn_queries", "tilt_queries", "hide_sector")
 
 
@@ -170,16 +172,55 @@ class RetrievalProtocol:
     def name(self) -> str:
         """Name of the protocol: `fair`, `paper`, `recorded` or `own`.
 
-        `fair` turns queries and tilts them by up to 1.5 deg; `paper` and
-        `recorded` leave queries as recorded. Of several merged scans, the first
-        stands for a place in `paper`, and the middle one in `recorded`. All
-        other changes of queries are `own`.
+        Only a shipped protocol as it is has its name; if any field that changes
+        a number differs, such as the radius or a spacing, the name is `own`.
+        The gate does not count, because tables have a column for it.
         """
-        if self._asked == FAIR_PROTOCOL._asked:
-            return "fair"
-        if self._asked != PAPER_PROTOCOL._asked:
-            return "own"
-        return "recorded" if self.place == "middle" else "paper"
+        return self._named(lambda one: one)
+
+    def name_with(self, method: Method) -> str:
+        """Returns the name of the protocol for the results of one method.
+
+        Options that a method chooses itself (see `of`) do not make a shipped
+        protocol `own`.
+        """
+        return self._named(lambda one: one.of(method))
+
+    def _named(
+        self, filled: Callable[[RetrievalProtocol], RetrievalProtocol]
+    ) -> str:
+        mine = filled(self)._counting
+        for name, shipped in PROTOCOLS.items():
+            if filled(shipped)._counting == mine:
+                return name
+        return "own"
+
+    def digest(self, **further: object) -> str:
+        """Returns a hash of everything in the protocol that changes a number.
+
+        Two results can be compared only if their protocols have the same
+        digest. The gate does not count, because tables have a column for it.
+
+        Args:
+            further: settings outside of the protocol that change a number, such
+                as the height of the LiDAR.
+        """
+        # Imported here: it takes time, and options need only the fields.
+        from cns_drake.base.jobs.fingerprint import fingerprint
+
+        return fingerprint({**self._counting, **further})[:_DIGEST_LENGTH]
+
+    @property
+    def _counting(self) -> dict[str, object]:
+        """Name -> value of the fields that change a number."""
+        values = asdict(self)
+        del values["gate"]
+        if not self._changes_queries:
+            values["seed"] = 0  # Nothing is drawn.
+        return {
+            name: float(value) if type(value) is int else value
+            for name, value in values.items()
+        }
 
     @property
     def _asked(self) -> dict[str, Any]:
@@ -300,17 +341,20 @@ _ASKED = (*_QUERY_CHANGES, "seed")
 
 
 def check_one_protocol(protocols: Iterable[RetrievalProtocol]) -> None:
-    """Checks that all protocols make queries in the same way.
+    """Checks that all protocols are the same, but for each method's choices.
 
     Raises:
-        InputError: the protocols make queries in different ways.
+        InputError: the protocols differ.
     """
     first = None
     for one in protocols:
-        first = first or one
-        if one._asked != first._asked:
+        # Each method sets its scans per place.
+        shared = replace(one, scans_per_place=None, place="middle")
+        first = first or shared
+        if shared.digest() != first.digest():
             raise InputError(
-                f"protocol: {first.name} and {one.name} in one table"
+                f"protocol: {first.to_text()} and {shared.to_text()} in one"
+                " table"
             )
 
 

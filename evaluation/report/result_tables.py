@@ -19,6 +19,7 @@ from scipy.spatial.transform import Rotation
 from evaluation.change.drive_change import ChangeResult, symmetric_changes
 from evaluation.recognition.costs import Cost
 from evaluation.recognition.fault_kinds import (
+    ELSEWHERE_KINDS,
     FAULT_KINDS,
     PairEvidence,
     fault_kinds,
@@ -30,7 +31,7 @@ from evaluation.recognition.metrics import (
     PlaceRecognitionMetrics,
     compared_by_auc,
 )
-from evaluation.recognition.place_outcome import kept_share
+from evaluation.recognition.place_outcome import ELSEWHERE, kept_share
 from evaluation.recognition.place_recognition import RADII, PlaceRecognition
 from evaluation.recognition.protocol import PROTOCOL_COLUMNS, check_one_protocol
 from evaluation.report.reference import NO_REFERENCE, Published, Reference
@@ -77,7 +78,7 @@ _KEYS: Columns[PlaceRecognition] = {
     "query": lambda r: r.pair[2],
     "method": lambda r: r.method,
 }
-_PROTOCOL = protocol_columns("protocol")
+_PROTOCOL = protocol_columns("")
 
 
 def change_table(
@@ -311,7 +312,7 @@ def audit_table(
                 c.metrics.curve.true_positives
             ),
             "T of F1max": lambda c: c.at_f1_max(c.metrics.curve.counted),
-            **protocol_columns("result.protocol"),
+            **protocol_columns("result."),
         },
         CAPTIONS["audit"],
     )
@@ -392,7 +393,7 @@ def difference_numbers(differences: Sequence[MethodDifference]) -> Table:
             "low": lambda d: d.difference.interval.low,
             "high": lambda d: d.difference.interval.high,
             "p": lambda d: d.p_value,
-            "protocol": lambda d: d.result.protocol.name,
+            "protocol": lambda d: d.result.protocol_name,
         },
     )
 
@@ -468,6 +469,11 @@ class _Faults(NamedTuple):
         """Number of wrong best places of queries that have a match."""
         return self.kinds.total() - self.kinds["no_place"]
 
+    @property
+    def elsewhere(self) -> int:
+        """Number of all kinds of the reason `elsewhere`, as in tables."""
+        return sum(self.kinds[kind] for kind in ELSEWHERE_KINDS)
+
 
 def fault_table(
     results: Sequence[PlaceRecognition], evidence: Evidence
@@ -513,11 +519,12 @@ def fault_numbers(
                 {kind: kind for kind in FAULT_KINDS},
                 lambda one, kind: one.kinds[kind],
             ),
+            ELSEWHERE: lambda one: one.elsewhere,
             "changed_by": lambda one: (
                 " ".join(f"{name}:{n}" for name, n in one.changed.most_common())
                 or None
             ),
-            **protocol_columns("result.protocol"),
+            **protocol_columns("result."),
         },
     )
 
@@ -641,7 +648,7 @@ _QUERY_COLUMNS: Columns[_Queries] = {
     "right_fit": lambda q: q.evidence and q.evidence.right_fits,
     "wrong_fit": lambda q: q.evidence and q.evidence.fits[q.result.method],
     "visible_change": lambda q: q.evidence and q.evidence.visible_changes,
-    "protocol": attrgetter("result.protocol.name"),
+    "protocol": attrgetter("result.protocol_name"),
 }
 
 

@@ -26,7 +26,14 @@ from evaluation.report.result_tables import MethodDifference
 from evaluation.results import table_forms as tables
 from evaluation.results.headlines import listed, told_apart
 from evaluation.results.summaries import Ranked, median_kept, ranking
-from evaluation.results.table import LAST, OWN, STAGE, Results, Row
+from evaluation.results.table import (
+    LAST,
+    OWN,
+    STAGE,
+    Results,
+    Row,
+    made_by,
+)
 
 EXPERIMENT = "stages"
 _SEED = 1
@@ -96,7 +103,7 @@ def place_rows(
                         seed=_SEED,
                         factors={STAGE: stage},
                         task=task,
-                        protocol=changed.protocol.name,
+                        **made_by(changed.asked),
                     )
 
 
@@ -128,7 +135,7 @@ def change_rows(
                     task="change",
                     method="",
                     gate=False,
-                    protocol=outcome.protocol.name,
+                    **made_by(outcome.asked),
                     metric="tcr_sym",
                     value=float(change.symmetric),
                     n=change.num_in_hull,

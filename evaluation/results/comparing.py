@@ -1,6 +1,7 @@
 """Compares your tables of results with the shipped tables."""
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections import Counter
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 import contextlib
 from dataclasses import dataclass, replace
 import itertools
@@ -23,7 +24,8 @@ from evaluation.recognition.metrics import (
     resampled_metrics,
     weights_by_drive,
 )
-from evaluation.recognition.protocol import PROTOCOL_NAMES
+from evaluation.recognition.place_outcome import areas
+from evaluation.recognition.protocol import PROTOCOL_NAMES, PROTOCOLS
 from evaluation.results.summaries import (
     Ranked,
     check_same_queries,
@@ -52,6 +54,13 @@ _LESS = re.compile(
 )
 # Metric -> its index in the result of `resampled_metrics`.
 _RESAMPLED = {"auc": 0, "r1": 1}
+
+# Metrics that are computed from answers to queries.
+_RECOMPUTED = ("auc", "r1", "auc_strict")
+# Values that differ by no more are the same result, with the digits that ship.
+_ALIKE = 1e-4
+# The same for a value and its answers, for tables that were rounded by hand.
+_AGREED = 1e-3
 
 # A method, and what identifies a condition.
 _Place = tuple[str, tuple[object, ...]]
@@ -196,6 +205,8 @@ def compare(
         protocol: name of the protocol whose rows count. By default, rows of the
             same protocol are compared. With `rankings`, the default is `fair`
             or, in a table without this protocol, the table's only protocol.
+            Rows whose protocols differ in anything that changes a number (see
+            `RetrievalProtocol.digest`) are never compared.
         gate: whether to compare the rows with the gate (true) or without it
             (false).
         rankings: whether to compare only the order of the methods in these
@@ -203,8 +214,8 @@ def compare(
             common; one can contain simulated drives and another real drives.
 
     Raises:
-        InputError: a table cannot be read, has no such row, or the tables have
-            no condition in common.
+        InputError: a table cannot be read, has no such row, contradicts the
+            answers beside it, or the tables have no condition in common.
     """
     if protocol not in (None, *PROTOCOL_NAMES):
         names = ", ".join(PROTOCOL_NAMES)
@@ -228,8 +239,14 @@ def compare(
             )
         if rankings and protocol is None:
             chosen_rows = _by_one_protocol(chosen_rows, path)
+        if any(not row.protocol_digest for row in chosen_rows):
+            notes.append(
+                f"{path}: rows do not say how they were made (column"
+                " protocol_digest); taken for the shipped protocol of this name"
+            )
         queries = (path if path.is_dir() else path.parent) / QUERIES
         answers = QueryRows.read(queries).answers if queries.is_file() else ()
+        _check_agreement(queries, answers, path, results)
         asked = [a for a in answers if (a.task, a.gate) == (task, gate)]
         if metric in _RESAMPLED and any(
             a.outcomes.blocks is None for a in asked
@@ -262,22 +279,8 @@ def compare(
     common, left_out = _without_controls(common)
     notes += [*apart, *left_out]
     tables = [_on(table, common) for table in (shipped, *own)]
-    entries: dict[str, tuple[_Table, str]] = {}
-    for table in tables:
-        for method in table.methods:
-            name = method
-            others = [one for one in tables if one is not table]
-            if table is not tables[0] and any(
-                method in one.methods for one in others
-            ):
-                name = f"{method} ({table.name})"
-            has = sum((method, one) in table.rows for one in common)
-            if has == len(common):
-                entries[name] = table, method
-            else:
-                notes.append(
-                    f"{name}: left out, with {has} of {len(common)} conditions"
-                )
+    entries, left_out = _entries(tables, common)
+    notes += [*left_out, *_unlike(entries, common)]
     rows = [
         replace(table.rows[method, one], method=name)
         for name, (table, method) in entries.items()
@@ -331,7 +334,10 @@ def _by_one_protocol(rows: Sequence[Row], path: Path) -> tuple[Row, ...]:
 
 
 def _by_place(keys: Iterable[Any]) -> dict[_Place, Any]:
-    """Returns (method with settings, condition) -> row or answers."""
+    """Returns (method with settings, condition) -> row or answers.
+
+    An unknown digest of a protocol is taken for that of the shipped protocol.
+    """
     found = {}
     for key in keys:
         factors = {
@@ -339,9 +345,134 @@ def _by_place(keys: Iterable[Any]) -> dict[_Place, Any]:
             for name, value in key.factors.items()
             if not name.startswith(SETTINGS)
         }
-        plain = replace(key, method=key.label, factors=factors)
+        digest = key.protocol_digest
+        if not digest and key.protocol in PROTOCOLS:
+            digest = PROTOCOLS[key.protocol].digest()
+        plain = replace(
+            key, method=key.label, factors=factors, protocol_digest=digest
+        )
         found[plain.method, plain.but("method")] = plain
     return found
+
+
+def _check_agreement(
+    queries: Path, answers: Iterable[Answers], path: Path, results: Results
+) -> None:
+    """Checks that answers to queries give the results beside them.
+
+    Raises:
+        InputError: a result differs, or the number of queries.
+    """
+    known = {
+        (*row.but(), row.metric): row
+        for row in results.where(task="place").rows
+    }
+    for one in answers:
+        # Areas take time, and other tasks have none.
+        if one.task != "place" or not any(
+            (*one.but(), name) in known for name in _RECOMPUTED
+        ):
+            continue
+        for name, value in areas(one.outcomes).items():
+            row = known.get((*one.but(), name))
+            number = len(one.outcomes)
+            if row is None or (
+                abs(row.value - value) <= _AGREED and row.n in (None, number)
+            ):
+                continue
+            count = "" if row.n is None else f" of {row.n} queries"
+            raise InputError(
+                f"{queries}: contradicts {path}: {name} of {one.label},"
+                f" {one.database} -> {one.query}: {value:.4f} of {number}"
+                f" queries, but {row.value:.4f}{count} in the results"
+            )
+
+
+def _entries(
+    tables: Sequence[_Table], common: Sequence[tuple[object, ...]]
+) -> tuple[dict[str, tuple[_Table, str]], list[str]]:
+    """Returns the methods to rank by their names, and notes on the others.
+
+    A method with the same results in two tables is there once. If the results
+    differ, the name of a table is appended to the name of its method.
+
+    Args:
+        tables: the shipped tables, followed by the user's.
+        common: the conditions that all tables have.
+    """
+    notes = []
+    kept: list[tuple[_Table, str]] = []
+    # The user's tables come first: they may hold answers to queries.
+    for table in (*tables[1:], tables[0]):
+        for method in table.methods:
+            has = sum((method, one) in table.rows for one in common)
+            if has < len(common):
+                is_once = sum(method in one.methods for one in tables) == 1
+                name = method if is_once else f"{method} ({table.name})"
+                notes.append(
+                    f"{name}: left out, with {has} of {len(common)} conditions"
+                )
+                continue
+            same = [
+                other.name
+                for other, name in kept
+                if name == method
+                and all(
+                    abs(
+                        other.rows[method, one].value
+                        - table.rows[method, one].value
+                    )
+                    <= _ALIKE
+                    for one in common
+                )
+            ]
+            if same:
+                notes.append(
+                    f"{method}: the same in {same[0]} and {table.name}; shown"
+                    " once"
+                )
+            else:
+                kept.append((table, method))
+    counts = Counter(method for _, method in kept)
+    # In the order of the tables, as ties are shown.
+    kept.sort(key=lambda one: tables.index(one[0]))
+    return {
+        f"{method} ({table.name})"
+        if table is not tables[0] and counts[method] > 1
+        else method: (table, method)
+        for table, method in kept
+    }, notes
+
+
+def _unlike(
+    entries: Mapping[str, tuple[_Table, str]],
+    common: Sequence[tuple[object, ...]],
+) -> Iterator[str]:
+    """Yields notes on results that are not of the same queries or version."""
+    rows = {
+        name: [table.rows[method, one] for one in common]
+        for name, (table, method) in entries.items()
+    }
+    unknown = [
+        name for name, some in rows.items() if any(r.n is None for r in some)
+    ]
+    if unknown and len(unknown) < len(rows):
+        yield f"{', '.join(unknown)}: of how many queries is not known"
+    for some in zip(*rows.values(), strict=True):
+        numbers: dict[int, str] = {}
+        for name, row in zip(rows, some, strict=True):
+            if row.n is not None:
+                numbers.setdefault(row.n, name)
+        if len(numbers) > 1:
+            each = ", ".join(f"{n} ({name})" for n, name in numbers.items())
+            yield (
+                f"{some[0].database} -> {some[0].query}: not the same queries:"
+                f" {each}; their values are of different difficulty"
+            )
+            break
+    versions = {row.version for some in rows.values() for row in some} - {""}
+    if len(versions) > 1:
+        yield f"measured by versions {', '.join(sorted(versions))}"
 
 
 def _shipped(wanted: Mapping[str, object]) -> _Table:
@@ -362,17 +493,60 @@ def _common(
         common = [one for one in common if one in set(table.conditions)]
     with_shipped = [one for one in common if one in set(shipped.conditions)]
     if with_shipped:
-        left = len(common) - len(with_shipped)
-        note = f"left out, as the shipped tables lack them: {left} conditions"
-        return with_shipped, [note] if left else []
+        others = (*own, shipped)
+        return with_shipped, _left_out(own, others, with_shipped)
     if len(own) > 1 and common:
-        return common, ["the shipped tables have none of these conditions"]
+        notes = _left_out(own, own, common)
+        return common, [
+            *notes,
+            "the shipped tables have none of these conditions",
+        ]
     names = ", ".join(map(str, paths))
-    others = own[1:] or [shipped]
+    others = (*own[1:], *([] if own[1:] else [shipped]))
     beside = "" if len(own) > 1 else " with the shipped tables"
     raise InputError(
         f"{names}: no condition in common{beside} ({_apart(own[0], others[0])})"
     )
+
+
+def _left_out(
+    own: Sequence[_Table],
+    tables: Sequence[_Table],
+    common: Iterable[tuple[object, ...]],
+) -> list[str]:
+    """Returns notes on the conditions of tables that another one lacks."""
+    kept = set(common)
+    notes: Counter[str] = Counter()
+    for table in own:
+        left = {c: r for (_, c), r in table.rows.items() if c not in kept}
+        for condition, row in left.items():
+            other = next(
+                one
+                for one in tables
+                if one is not table and condition not in set(one.conditions)
+            )
+            wanted = row.but("method", "protocol")
+            alike = [
+                one
+                for one in other.rows.values()
+                if one.but("method", "protocol") == wanted
+            ]
+            name = (
+                "the shipped tables" if other.name == _SHIPPED else other.name
+            )
+            lack = "lack" if other.name == _SHIPPED else "lacks"
+            why = f"as {name} {lack} them"
+            if alike:
+                why = (
+                    f"by protocol {_protocol_text(row)}, not"
+                    f" {_protocol_text(alike[0])} in {name}"
+                )
+            notes[f"{table.name}: left out, {why}"] += 1
+    return [f"{why}: {count} conditions" for why, count in notes.items()]
+
+
+def _protocol_text(row: Row) -> str:
+    return f"{row.protocol} ({row.protocol_digest or 'unknown'})"
 
 
 def _without_controls(
@@ -398,7 +572,7 @@ def _apart(one: _Table, other: _Table) -> str:
     factors = {
         name: None for some in rows for row in some for name in row.factors
     }
-    for column in (*KEYS, *factors):
+    for column in (*(name for name in KEYS if name != "version"), *factors):
         first, second = (
             sorted({str(row[column]) for row in some}) for some in rows
         )

@@ -1,7 +1,7 @@
 """The table of results, one number per row; and the table of queries.
 
-`results.csv` and `queries.csv` begin with the same columns: where and under
-which condition something was measured. All further columns are factors of an
+`results.csv` and `queries.csv` begin with the same columns: where, under which
+condition and how something was measured. All further columns are factors of an
 experiment. They are named by the path of the field in the experiment's file,
 such as `query.transient.snow`. Their values are numbers, text or truth values;
 a cell is empty where a factor does not apply.
@@ -11,7 +11,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 import csv
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import cached_property
 import io
 import math
@@ -26,8 +26,9 @@ from cns_drake.base.csv_files import check_separator, csv_text
 from cns_drake.base.errors import InputError, errors_at
 from cns_drake.base.files import read_bytes, write_text
 from cns_drake.base.value_lists import repeated
+from cns_drake.base.version import __version__
 from evaluation.recognition.place_outcome import Number
-from evaluation.recognition.protocol import PROTOCOL_NAMES
+from evaluation.recognition.protocol import PROTOCOL_NAMES, RetrievalProtocol
 from evaluation.recognition.query_outcomes import QueryOutcomes
 from evaluation.results.ranges import Range, checked, range_of
 
@@ -36,7 +37,10 @@ RESULTS, QUERIES = "results.csv", "queries.csv"
 SETTINGS = "methods."
 _BEFORE = ("experiment", "map", "database", "query", "seed")
 _BEHIND = ("task", "method", "gate", "protocol")
-KEYS = (*_BEFORE, *_BEHIND)
+# Columns that tables of earlier versions lack; their values are then unknown.
+_MADE = ("protocol_digest", "version")
+_NEEDED = (*_BEFORE, *_BEHIND)
+KEYS = (*_NEEDED, *_MADE)
 _MEASURED = ("metric", "value", "low", "high", "n")
 # A factor, and two of its values: a drive's own stage, or that of the query.
 STAGE = "both.stage"
@@ -123,7 +127,11 @@ class Key:
         task: `place`, `pose`, `localise`, `map`, `change`, `cost` or another.
         method: method, estimator or baseline; "" for the task `change`.
         gate: whether places were rejected by the method's own pose.
-        protocol: name of the protocol: `fair`, `paper`, `recorded` or `own`.
+        protocol: name of the protocol: `fair`, `paper` or `recorded` for the
+            shipped protocol as it is, and `own` for any other.
+        protocol_digest: hash of everything in the protocol that changes a
+            number, see `RetrievalProtocol.digest`; "" if unknown.
+        version: version of this program; "" if unknown.
     """
 
     experiment: str
@@ -136,6 +144,8 @@ class Key:
     method: str
     gate: bool
     protocol: str
+    protocol_digest: str = field(default="", kw_only=True)
+    version: str = field(default="", kw_only=True)
 
     def __getitem__(self, column: str) -> object:
         """Returns the value of a column, or `label`; None if it is unknown."""
@@ -163,10 +173,16 @@ class Key:
         Args:
             names: names of the columns to leave out. With `method`, its
                 settings, such as `methods.ring++.crop`, are left out as well.
+                With `protocol` or one of its fields, such as
+                `protocol.radius`, name and digest of the protocol are left out.
+                The version is never part of the key.
 
         Returns:
             The values of the remaining columns, in a fixed order.
         """
+        if any(one.partition(".")[0] == "protocol" for one in names):
+            names = (*names, "protocol", "protocol_digest")
+        names = (*names, "version")
         known = [name for name in KEYS if name not in names]
         without_settings = "method" in names
         applying = (
@@ -183,6 +199,27 @@ class Key:
 
 
 _NAME: Callable[[Any], str] = itemgetter(0)
+
+
+def made_by(
+    protocol: RetrievalProtocol, settings: Mapping[str, object] | None = None
+) -> dict[str, Any]:
+    """Returns the columns of a `Key` that say how something was measured.
+
+    Args:
+        protocol: the protocol.
+        settings: name -> value of settings outside of the protocol that change
+            a number, without those that have their defaults.
+
+    Returns:
+        `protocol`, `protocol_digest` and `version`. With settings, the protocol
+        is `own`.
+    """
+    return {
+        "protocol": "own" if settings else protocol.name,
+        "protocol_digest": protocol.digest(**(settings or {})),
+        "version": __version__,
+    }
 
 
 @dataclass(frozen=True)
@@ -289,7 +326,7 @@ class Results:
                 impossible value. The error names the line, the column and the
                 fault.
         """
-        table = _Cells.read(path, RESULTS, (*KEYS, *_MEASURED))
+        table = _Cells.read(path, RESULTS, (*_NEEDED, *_MEASURED), _MADE)
         rows: list[Row] = []
         lines: dict[tuple[object, ...], int] = {}
         for one, key, identity in table.keyed():
@@ -311,7 +348,7 @@ class Results:
                 (*_key_cells(row, self.factors), *_measured_cells(row))
                 for row in self.rows
             ]
-        header = (*_BEFORE, *self.factors, *_BEHIND, *_MEASURED)
+        header = (*_BEFORE, *self.factors, *_BEHIND, *_MADE, *_MEASURED)
         write_text(path, csv_text(header, lines))
 
     def where(
@@ -388,7 +425,10 @@ class QueryRows:
             InputError: as `Results.read`.
         """
         table = _Cells.read(
-            path, QUERIES, (*KEYS, *_NEEDED_ANSWERS), tuple(_ANSWERS)
+            path,
+            QUERIES,
+            (*_NEEDED, *_NEEDED_ANSWERS),
+            (*_MADE, *_ANSWERS),
         )
         names = [name for name in _ANSWERS if name in table.columns]
         found: dict[tuple[object, ...], tuple[dict, list[_Line]]] = {}
@@ -408,7 +448,7 @@ class QueryRows:
         Raises:
             InputError: the file cannot be written.
         """
-        header = (*_BEFORE, *self.factors, *_BEHIND, *_ANSWERS)
+        header = (*_BEFORE, *self.factors, *_BEHIND, *_MADE, *_ANSWERS)
         write_text(path, csv_text(header, self._lines()))
 
     def _lines(self) -> Iterator[list[str]]:
@@ -430,7 +470,7 @@ def _factor_names(keys: Iterable[Key]) -> tuple[str, ...]:
 
 
 def _key_cells(key: Key, factors: Sequence[str]) -> list[str]:
-    names = (*_BEFORE, *factors, *_BEHIND)
+    names = (*_BEFORE, *factors, *_BEHIND, *_MADE)
     cells = [_cell(key[name]) for name in names]
     cells[names.index("gate")] = str(int(key.gate))
     return cells
@@ -599,6 +639,8 @@ class _Line:
         }
         for name in ("database", "query", "method", "protocol"):
             values[name] = self.cells[self.columns[name]]
+        for name in filter(self.columns.__contains__, _MADE):
+            values[name] = self.cells[self.columns[name]]
         values["seed"] = self.value("seed", int)
         if values["seed"] < 0:
             raise self.fault("seed", "empty")
@@ -718,7 +760,8 @@ class _Cells:
         Raises:
             InputError: a line has a wrong key.
         """
-        names = (*_BEFORE, *self.factors, *_BEHIND)
+        made = filter(self.columns.__contains__, _MADE)
+        names = (*_BEFORE, *self.factors, *_BEHIND, *made)
         known: dict[tuple[str, ...], tuple[dict, tuple[object, ...]]] = {}
         for number, cells in self.rows:
             one = _Line(self.file, number, self.columns, cells)

@@ -282,14 +282,14 @@ def protocol_columns(path: str) -> Columns[Any]:
     the name of the protocol.
 
     Args:
-        path: where an item holds its protocol: attribute names joined by dots,
-            such as `result.protocol`.
+        path: where an item holds its result: the name of an attribute and a
+            dot, such as `result.`; "" if an item is a result.
     """
     columns = keyed(
         {name: name for name in PROTOCOL_COLUMNS},
-        lambda item, name: attrgetter(f"{path}.{name}")(item),
+        lambda item, name: attrgetter(f"{path}protocol.{name}")(item),
     )
-    return {**columns, "protocol": attrgetter(f"{path}.name")}
+    return {**columns, "protocol": attrgetter(f"{path}protocol_name")}
 
 
 def _rows(values: Sequence[object]) -> list[tuple[object, ...]]:

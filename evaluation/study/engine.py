@@ -21,6 +21,7 @@ from evaluation.results.table import (
     QueryRows,
     Results,
     Row,
+    made_by,
 )
 from evaluation.study.chosen_methods import MethodChoice
 from evaluation.study.parts import Part, StudyFiles
@@ -76,8 +77,8 @@ class Engine:
     Attributes:
         experiment: name of the experiment, which stands in the tables.
         tasks: name -> task.
-        methods: key of a method -> the method, and the columns of its settings
-            that vary.
+        methods: key of a method -> the method, and the columns of its
+            settings.
         output: folder of the results.
         cluster: runs the jobs.
         on_note: is called with notes on what is left out, and on how long the
@@ -198,10 +199,16 @@ class Engine:
         self, one: Comparison, task: str, method: str, gate: bool
     ) -> dict[str, Any]:
         factors = dict(one.factors)
+        settings = self.tasks[task].changed_settings
         if method in self.methods:
             choice, columns = self.methods[method]
             method = choice.name
             factors |= columns
+            settings |= {
+                name: value
+                for name, value in choice.settings
+                if name == "sensor_height"
+            }
         database, query = one.names
         return {
             "experiment": self.experiment,
@@ -213,7 +220,7 @@ class Engine:
             "task": task,
             "method": method,
             "gate": gate,
-            "protocol": one.protocol.name,
+            **made_by(one.protocol, settings),
         }
 
 

@@ -20,8 +20,9 @@ from evaluation.drives.sampling import within_range
 from evaluation.maps.voxel_maps import thin
 from evaluation.methods import MethodConfig
 from evaluation.methods.layered_overlap import LayeredOverlap, LayeredScan
-from evaluation.recognition.fault_kinds import NEARLY, PairEvidence
+from evaluation.recognition.fault_kinds import PairEvidence
 from evaluation.recognition.overlap_truth import sampled
+from evaluation.recognition.place_outcome import NEARLY
 from evaluation.recognition.place_recognition import PlaceRecognition
 from evaluation.recognition.protocol import RetrievalProtocol
 from evaluation.recognition.seen_surfaces import SeenSurfaces

@@ -272,6 +272,19 @@ class Task(abc.ABC):
             InputError: the value is not usable.
         """
 
+    @property
+    def changed_settings(self) -> dict[str, Any]:
+        """Name -> value of the settings that change a number.
+
+        Settings that have their defaults are left out. The methods do not
+        count, because each number is that of one method.
+        """
+        return {
+            f"{self.name}.{name}": value
+            for name, value in self.settings.items()
+            if name != "methods" and value != self.defaults[name]
+        }
+
     @abc.abstractmethod
     def measure(self, pair: Pair, jobs: Jobs) -> Part:
         """Adds the jobs that measure a pair of drives to `jobs`.

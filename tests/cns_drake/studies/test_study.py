@@ -129,7 +129,7 @@ def test_the_numbers_are_those_of_the_single_commands(
     assert {(r.map, r.database, r.query) for r in results.rows} == {
         ("town", "town_01", "town_04")
     }
-    assert {row.protocol for row in results.rows} == {"recorded"}
+    assert {row.protocol for row in results.rows} == {"own"}
     protocol = RetrievalProtocol(query_spacing=5)
     drives = {
         "own": DriveSimulation(database)(),

@@ -84,7 +84,7 @@ def test_each_scan_is_localised_in_the_map_of_the_others(measured):
     assert found["translation_median"] < 0.1
     rows = results.where(task="localise").rows
     assert {row.n for row in rows} == {4}
-    assert {row.protocol for row in results.rows} == {"fair"}
+    assert {row.protocol for row in results.rows} == {"own"}
 
 
 def test_an_own_registration_function(tmp_path):

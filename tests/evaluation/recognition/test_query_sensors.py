@@ -220,13 +220,27 @@ def test_overlaps_do_not_depend_on_the_heading(drives):
 
 def test_protocols_have_names():
     assert (FAIR_PROTOCOL.name, PAPER_PROTOCOL.name) == ("fair", "paper")
-    assert replace(FAIR_PROTOCOL, radius=12.0, gate=True).name == "fair"
-    assert replace(FAIR_PROTOCOL, seed=1).name == "own"
+    assert replace(FAIR_PROTOCOL, radius=7.5, gate=True).name == "fair"
+    for changed in (
+        {"radius": 12.0},
+        {"query_spacing": 9.9},
+        {"max_range": 80.0},
+        {"scans_per_place": 1},
+        {"exclude_recent": 30.0},
+        {"seed": 1},
+    ):
+        assert replace(FAIR_PROTOCOL, **changed).name == "own", changed
+    # A method's own number of scans is no change of the protocol.
+    btc = make_method("btc", {})
+    assert FAIR_PROTOCOL.of(btc).name_with(btc) == "fair"
+    fewer = replace(FAIR_PROTOCOL, scans_per_place=2)
+    assert fewer.of(btc).name_with(btc) == "own"
     assert RetrievalProtocol().name == "recorded"
     assert RetrievalProtocol(hide_sector=30.0).name == "own"
-    check_one_protocol([FAIR_PROTOCOL, replace(FAIR_PROTOCOL, radius=3.0)])
-    with pytest.raises(InputError, match="fair and paper in one table"):
-        check_one_protocol([FAIR_PROTOCOL, PAPER_PROTOCOL])
+    check_one_protocol([FAIR_PROTOCOL.of(btc), FAIR_PROTOCOL])
+    for other in (replace(FAIR_PROTOCOL, radius=3.0), PAPER_PROTOCOL):
+        with pytest.raises(InputError, match=r"turned .* in one table"):
+            check_one_protocol([FAIR_PROTOCOL, other])
 
 
 @pytest.mark.parametrize("turn_deg", [90.0, 180.0, 270.0])

@@ -1,6 +1,7 @@
 """Tables beside each other, and beside those that ship."""
 
 import csv
+from dataclasses import replace
 import itertools
 import json
 
@@ -9,6 +10,7 @@ import numpy as np
 import pytest
 
 from cns_drake.base.errors import InputError
+from evaluation.recognition.protocol import FAIR_PROTOCOL, RetrievalProtocol
 from evaluation.results.comparing import (
     _BASELINES,
     compare,
@@ -22,6 +24,7 @@ from evaluation.results.table import (
     QueryRows,
     Results,
     Row,
+    made_by,
 )
 
 
@@ -36,7 +39,7 @@ def key(method, town="town", **changes):
         "task": "place",
         "method": method,
         "gate": False,
-        "protocol": "fair",
+        **made_by(FAIR_PROTOCOL),
     }
     return {**values, **changes}
 
@@ -173,14 +176,14 @@ def test_controls_are_not_ranked(tmp_path):
         "left out, as nothing changes in them (both.stage last): 1 conditions"
     )
     found = compare([both, both / "results.csv"])
-    assert [one.value for one in found.ranked] == [0.5, 0.5, 0.4, 0.4]
+    assert [one.value for one in found.ranked] == [0.5, 0.4]
     assert left in found.notes
     found = compare([both, own], rankings=True)
     assert [one.value for one in found.ranked] == [0.5, 0.4, 0.5, 0.4]
     assert found.agreements[0].tau == pytest.approx(1.0)
     assert found.notes == [f"both: {left}"]
     found = compare([last, both])
-    assert [one.value for one in found.ranked] == [1.0, 1.0, 0.9, 0.9]
+    assert [one.value for one in found.ranked] == [1.0, 0.9]
 
 
 def test_what_lacks_conditions_is_left_out_and_named(tmp_path):
@@ -196,6 +199,7 @@ def test_what_lacks_conditions_is_left_out_and_named(tmp_path):
         ("z", pytest.approx(0.25)),
     ]
     assert found.notes == [
+        "one: left out, as two lacks them: 1 conditions",
         "the shipped tables have none of these conditions",
         "y: left out, with 1 of 2 conditions",
     ]
@@ -362,7 +366,7 @@ def test_less_may_be_better(tmp_path):
         Results.of(rows).write_csv(path)
     found = compare(paths, "translation_median")
     assert found.task == "localise"
-    assert [r.method for r in found.ranked[::2]] == ["gicp (a)", "icp (a)"]
+    assert [r.method for r in found.ranked] == ["gicp", "icp"]
 
 
 def test_the_command(tmp_path, capsys):
@@ -461,3 +465,106 @@ def test_the_queries_of_a_report_count(tmp_path):
     files[0].write_text(files[0].read_text() + "town,01\n")
     with pytest.raises(InputError, match=f"{files[0]}: line 42: 2 cells .* 15"):
         compare(pair)
+
+
+def test_rows_by_another_protocol_are_left_out_and_named(tmp_path):
+    """They have the name of no shipped protocol, and each digest is its own."""
+    fair = made_by(FAIR_PROTOCOL)
+    wide, coarse = (
+        made_by(replace(FAIR_PROTOCOL, **one))
+        for one in ({"radius": 25.0}, {"place_spacing": 8})
+    )
+    assert [one["protocol"] for one in (fair, wide, coarse)] == [
+        *("fair", "own", "own")
+    ]
+    both = {"x": 0.5, "y": 0.4}
+    one = write_table(tmp_path / "one", {"a": both}, **fair)
+    two = write_table(tmp_path / "two", {"a": {"z": 0.9}}, **wide)
+    with pytest.raises(InputError, match="protocol: fair in one, but own in t"):
+        compare([one, two])
+    three = write_table(tmp_path / "three", {"a": {"z": 0.9}}, **coarse)
+    with pytest.raises(InputError, match=f"digest: {wide['protocol_digest']}"):
+        compare([two, three])
+    rows = [Results.read(path).rows for path in (one, two)]
+    mixed = tmp_path / "mixed.csv"
+    Results.of(itertools.chain(*rows)).write_csv(mixed)
+    found = compare([one, mixed])
+    assert [(r.method, r.value) for r in found.ranked] == [
+        ("x", 0.5),
+        ("y", 0.4),
+    ]
+    assert (
+        f"mixed: left out, by protocol own ({wide['protocol_digest']}), not"
+        f" fair ({fair['protocol_digest']}) in one: 1 conditions"
+    ) in found.notes
+
+
+def test_settings_outside_of_the_protocol_count():
+    """The height of a LiDAR changes numbers; the gate has its own column."""
+    fair = made_by(FAIR_PROTOCOL)
+    assert made_by(replace(FAIR_PROTOCOL, gate=True)) == fair
+    other = made_by(FAIR_PROTOCOL, {"sensor_height": 2.0})
+    assert other["protocol"] == "own"
+    assert other["protocol_digest"] != fair["protocol_digest"]
+    # A whole number is the same number; a seed counts where it draws.
+    same = replace(FAIR_PROTOCOL, query_spacing=10)
+    assert made_by(same) == fair
+    assert made_by(RetrievalProtocol(seed=4))["protocol"] == "recorded"
+    assert made_by(replace(FAIR_PROTOCOL, seed=4))["protocol"] == "own"
+
+
+@pytest.mark.parametrize("fault", ["value", "n"])
+def test_answers_that_contradict_their_results_are_refused(tmp_path, fault):
+    folder = write_table(tmp_path / "mine", {"a": {"x": 0.5}}, queries=True)
+    other = write_table(tmp_path / "other", {"a": {"y": 0.4}}, queries=True)
+    rows = [
+        replace(row, **{"n": 40, fault: {"n": 39, "value": 0.475}[fault]})
+        for row in Results.read(folder).rows
+    ]
+    Results.of(rows).write_csv(folder / "results.csv")
+    with pytest.raises(
+        InputError, match=r"queries.csv: contradicts .*: auc of x"
+    ):
+        compare([folder, other])
+    (folder / "queries.csv").unlink()
+    assert len(compare([folder, other]).ranked) == 2
+
+
+def test_other_numbers_of_queries_are_named(tmp_path):
+    paths = []
+    for name, number in (("one", 12), ("two", 141), ("three", None)):
+        folder = write_table(tmp_path / name, {"a": {name: 0.5}})
+        rows = [replace(row, n=number) for row in Results.read(folder).rows]
+        Results.of(rows).write_csv(folder / "results.csv")
+        paths.append(folder)
+    notes = compare(paths).notes
+    assert "three: of how many queries is not known" in notes
+    assert any("not the same queries: 12 (one), 141 (two)" in n for n in notes)
+    alike = compare(
+        [paths[0], write_table(tmp_path / "four", {"a": {"z": 0.1}})]
+    )
+    assert not any("not the same queries" in note for note in alike.notes)
+
+
+def test_what_a_table_does_not_say_is_unknown(tmp_path):
+    """Tables of earlier versions have neither digest nor version."""
+    folder = write_table(tmp_path / "old", {"a": {"x": 0.5, "y": 0.4}})
+    file = folder / "results.csv"
+    lines = [line.split(",") for line in file.read_text().splitlines()]
+    kept = [
+        k
+        for k, name in enumerate(lines[0])
+        if name not in ("protocol_digest", "version")
+    ]
+    file.write_text(
+        "\n".join(",".join(line[k] for k in kept) for line in lines)
+    )
+    assert {row.protocol_digest for row in Results.read(file).rows} == {""}
+    new = write_table(
+        tmp_path / "new", {"a": {"z": 0.3}}, **made_by(FAIR_PROTOCOL)
+    )
+    found = compare([folder, new])
+    assert len(found.ranked) == 3
+    assert any(
+        "old: rows do not say how they were made" in n for n in found.notes
+    )

@@ -13,6 +13,7 @@ from evaluation.recognition.fault_kinds import (
     PairEvidence,
     fault_kinds,
 )
+from evaluation.recognition.place_outcome import faults
 from evaluation.recognition.place_recognition import (
     judge_retrieval,
 )
@@ -188,12 +189,12 @@ CASES = [
     (0, NAN, 0.1, 0.9, 0.9, ""),
     (None, NAN, 0.9, 0.0, 0.9, "no_candidate"),
     (1, NAN, 0.1, 0.9, 0.9, "too_far"),
-    (2, 0.9, 0.49, 0.26, 0.9, "hidden"),
+    (2, 0.9, 0.49, 0.26, 0.9, "occluded"),
     (2, 0.9, 0.49, 0.25, 0.9, "no_overlap"),
     (2, 0.9, 0.5, 0.5, 0.25, "changed"),
     (2, 0.6, 0.5, 0.5, 0.24, "twin"),
-    (2, 0.59, 0.5, 0.5, 0.24, "elsewhere"),
-    (2, 0.1, 0.9, 0.0, NAN, "elsewhere"),
+    (2, 0.59, 0.5, 0.5, 0.24, "unexplained"),
+    (2, 0.1, 0.9, 0.0, NAN, "unexplained"),
 ]
 
 
@@ -225,6 +226,12 @@ def test_reasons_are_counted(judged):
     assert (row["queries"], row["wrong"]) == ("10", "8")
     assert [row[kind] for kind in FAULT_KINDS] == ["1"] * 7 + ["2"]
     assert row["changed_by"] == "car:1"
+    # The same number as in the table of results.
+    retrieval = result.retrieval
+    reasons = faults(
+        result.outcomes, retrieval.best_frames, retrieval.best_distances, 7.5
+    )
+    assert int(row["elsewhere"]) == np.sum(reasons == "elsewhere") == 6
     table = fault_table([result], known)
     (shown,) = table.rows
     assert shown[3:5] == (8, "12 %")
