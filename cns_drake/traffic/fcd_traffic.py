@@ -4,7 +4,8 @@ Format: https://sumo.dlr.de/docs/Simulation/Output/FCDOutput.html
 """
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from itertools import pairwise
 from pathlib import Path
 import zlib
 
@@ -47,6 +48,10 @@ _KINDS_BY_WORD = (
     ("van", "van"),
     ("delivery", "van"),
 )
+# Nothing of its kind is faster [m/s]: bodies that are were moved by SUMO, which
+# teleports a vehicle that has waited for too long.
+_FASTEST = 80.0
+_FASTEST_OF = {"bicycle": 20.0, "person": 12.0}
 _CARS = tuple(kind for kind in KINDS if kind.semantic_class == "car")
 
 
@@ -114,6 +119,16 @@ def read_fcd(path: Path) -> FcdTrace:
         vehicles = _objects(steps, "vehicle")
         notes = _leave_out(path, steps)
         persons = _objects(steps, "person")
+    jumps: list[str] = []
+    vehicles = _without_jumps(
+        vehicles, [_kind_name(one) for one in vehicles], times, jumps
+    )
+    persons = _without_jumps(persons, ["person"] * len(persons), times, jumps)
+    if jumps:
+        notes += (
+            f"{path}: left out: {len(jumps)} jumps from one timestep to the"
+            f" next, such as that of {jumps[0]}",
+        )
     if not vehicles and not persons:
         raise InputError(
             f"{path}: the trace has no vehicle and no person in any timestep"
@@ -212,6 +227,50 @@ def _objects(steps: list[Element], tag: str) -> tuple[TracedObject, ...]:
             TracedObject(name, types[name], at, xy, yaw, np.radians(slope), z)
         )
     return tuple(objects)
+
+
+def _without_jumps(
+    objects: Sequence[TracedObject],
+    kinds: Sequence[str],
+    times: np.ndarray,
+    jumps: list[str],
+) -> tuple[TracedObject, ...]:
+    """Returns objects without the steps that are too fast for their kind.
+
+    An object that jumps ends there, and another one with the same name begins.
+    A text on each jump is added to `jumps`.
+
+    Args:
+        objects: vehicles or persons.
+        kinds: kind of each object.
+        times: times of the trace [s].
+        jumps: list to which texts are added.
+    """
+    found = []
+    for one, kind in zip(objects, kinds, strict=True):
+        steps = np.diff(one.steps)
+        speeds = np.linalg.norm(np.diff(one.xy, axis=0), axis=1) / np.diff(
+            times[one.steps]
+        )
+        is_jump = (steps == 1) & (speeds > _FASTEST_OF.get(kind, _FASTEST))
+        ends = np.flatnonzero(is_jump) + 1
+        jumps += [
+            f"{one.name[:40]!r} at {times[one.steps[k]]:g} s, by"
+            f" {speeds[k - 1]:.0f} m/s"
+            for k in ends
+        ]
+        for begin, end in pairwise([0, *ends, len(one.steps)]):
+            part = slice(begin, end)
+            found.append(
+                replace(
+                    one,
+                    **{
+                        name: getattr(one, name)[part]
+                        for name in ("steps", "xy", "yaw", "slope", "z")
+                    },
+                )
+            )
+    return tuple(found)
 
 
 def play_trace(
@@ -394,14 +453,23 @@ def _zero(trace: FcdTrace, heights: Heights) -> float:
     )
 
 
-def _kind(one: TracedObject, seed: int) -> VehicleKind:
-    """Returns the kind of a vehicle: from its type, or else a random car."""
+def _kind_name(one: TracedObject) -> str:
+    """Returns the name of a vehicle's kind; "" if its type does not state it.
+
+    The result is one of `KINDS`.
+    """
     text = one.type_name.lower().replace("default_biketype", "bicycle")
     for word, name in _KINDS_BY_WORD:
         if word in text:
-            return next(kind for kind in KINDS if kind.name == name)
+            return name
+    return text if text in {kind.name for kind in KINDS} else ""
+
+
+def _kind(one: TracedObject, seed: int) -> VehicleKind:
+    """Returns the kind of a vehicle: from its type, or else a random car."""
+    name = _kind_name(one)
     for kind in KINDS:
-        if kind.name == text:
+        if kind.name == name:
             return kind
     rng = np.random.default_rng([seed, zlib.crc32(one.name.encode())])
     return _CARS[int(rng.integers(len(_CARS)))]

@@ -221,6 +221,73 @@ def fault(path, **options):
     return str(error.value)[len(f"{path}: ") :]
 
 
+def write_moves(path, tag, kind, dt, xs):
+    """A trace of one body that moves along x; None where it is absent."""
+    rows = "".join(
+        f'<timestep time="{k * dt:.2f}">'
+        + (
+            ""
+            if x is None
+            else f'<{tag} id="a" x="{x}" y="{-RADIUS}" angle="90" type="{kind}"'
+            ' speed="1"/>'
+        )
+        + f'<vehicle id="b" x="{-k * dt}" y="{RADIUS}" angle="270"/></timestep>'
+        for k, x in enumerate(xs)
+    )
+    path.write_text(f"<fcd-export>{rows}</fcd-export>")
+    return path
+
+
+@pytest.mark.parametrize(
+    ("tag", "kind", "fastest"),
+    [
+        ("vehicle", "passenger", 80.0),
+        ("vehicle", "DEFAULT_BIKETYPE", 20.0),
+        ("vehicle", "city_bus", 80.0),
+        ("person", "DEFAULT_PEDTYPE", 12.0),
+    ],
+)
+@pytest.mark.parametrize("dt", [0.1, 1.0])
+def test_what_jumps_is_absent_meanwhile(tmp_path, tag, kind, fastest, dt):
+    """SUMO teleports vehicles; nobody flies through the city at that speed."""
+    for factor, jumps in ((0.999, 0), (1.001, 1)):
+        far = factor * fastest * dt
+        xs = [0.0, 0.1, 0.2, 0.2 + far, 0.3 + far, 0.4 + far]
+        path = write_moves(tmp_path / "a.xml", tag, kind, dt, xs)
+        trace = read_fcd(path)
+        plan = play(path, duration=5 * dt, end=5 * dt)
+        tracks = plan.vehicles if tag == "vehicle" else plan.walkers
+        own = [0, 1][: 1 + jumps]
+        for k in range(5):
+            t = (k + 0.5) * dt
+            there = tracks.is_present(t)[own]
+            assert there.sum() == (0 if jumps and k == 2 else 1)
+            speed = np.abs(tracks.at(t)[1][own, 0][there])
+            if jumps:
+                np.testing.assert_allclose(speed, 0.1 / dt, rtol=1e-6)
+        if not jumps:
+            assert trace.notes == ()
+            continue
+        (note,) = trace.notes
+        assert note.startswith(
+            f"{path}: left out: 1 jumps from one timestep to the next, such as"
+            f" that of 'a' at {3 * dt:g} s, by "
+        )
+        # It stays the same kind of body.
+        assert tag == "person" or plan.kinds[0] == plan.kinds[1]
+
+
+def test_what_is_away_for_a_time_may_come_back_elsewhere(tmp_path):
+    xs = [0.0, 3.0, None, None, 500.0, 503.0]
+    path = write_moves(tmp_path / "a.xml", "vehicle", "passenger", 1.0, xs)
+    assert read_fcd(path).notes == ()
+    tracks = play(path, duration=5.0, end=5.0).vehicles
+    there = [bool(tracks.is_present(k + 0.5)[0]) for k in range(5)]
+    assert there == [True, False, False, False, True]
+    for t in (0.01, 0.99, 4.01, 4.99):
+        assert tracks.at(t)[1][0, 0] == pytest.approx(3.0)
+
+
 def test_a_trace_that_is_too_short(trace):
     play(trace, duration=7.9)
     assert fault(trace, duration=7.91) == (
