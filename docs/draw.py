@@ -67,6 +67,10 @@ from evaluation.results.drawing import (
 from evaluation.results.table import Results
 from evaluation.results.table_forms import title
 
+# The methods that this project made; all others are published ones.
+OURS = {"layered-overlap", "learned"}
+# Networks with the weights of their authors.
+_NETWORKS = {"SVT-Net", "DPA-Net"}
 ROOT = Path(__file__).resolve().parents[1]
 PICTURES = ROOT / "docs/pictures"
 REGISTRY = ROOT / "docs/pictures.yaml"
@@ -132,16 +136,22 @@ def main(names: Sequence[str]) -> None:
 
 
 def survival(path: Path) -> str:
-    """Draws what each method keeps of both AUC; returns the title."""
+    """Draws what methods and outside networks keep; returns the title.
+
+    The networks were measured by R@1 alone, with queries that are not turned,
+    so that a panel of its own shows all methods that were measured so.
+    """
     numbers = ("No", "One", "Two", "Three", "Four", "Five", "Six")
     tables = [kept_shares(name) for name in ("stages", "fresh")]
     strict = kept_shares("stages", "kept_strict")
     # A method survives if the median pair keeps this share of its AUC.
     medians = [{n: np.median(some[n]) for n in some} for some in tables]
     order = sorted(METHOD_STYLES, key=medians[0].__getitem__)
-    survive = sum(min(some[n] for some in medians) >= 0.95 for n in order)
-    figure = Figure(figsize=(_WIDTH, 5.0), layout="constrained")
-    panels = figure.subplots(1, 2, sharey=True)
+    survivors = {n for n in order if min(some[n] for some in medians) >= 0.95}
+    assert survivors == OURS  # As the title says.
+    figure = Figure(figsize=(_WIDTH, 9.2), layout="constrained")
+    upper, lower = figure.subfigures(2, height_ratios=(5.0, 4.2))
+    panels = upper.subplots(1, 2, sharey=True)
     for y, name in enumerate(order):
         colour = METHOD_STYLES[name][0]
         for axes, shares, offset, fill in (
@@ -154,15 +164,13 @@ def survival(path: Path) -> str:
             axes.scatter(shown, heights, s=34, ec=colour, fc=fill)
             ends = [at - 0.17, at + 0.17]
             axes.plot([np.median(shown)] * 2, ends, color=INK, lw=3.5)
-    panels[0].set_yticks(range(len(order)), [title(name) for name in order])
+    names = [f"{title(n)}*" if n in OURS else title(n) for n in order]
+    panels[0].set_yticks(range(len(order)), names)
     for axes, metric in zip(panels, ("AUC", "AUC strict"), strict=True):
-        axes.set_xlim(0.0, 119.0)
-        axes.axvline(100.0, color=PALE, linewidth=1, zorder=0)
         axes.set_xlabel(f"{metric} kept [%]")
-        _plain(axes)
     finding = (
-        f"{numbers[survive]} of {numbers[len(order)].lower()} methods survive "
-        "a rebuilt city"
+        f"{numbers[len(survivors)]} of {numbers[len(order)].lower()} methods"
+        " survive a rebuilt city:\nboth are this project's own (*)"
     )
     counts = [len(some[order[0]]) for some in tables]
     panels[0].set_title(
@@ -170,9 +178,53 @@ def survival(path: Path) -> str:
         "cities   ┃ median",
         loc="left", x=-0.57,
     )  # fmt: skip
+    below = lower.subplots()
+    outside = outside_shares()
+    rows = sorted(outside, key=lambda n: np.mean(list(outside[n].values())))
+    names = []
+    for y, row in enumerate(rows):
+        key = next((n for n in order if title(n).lower() == row.lower()), "")
+        colour = METHOD_STYLES[key][0] if key else INK
+        for (city, _), share in outside[row].items():
+            fill = colour if city == "Metropolis" else "none"
+            below.scatter(100.0 * share, y, s=44, ec=colour, fc=fill)
+        mark = "*" if key in OURS else "†" if row in _NETWORKS else ""
+        names.append((title(key) if key else row) + mark)
+    below.set_yticks(range(len(rows)), names)
+    below.set_xlabel("R@1 kept [%], queries that are not turned")
+    below.set_title(
+        "● Metropolis   ○ Suburbia   † network trained by others",
+        loc="left", x=-0.25,
+    )  # fmt: skip
+    for axes in (*panels, below):
+        axes.set_xlim(-3.0, 119.0)
+        axes.axvline(100.0, color=PALE, linewidth=1, zorder=0)
+        _plain(axes)
     _head(figure, finding)
     figure.savefig(path, dpi=_DPI)
     return finding
+
+
+def outside_shares() -> dict[str, dict[tuple[str, str], float]]:
+    """Returns the R@1 that methods and networks of others keep.
+
+    Returns:
+        Method -> (city, weights of a network or "") -> R@1 in the map of the
+        first stage, divided by that in the unchanged city.
+    """
+    found: dict[str, dict[tuple[str, str], float]] = {}
+    for city, after, column in (
+        ("Metropolis", "### Metropolis", 2),
+        ("Suburbia", "tilted but not turned:", 4),
+    ):
+        _, *rows = _table("docs/notes/published_networks.md", after)
+        for name, *cells in rows:
+            before, now = (
+                float(cells[k].partition(" ")[0]) for k in (0, column - 1)
+            )
+            method, _, weights = name.partition(", ")
+            found.setdefault(method, {})[city, weights] = now / before
+    return found
 
 
 def kept_shares(table: str, metric: str = "kept") -> dict[str, list[float]]:

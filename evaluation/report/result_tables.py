@@ -116,7 +116,7 @@ def change_table(
             "voxels in hulls": lambda r: r.report.change.num_in_hull,
             "unchanged": lambda r: r.report.change.num_unchanged,
             "visible change": lambda r: visible(r)[0],
-            "less the control's": lambda r: visible(r)[2],
+            "minus the control's": lambda r: visible(r)[2],
             "share left": lambda r: visible(r)[3],
             "queries": lambda r: visible(r)[1],
             "least of the grids": lambda r: r.report.spread[0],
@@ -248,7 +248,7 @@ def recognition_table(
         caption=f"Place recognition{captions[mode]}. {protocol}{beside}"
         " Strict: the AUC with recall = TP / N, which wrong accepted answers"
         " lower, too. Bold: best of a row; underlined: second. Beside"
-        " visible change: what is left of it without the control's.",
+        " visible change: the same minus that of the control.",
     )
 
 

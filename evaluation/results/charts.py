@@ -42,14 +42,23 @@ from evaluation.results.headlines import (
     greatest_auc,
     listed,
 )
+from evaluation.results.ranges import checked
 from evaluation.results.smoothing import curves
 from evaluation.results.summaries import (
+    LEAST_POINTS,
     correlations,
     means,
     median_kept,
     paired_values,
 )
-from evaluation.results.table import LAST, OWN, QueryRows, Results, Row
+from evaluation.results.table import (
+    LAST,
+    OWN,
+    STAGE,
+    QueryRows,
+    Results,
+    Row,
+)
 from evaluation.results.table_forms import in_table_order, title
 
 # Widths [px] on a screen and on a phone.
@@ -77,9 +86,11 @@ _METRICS = {
     "kept": "kept share",
     "tcr_sym": "TCR_sym",
     "miou": "mean IoU",
-    "visible_change_added": "visible change less the baseline's",
+    "visible_change_added": "visible change minus the baseline's",
     "query_ms": "time of a query [ms]",
 }
+# The sign of per cent never begins a line.
+_PERCENT = "{:.0f}\N{NO-BREAK SPACE}%"
 # Values of the factor `both.stage`, in words.
 _STAGES = {LAST: "without the change", OWN: "with the change"}
 # Told apart by all kinds of colour vision, and light enough for letters.
@@ -99,8 +110,8 @@ class Drawn:
     Attributes:
         message: sentence that says what the chart shows.
         figure: the drawing.
-        legend: name -> colour, line style and marker; empty if the names stand
-            in the drawing.
+        legend: name -> colour, line style (empty if the drawing has no line of
+            it) and marker; empty if the names stand in the drawing.
     """
 
     message: str
@@ -200,9 +211,11 @@ def draw(
         raise InputError(f"charts: {kind}: the table has no {metric} like that")
     names = in_table_order(row.label for row in rows)
     drawn = _Chart(keys, results, rows, styles(names), width, queries)
-    legend = drawn.styles if kind in ("lines", "scatter") else {}
     with rc_context({"font.size": _FONT, "axes.titlesize": "medium"}):
         message, figure = _KINDS[kind][0](drawn)
+        legend = {}
+        if kind in ("lines", "scatter"):
+            legend = _legend(figure, drawn.styles)
         if alone:
             figure.suptitle(plain(textwrap.fill(message, width // 9)))
         if alone and legend:
@@ -218,6 +231,22 @@ def draw(
                 handles=handles, loc="outside lower center", ncols=columns
             )
     return Drawn(message, figure, legend)
+
+
+def _legend(
+    figure: Figure, looks: Mapping[str, tuple[str, str, str]]
+) -> dict[str, tuple[str, str, str]]:
+    """Returns the looks of methods, without a line style if none is drawn."""
+    with_line = {
+        line.get_color()
+        for axes in figure.axes
+        for line in axes.get_lines()
+        if line.get_linestyle() != "None"
+    }
+    return {
+        name: (colour, style if colour in with_line else "", marker)
+        for name, (colour, style, marker) in looks.items()
+    }
 
 
 def check(chart: Mapping[str, Any]) -> dict[str, str]:
@@ -311,7 +340,9 @@ def _dumbbell(chart: _Chart) -> tuple[str, Figure]:
             label.set_fontweight("bold")
     axes.set_ylim(len(places) - 0.4, -0.7)
     first, last = (
-        _STAGES.get(str(v), f"at {words(over)} {value_words(v)}")
+        value_words(v, over)
+        if over == STAGE
+        else f"at {words(over)} {value_words(v)}"
         for v in (before, after)
     )
     text = f"{words(chart.metric)} {first} (hollow) and {last} (filled)"
@@ -323,7 +354,7 @@ def _dumbbell(chart: _Chart) -> tuple[str, Figure]:
     number = f"median of {len(pairs)} pairs" if len(pairs) > 1 else "one pair"
     message = (
         f"Share of the {words(chart.metric)} that is kept, {number}:"
-        f" {from_least_to_greatest(shares, '{:.0f} %')}"
+        f" {from_least_to_greatest(shares, _PERCENT)}"
     )
     return chart.tested(message, after), figure
 
@@ -386,12 +417,13 @@ def _matrix(chart: _Chart) -> tuple[str, Figure]:
     figure, panels = chart.panels(_BELOW + len(values) * _ROW)
     names = list(chart.styles)
     weakest: list[tuple[float, str, str]] = []
+    most = 1
     for axes, rows in zip(panels, chart.panes.values(), strict=True):
         cells: dict[tuple[int, int], list[tuple[Any, float]]] = {}
         for mean in means(rows, "label", over, strips or over):
             x = names.index(title(mean.key[0]))
             cell = cells.setdefault((x, values.index(mean.key[1])), [])
-            cell.append((mean.key[2], mean.value))
+            cell.append((mean.key[2], checked(chart.metric, mean.value)))
         for (x, y), some in cells.items():
             shares = [share for _, share in sorted(some, key=_level)]
             for k, share in enumerate(shares):
@@ -406,8 +438,9 @@ def _matrix(chart: _Chart) -> tuple[str, Figure]:
                 )
             text = f"{100.0 * shares[-1]:.0f}"
             axes.text(x + 0.5, y + 0.5, text, ha="center", va="center")
-            worst = value_words(values[y])
-            if not isinstance(values[y], str):
+            most = max(most, len(shares))
+            worst = value_words(values[y], over)
+            if not isinstance(values[y], str) or over == "map":
                 worst = f"{words(over)} {worst}"
             weakest.append((shares[-1], names[x], worst))
         axes.set(xlim=(0, len(names)), ylim=(len(values), 0))
@@ -417,31 +450,33 @@ def _matrix(chart: _Chart) -> tuple[str, Figure]:
             label.set_rotation_mode("anchor")
         axes.set_yticks(
             np.arange(len(values)) + 0.5,
-            [plain(value_words(v)) for v in values],
+            [plain(value_words(v, over)) for v in values],
         )
         axes.tick_params(length=0)
         axes.vlines(range(1, len(names)), 0, len(values), "white", lw=2)
         axes.hlines(range(1, len(values)), 0, len(names), "white", lw=2)
         axes.spines[:].set_visible(False)
     text = f"{words(chart.metric)} in per cent"
-    if strips is not None:
-        text += f"; a strip for each {words(strips)}, the number of the last"
+    if strips is not None and most > 1:
+        text += f"; a strip for each {words(strips)}, the number is of the last"
     text = textwrap.fill(text, chart.width // 8)
     figure.supxlabel(plain(text), fontsize=_FONT)
     share, name, worst = min(weakest)
-    return (
-        f"Least {words(chart.metric)} of all cells: {share:.2f}, {name} with"
-        f" {worst}",
-        figure,
-    )
+    message = f"Least {words(chart.metric)}: {share:.2f}"
+    number = sum(f"{one:.2f}" == f"{share:.2f}" for one, *_ in weakest)
+    if number > 1:
+        return f"{message}, in {number} of {len(weakest)} cells", figure
+    return f"{message} ({name}; {worst})", figure
 
 
 def _level(cell: tuple[Any, float]) -> tuple[bool, Any]:
     return isinstance(cell[0], str), cell[0]
 
 
-def value_words(value: object) -> str:
+def value_words(value: object, factor: str = "") -> str:
     """Returns the value of a factor in words; lists have no brackets."""
+    if factor == STAGE:
+        return _STAGES.get(str(value), str(value))
     if isinstance(value, float):
         return f"{value:g}"
     text = re.sub(r"[\[\]]", "", str(value).replace("_", " "))
@@ -467,7 +502,9 @@ def _scatter(chart: _Chart) -> tuple[str, Figure]:
         if not known:
             continue
         x, y = np.array(known).T
-        axes.plot(x, y, marker, color=colour, ms=5, alpha=0.55, mew=0)
+        few = len(x) < LEAST_POINTS
+        size, alpha = (8.0, 0.9) if few else (5.0, 0.55)
+        axes.plot(x, y, marker, color=colour, mew=0, ms=size, alpha=alpha)
         for one in curves(x, y):
             axes.fill_between(
                 one.x, one.low, one.high, color=colour, alpha=0.18, lw=0
@@ -487,6 +524,9 @@ def _scatter(chart: _Chart) -> tuple[str, Figure]:
     ]
     message = f"{words(y_name)} over {words(x_name)}"
     if not found:
+        number = len({row.but("method") for row, _ in points})
+        if number < LEAST_POINTS:
+            message += ", too few points for a trend"
         return message, figure
     shares = {title(one.method): one.value for one in found}
     text = from_least_to_greatest(shares, "{:+.2f}")

@@ -92,6 +92,8 @@ def greatest_auc(rows: Sequence[Row], queries: QueryRows | None) -> str:
     text = f"the greatest AUC, of {title(best)}, is "
     if not rest:
         return f"{text}told apart from all others"
+    if not apart and len(rest) > 2:
+        return f"{text}not told apart from any other"
     if not apart:
         return f"{text}not told apart from {listed(rest)}"
     return f"{text}told apart from {listed(apart)}, not from {listed(rest)}"

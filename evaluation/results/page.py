@@ -49,7 +49,7 @@ _HEADLINES = {
     "cost": ("query_ms", "build_ms"),
 }
 _MOST_COLUMNS = 12
-_DASHES = {"-": "none", "--": "6 3", "-.": "8 3 2 3", ":": "2 3"}
+_DASHES = {"-": "none", "--": "6 3", "-.": "8 3 2 3", ":": "2 3", "": "0 99"}
 
 
 def write_page(
@@ -209,7 +209,10 @@ def _summary(results: Results, task: str) -> dict[str, Any]:
         title += f": {heads[0]}"
         if factors:
             title += f" by {', '.join(map(drawing.words, factors))}"
-        heads = [", ".join(map(drawing.value_words, c)) for _, *c in columns]
+        heads = [
+            ", ".join(map(drawing.value_words, values, factors))
+            for _, *values in columns
+        ]
     return {"name": title, "metrics": heads, "rows": lines}
 
 

@@ -44,6 +44,8 @@ _ANY = Range()
 _ROUNDING = 1e-9
 # Names, in lower case and with underscores between words -> their range.
 _RANGES = (
+    # The label of a chart whose values stand in its cells.
+    (r"\w+_in_per_cent\w*", _ANY),
     # Place recognition.
     (r"(paper_s_)?(auc|r1|r@\d+%?|f1|f1max)(_(?!kept)\w+)?", _SHARE),
     (r"strict|precision\w*|recall\w*|success\w*|pose_success\w*", _SHARE),
@@ -60,7 +62,7 @@ _RANGES = (
     (r"tcr_\w+|paper|earlier_later|later_earlier|overlap", _SHARE),
     (r"same_stage_both_routes|where_both_drove", _SHARE),
     (r"least_of_the_grids|greatest|scan_without_map", _SHARE),
-    (r"visible_change\w*|less_the_control_s", _SIGNED_SHARE),
+    (r"visible_change\w*|minus_the_control_s", _SIGNED_SHARE),
     (r"voxels_in_hulls|unchanged", _COUNT),
     # What has no limits, or says how something was measured.
     (r"share_left|score|(right|wrong)_fit|low|high|gate|\w*spacing", _ANY),

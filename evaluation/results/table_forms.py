@@ -412,7 +412,7 @@ class _Form(NamedTuple):
         text = self.escape(to_text(value.value))
         if value.rank is not None:
             text = self.marks[value.rank - 1].format(text)
-        if value.printed is None:
+        if _is_missing(value.printed):
             return text
         return self.printed.format(text, value.printed)
 

@@ -1,5 +1,6 @@
 """Charts of tables, and the page that shows them."""
 
+from dataclasses import replace
 from html.parser import HTMLParser
 import math
 import re
@@ -13,6 +14,7 @@ from cns_drake.base.errors import InputError
 from evaluation.report.rows import Survival, survival_summary
 from evaluation.results import charts
 from evaluation.results import page as page_module
+from evaluation.results.drawing import save
 from evaluation.results.page import write_page
 from evaluation.results.table import Results, Row
 
@@ -71,6 +73,10 @@ def scattered(number=8):
     return Results.of(rows)
 
 
+def shown(message):
+    return message.replace("\N{NO-BREAK SPACE}", " ")
+
+
 def test_lines_have_means_and_bands():
     drawn = charts.draw(
         {"kind": "lines", "over": YEARS, "metric": "auc"}, aged()
@@ -127,9 +133,7 @@ def test_a_matrix_has_strips_and_the_last_number():
         "none",
         "parked cars",
     ]
-    assert drawn.message == (
-        "Least kept share of all cells: 0.60, SOLiD with parked cars"
-    )
+    assert drawn.message == ("Least kept share: 0.60 (SOLiD; parked cars)")
     assert not drawn.legend
 
 
@@ -148,7 +152,7 @@ def test_a_dumbbell_joins_both_ends():
     assert found == [[0.5, 0.1]] * 2 + [[0.8, 0.6]] * 2
     labels = [label.get_text() for label in axes.get_yticklabels()]
     assert labels == ["SOLiD", "x", "y", "RING++", "x", "y"]
-    assert drawn.message == (
+    assert shown(drawn.message) == (
         "Share of the AUC that is kept, median of 2 pairs: from 20 % (SOLiD) to"
         " 75 % (RING++)"
     )
@@ -171,7 +175,7 @@ def test_texts_and_charts_have_one_definition_of_what_is_kept():
     ]
     chart = {"kind": "dumbbell", "over": "both.stage", "metric": "auc"}
     message = charts.draw(chart, Results.of(rows)).message
-    assert message.endswith("from 90 % (RING++) to 100 % (SOLiD)")
+    assert shown(message).endswith("from 90 % (RING++) to 100 % (SOLiD)")
     text = survival_summary(
         [
             Survival(
@@ -203,7 +207,10 @@ def test_a_scatter_of_points_on_a_line(number):
     assert len(axes.get_lines()) == 2 + 2 * has_curve
     assert len(axes.collections) == 2 * has_curve
     words = "Rank correlation of AUC with TCR_sym: -1.00"
-    assert drawn.message == (words if has_curve else "AUC over TCR_sym")
+    few = "AUC over TCR_sym, too few points for a trend"
+    assert drawn.message == (words if has_curve else few)
+    # A line in the legend stands for a curve.
+    assert {bool(style) for _, style, _ in drawn.legend.values()} == {has_curve}
 
 
 def test_other_keys_select_rows():
@@ -225,9 +232,7 @@ def test_maps_may_be_the_lines_of_a_matrix():
     drawn = charts.draw(chart, Results.of(rows))
     (axes,) = drawn.figure.axes
     assert [t.get_text() for t in axes.get_yticklabels()] == ["x", "y"]
-    assert drawn.message == (
-        "Least mean IoU of all cells: 0.25, distance with y"
-    )
+    assert drawn.message == ("Least mean IoU: 0.25, in 2 of 4 cells")
 
 
 def test_times_are_on_a_logarithmic_axis():
@@ -379,9 +384,44 @@ def test_a_legend_covers_nothing(keys, width):
             assert axes.get_window_extent().height > 100.0
 
 
-def test_a_picture_for_print_has_its_legend(tmp_path):
-    from evaluation.results.drawing import save
+@pytest.mark.parametrize(
+    ("chart", "results"),
+    [
+        ({"kind": "lines", "over": YEARS, "metric": "auc"}, aged()),
+        ({"kind": "matrix", "over": YEARS, "metric": "auc"}, aged()),
+        ({"kind": "scatter", "x": "tcr_sym", "y": "auc"}, scattered()),
+        ({"kind": "dumbbell", "over": YEARS, "metric": "auc"}, aged()),
+    ],
+)
+@pytest.mark.parametrize("value", [1.0, 1.5])
+def test_no_chart_shows_what_cannot_be(tmp_path, chart, results, value):
+    """Each kind of chart passes the check, and none with an AUC of 1.5."""
+    rows = [
+        replace(row, value=value) if row.metric == "auc" and k % 3 == 1 else row
+        for k, row in enumerate(results.rows)
+    ]
+    results = Results.of(rows)
 
+    def draw_and_save():
+        save(charts.draw(chart, results).figure, tmp_path / "chart", ("svg",))
+
+    if value == 1.0:
+        draw_and_save()
+        return
+    with pytest.raises(InputError, match=r"(auc|AUC)\b.* cannot be"):
+        draw_and_save()
+    assert not list(tmp_path.iterdir())
+
+
+def test_values_of_factors_are_words():
+    assert charts.value_words("[0,0,2.8]") == "0, 0, 2.8"
+    assert charts.value_words("parked_cars") == "parked cars"
+    assert charts.value_words(0.30) == "0.3"
+    assert charts.value_words("own", "both.stage") == "with the change"
+    assert charts.value_words("own", "query.kind") == "own"
+
+
+def test_a_picture_for_print_has_its_legend(tmp_path):
     keys = {"kind": "lines", "over": YEARS, "metric": "auc"}
     figure = charts.draw(keys, aged(), alone=True).figure
     save(figure, tmp_path / "chart", ("pdf", "png"))
@@ -406,7 +446,7 @@ def test_a_picture_for_print_has_its_legend(tmp_path):
 def test_one_method_is_not_both_best_and_worst(chart, results, message):
     first = PARTS["solid"]
     wanted = message.format(first=first, last=first - 0.3)
-    assert charts.draw(chart, results).message == wanted
+    assert shown(charts.draw(chart, results).message) == wanted
 
 
 def test_a_page_shows_the_markers_of_its_charts():

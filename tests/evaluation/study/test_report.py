@@ -211,7 +211,7 @@ def test_change_beside_the_paper(report):
         if row["metric"].startswith("visible_change")
     }
     assert 0.0 < seen["last", "visible_change"] < 1 - shares.mean()
-    added = float(change["less the control's"])
+    added = float(change["minus the control's"])
     assert added == pytest.approx(seen["own", "visible_change_added"])
     assert added == pytest.approx(
         1 - shares.mean() - seen["last", "visible_change"], abs=0.05
