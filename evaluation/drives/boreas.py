@@ -55,7 +55,7 @@ class BoreasDrive(FileDrive):
         files, stamps_ns = list_stamped(
             path / _SCANS, ".bin", parse_microseconds
         )
-        trajectory, unknown = read_angles(path / _POSES, 12)
+        trajectory, unknown = read_angles(path / _POSES, num_velocities=3)
         X_WS = trajectory.X_WB
         X_WS[:, :3, :3] = np.swapaxes(X_WS[:, :3, :3], 1, 2)
         local = is_local(X_WS)

@@ -34,6 +34,10 @@ from evaluation.drives.text_tables import (
 
 _POSES = "gt.csv"
 _IMU = "imu.csv"
+_IMU_COLUMNS = (
+    *("time", "qx", "qy", "qz", "qw"),
+    *("wx", "wy", "wz", "ax", "ay", "az"),
+)
 # Names of the folder in the paper and in the download.
 _FOLDERS = ("pcd", "LiDAR")
 _MOUNT = "transformation_lidar.yaml"
@@ -108,7 +112,9 @@ class CnsFolderDrive(FileDrive):
     def imu(self) -> np.ndarray | None:
         if not is_there(self._imu_path):
             return None
-        stamps_ns, values = read_stamped_rows(self._imu_path, 10, ",")
+        stamps_ns, values = read_stamped_rows(
+            self._imu_path, 10, ",", names=_IMU_COLUMNS
+        )
         imu = np.empty(len(values), dtype=IMU_DTYPE)
         imu["stamp_ns"] = stamps_ns
         imu["quat_xyzw"] = values[:, :4]

@@ -74,7 +74,7 @@ class NcltDrive(FileDrive):
             path / _SCANS, ".bin", parse_microseconds
         )
         name = path.resolve().name
-        trajectory, unknown = read_angles(_poses_path(path), 6)
+        trajectory, unknown = read_angles(_poses_path(path))
         X_NB, spanned = trajectory.interpolate(stamps_ns, _LONGEST_GAP_NS)
         kept, notes = keep_spanned(files, spanned, trajectory.path)
         super().__init__(

@@ -1,9 +1,10 @@
 """Tables of numbers as text, in which every row begins with a time."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from decimal import Decimal
 import io
+import itertools
 from pathlib import Path
 
 import numpy as np
@@ -12,7 +13,8 @@ from scipy.spatial.transform import Rotation
 from cns_drake.base import poses
 from cns_drake.base.errors import InputError, value_errors
 from cns_drake.base.files import decode_text, read_bytes
-from cns_drake.base.number_rows import is_number, parse_rows
+from cns_drake.base.number_rows import is_number, parse_rows, pick_columns
+from evaluation.drives.table_headers import find_columns, split_header
 
 _NS_PER_S = 1_000_000_000
 _NS_PER_US = 1000
@@ -21,6 +23,8 @@ _TABLE_LIMIT_BYTES = 1 << 26
 # Greatest error of a rotation matrix or quaternion: that of numbers written
 # with four digits.
 _ROTATION_TOLERANCE = 1e-3
+# Columns of a table of poses.
+_POSE = ("time", "x", "y", "z", "qx", "qy", "qz", "qw")
 
 
 def read_stamped_rows(
@@ -28,6 +32,7 @@ def read_stamped_rows(
     width: int,
     separator: str | None,
     parse: Callable[[np.ndarray], np.ndarray] | None = None,
+    names: Sequence[str] = (),
 ) -> tuple[np.ndarray, np.ndarray]:
     """Reads a table whose rows are a time and `width` numbers.
 
@@ -36,6 +41,7 @@ def read_stamped_rows(
         width: number of values after the time.
         separator: text between columns; None for white space.
         parse: function that reads times; by default `parse_stamps_ns`.
+        names: names of the columns, see `read_numbers`.
 
     Returns:
         (N,) int64 times [ns]; (N, width) float64.
@@ -45,7 +51,7 @@ def read_stamped_rows(
             length, or a value is no number or not finite.
     """
     rows = read_numbers(
-        path, [("stamp", "U40"), ("values", "f8", width)], separator
+        path, [("stamp", "U40"), ("values", "f8", width)], separator, names
     )
     with value_errors(f"{path}: time"):
         stamps_ns = (parse or parse_stamps_ns)(rows["stamp"])
@@ -54,43 +60,85 @@ def read_stamped_rows(
 
 
 def read_numbers(
-    path: Path, columns: list | type, separator: str | None = None
+    path: Path,
+    columns: list | type,
+    separator: str | None = None,
+    names: Sequence[str] = (),
 ) -> np.ndarray:
     """Reads a table of text.
 
     Lines that begin with `#` are remarks. A first line that does not begin
-    with a number is a header.
+    with a number is a header, and so is a remark above the first row that names
+    its columns. If a header names the wanted columns, they are read wherever
+    they are.
 
     Args:
         path: the file.
         columns: NumPy type of a row, with named fields; or the type of a
             number, if all columns have the same type.
         separator: text between columns; None for white space.
+        names: names of all columns in their usual order, "" for one that is
+            not read, see `evaluation.drives.table_headers.find_columns`. By
+            default the columns have no names, and all are read.
 
     Returns:
         (N,) records if `columns` has fields, otherwise (N, width) numbers. N is
         at least 1.
 
     Raises:
-        InputError: if there is no such table, it is empty, or a row has another
-            form.
+        InputError: if there is no such table, it is empty, a row has another
+            form, or a header contradicts the order of the columns.
     """
     try:
         text = decode_text(read_bytes(path, _TABLE_LIMIT_BYTES))
     except UnicodeDecodeError as error:
         raise InputError(f"{path}: not a text file") from error
     # Only \n and \r\n end a line; str.splitlines splits at more characters.
-    lines = [
-        line
-        for line in io.StringIO(text, newline=None)
-        if line.strip() and not line.startswith("#")
-    ]
+    every = [line for line in io.StringIO(text, newline=None) if line.strip()]
+    lines = [line for line in every if not line.startswith("#")]
+    header = ""
     if lines and not _begins_with_number(lines[0]):
-        lines = lines[1:]
+        header, *lines = lines
     if not lines:
         raise InputError(f"{path}: no row of numbers")
+    remarks = itertools.takewhile(lambda line: line is not lines[0], every)
+    *_, before = ("", *remarks)
     with value_errors(path):
+        if names:
+            places, width = _places(
+                header or before, lines[0], separator, names
+            )
+            if places != list(range(width)):
+                lines = pick_columns(lines, places, width, separator)
         return parse_rows(lines, np.dtype(columns), separator)
+
+
+def _places(
+    header: str, row: str, separator: str | None, names: Sequence[str]
+) -> tuple[list[int], int]:
+    """Returns the places of the columns to read, and the number of all.
+
+    Args:
+        header: line above the first row; it may be no header, or empty.
+        row: the first row.
+        separator: text between columns; None for white space.
+        names: see `read_numbers`.
+
+    Raises:
+        ValueError: see `evaluation.drives.table_headers.find_columns`.
+    """
+    usual = [k for k, name in enumerate(names) if name]
+    words = split_header(header, separator)
+    width = len(row.split(separator))
+    if words and len(words) != width:
+        # A remark need not be a header.
+        if header.startswith("#"):
+            words = []
+        else:
+            raise ValueError(f"header: {len(words)} names for {width} columns")
+    if not words:
+        return usual, len(names)
+    return find_columns(words, names) or usual, width
 
 
 def parse_stamps_ns(texts: np.ndarray) -> np.ndarray:
@@ -316,7 +364,7 @@ def read_quaternions(
         InputError: if the table does not have that form, a quaternion is not of
             unit length, or the poses are out of order.
     """
-    stamps_ns, values = read_stamped_rows(path, 7, separator, parse)
+    stamps_ns, values = read_stamped_rows(path, 7, separator, parse, _POSE)
     with np.errstate(over="ignore"):
         lengths = np.linalg.norm(values[:, 3:], axis=1)
     bad = np.flatnonzero(np.abs(lengths - 1.0) > _ROTATION_TOLERANCE)
@@ -330,16 +378,17 @@ def read_quaternions(
     return _in_order(path, stamps_ns, poses.make_pose(R, values[:, :3]))
 
 
-def read_angles(path: Path, width: int) -> tuple[Trajectory, tuple[str, ...]]:
+def read_angles(
+    path: Path, num_velocities: int = 0
+) -> tuple[Trajectory, tuple[str, ...]]:
     """Reads a trajectory: rows with a time, a position and three angles.
 
     Times are in microseconds, roll, pitch and yaw in radians.
 
     Args:
         path: a table with commas.
-        width: number of values after the time. The position comes first. The
-            angles are the last three values or, if there are more than nine,
-            the seventh to ninth. All other values are velocities.
+        num_velocities: number of velocities behind the position, and again
+            behind the angles, in a table without a header.
 
     Returns:
         Poses with the rotation Rz(yaw) Ry(pitch) Rx(roll); a note if rows were
@@ -349,8 +398,11 @@ def read_angles(path: Path, width: int) -> tuple[Trajectory, tuple[str, ...]]:
         InputError: if the table does not have that form, or the poses are out
             of order.
     """
-    columns = [("stamp", "U40"), ("values", "f8", width)]
-    rows = read_numbers(path, columns, ",")
+    velocities = [""] * num_velocities
+    names = ["time", "x", "y", "z", *velocities]
+    names += ["roll", "pitch", "yaw", *velocities]
+    columns = [("stamp", "U40"), ("values", "f8", 6)]
+    rows = read_numbers(path, columns, ",", names)
     known = rows[~np.isnan(rows["values"]).any(axis=1)]
     with value_errors(f"{path}: time"):
         stamps_ns = parse_microseconds(known["stamp"])
@@ -359,9 +411,7 @@ def read_angles(path: Path, width: int) -> tuple[Trajectory, tuple[str, ...]]:
         raise InputError(f"{path}: no row without NaN")
     check_finite(path, values)
     _check_near(path, values[:, :3])
-    first = min(width - 3, 6)
-    angles = values[:, first : first + 3]
-    R = Rotation.from_euler("xyz", angles).as_matrix()
+    R = Rotation.from_euler("xyz", values[:, 3:]).as_matrix()
     num_unknown = len(rows) - len(known)
     note = f"{path}: {num_unknown} rows with NaN are left out"
     return (
