@@ -1,5 +1,7 @@
 """Recording the sensors of a Diagram as ROS 2 messages."""
 
+from __future__ import annotations
+
 from collections.abc import Callable, Collection, Mapping
 import functools
 import math
@@ -24,6 +26,12 @@ from pydrake.systems.sensors import (
 
 from cns_drake.base.drives import ros_types
 from cns_drake.base.drives.point_layouts import to_labels, to_layout
+from cns_drake.base.drives.sensor_names import (
+    BASE_FRAME,
+    IMU_FRAME,
+    MAP_FRAME,
+    check_sensor_name,
+)
 from cns_drake.recording import messages, object_messages, recorded_topics
 from cns_drake.recording.bag_writer import BackgroundWriter, BagWriter
 from cns_drake.recording.recorded_topics import (
@@ -43,10 +51,18 @@ class RecordedCamera(NamedTuple):
 
     X_BC is the pose of the camera's optical frame C (z ahead, y down) in the
     frame B of Drake's RgbdSensor. The pose of B is on the port `<camera>_pose`.
+
+    Attributes:
+        info: intrinsics as Drake describes them.
+        X_BC: pose of C in B.
+        depth: camera of the depth images, if its intrinsics or its pose differ.
+            These images then have the frame `<camera>_depth`, and intrinsics on
+            the topic `/<camera>/depth/camera_info`.
     """
 
     info: CameraInfo
     X_BC: RigidTransform
+    depth: RecordedCamera | None = None
 
 
 class RecordedSensor(NamedTuple):
@@ -67,6 +83,11 @@ class RecordedSensor(NamedTuple):
     make_message: Callable[[Any, str, int], Any]
     frame: str | None = None
     example: Any = None
+
+
+def depth_frame(camera_name: str) -> str:
+    """Returns the frame of depth images with a pose of their own."""
+    return f"{camera_name}_depth"
 
 
 class McapRecorder(LeafSystem):
@@ -170,10 +191,22 @@ class McapRecorder(LeafSystem):
             start_ns: the stamp of time zero [ns].
 
         Raises:
-            ValueError: period and schedule are both given, or neither is.
+            ValueError: period and schedule are both given, or neither is; or
+                names of sensors are not unique, or cannot be parts of ROS 2
+                topics.
         """
         super().__init__()
         cameras, further, layouts = cameras or {}, further or {}, layouts or {}
+        own_depth = [name for name, one in cameras.items() if one.depth]
+        taken: list[str] = []
+        for name in (
+            *X_BSs,
+            *cameras,
+            *map(depth_frame, own_depth),
+            *dict.fromkeys(s.frame or n for n, s in further.items()),
+        ):
+            check_sensor_name(name, taken)
+            taken.append(name)
         if (period is None) == (schedule is None):
             raise ValueError("a recorder needs either a period or a schedule")
         if period is not None:
@@ -182,6 +215,7 @@ class McapRecorder(LeafSystem):
                 camera_names=cameras,
                 layouts=layouts,
                 further=[sensor.topic for sensor in further.values()],
+                depth_camera_names=own_depth,
             )
             schedule = make_schedule({topic.name: period for topic in topics})
         assert schedule is not None
@@ -193,7 +227,7 @@ class McapRecorder(LeafSystem):
         # Frame of a sensor with a fixed place -> its pose on the vehicle.
         X_BCs = {
             **X_BSs,
-            **({} if X_BI is None else {messages.IMU_FRAME: X_BI}),
+            **({} if X_BI is None else {IMU_FRAME: X_BI}),
             **{s.frame or n: s.X_BC for n, s in further.items()},
         }
         self._X_BCs = {
@@ -202,7 +236,7 @@ class McapRecorder(LeafSystem):
             if X is not None
         }
         # Child frame of the map -> the port of a frame's pose, and the child's
-        # pose in that frame.
+        # pose in that frame. Several children may share a port.
         self._poses: dict[str, tuple[InputPort, RigidTransform]] = {}
         # A topic, and a function that makes all messages that are due with it.
         self._streams: list[
@@ -233,10 +267,13 @@ class McapRecorder(LeafSystem):
             self._add_lidar(name, convert)
         for name, X_BS in X_BSs.items():
             if X_BS is None:
-                self._add_pose(name, RigidTransform())
+                self._poses[name] = self._declare_pose(name), RigidTransform()
         for name, camera in cameras.items():
-            self._add_camera(name, camera.info)
-            self._add_pose(name, camera.X_BC)
+            self._add_camera(name, camera)
+            port = self._declare_pose(name)
+            self._poses[name] = port, camera.X_BC
+            if camera.depth is not None:
+                self._poses[depth_frame(name)] = port, camera.depth.X_BC
         for name, sensor in further.items():
             self._add_sensor(name, sensor)
         self.DeclareInitializationPublishEvent(publish=_warn_of_early_start)
@@ -244,12 +281,12 @@ class McapRecorder(LeafSystem):
 
     def _declare(self, name: str, example: object) -> InputPort:
         """Declares an abstract port of the value's type; object means any."""
+        if self.HasInputPort(name):
+            raise ValueError(f"name: two sensors would have the port '{name}'")
         return self.DeclareAbstractInputPort(name, Value(example))
 
-    def _add_pose(self, name: str, X_PC: RigidTransform) -> None:
-        """Declares the pose port of a frame P, and a sensor's pose in P."""
-        port = self._declare(f"{name}_pose", RigidTransform())
-        self._poses[name] = (port, X_PC)
+    def _declare_pose(self, name: str) -> InputPort:
+        return self._declare(f"{name}_pose", RigidTransform())
 
     def _add_port(
         self,
@@ -279,7 +316,7 @@ class McapRecorder(LeafSystem):
                 recorded_topics.OBJECTS_TOPIC: detections.encode(objects, ns),
                 recorded_topics.BOXES_TOPIC: boxes.encode(objects, ns),
                 recorded_topics.MOTION_TOPIC: messages.encode_point_cloud(
-                    table, messages.MAP_FRAME, ns
+                    table, MAP_FRAME, ns
                 ),
             }
 
@@ -313,15 +350,18 @@ class McapRecorder(LeafSystem):
             sensor.example,
         )
 
-    def _add_camera(self, name: str, info: CameraInfo) -> None:
+    def _add_camera(self, name: str, camera: RecordedCamera) -> None:
         def make(kind: str, image: Any, stamp_ns: int) -> dict:
+            info, frame = camera.info, name
+            info_topic = recorded_topics.camera_info_topic(name)
+            if kind == "depth" and camera.depth is not None:
+                info, frame = camera.depth.info, depth_frame(name)
+                info_topic = recorded_topics.depth_info_topic(name)
             return {
                 recorded_topics.image_topic(name, kind): messages.make_image(
-                    image.data, messages.ENCODINGS[kind], name, stamp_ns
+                    image.data, messages.ENCODINGS[kind], frame, stamp_ns
                 ),
-                recorded_topics.camera_info_topic(name): (
-                    messages.make_camera_info(info, name, stamp_ns)
-                ),
+                info_topic: messages.make_camera_info(info, frame, stamp_ns),
             }
 
         for kind, image in _IMAGES.items():
@@ -356,7 +396,7 @@ class McapRecorder(LeafSystem):
         if self._X_BCs and self._last_tick is None:
             # Written at the first frame. A bag takes latched messages once: a
             # resumed one has this already.
-            tf = messages.make_tf(messages.BASE_FRAME, self._X_BCs, stamp_ns)
+            tf = messages.make_tf(BASE_FRAME, self._X_BCs, stamp_ns)
             self._write(TF_STATIC_TOPIC, tf, stamp_ns, 0)
         outgoing: dict[Topic, Any] = {}
         if TF_TOPIC.name in due or ODOMETRY_TOPIC.name in due:
@@ -382,7 +422,7 @@ class McapRecorder(LeafSystem):
         odometry = _value_of(self._odometry, context)
         X_WCs, made = {}, {}
         if odometry is not None:
-            X_WCs[messages.BASE_FRAME] = odometry.X_WB
+            X_WCs[BASE_FRAME] = odometry.X_WB
             made[ODOMETRY_TOPIC] = messages.make_odometry(
                 odometry.X_WB, odometry.V_WB_B, stamp_ns
             )
@@ -390,7 +430,7 @@ class McapRecorder(LeafSystem):
             if port.HasValue(context):
                 X_WCs[name] = port.Eval(context) @ X_PC
         if X_WCs:
-            tf = messages.make_tf(messages.MAP_FRAME, X_WCs, stamp_ns)
+            tf = messages.make_tf(MAP_FRAME, X_WCs, stamp_ns)
             return {TF_TOPIC: tf, **made}
         return made
 

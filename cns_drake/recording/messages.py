@@ -16,11 +16,9 @@ from pydrake.systems.sensors import CameraInfo
 
 from cns_drake.base.drives import ros_types
 from cns_drake.base.drives.point_layouts import point_field_datatype
+from cns_drake.base.drives.sensor_names import BASE_FRAME, IMU_FRAME, MAP_FRAME
 from cns_drake.base.jpeg_images import to_jpeg
 
-MAP_FRAME = "map"
-BASE_FRAME = "base_link"
-IMU_FRAME = "imu"
 _NS_PER_S = 1_000_000_000
 # Variance given for an exact value, in the square of its unit: a standard
 # deviation of a millionth. It is not 0, because ROS reads zeros as an unknown
@@ -261,13 +259,30 @@ def make_compressed_image(
     )
 
 
+def rendered_intrinsics(camera: CameraInfo) -> np.ndarray:
+    """Returns the intrinsic matrix K (3, 3) of the images that Drake renders.
+
+    Pixel (u, v) of an image shows what lies along K^-1 (u, v, 1), in the
+    optical frame. Drake's renderers count the principal point of `camera` from
+    the outer corner of the first pixel, but its documentation, like ROS, from
+    the centre of this pixel: K is half a pixel less in both.
+    """
+    K = camera.intrinsic_matrix()
+    K[:2, 2] -= 0.5
+    return K
+
+
 def make_camera_info(camera: CameraInfo, frame_id: str, stamp_ns: int) -> Any:
     """Returns a CameraInfo message of a pinhole camera without distortion.
 
-    `frame_id` names the camera's frame, with z ahead and y down. `stamp_ns` is
-    the time of the message [ns].
+    Its K is that of `rendered_intrinsics`.
+
+    Args:
+        camera: the camera, as Drake describes it.
+        frame_id: name of the camera's frame, z ahead and y down.
+        stamp_ns: time of the message [ns].
     """
-    K = camera.intrinsic_matrix()
+    K = rendered_intrinsics(camera)
     return ros_types.make_message(
         CAMERA_INFO,
         header=make_header(frame_id, stamp_ns),

@@ -6,6 +6,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from cns_drake.base.drives import ros_types
+from cns_drake.base.drives.sensor_names import MAP_FRAME
 from cns_drake.recording import messages
 
 # Placeholders of numbers in a message: this and the following integers, which
@@ -146,7 +147,7 @@ def marked_detections(
         numbers: (N, 10) position [m], orientation (x, y, z, w) and size [m] of
             each box.
     """
-    header = messages.make_header(messages.MAP_FRAME, _STAMP_MARK_NS)
+    header = messages.make_header(MAP_FRAME, _STAMP_MARK_NS)
     detections = []
     for (instance, semantic_class), row in zip(who, numbers, strict=True):
         pose, size = _box(row)
@@ -175,14 +176,14 @@ def marked_boxes(who: Sequence[tuple[int, str]], numbers: np.ndarray) -> Any:
         numbers: (N, 10) position [m], orientation (x, y, z, w) and size [m] of
             each box.
     """
-    stamp = messages.make_header(messages.MAP_FRAME, _STAMP_MARK_NS).stamp
+    stamp = messages.make_header(MAP_FRAME, _STAMP_MARK_NS).stamp
     entities = []
     for (instance, semantic_class), row in zip(who, numbers, strict=True):
         color = (*_RGB.get(semantic_class, _OTHER_RGB), _OPACITY)
         entities.append(
             {
                 "timestamp": stamp,
-                "frame_id": messages.MAP_FRAME,
+                "frame_id": MAP_FRAME,
                 "id": instance,
                 "metadata": [("class", semantic_class)],
                 "cubes": [(*_box(row), color)],

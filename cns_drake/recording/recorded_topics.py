@@ -1,10 +1,12 @@
 """Topics of a recording, and the frames of its sensors."""
 
+from collections import Counter
 from collections.abc import Iterable, Mapping
 
 from pydrake.math import RigidTransform
 
 from cns_drake.base.drives import ros_types
+from cns_drake.base.drives.sensor_names import BASE_FRAME, IMU_FRAME
 from cns_drake.recording import messages
 from cns_drake.recording.messages import CAMERA_INFO, ENCODINGS, IMAGE
 from cns_drake.recording.rosbag2_metadata import Topic
@@ -28,6 +30,7 @@ def recording_topics(
     layouts: Mapping[str, str] | None = None,
     with_objects: bool = False,
     further: Iterable[Topic] = (),
+    depth_camera_names: Iterable[str] = (),
 ) -> tuple[Topic, ...]:
     """Returns the topics of a recording with their types and encodings.
 
@@ -39,6 +42,11 @@ def recording_topics(
         layouts: LiDAR name -> layout of its points, if not `cns`.
         with_objects: whether boxes of moving objects are recorded.
         further: topics of sensors of other kinds.
+        depth_camera_names: names of those cameras whose depth images have
+            intrinsics or a pose of their own.
+
+    Raises:
+        ValueError: two topics have the same name.
 
     Example:
         from cns_drake import recording_topics
@@ -53,11 +61,16 @@ def recording_topics(
     for name in camera_names:
         topics += [image_topic(name, kind) for kind in ENCODINGS]
         topics.append(camera_info_topic(name))
+    topics += map(depth_info_topic, depth_camera_names)
     topics += [IMU_TOPIC] if with_imu else []
     topics += [ODOMETRY_TOPIC] if with_odometry else []
     topics += OBJECT_TOPICS if with_objects else []
     topics += further
-    return (*topics, TF_TOPIC, TF_STATIC_TOPIC)
+    topics += [TF_TOPIC, TF_STATIC_TOPIC]
+    for name, count in Counter(topic.name for topic in topics).items():
+        if count > 1:
+            raise ValueError(f"{name}: two sensors have this topic")
+    return tuple(topics)
 
 
 def make_calibration(
@@ -71,10 +84,10 @@ def make_calibration(
     """
     X_BCs = dict(X_BSs)
     if X_BI is not None:
-        X_BCs[messages.IMU_FRAME] = X_BI
+        X_BCs[IMU_FRAME] = X_BI
     return {
         name: {
-            "parent": messages.BASE_FRAME,
+            "parent": BASE_FRAME,
             "translation": [float(x) for x in X_BC.translation()],
             "quat_xyzw": list(messages.to_quat_xyzw(X_BC.rotation())),
         }
@@ -107,6 +120,10 @@ def camera_topic(camera_name: str, kind: str) -> Topic:
         "camera_info": CAMERA_INFO,
     }
     return Topic(f"/{camera_name}/{kind}", message_type.get(kind, IMAGE))
+
+
+def depth_info_topic(camera_name: str) -> Topic:
+    return Topic(f"/{camera_name}/depth/camera_info", CAMERA_INFO)
 
 
 def camera_info_topic(camera_name: str) -> Topic:

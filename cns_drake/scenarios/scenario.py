@@ -18,6 +18,7 @@ from pydantic import (
     model_validator,
 )
 
+from cns_drake.base.drives.sensor_names import check_sensor_name
 from cns_drake.base.errors import validated
 from cns_drake.motion.road_profile import RoadProfile, RoughnessClass
 from cns_drake.roads.lane_path import Speeds
@@ -37,6 +38,26 @@ from cns_drake.sensors.sensor_config import (
 Name = Annotated[str, StringConstraints(pattern=r"^[A-Za-z0-9][A-Za-z0-9_]*$")]
 # Defaults are validated as well, because a rule may depend on another field.
 _Optional = Field(default=None, validate_default=True)
+# Systems and ports of a drive's Diagram that are not a sensor's; and endings of
+# names of systems and ports that belong to a LiDAR or a camera.
+_SYSTEMS = (
+    "scene_graph",
+    "vehicle_motion",
+    "geometry_pose",
+    "traffic",
+    "frame_poses",
+    "camera_scene",
+    "camera_colours",
+    "camera_classes",
+    "mcap_recorder",
+    "meshcat_recorder",
+    "geometry_query",
+    "specific_force",
+    "angular_velocity",
+    "imu_samples",
+)
+_OF_LIDARS = ("scan", "sweep", "pose")
+_OF_CAMERAS = ("image", "camera_info", "depth", "label")
 # More vehicles or walkers than any map can hold.
 _MOST_TRAFFIC = 2000
 
@@ -376,10 +397,7 @@ class Scenario(Section):
 
     @field_validator("lidars")
     @classmethod
-    def _check_frames_differ(cls, lidars: dict) -> dict:
-        taken = {"map", "base_link", "imu"} & lidars.keys()
-        if taken:
-            raise ValueError(f"'{taken.pop()}' is the name of another frame")
+    def _check_scan_rates(cls, lidars: dict) -> dict:
         # Every scan has the odometry of its own time.
         fastest = _fastest(lidars)
         for name, one in lidars.items():
@@ -401,10 +419,27 @@ class Scenario(Section):
         return section
 
     @model_validator(mode="after")
+    def _check_names(self) -> Scenario:
+        """Checks that sensors have names of their own, also as systems."""
+        taken = set(_SYSTEMS)
+        taken |= {f"{name}_{of}" for name in self.lidars for of in _OF_LIDARS}
+        taken |= {f"{name}_{of}" for name in self.cameras for of in _OF_CAMERAS}
+        for field, names in (
+            ("lidars", self.lidars),
+            ("sensors", self.further_sensors),
+            ("cameras", self.cameras),
+        ):
+            for name in names:
+                try:
+                    check_sensor_name(name, taken)
+                except ValueError as error:
+                    raise ValueError(f"{field}: {error}") from None
+                taken.add(name)
+        return self
+
+    @model_validator(mode="after")
     def _check_further_sensors(self) -> Scenario:
-        for name, sensor in self.further_sensors.items():
-            if name in self.lidars:
-                raise ValueError(f"'{name}' is the name of another frame")
+        for sensor in self.further_sensors.values():
             if sensor.rate is not None:
                 check_rate(sensor.rate, self.fastest_rate)
         return self
@@ -412,12 +447,7 @@ class Scenario(Section):
     @model_validator(mode="after")
     def _check_cameras(self) -> Scenario:
         frame_rate = next(iter(self.lidars.values())).rate
-        taken = {"map", "base_link", "imu", *self.lidars, *self.further_sensors}
         for name, camera in self.cameras.items():
-            if name in taken:
-                raise ValueError(
-                    f"cameras: '{name}' is the name of another frame"
-                )
             if frame_rate % camera.rate:
                 raise ValueError(
                     f"cameras.{name}.rate: {camera.rate} does not divide "

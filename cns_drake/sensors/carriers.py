@@ -1,4 +1,4 @@
-"""The pose of a sensor on its carrier, and the carrier's motion."""
+"""The pose of a sensor on its carrier, the carrier's motion, and names."""
 
 import math
 
@@ -47,6 +47,22 @@ def body_and_pose(
     if isinstance(place, Frame):
         return place.body(), place.GetFixedPoseInBodyFrame() @ X_PS
     return place, X_PS
+
+
+def check_free(builder: DiagramBuilder, *names: str) -> None:
+    """Checks that a diagram has no systems of these names yet.
+
+    A diagram with two systems of one name ends the process when it is built.
+
+    Raises:
+        ValueError: it has one.
+    """
+    for name in names:
+        if builder.HasSubsystemNamed(name):
+            raise ValueError(
+                f"name: the diagram has a system '{name}'; give each a name "
+                "of its own"
+            )
 
 
 def connect_motion(

@@ -29,6 +29,7 @@ from pydrake.systems.lcm import LcmBuses, LcmInterfaceSystem
 
 from cns_drake.base.errors import describe_validation_error
 from cns_drake.scene.drake_releases import find_bus
+from cns_drake.sensors.carriers import check_free
 from cns_drake.sensors.imu.config import ImuSection
 from cns_drake.sensors.imu.imu import Imu, add_imu
 from cns_drake.sensors.lidar.adding import add_described_lidar
@@ -376,8 +377,10 @@ def _place(
     """Returns the frame P that carries a sensor, and X_PB.
 
     Raises:
-        ValueError: X_PB is not finite.
+        ValueError: X_PB is not finite, or the systems that publish would have
+            the names of others.
     """
+    check_free(builder, f"{config.name}_to_lcm", f"{config.name}_publisher")
     plant = plant or builder.GetSubsystemByName("plant")
     frame = plant.world_frame()
     if config.X_PB.base_frame is not None:

@@ -5,6 +5,8 @@ import math
 from cns_drake.recording.recorded_topics import (
     OBJECT_TOPICS,
     camera_topic,
+    labels_topic,
+    points_topic,
     recording_topics,
 )
 from cns_drake.recording.rosbag2_metadata import Topic
@@ -84,9 +86,10 @@ def drive_schedule(scenario: Scenario) -> Schedule:
         rates[topic.name] = scenario.further_sensors[name].rate or fastest
     for topic, rate in _camera_rates(scenario).items():
         rates[topic.name] = rate
-    for topic in scenario_topics(scenario):
-        if not topic.latched and topic.name not in rates:
-            rates[topic.name] = scenario.lidars[topic.name.split("/")[1]].rate
+    for name, lidar in scenario.lidars.items():
+        rates[points_topic(name).name] = lidar.rate
+        if lidar.layout != "cns":
+            rates[labels_topic(name).name] = lidar.rate
     periods = {name: 1.0 / rate for name, rate in rates.items()}
     if scenario.frames is None:
         return make_schedule(periods)

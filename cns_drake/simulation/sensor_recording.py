@@ -8,14 +8,24 @@ from pydrake.math import RigidTransform
 from pydrake.systems.framework import DiagramBuilder, OutputPort
 from pydrake.systems.sensors import RgbdSensor
 
+from cns_drake.base.drives.sensor_names import check_sensor_name
 from cns_drake.recording.bag_writer import BagWriter
 from cns_drake.recording.mcap_recorder import McapRecorder, RecordedCamera
+from cns_drake.recording.messages import ENCODINGS
 from cns_drake.recording.recorded_topics import (
+    IMU_TOPIC,
+    ODOMETRY_TOPIC,
+    TF_TOPIC,
+    camera_info_topic,
+    depth_info_topic,
+    image_topic,
     make_calibration,
+    points_topic,
     recording_topics,
 )
 from cns_drake.recording.rosbag2_metadata import Topic
 from cns_drake.recording.schedule import Schedule, make_schedule
+from cns_drake.sensors.carriers import check_free
 from cns_drake.sensors.imu.imu import Imu
 from cns_drake.sensors.lidar.lidar import Lidar
 from cns_drake.sensors.odometry.odometry import OdometrySensor
@@ -38,7 +48,9 @@ def add_mcap_recorder(
     """Adds a recorder of a diagram's sensors, as a rosbag2 folder.
 
     The topics are `/<name of the system>/points` for every LiDAR;
-    `/<name>/color`, `depth`, `label` and `camera_info` for every camera;
+    `/<name>/color`, `depth`, `label` and `camera_info` for every camera, and
+    `/<name>/depth/camera_info` if its depth images have intrinsics or a pose of
+    their own (their frame is then `<name>_depth`);
     `/imu/data` for an IMU; and `/odometry` for odometry. The poses of sensors
     on the same body as the odometry are in `/tf_static`; those of all other
     sensors are in `/tf`.
@@ -70,8 +82,9 @@ def add_mcap_recorder(
     Raises:
         InputError: the folder contains a finished recording or other files.
         ValueError: `rates` names an unknown sensor, neither a period nor a
-            LiDAR is given, or a LiDAR is causal (its scan covers the turn
-            before its time stamp).
+            LiDAR is given, a LiDAR is causal (its scan covers the turn before
+            its time stamp), or names of sensors are not unique or cannot be
+            parts of ROS 2 topics.
 
     Example:
         from cns_drake import add_mcap_recorder
@@ -88,7 +101,12 @@ def add_mcap_recorder(
                 f"lidars: '{lidar.get_name()}' is causal: its scan at a time "
                 "began a turn before, and a recording stamps it with the time"
             )
+    check_free(builder, name)
+    names = [*(lidar.get_name() for lidar in lidars), *cameras]
+    for k, one in enumerate(names):
+        check_sensor_name(one, names[:k])
     X_BSs = {lidar.get_name(): _place_of(lidar, odometry) for lidar in lidars}
+    recorded = {key: _describe(camera) for key, camera in cameras.items()}
     X_BI = None
     if imu is not None and odometry is not None:
         X_BI = odometry.place_of(
@@ -103,6 +121,7 @@ def add_mcap_recorder(
         camera_names=cameras,
         with_imu=imu is not None,
         with_odometry=odometry is not None,
+        depth_camera_names=[key for key, c in recorded.items() if c.depth],
     )
     bag = BagWriter(
         Path(folder),
@@ -118,9 +137,9 @@ def add_mcap_recorder(
             bag,
             X_BSs=X_BSs,
             X_BI=X_BI,
-            cameras={key: _describe(c) for key, c in cameras.items()},
+            cameras=recorded,
             schedule=_make_schedule(
-                topics, _periods(period, rates or {}, lidars, cameras, imu)
+                _periods(period, rates or {}, lidars, cameras, imu), topics
             ),
             imu_variances=variances,
             start_ns=start_ns,
@@ -177,18 +196,27 @@ def _periods(
 
 
 def _make_schedule(
-    topics: Collection[Topic], periods: Mapping[str, float]
+    periods: Mapping[str, float], topics: Collection[Topic]
 ) -> Schedule:
     """Returns the schedule of the topics of sensors with periods [s]."""
-    by_topic = {}
-    for topic in topics:
-        if topic.latched:
-            continue
-        sensor = topic.name.split("/")[1]
-        # `/tf` has all moving frames, at the highest rate of any of them.
-        moving = [one for name, one in periods.items() if name != "imu"]
-        by_topic[topic.name] = periods.get(sensor, min(moving))
-    return make_schedule(by_topic)
+    sensor_of = {IMU_TOPIC: "imu", ODOMETRY_TOPIC: "odometry"}
+    for name in periods:
+        sensor_of[points_topic(name)] = name
+        for kind in ENCODINGS:
+            sensor_of[image_topic(name, kind)] = name
+        sensor_of[camera_info_topic(name)] = name
+        sensor_of[depth_info_topic(name)] = name
+    # `/tf` has all moving frames, at the highest rate of any of them.
+    moving = min(period for name, period in periods.items() if name != "imu")
+    return make_schedule(
+        {
+            topic.name: moving
+            if topic == TF_TOPIC
+            else periods[sensor_of[topic]]
+            for topic in topics
+            if not topic.latched
+        }
+    )
 
 
 def _place_of(
@@ -201,5 +229,25 @@ def _place_of(
 
 
 def _describe(camera: RgbdSensor) -> RecordedCamera:
-    core = camera.default_color_render_camera().core()
-    return RecordedCamera(core.intrinsics(), core.sensor_pose_in_camera_body())
+    """Returns the intrinsics and poses of colour (and label) and of depth."""
+    color, depth = (
+        RecordedCamera(core.intrinsics(), core.sensor_pose_in_camera_body())
+        for core in (
+            camera.default_color_render_camera().core(),
+            camera.default_depth_render_camera().core(),
+        )
+    )
+    if _numbers(color) == _numbers(depth):
+        return color
+    return color._replace(depth=depth)
+
+
+def _numbers(camera: RecordedCamera) -> tuple:
+    """Returns what two cameras share if their images cover each other."""
+    info = camera.info
+    return (
+        info.width(),
+        info.height(),
+        info.intrinsic_matrix().tobytes(),
+        camera.X_BC.GetAsMatrix34().tobytes(),
+    )

@@ -1,7 +1,7 @@
 """Traffic in a diagram: a system that moves vehicles and walkers."""
 
 from collections.abc import Sequence
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 from pydrake import geometry
@@ -24,6 +24,7 @@ from cns_drake.ray_casting.moving_groups import KnownPoses
 from cns_drake.recording.object_messages import RecordedObjects
 from cns_drake.scene.labels import MAX_INSTANCE
 from cns_drake.scene.structure_table import StructureEntry, StructureTable
+from cns_drake.sensors.carriers import check_free
 from cns_drake.traffic.body_shapes import Limb, vehicle_limbs, walker_limbs
 from cns_drake.traffic.traffic_plan import WALKER_SIZE, TrafficPlan
 
@@ -367,8 +368,10 @@ def add_traffic(
     scene_graph: SceneGraph,
     plan: TrafficPlan,
     *,
+    seed: int = 0,
+    structures: StructureTable | None = None,
+    turn: float = 0.05,
     name: str = "traffic",
-    **options: Any,
 ) -> TrafficMotion:
     """Adds moving vehicles and walkers to a diagram.
 
@@ -376,19 +379,33 @@ def add_traffic(
         builder: builder of a diagram with `scene_graph`.
         scene_graph: SceneGraph to which the geometry is added.
         plan: the planned traffic.
+        seed: seed of colours and sizes.
+        structures: table with an instance id for each body; by default
+            `traffic_structures` of the plan.
+        turn: time over which the output `body_spatial_velocities` is averaged
+            [s]: the duration of a turn of a LiDAR with motion distortion.
         name: name of the system and of the geometry source.
-        options: further arguments of
-            `cns_drake.traffic.traffic_motion.make_traffic`.
 
     Returns:
         The system that moves the bodies, connected to the SceneGraph.
+
+    Raises:
+        ValueError: the diagram has a system of that name.
 
     Example:
         from cns_drake import add_traffic
 
         traffic = add_traffic(builder, scene_graph, plan)
     """
-    traffic = make_traffic(scene_graph, plan, name=name, **options)
+    check_free(builder, name)
+    traffic = make_traffic(
+        scene_graph,
+        plan,
+        seed=seed,
+        structures=structures,
+        turn=turn,
+        name=name,
+    )
     builder.AddNamedSystem(name, traffic)
     builder.Connect(
         traffic.GetOutputPort("geometry_pose"),

@@ -23,6 +23,7 @@ from pydrake.systems.sensors import Accelerometer, Gyroscope
 from scipy.spatial.transform import Rotation
 
 from cns_drake.base.drives.drive import ImuSamples
+from cns_drake.base.drives.sensor_names import check_topic_part
 from cns_drake.base.elementary import product, rotated
 from cns_drake.motion.trajectory import Trajectory
 from cns_drake.sensors import carriers
@@ -37,6 +38,8 @@ _BLOCK = 512
 # second.
 _REMEMBERED = 256
 _NAMES = ("specific_force", "angular_velocity")
+# The systems of an IMU are named after it and these.
+_PARTS = ("accelerometer", "gyroscope", "noise")
 
 
 @dataclass(frozen=True)
@@ -107,7 +110,8 @@ def add_imu(
     Raises:
         RuntimeError: the plant is not finalized.
         TypeError: `body` is neither a body nor a frame.
-        ValueError: there is noise without a rate, or the rate is not positive.
+        ValueError: there is noise without a rate, the rate is not positive, or
+            the name is taken or cannot be a part of a ROS 2 topic.
 
     Example:
         from cns_drake import add_imu
@@ -123,15 +127,16 @@ def add_imu(
         raise ValueError("noise: it needs a rate; give rate as well")
     if noise is not None and noise.sensor_name == ImuNoise.sensor_name:
         noise = replace(noise, sensor_name=name)
+    check_topic_part(name)
+    systems = [f"{name}_{part}" for part in _PARTS]
+    carriers.check_free(builder, *systems)
     body, X_BI = carriers.body_and_pose(body, X_PI)
     # The accelerometer's default is no gravity.
     gravity = body.GetParentPlant().gravity_field().gravity_vector()
     accelerometer = builder.AddNamedSystem(
-        f"{name}_accelerometer", Accelerometer(body, X_BI, gravity)
+        systems[0], Accelerometer(body, X_BI, gravity)
     )
-    gyroscope = builder.AddNamedSystem(
-        f"{name}_gyroscope", Gyroscope(body, X_BI)
-    )
+    gyroscope = builder.AddNamedSystem(systems[1], Gyroscope(body, X_BI))
     for sensor in (accelerometer, gyroscope):
         inputs = {
             "body_poses": sensor.get_body_poses_input_port(),
@@ -144,7 +149,7 @@ def add_imu(
     imu = Imu(accelerometer, gyroscope, rate, noise)
     if noise is None or rate is None:
         return imu
-    noisy = builder.AddNamedSystem(f"{name}_noise", NoisyImu(noise, rate))
+    noisy = builder.AddNamedSystem(systems[2], NoisyImu(noise, rate))
     for port_name, port in imu.ports().items():
         builder.Connect(port, noisy.GetInputPort(port_name))
     return replace(imu, noisy=noisy)

@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection
+from collections.abc import Collection, Mapping
 from dataclasses import replace
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, TypeVar
 import warnings
 
 from pydrake import geometry
@@ -13,18 +13,20 @@ from pydrake.math import RigidTransform
 from pydrake.multibody.tree import BodyIndex, Frame, RigidBody, WeldJoint
 from pydrake.systems.framework import DiagramBuilder, System
 
-from cns_drake.scene.perception_geometry import (
-    anchored_frames,
-    geometry_port,
+from cns_drake.base.drives.sensor_names import check_sensor_name
+from cns_drake.scene import perception_geometry
+from cns_drake.sensors.carriers import (
+    body_and_pose,
+    check_free,
+    connect_motion,
 )
-from cns_drake.sensors.carriers import body_and_pose, connect_motion
 from cns_drake.sensors.lidar.config import (
     LidarSection,
     WeatherConfig,
     make_pattern,
     make_returns,
 )
-from cns_drake.sensors.lidar.lidar import Lidar
+from cns_drake.sensors.lidar.lidar import Lidar, Structures
 from cns_drake.sensors.lidar.measurement import IDEAL, MeasurementModel
 from cns_drake.sensors.lidar.patterns import BeamPattern
 from cns_drake.sensors.lidar.presets import make_beam_pattern
@@ -51,8 +53,14 @@ def add_lidar(
     range_noise: float = 0.0,
     dropout: float = 0.0,
     seed: int = 0,
+    measurement: MeasurementModel | None = None,
     returns: CalibratedReturns | str = "ideal",
-    **options: Any,
+    role: Role = Role.kPerception,
+    structures: Structures | None = None,
+    anchored_frames: Collection[FrameId] | None = None,
+    moving_bodies: Mapping[FrameId, int] | None = None,
+    num_threads: int = 1,
+    causal: bool = False,
 ) -> Lidar:
     """Adds a LiDAR to a diagram and connects it to the SceneGraph.
 
@@ -68,12 +76,16 @@ def add_lidar(
         pattern: beams of the LiDAR, or the name of a preset. With a name, the
             LiDAR turns at the rate of its data sheet, and coordinates are not
             rounded.
-        name: name of the system.
+        name: name of the system, and of the LiDAR's frame and topics in a
+            recording.
         unseen: bodies, frames and geometries that the LiDAR does not see; by
             default its body and all bodies that are welded to it, except the
-            world. A frame on a body stands for the whole body.
-        motion_distortion: whether the LiDAR and all other bodies of the plant
-            keep moving during a turn (see `Lidar`).
+            world. A frame on a body stands for the whole body. A FrameId stands
+            for its own geometry only: a SceneGraph does not know of welds.
+        motion_distortion: whether the LiDAR and all other bodies of its plant
+            keep moving during a turn (see `Lidar`). Bodies of other plants and
+            frames of other sources stay where they are at the time of the
+            output.
         motion: source of the bodies' velocities for motion distortion; by
             default the plant.
         range_noise: standard deviation of the Gaussian errors of ranges [m]; 0
@@ -83,11 +95,20 @@ def add_lidar(
             numbers depend on the seed, the name and the number of the frame. A
             model of noise or returns with a `sensor_name` uses that instead of
             the name.
+        measurement: model of the noise, instead of `range_noise`, `dropout` and
+            `seed`.
         returns: `ideal`, `calibrated` by the data sheet of a preset, or a
             `CalibratedReturns`.
-        options: further arguments of `Lidar`, such as `causal`; also
-            `measurement`, a `MeasurementModel` to give instead of
-            `range_noise`, `dropout` and `seed`.
+        role: role of the geometry that it sees.
+        structures: table of the structures' labels and instance ids; by default
+            structures have no class.
+        anchored_frames: frames that never move; by default the frames of the
+            plant's bodies that are welded to the world.
+        moving_bodies: frame -> index of its body in the LiDAR's port
+            `body_spatial_velocities`, if you connect this port yourself; with
+            `motion_distortion`, all bodies of the plant.
+        num_threads: number of threads that share its rays.
+        causal: whether a scan is the turn that ends at the time of the output.
 
     Returns:
         The system, with the ports `scan`, `point_cloud_S`, `point_cloud_W` and
@@ -95,13 +116,13 @@ def add_lidar(
         `CastRays` of a Context.
 
     Raises:
-        KeyError: there is no preset of that name.
         RuntimeError: the plant is not finalized, or not registered with the
             SceneGraph.
         TypeError: an argument is of the wrong type.
-        ValueError: the diagram has a system of that name, the noise is out of
-            range or given twice, motion distortion needs a body, or calibrated
-            returns need a preset.
+        ValueError: there is no preset of that name, the name of the LiDAR is
+            taken, reserved or cannot be a part of a ROS 2 topic, the noise is
+            out of range or given twice, motion distortion needs a body, or
+            calibrated returns need a preset.
 
     Warns:
         UserWarning: the SceneGraph has no geometry that the LiDAR could see.
@@ -119,11 +140,8 @@ def add_lidar(
         )
     if not isinstance(X_PS, RigidTransform):
         raise TypeError(f"X_PS: {X_PS!r} is not a RigidTransform")
-    if builder.HasSubsystemNamed(name):
-        raise ValueError(
-            f"name: the diagram has a system '{name}'; give each LiDAR a name "
-            "of its own"
-        )
+    check_sensor_name(name)
+    check_free(builder, name)
     if not isinstance(body, FrameId):
         body, X_PS = body_and_pose(body, X_PS)
     preset = pattern if isinstance(pattern, str) else None
@@ -155,28 +173,25 @@ def add_lidar(
         if (
             range_noise
             or dropout
-            or options.get("measurement", IDEAL).is_random
+            or (measurement is not None and measurement.is_random)
         ):
             raise ValueError(
                 "range_noise, dropout, measurement: calibrated returns have "
                 "noise of their own; leave these out"
             )
-        options["returns"] = returns
     elif range_noise or dropout or seed:
-        if "measurement" in options:
+        if measurement is not None:
             raise ValueError(
                 "measurement: give either it or range_noise, dropout and seed"
             )
-        options["measurement"] = MeasurementModel(
+        measurement = MeasurementModel(
             range_noise=range_noise,
             dropout=dropout,
             seed=seed,
             sensor_name=name,
         )
-    for option in ("measurement", "returns"):
-        model = options.get(option)
-        if model is not None and not model.sensor_name:
-            options[option] = replace(model, sensor_name=name)
+    measurement = _named(measurement or IDEAL, name)
+    model = None if isinstance(returns, str) else _named(returns, name)
     if isinstance(body, RigidBody):
         plant = body.GetParentPlant()
         source = plant.get_source_id()
@@ -190,13 +205,14 @@ def add_lidar(
         frame_id = plant.GetBodyFrameIdOrThrow(body.index())
         if unseen is None:
             unseen = _welded_to(body)
-        options.setdefault("anchored_frames", anchored_frames(plant))
+        if anchored_frames is None:
+            anchored_frames = perception_geometry.anchored_frames(plant)
         if motion_distortion:
             frames = map(
                 plant.GetBodyFrameIdIfExists,
                 map(BodyIndex, range(plant.num_bodies())),
             )
-            options["moving_bodies"] = {
+            moving_bodies = {
                 frame: k for k, frame in enumerate(frames) if frame is not None
             }
     else:
@@ -208,16 +224,29 @@ def add_lidar(
             )
     if unseen is not None:
         bodies = [p.body() if isinstance(p, Frame) else p for p in unseen]
-        options["unseen"] = [
+        unseen = [
             place.GetParentPlant().GetBodyFrameIdOrThrow(place.index())
             if isinstance(place, RigidBody)
             else place
             for place in bodies
         ]
     lidar = builder.AddNamedSystem(
-        name, Lidar(frame_id, X_PS, pattern, **options)
+        name,
+        Lidar(
+            frame_id,
+            X_PS,
+            pattern,
+            measurement=measurement,
+            returns=model,
+            moving_bodies=moving_bodies,
+            role=role,
+            unseen=unseen,
+            structures=structures,
+            anchored_frames=anchored_frames or (),
+            num_threads=num_threads,
+            causal=causal,
+        ),
     )
-    role = options.get("role", Role.kPerception)
     if scene_graph.model_inspector().NumGeometriesWithRole(role) == 0:
         warnings.warn(
             f"the SceneGraph holds no geometry of {role}: so far the LiDAR "
@@ -243,7 +272,13 @@ def add_described_lidar(
     seed: int = 0,
     weather: WeatherConfig = _CLEAR,
     period: float | None = None,
-    **options: Any,
+    unseen: Collection[RigidBody] | None = None,
+    motion_distortion: bool = False,
+    structures: Structures | None = None,
+    anchored_frames: Collection[FrameId] | None = None,
+    moving_bodies: Mapping[FrameId, int] | None = None,
+    num_threads: int = 1,
+    causal: bool = False,
 ) -> Lidar:
     """Adds a LiDAR to a diagram, given its description in a scenario.
 
@@ -259,7 +294,14 @@ def add_described_lidar(
         weather: weather of calibrated returns.
         period: duration of a turn [s]; by default it follows from the rate in
             the description.
-        options: further arguments of `add_lidar`.
+        unseen: see `add_lidar`, as for all further arguments.
+        motion_distortion: whether the bodies of its plant keep moving during a
+            turn; a drive connects a `Sweep` instead.
+        structures: table of the structures.
+        anchored_frames: frames that never move.
+        moving_bodies: frames that move during a turn.
+        num_threads: number of threads that share its rays.
+        causal: whether a scan is the turn that ends at the time of the output.
     """
     return add_lidar(
         builder,
@@ -277,7 +319,13 @@ def add_described_lidar(
             sensor_name=name,
         ),
         returns=make_returns(config, weather, name, seed) or "ideal",
-        **options,
+        unseen=unseen,
+        motion_distortion=motion_distortion,
+        structures=structures,
+        anchored_frames=anchored_frames,
+        moving_bodies=moving_bodies,
+        num_threads=num_threads,
+        causal=causal,
     )
 
 
@@ -304,12 +352,16 @@ def add_lidar_view(
         color: colour of the points.
         point_size: size of a point [m].
 
+    Raises:
+        ValueError: the LiDAR has a view already.
+
     Example:
         from cns_drake import add_lidar_view
 
         add_lidar_view(builder, lidar, meshcat)
     """
     name = lidar.get_name()
+    check_free(builder, f"{name}_view")
     view = builder.AddNamedSystem(
         f"{name}_view",
         geometry.MeshcatPointCloudVisualizer(
@@ -328,8 +380,16 @@ def connect_lidar(
     """Connects a LiDAR's inputs to a SceneGraph."""
     query = scene_graph.get_query_output_port()
     builder.Connect(query, lidar.query_object_input_port())
-    listed = geometry_port(scene_graph, lidar.role)
+    listed = perception_geometry.geometry_port(scene_graph, lidar.role)
     builder.Connect(listed, lidar.GetInputPort("geometry"))
+
+
+_Model = TypeVar("_Model", MeasurementModel, "CalibratedReturns")
+
+
+def _named(model: _Model, name: str) -> _Model:
+    """Returns a model with the name of the LiDAR, unless it has a name."""
+    return model if model.sensor_name else replace(model, sensor_name=name)
 
 
 def _welded_to(body: RigidBody) -> list[RigidBody]:

@@ -8,11 +8,12 @@ from typing import TYPE_CHECKING, Annotated, Any, Literal
 from pydantic import Field, PlainSerializer, field_validator, model_validator
 
 from cns_drake.base.drives.point_layouts import LayoutName
-from cns_drake.base.errors import did_you_mean, validated
+from cns_drake.base.errors import validated
 from cns_drake.sensors.lidar.measurement import Echoes
 from cns_drake.sensors.lidar.presets import (
     LIDAR_PRESETS,
     UnitPattern,
+    check_preset,
     make_beam_pattern,
 )
 from cns_drake.sensors.sensor_config import (
@@ -105,12 +106,7 @@ class LidarSection(Mount):
     @field_validator("preset")
     @classmethod
     def _check_known(cls, preset: str) -> str:
-        if preset not in LIDAR_PRESETS:
-            known = ", ".join(LIDAR_PRESETS)
-            raise ValueError(
-                f"unknown preset '{preset}'; known: {known}"
-                f"{did_you_mean(preset, LIDAR_PRESETS)}"
-            )
+        check_preset(preset)
         return preset
 
     @model_validator(mode="after")

@@ -73,6 +73,19 @@ LIDAR_PRESETS: dict[str, LidarPreset] = {
 }
 
 
+def check_preset(preset: str) -> None:
+    """Checks that there is a preset of this name.
+
+    Raises:
+        ValueError: there is none; the message lists all.
+    """
+    if preset not in LIDAR_PRESETS:
+        raise ValueError(
+            f"unknown preset '{preset}'; known: {', '.join(LIDAR_PRESETS)}"
+            f"{did_you_mean(preset, LIDAR_PRESETS)}"
+        )
+
+
 def make_beam_pattern(
     preset: str,
     period: float | None = None,
@@ -95,20 +108,15 @@ def make_beam_pattern(
             data sheet.
 
     Raises:
-        KeyError: there is no preset of that name.
-        ValueError: `num_columns` is given for a preset without columns, or a
-            value is impossible.
+        ValueError: there is no preset of that name, `num_columns` is given for
+            a preset without columns, or a value is impossible.
 
     Example:
         from cns_drake import LIDAR_PRESETS, make_beam_pattern
 
         patterns = [make_beam_pattern(name, 0.1) for name in LIDAR_PRESETS]
     """
-    if preset not in LIDAR_PRESETS:
-        raise KeyError(
-            f"no LiDAR preset '{preset}'; there are: {', '.join(LIDAR_PRESETS)}"
-            f"{did_you_mean(preset, LIDAR_PRESETS)}"
-        )
+    check_preset(preset)
     base = LIDAR_PRESETS[preset].pattern
     if num_columns is not None and base.num_columns is None:
         raise ValueError(f"the preset '{preset}' has no columns")

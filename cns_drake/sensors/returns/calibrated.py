@@ -15,6 +15,7 @@ from cns_drake.scene.perception_geometry import PerceptionGeometry
 from cns_drake.scene.structure_table import StructureTable
 from cns_drake.sensors.lidar.measurement import Echoes
 from cns_drake.sensors.lidar.patterns import BeamPattern, Beams
+from cns_drake.sensors.lidar.presets import check_preset
 from cns_drake.sensors.returns.echoes import Receiver, Reported, report_echoes
 from cns_drake.sensors.returns.footprint import find_sides, meet_sides
 from cns_drake.sensors.returns.light import BeamHits, Shots, join, texture
@@ -81,9 +82,9 @@ class CalibratedReturns:
             unit_seed: seed of the errors that are constant for a laser.
 
         Raises:
-            KeyError: there is no such preset.
-            ValueError: there is no such choice of echoes.
+            ValueError: there is no such preset, or no such choice of echoes.
         """
+        check_preset(preset)
         return cls(
             UNIT_SHEETS[preset],
             Echoes(echoes),

@@ -87,9 +87,7 @@ def test_elevations_of_data_sheets(preset, top, bottom, finest):
 
 
 def test_no_preset_of_that_name():
-    with pytest.raises(
-        KeyError, match="no LiDAR preset 'os1-65'; there are: cns"
-    ):
+    with pytest.raises(ValueError, match="unknown preset 'os1-65'; known: cns"):
         make_beam_pattern("os1-65")
     with pytest.raises(ValueError, match="'avia' has no columns"):
         make_beam_pattern("avia", num_columns=100)

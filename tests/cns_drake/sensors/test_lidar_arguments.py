@@ -67,7 +67,7 @@ class Site:
         ({"body": 3}, TypeError, "body: 3 is not a RigidBody"),
         ({"pose": [0, 0, 1]}, TypeError, "X_PS: .* is not a RigidTransform"),
         ({"pattern": 16}, TypeError, "pattern: 16 is neither a BeamPattern"),
-        ({"pattern": "vlp-61"}, KeyError, "no LiDAR preset 'vlp-61'"),
+        ({"pattern": "vlp-61"}, ValueError, "unknown preset 'vlp-61'"),
         (
             {"range_noise": -0.1},
             ValueError,

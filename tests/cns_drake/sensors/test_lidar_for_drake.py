@@ -17,7 +17,10 @@ from pydrake.geometry import (
 )
 from pydrake.math import RigidTransform, RollPitchYaw
 from pydrake.multibody.math import SpatialVelocity
-from pydrake.multibody.plant import AddMultibodyPlantSceneGraph
+from pydrake.multibody.plant import (
+    AddMultibodyPlantSceneGraph,
+    MultibodyPlant,
+)
 from pydrake.multibody.tree import FixedOffsetFrame, SpatialInertia
 from pydrake.systems.framework import DiagramBuilder
 import pytest
@@ -527,3 +530,68 @@ def test_lidars_of_many_diagrams_share_their_beams():
             assert own < 200_000
     gc.collect()
     assert len(turns) == 2
+
+
+def ahead_at(time=0.0):
+    """One beam along x that is fired at a time of the turn."""
+    return DirectionPattern(
+        [[1, 0, 0]], times=[time], min_range=0.1, max_range=99, period=0.1
+    )
+
+
+def test_a_frame_id_stands_for_its_own_geometry_only():
+    """As carrier and in `unseen`; a body stands for what is welded to it."""
+    for carrier, unseen, expected in (
+        ("body", None, 7.5),
+        ("frame", None, 3.5),
+        ("body", "frame", 3.5),
+        ("body", "body", 3.5),
+        ("body", "all", 7.5),
+    ):
+        field = Field()
+        field.show(field.car, Sphere(0.5), RigidTransform([2.0, 0.0, 0.0]))
+        mast = field.add("mast")
+        field.show(mast, Sphere(0.5), RigidTransform([4.0, 0.0, 0.0]))
+        field.plant.WeldFrames(field.car.body_frame(), mast.body_frame())
+        wall = RigidTransform([8.0, 0.0, 0.0])
+        field.show(field.plant.world_body(), Box(1, 9, 9), wall)
+        ids = [
+            field.plant.GetBodyFrameIdOrThrow(body.index())
+            for body in (field.car, mast)
+        ]
+        options = {
+            None: {},
+            "frame": {"unseen": ids[:1]},
+            "body": {"unseen": [field.car]},
+            "all": {"unseen": [ids[0], mast]},
+        }[unseen]
+        if carrier == "frame":
+            field.car = ids[0]
+        field.finish(ahead_at(), RigidTransform(), **options)
+        assert field.eval()["x"] == pytest.approx([expected], abs=1e-5)
+
+
+def test_bodies_of_another_plant_stay_during_a_turn():
+    """Those of the LiDAR's own plant move."""
+    for is_own, expected in ((True, 8.5), (False, 9.0)):
+        field = Field()
+        other = field.plant
+        if not is_own:
+            other = field.builder.AddSystem(MultibodyPlant(0.0))
+            other.RegisterAsSourceForSceneGraph(field.scene_graph)
+            field.builder.Connect(
+                other.get_geometry_pose_output_port(),
+                field.scene_graph.get_source_pose_port(other.get_source_id()),
+            )
+        body = other.AddRigidBody("other", INERTIA)
+        X_BG = RigidTransform([10.0, 0.0, 0.0])
+        other.RegisterVisualGeometry(body, X_BG, Box(2, 2, 2), "box", GREY)
+        if not is_own:
+            other.Finalize()
+        field.finish(ahead_at(0.05), RigidTransform(), motion_distortion=True)
+        other.SetFreeBodySpatialVelocity(
+            context=other.GetMyMutableContextFromRoot(field.context),
+            body=body,
+            V_JpJc=SpatialVelocity([0, 0, 0], [-10.0, 0.0, 0.0]),
+        )
+        assert field.eval()["x"] == pytest.approx([expected], abs=1e-5)

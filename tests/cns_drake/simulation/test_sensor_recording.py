@@ -4,6 +4,7 @@ import numpy as np
 from pydrake.geometry import (
     Box,
     ClippingRange,
+    ColorRenderCamera,
     DepthRange,
     DepthRenderCamera,
     MakeRenderEngineVtk,
@@ -27,6 +28,7 @@ from scipy.spatial.transform import Rotation
 
 from cns_drake.sensors.imu.imu import add_imu
 from cns_drake.sensors.lidar.adding import add_lidar, add_lidar_view
+from cns_drake.sensors.lidar.lidar import Lidar
 from cns_drake.sensors.lidar.presets import make_beam_pattern
 from cns_drake.sensors.odometry.odometry import add_odometry
 from cns_drake.simulation.sensor_recording import add_mcap_recorder
@@ -268,10 +270,125 @@ def test_images_of_drakes_camera(tmp_path):
     depth = found["/eye/depth"][-1].data.view(np.float32).reshape(30, 40)
     assert depth[15, 20] == pytest.approx(7.5, abs=1e-3)
     info = found["/eye/camera_info"][-1]
+    half = [[0.0, 0.0, 0.5], [0.0, 0.0, 0.5], [0.0, 0.0, 0.0]]
     np.testing.assert_array_equal(
-        info.k.reshape(3, 3), intrinsics.intrinsic_matrix()
+        info.k.reshape(3, 3), intrinsics.intrinsic_matrix() - half
     )
     (pose,) = found["/tf"][-1].transforms
     v = pose.transform.translation
     expected = (X_WB @ X_BC).translation()
     np.testing.assert_allclose([v.x, v.y, v.z], expected, atol=1e-12)
+
+
+def add_camera(made, color, depth):
+    """Adds an RgbdSensor on the world, of (info, X_BC) for colour and depth."""
+    try:
+        renderer = MakeRenderEngineVtk(RenderEngineVtkParams())
+    except RuntimeError as error:
+        pytest.skip(f"no rendering here: {error}")
+    made.scene_graph.AddRenderer("vtk", renderer)
+    clipping = ClippingRange(0.05, 50.0)
+    cores = [
+        RenderCameraCore("vtk", info, clipping, X) for info, X in (color, depth)
+    ]
+    camera = made.builder.AddSystem(
+        RgbdSensor(
+            made.scene_graph.world_frame_id(),
+            X_WB,
+            ColorRenderCamera(cores[0]),
+            DepthRenderCamera(cores[1], DepthRange(0.1, 40.0)),
+        )
+    )
+    made.builder.Connect(
+        made.scene_graph.get_query_output_port(),
+        camera.query_object_input_port(),
+    )
+    return camera
+
+
+# z looks along x of the world.
+X_WB = RigidTransform(
+    RollPitchYaw(-np.pi / 2, 0.0, -np.pi / 2), [1.0, 0.0, 0.0]
+)
+INFO = CameraInfo(40, 30, 35.0, 33.0, 18.0, 16.0)
+X_BC = RigidTransform(RollPitchYaw(0.0, 0.0, 0.2), [0.1, 0.0, 0.0])
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(
+    "depth",
+    [
+        (CameraInfo(24, 20, 21.0, 22.0, 11.0, 9.0), X_BC),
+        (CameraInfo(40, 30, 35.0, 33.0, 18.0, 15.0), X_BC),
+        (INFO, RigidTransform([0.0, 0.3, 0.0])),
+    ],
+)
+def test_depth_images_of_a_camera_of_their_own(tmp_path, depth):
+    """Another size, another K or another pose than that of the colours."""
+    made = Carousel()
+    camera = add_camera(made, (INFO, X_BC), depth)
+    bag = add_mcap_recorder(
+        made.builder,
+        tmp_path / "two",
+        period=PERIOD,
+        rates={"eye": 20.0},
+        cameras={"eye": camera},
+    )
+    made.simulate(2, bag)
+    found = read(tmp_path / "two")
+    for topic, frame, (info, X), kinds in (
+        ("/eye/camera_info", "eye", (INFO, X_BC), ("color", "label")),
+        ("/eye/depth/camera_info", "eye_depth", depth, ("depth",)),
+    ):
+        message = found[topic][-1]
+        assert (message.width, message.height) == (info.width(), info.height())
+        K = info.intrinsic_matrix()
+        K[:2, 2] -= 0.5
+        np.testing.assert_array_equal(message.k.reshape(3, 3), K)
+        assert message.header.frame_id == frame
+        for kind in kinds:
+            images = found[f"/eye/{kind}"]
+            assert len(images) == len(found[topic]) == 3
+            assert images[-1].header.frame_id == frame
+            size = images[-1].width, images[-1].height
+            assert size == (info.width(), info.height())
+        (pose,) = (
+            one.transform
+            for one in found["/tf"][-1].transforms
+            if one.child_frame_id == frame
+        )
+        v, q = pose.translation, pose.rotation
+        X_WC = X_WB @ X
+        np.testing.assert_allclose([v.x, v.y, v.z], X_WC.translation())
+        R = Rotation.from_quat([q.x, q.y, q.z, q.w]).as_matrix()
+        np.testing.assert_allclose(R, X_WC.rotation().matrix(), atol=1e-12)
+
+
+def test_names_in_a_recording_are_unique_and_fit_ros(tmp_path):
+    made = Carousel()
+    lidars = {
+        name: made.builder.AddNamedSystem(
+            name, Lidar(made.scene_graph.world_frame_id(), X_PL, PATTERN)
+        )
+        for name in ("a/b", "tf_static", "x", "eye_depth")
+    }
+    camera = add_camera(made, (INFO, X_BC), (INFO, X_PL))
+    for names, cameras, fault in (
+        (["a/b"], {}, "'a/b' cannot be a part"),
+        (["tf_static"], {}, "'tf_static' is the name of another"),
+        (["x"], {"x": camera}, "'x' is the name of another"),
+        (["x"], {"imu": camera}, "'imu' is the name of another"),
+        ([], {"2nd": camera}, "'2nd' cannot be a part"),
+        (["eye_depth"], {"eye": camera}, "'eye_depth' is the name of another"),
+    ):
+        with pytest.raises(ValueError, match=fault):
+            add_mcap_recorder(
+                made.builder,
+                tmp_path / "bad",
+                period=PERIOD,
+                lidars=[lidars[name] for name in names],
+                cameras=cameras,
+            )
+    add_mcap_recorder(made.builder, tmp_path / "one", lidars=[lidars["x"]])
+    with pytest.raises(ValueError, match="has a system 'mcap_recorder'"):
+        add_mcap_recorder(made.builder, tmp_path / "two", lidars=[lidars["x"]])

@@ -1,0 +1,166 @@
+"""Names of sensors are checked when they are added, in each way of adding."""
+
+import numpy as np
+from pydrake.geometry import Box, Meshcat
+from pydrake.lcm import DrakeLcm
+from pydrake.math import RigidTransform
+from pydrake.multibody.plant import AddMultibodyPlantSceneGraph
+from pydrake.systems.framework import DiagramBuilder
+import pytest
+
+from cns_drake.base.drives.sensor_names import RESERVED_NAMES
+from cns_drake.recording.bag_writer import BagWriter
+from cns_drake.recording.mcap_recorder import McapRecorder, RecordedSensor
+from cns_drake.recording.recorded_topics import points_topic, recording_topics
+from cns_drake.sensors.drake_configs import (
+    ApplyImuConfig,
+    ApplyLidarConfig,
+    ApplyOdometryConfig,
+    ImuConfig,
+    LidarConfig,
+    OdometryConfig,
+)
+from cns_drake.sensors.imu.imu import add_imu
+from cns_drake.sensors.imu.noise import ImuNoise
+from cns_drake.sensors.lidar.adding import add_lidar, add_lidar_view
+from cns_drake.sensors.odometry.odometry import add_odometry
+
+X_PS = RigidTransform([0.0, 0.0, 1.0])
+BAD = (
+    "",
+    "a/b",
+    "a b",
+    "A::b",
+    "..",
+    "/",
+    "ünï",
+    "9a",
+    "a__b",
+    "a-b",
+    "a\n",
+    3,
+)
+GOOD = ("roof", "Roof_2", "_x", "a1", "x_")
+
+
+class Site:
+    def __init__(self):
+        self.builder = DiagramBuilder()
+        self.plant, self.scene_graph = AddMultibodyPlantSceneGraph(
+            self.builder, 0.0
+        )
+        self.plant.RegisterVisualGeometry(
+            self.plant.world_body(), X_PS, Box(9, 9, 9), "b", np.ones(4)
+        )
+        self.plant.Finalize()
+        self.lcm = DrakeLcm("memq://")
+
+    def lidar(self, name):
+        body = self.plant.world_body()
+        return add_lidar(
+            self.builder, self.scene_graph, body, X_PS, "vlp-16", name=name
+        )
+
+    def imu(self, name):
+        noise = ImuNoise(gyroscope_noise_density=0.1)
+        body = self.plant.world_body()
+        add_imu(self.builder, body, X_PS, name=name, rate=9, noise=noise)
+
+    def odometry(self, name):
+        add_odometry(self.builder, self.plant.world_body(), name=name)
+
+    def lidar_config(self, name):
+        ApplyLidarConfig(LidarConfig(name=name), self.builder, lcm=self.lcm)
+
+    def imu_config(self, name):
+        ApplyImuConfig(ImuConfig(name=name), self.builder, lcm=self.lcm)
+
+    def odometry_config(self, name):
+        config = OdometryConfig(name=name)
+        ApplyOdometryConfig(config, self.builder, lcm=self.lcm)
+
+
+WAYS = [name for name in vars(Site) if not name.startswith("_")]
+
+
+@pytest.mark.parametrize("way", WAYS)
+def test_a_name_is_a_part_of_a_topic(way):
+    for name in BAD:
+        site = Site()
+        with pytest.raises((ValueError, TypeError)):
+            getattr(site, way)(name)
+        assert len(site.builder.GetSystems()) == 2
+    site = Site()
+    for name in GOOD:
+        getattr(site, way)(name)
+    site.builder.Build()
+
+
+@pytest.mark.parametrize("way", ["lidar", "lidar_config"])
+def test_a_lidar_has_a_frame_of_its_own(way):
+    for name in RESERVED_NAMES:
+        with pytest.raises(
+            ValueError, match=f"'{name}' is the name of another"
+        ):
+            getattr(Site(), way)(name)
+
+
+@pytest.mark.parametrize("second", WAYS)
+@pytest.mark.parametrize("first", WAYS)
+def test_a_diagram_with_two_sensors_can_be_built(first, second):
+    """Two of a name and a kind are refused, and two that publish on LCM."""
+    site = Site()
+    getattr(site, first)("one")
+    known = [system.get_name() for system in site.builder.GetSystems()]
+    is_config = [way.endswith("config") for way in (first, second)]
+    if first.split("_")[0] == second.split("_")[0] or all(is_config):
+        with pytest.raises(ValueError, match="the diagram has a system 'one"):
+            getattr(site, second)("one")
+        names = [system.get_name() for system in site.builder.GetSystems()]
+        assert names == known
+    getattr(site, second)("two")
+    site.builder.Build()
+
+
+def test_a_lidar_has_one_view():
+    site, meshcat = Site(), Meshcat(port=7198)
+    lidar = site.lidar("roof")
+    add_lidar_view(site.builder, lidar, meshcat)
+    with pytest.raises(ValueError, match="has a system 'roof_view'"):
+        add_lidar_view(site.builder, lidar, meshcat)
+    site.builder.Build()
+
+
+def test_names_of_a_recorder_of_ones_own(tmp_path):
+    bag = BagWriter(
+        tmp_path / "bag",
+        recording_topics(["a"]),
+        start_ns=0,
+        attachments={},
+        scenario={},
+    )
+    further = RecordedSensor(points_topic("a"), X_PS, lambda *values: None)
+    for lidars, sensors, fault in (
+        (["a/b"], {}, "'a/b' cannot be a part"),
+        (["base_link"], {}, "'base_link' is the name of another"),
+        (["a"], {"a": further}, "'a' is the name of another"),
+        (["a"], {"imu": further}, "'imu' is the name of another"),
+        (["a"], {"radar": further}, "/a/points: two sensors have this topic"),
+        (
+            ["b"],
+            {"b_scan": further},
+            "two sensors would have the port 'b_scan'",
+        ),
+        (
+            ["b"],
+            {"c": further._replace(frame="map")},
+            "'map' is the name of another",
+        ),
+    ):
+        with pytest.raises(ValueError, match=fault):
+            McapRecorder(
+                bag,
+                X_BSs=dict.fromkeys(lidars, X_PS),
+                further=sensors,
+                period=0.1,
+            )
