@@ -11,7 +11,6 @@ import sys
 import time
 from types import ModuleType
 
-from _pytest.runner import runtestprotocol
 import pytest
 
 from cns_drake.base.process import look_seldom, num_cores
@@ -39,13 +38,15 @@ _LONGEST = (
 )
 
 
-# A quick test takes a second of processor time at most, without its fixtures.
-# Processors differ by a factor of two, so that only twice the time fails [s].
+# Processor time of a quick test without its fixtures, at most [s]. Processors
+# differ, and the first test that needs a library loads it. Tests that take
+# longer are named at the end of a run; none of them fails.
 _BUDGET = 2.0
 # What quick tests do not do: start processes, and read a stage of a city.
 _STARTS = ("subprocess.Popen", "os.fork", "os.posix_spawn")
 _WORLDS = os.path.join(os.path.dirname(os.path.dirname(__file__)), "worlds", "")
-_TAKEN = pytest.StashKey[float]()
+# A property of each test: its processor time [s].
+_TAKEN = "processor_time"
 _seen: list[str] = []
 
 
@@ -63,45 +64,31 @@ def _look(event, arguments):
 sys.addaudithook(_look)
 
 
+@pytest.hookimpl(tryfirst=True)
+def pytest_runtest_setup():
+    _seen.clear()
+
+
 @pytest.hookimpl(wrapper=True)
 def pytest_runtest_call(item):
+    """Measures a test; fails a quick one that does what only slow ones may."""
     started = time.process_time()
     result = yield
-    item.stash[_TAKEN] = time.process_time() - started
+    item.user_properties.append((_TAKEN, time.process_time() - started))
+    if _seen and not item.get_closest_marker("slow"):
+        pytest.fail(f"{item.nodeid} {_seen[0]}; mark it slow", pytrace=False)
     return result
 
 
-@pytest.hookimpl(tryfirst=True)
-def pytest_runtest_protocol(item, nextitem):
-    """Fails a quick test that does what only slow ones may.
-
-    One that takes long runs again, and the second run counts: the first test
-    that needs a library loads it, and the first that needs a compiled loop
-    compiles it.
-    """
-    if item.get_closest_marker("slow"):
-        return None
-    where = {"nodeid": item.nodeid, "location": item.location}
-    item.ihook.pytest_runtest_logstart(**where)
-    _seen.clear()
-    for _ in range(2):
-        item.stash[_TAKEN] = 0.0
-        reports = runtestprotocol(item, nextitem=nextitem, log=False)
-        is_long = item.stash[_TAKEN] > _BUDGET
-        has_passed = all(report.passed for report in reports)
-        if not (is_long and has_passed):
-            break
-    if has_passed and (is_long or _seen):
-        taken = f"takes {item.stash[_TAKEN]:.1f} s of processor time"
-        fault = _seen[0] if _seen else taken
-        reports[1].outcome = "failed"
-        reports[
-            1
-        ].longrepr = f"{item.nodeid} {fault}; mark it slow, or make it quicker"
-    for report in reports:
-        item.ihook.pytest_runtest_logreport(report=report)
-    item.ihook.pytest_runtest_logfinish(**where)
-    return True
+def pytest_terminal_summary(terminalreporter):
+    """Names quick tests that took long."""
+    for report in terminalreporter.getreports("passed"):
+        taken = dict(report.user_properties).get(_TAKEN, 0.0)
+        if "unit" in report.keywords and taken > _BUDGET:
+            terminalreporter.write_line(
+                f"{report.nodeid} took {taken:.1f} s of processor time:"
+                " mark it slow, or make it quicker"
+            )
 
 
 def pytest_xdist_auto_num_workers(config):
