@@ -4,6 +4,9 @@ A command takes seconds to import its modules, and often little else. In a
 folder like that of a virtual environment, `cns-drake` and `cns-eval` are small
 clients, which pass their words, folder, environment and standard streams to a
 server. The server forks, and the fork runs the program.
+
+The program is that of the checkout. If `INSTALLED_VARIABLE` names the Python of
+another environment, it is the one that is installed there.
 """
 
 from __future__ import annotations
@@ -24,6 +27,7 @@ import tempfile
 
 from _pytest.monkeypatch import MonkeyPatch
 
+import cns_drake
 from cns_drake.base.compiled import start_compiler
 from cns_drake.base.jobs import processes
 from cns_drake.base.jobs.fingerprint import code_digest
@@ -37,6 +41,10 @@ from helpers.tiny_drive import tiny_scenario
 # Environment variable with the methods that a study compares; its figures are
 # not rendered, either.
 METHODS_VARIABLE = "CNS_DRAKE_TEST_METHODS"
+# Environment variable with the Python of an environment in which the program is
+# installed from its wheel, as `.ci/run` does. It must find the packages that
+# tests need, too.
+INSTALLED_VARIABLE = "CNS_DRAKE_TEST_INSTALLED"
 
 _CLIENT = """#!{python} -IS
 import json, os, socket, sys
@@ -52,6 +60,7 @@ _PROGRAMS = {
     "cns-drake": "cns_drake.__main__",
     "cns-eval": "evaluation.command_line.cli",
 }
+_TESTS = Path(__file__).parents[1]
 _LONGEST = 1 << 17
 # Those of the processes of jobs; a fork cannot change them any more.
 _SETTINGS = {**ALLOCATION, "OPENBLAS_NUM_THREADS": "1"}
@@ -60,7 +69,8 @@ _SETTINGS = {**ALLOCATION, "OPENBLAS_NUM_THREADS": "1"}
 class CommandServer:
     """A server, and the folder of its clients.
 
-    Apart from the clients, the folder is the environment of the tests.
+    Apart from the clients, the folder is the environment of the tests, or the
+    one in which the program is installed.
     """
 
     def __init__(self, environment: Path):
@@ -68,11 +78,18 @@ class CommandServer:
         # The address of a socket must be short.
         self._folder = tempfile.TemporaryDirectory()
         address = f"{self._folder.name}/server"
-        _link_all(Path(sys.prefix), environment, but={"bin"})
+        installed = os.environ.get(INSTALLED_VARIABLE)
+        python = installed or sys.executable
+        path = [str(_TESTS)] if installed else sys.path
+        prefix = Path(python).parents[1]
+        _link_all(prefix, environment, but={"bin"})
         programs = environment / "bin"
-        _link_all(Path(sys.prefix) / "bin", programs, but=_PROGRAMS.keys())
+        _link_all(prefix / "bin", programs, but=_PROGRAMS.keys())
+        if installed:  # Programs of extras are those of the tests.
+            known = {path.name for path in programs.iterdir()}
+            _link_all(Path(sys.prefix) / "bin", programs, known | {*_PROGRAMS})
         for name in _PROGRAMS:
-            text = _CLIENT.format(python=sys.executable, address=address)
+            text = _CLIENT.format(python=python, address=address)
             (programs / name).write_text(text)
             (programs / name).chmod(0o755)
         listener = socket.socket(socket.AF_UNIX, socket.SOCK_SEQPACKET)
@@ -81,12 +98,14 @@ class CommandServer:
             listener.listen()
             number = listener.fileno()
             self._process = subprocess.Popen(
-                [sys.executable, "-m", __name__, str(number)],
+                [python, "-m", __name__, str(number)],
                 pass_fds=[number],
                 stdin=subprocess.PIPE,
                 env=os.environ
                 | _SETTINGS
-                | {"PYTHONPATH": os.pathsep.join(sys.path)},
+                | {"PYTHONPATH": os.pathsep.join(path)},
+                # Python looks for packages in the current folder first.
+                cwd=environment,
             )
 
     def close(self) -> None:
@@ -96,7 +115,7 @@ class CommandServer:
 
 
 def _link_all(source: Path, target: Path, but) -> None:
-    target.mkdir()
+    target.mkdir(exist_ok=True)
     for path in source.iterdir():
         if path.name not in but:
             (target / path.name).symlink_to(path)
@@ -104,6 +123,8 @@ def _link_all(source: Path, target: Path, but) -> None:
 
 def _serve(listener: socket.socket) -> None:
     """Forks for each client until stdin ends, without waiting for the forks."""
+    if INSTALLED_VARIABLE in os.environ:
+        assert _TESTS.parent not in Path(cns_drake.__file__).parents
     look_seldom()
     os.fsync = os.fstat  # As in the process of the tests.
     for package in map(importlib.import_module, ("cns_drake", "evaluation")):

@@ -39,6 +39,7 @@ RUNS = {
 BY_HAND = {
     "any_diagram.py",
     "evaluation_of_recordings.py",
+    "first_hour.py",
     "growth.py",
     "kills.py",
     "lidar_odometry.py",
