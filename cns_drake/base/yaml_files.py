@@ -1,7 +1,8 @@
 """Reading YAML strictly and within bounds."""
 
 from pathlib import Path
-from typing import Any
+import re
+from typing import Any, ClassVar
 
 import yaml
 
@@ -13,6 +14,53 @@ _DEEPEST = 50
 _MOST_NODES = 1_000_000
 _LONGEST_NUMBER = 100
 _WHOLE = "tag:yaml.org,2002:int"
+# Numbers to the base 8 in YAML 1.1, and names to most people.
+_OCTAL = re.compile(r"([-+]?)0+([0-7_]+)")
+_WORDS = {"yes": "true", "on": "true", "no": "false", "off": "false"}
+# What PyYAML takes for numbers, without those to the bases 2, 8 and 60 and
+# those with underscores.
+_RESOLVERS = (
+    (_WHOLE, r"[-+]?(0|[1-9][0-9]*|0x[0-9a-fA-F]+)", "-+0123456789"),
+    (
+        "tag:yaml.org,2002:float",
+        r"[-+]?([0-9]+\.[0-9]*|\.[0-9]+)([eE][-+][0-9]+)?"
+        r"|[-+]?\.(inf|Inf|INF)|\.(nan|NaN|NAN)",
+        "-+.0123456789",
+    ),
+    (
+        "tag:yaml.org,2002:bool",
+        "true|True|TRUE|false|False|FALSE",
+        "tTfF",
+    ),
+    ("tag:yaml.org,2002:null", "~|null|Null|NULL|", ["~", "n", "N", ""]),
+    ("tag:yaml.org,2002:merge", "<<", "<"),
+)
+
+
+class _PlainScalars:
+    """Reads scalars without quotes as they are written.
+
+    YAML 1.1, and so PyYAML, reads 010 as 8, 1:30 as 90, 1_0 as 10, and `on` and
+    `no` as true and false. Here such numbers and dates are texts, which a
+    field for numbers reads or refuses.
+    """
+
+    yaml_implicit_resolvers: ClassVar[dict] = {}
+
+
+for _tag, _form, _first in _RESOLVERS:
+    for _letter in _first:
+        _PlainScalars.yaml_implicit_resolvers.setdefault(_letter, []).append(
+            (_tag, re.compile(f"(?:{_form})\\Z"))
+        )
+
+
+class YamlLoader(_PlainScalars, yaml.CSafeLoader):
+    """Loads YAML as `parse_yaml` does."""
+
+
+class MarkedYamlLoader(_PlainScalars, yaml.SafeLoader):
+    """A slower loader, whose nodes know their places in the text."""
 
 
 def read_yaml(path: Path) -> Any:
@@ -27,12 +75,14 @@ def read_yaml(path: Path) -> Any:
         return parse_yaml(text)
 
 
-def parse_yaml(text: str | bytes, loader: type = yaml.CSafeLoader) -> Any:
+def parse_yaml(text: str | bytes, loader: type = YamlLoader) -> Any:
     """Returns the content of a YAML document.
 
     A document whose aliases expand to too many values is refused, since a few
     lines of aliases could fill the memory. A repeated key is an error; YAML
-    libraries would silently use the last value.
+    libraries would silently use the last value. Without quotes, yes, no, on and
+    off, and whole numbers that begin with a zero, are errors, too, since
+    libraries read them in different ways.
 
     Args:
         text: the document.
@@ -89,8 +139,10 @@ def _check(node: yaml.Node, sizes: dict[int, int]) -> int:
     """Returns the number of nodes of a tree when aliases are resolved."""
     line = node.start_mark.line + 1
     if isinstance(node, yaml.ScalarNode):
-        # Python cannot print what `0xff...` stands for.
         text = node.value
+        if not node.style:
+            _check_plain(text, line)
+        # Python cannot print what `0xff...` stands for.
         if (
             node.tag == _WHOLE
             and len(text) > _LONGEST_NUMBER
@@ -114,6 +166,17 @@ def _check(node: yaml.Node, sizes: dict[int, int]) -> int:
         )
     sizes[id(node)] = size
     return size
+
+
+def _check_plain(text: str, line: int) -> None:
+    """Refuses a scalar without quotes that is read in several ways."""
+    instead = _WORDS.get(text.lower())
+    if match := _OCTAL.fullmatch(text):
+        instead = f"{match[1]}{match[2].lstrip('0') or '0'}"
+    if instead is not None:
+        raise ValueError(
+            f'line {line}: {text}: quote it ("{text}"), or write {instead}'
+        )
 
 
 def _check_keys(node: yaml.MappingNode) -> None:

@@ -17,13 +17,12 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-import yaml
 
 from cns_drake.base import poses
 from cns_drake.base.drives.drive import IMU_DTYPE, SCENARIO, read_scenario
 from cns_drake.base.errors import InputError, value_errors
 from cns_drake.base.files import is_there, read_text
-from cns_drake.base.yaml_files import parse_yaml
+from cns_drake.base.yaml_files import YamlLoader, parse_yaml
 from evaluation.clouds.cloud_files import read_cloud
 from evaluation.drives.scan_files import FileDrive, list_stamped
 from evaluation.drives.text_tables import (
@@ -158,7 +157,7 @@ def _read_mount(path: Path | None) -> np.ndarray:
     return X_BS
 
 
-class _Loader(yaml.SafeLoader):
+class _Loader(YamlLoader):
     """Loads YAML and ignores custom tags, such as OpenCV's for matrices."""
 
 

@@ -23,8 +23,8 @@ from pathlib import Path
 
 import numpy as np
 from pydantic import BaseModel
-import yaml
 
+from cns_drake.base.yaml_files import parse_yaml
 from cns_drake.city.facades.assembly import Building, Rgb
 from cns_drake.city.geometry import Mesh, MeshShape, read_mesh, triple
 
@@ -97,7 +97,7 @@ class Landmark(Building):
 @cache
 def _read(folder: Path) -> _Model:
     text = (folder / "model.yaml").read_text(encoding="utf-8")
-    return _Model.model_validate(yaml.safe_load(text))
+    return _Model.model_validate(parse_yaml(text))
 
 
 def _stretched(mesh: Mesh, along: np.ndarray) -> Mesh:

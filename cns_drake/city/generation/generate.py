@@ -20,7 +20,7 @@ from cns_drake.base.map_folder import (
     STRUCTURES_NAME,
     stage_name,
 )
-from cns_drake.base.yaml_files import read_yaml
+from cns_drake.base.yaml_files import MarkedYamlLoader, read_yaml
 from cns_drake.city.generation.city_structures import City, make_city, meshes_of
 from cns_drake.city.geometry.structures import (
     MeshShape,
@@ -138,7 +138,7 @@ def _name_nodes(path: Path) -> list[yaml.ScalarNode]:
     """Returns the YAML scalars in a file of stages that name structures."""
     read_yaml(path)  # Errors in one line.
     # Only this slower loader records where in the text a node is.
-    root = yaml.compose(_text(path), yaml.SafeLoader)
+    root = yaml.compose(_text(path), MarkedYamlLoader)
     lists = [
         node
         for _, stage in _items(root, "stages")

@@ -18,6 +18,7 @@ import yaml
 
 from cns_drake.base.files import complete_part, write_part
 from cns_drake.base.map_folder import STAGES_NAME, MapFolder
+from cns_drake.base.yaml_files import parse_yaml
 from cns_drake.city.generation.city_structures import City, lay_out
 from cns_drake.city.geometry.polygons import polygons_of, snap
 from cns_drake.city.plan.city_plan import CityPlan, load_plan
@@ -120,7 +121,7 @@ def starter_plan(areas: Areas, seed: int) -> dict:
     """
     folder = resources.files("cns_drake.city.generation")
     text = folder.joinpath("characters.yaml").read_text(encoding="utf-8")
-    templates = yaml.safe_load(text)
+    templates = parse_yaml(text)
     parts = [areas.carriageway, areas.sidewalks, areas.medians]
     streets = unary_union(parts)
     x0, y0, x1, y1 = streets.bounds

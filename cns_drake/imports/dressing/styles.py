@@ -7,8 +7,8 @@ import re
 
 from matplotlib.colors import to_rgb
 import numpy as np
-import yaml
 
+from cns_drake.base.yaml_files import parse_yaml
 from cns_drake.city.facades.assembly import Rgb, pick
 from cns_drake.imports.openstreetmap.tags import count
 
@@ -21,9 +21,7 @@ _USE_KEYS = (
     "class",
     "building:part",
 )
-_LOOKS = yaml.safe_load(
-    Path(__file__).with_name("styles.yaml").read_text(encoding="utf-8")
-)
+_LOOKS = parse_yaml(Path(__file__).with_name("styles.yaml").read_bytes())
 # A house is old if it was built before the first year, and new if after the
 # second.
 _OLD, _NEW = 1930, 1965
