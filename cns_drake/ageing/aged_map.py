@@ -20,6 +20,7 @@ from cns_drake.base.csv_files import write_csv
 from cns_drake.base.errors import InputError
 from cns_drake.base.files import draft_folder, is_there, user_errors
 from cns_drake.base.map_folder import MapFolder, stage_name
+from cns_drake.base.progress import doing
 from cns_drake.base.yaml_files import read_yaml
 from cns_drake.city.generation.generate import stage_sdf
 from cns_drake.city.geometry import Mesh, Structure
@@ -72,7 +73,6 @@ def age_map(
     seed: int,
     rates: Mapping[str, float],
     output: Path,
-    progress: Callable[[str], None] = lambda line: None,
     finish: Callable[[Path, AgedMap], None] = lambda folder, aged: None,
 ) -> AgedMap:
     """Writes a map folder in which a city ages by given numbers of years.
@@ -85,7 +85,6 @@ def age_map(
         seed: the seed of all random draws, not negative.
         rates: event -> rate per year, see `cns_drake.ageing.rates.read_rates`.
         output: the folder to write, which must not exist yet.
-        progress: called with each message on the progress, a line of text.
         finish: called with the folder and the result when all else is done, to
             add files of your own. The folder gets its final name afterwards.
 
@@ -105,7 +104,7 @@ def age_map(
         raise InputError(
             f"{source}: no sequence_NN.yaml whose stage_NN.sdf is there"
         )
-    progress(f"reading {folder.name}")
+    doing(f"reading {folder.name}")
     ways = [plan_drive(load_scenario(path)) for path in drives]
     world = OldWorld(folder)
     if min(wanted) < 0 and world.today is None:
@@ -114,7 +113,7 @@ def age_map(
             f"column {YEAR_COLUMN} of {map_folder.STRUCTURES_NAME}, as the "
             "past needs"
         )
-    progress("looking for lots")
+    doing("looking for lots")
     city = City(world, rates, seed, shapely.union_all([*map(_swept, ways)]))
     # Today is the first stage.
     others = [year for year in wanted if year != 0]
@@ -132,9 +131,10 @@ def age_map(
                 events += passed if year == min(wanted) else []
                 writing.stage(stage, year, standing)
             while city.year < year:
+                doing("ageing the city", city.year, max(wanted), "years")
                 city.live()
             if year > 0:
-                progress(f"year {year}")
+                doing(f"writing year {year}")
                 writing.stage(stage, year, city.standing)
         events += city.events
         writing.table(city.new)

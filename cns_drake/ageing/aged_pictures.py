@@ -1,6 +1,5 @@
 """Pictures of an ageing city, from the air and from three streets."""
 
-from collections.abc import Callable
 from pathlib import Path
 
 from matplotlib.figure import Figure
@@ -9,6 +8,7 @@ import numpy as np
 
 from cns_drake.ageing.aged_map import AgedMap
 from cns_drake.base.map_folder import stage_name
+from cns_drake.base.progress import doing
 from cns_drake.pictures.stage_scene import StageScene, View
 
 PICTURES = "pictures"
@@ -67,11 +67,7 @@ def air_view(aged: AgedMap) -> View:
     return View(position=up, target=(x, y, z), fov_y=52)
 
 
-def draw_pictures(
-    folder: Path,
-    aged: AgedMap,
-    progress: Callable[[str], None] = lambda line: None,
-) -> None:
+def draw_pictures(folder: Path, aged: AgedMap) -> None:
     """Writes a picture of each view in each year, and one of all together.
 
     The files are `pictures/year_<year>_<view>.jpg` and `pictures/film.jpg` in
@@ -80,7 +76,6 @@ def draw_pictures(
     Args:
         folder: folder of the map.
         aged: stages and last drive of the map.
-        progress: called with each message on the progress, a line of text.
     """
     views = {"air": air_view(aged), **street_views(aged)}
     years = sorted(aged.years, key=lambda stage: aged.years[stage])
@@ -91,7 +86,7 @@ def draw_pictures(
     panels = figure.subplots(len(years), len(views), squeeze=False)
     for row, stage in zip(panels, years, strict=True):
         year = aged.years[stage]
-        progress(f"picturing year {year}")
+        doing(f"drawing year {year}")
         scene = None  # The scenes of two years would need twice the memory.
         scene = StageScene(folder / stage_name(stage))
         for axes, (name, view) in zip(row, views.items(), strict=True):

@@ -12,6 +12,7 @@ import numba
 
 from cns_drake.base.files import cache_folder
 from cns_drake.base.interrupts import uninterrupted
+from cns_drake.base.progress import doing
 
 _Function = TypeVar("_Function", bound=Callable)
 
@@ -60,6 +61,7 @@ def _for_all(
     """
 
     def compile_once(types: tuple) -> object:
+        doing(f"compiling {file.stem.rpartition('.')[2]}")
         with contextlib.ExitStack() as stack:
             # This lock excludes other processes but not other threads: numba
             # compiles one thread at a time already, and a second lock could

@@ -105,7 +105,7 @@ def list_drives(
 
     rows = []
     for folder in folders or shipped_maps().values():
-        of_map = drive_rows(folder, note)
+        of_map = drive_rows(folder)
         if folders and not of_map:
             raise InputError(
                 f"{folder}: no sequence_NN.yaml whose stage_NN.sdf is there"
@@ -240,8 +240,7 @@ def import_city(
         path,
         output,
         options,
-        note,
-        finish=lambda folder, sizes: write_table(folder, note, sizes),
+        finish=write_table,
     )
     for line in _shortcomings(report, output, options):
         note(f"{output}: {line}")
@@ -360,7 +359,7 @@ def city(
     if start:
         start_city(folder, seed or 0, note)
     files = generate_city(folder, note, repair_stages=repair_stages)
-    write_table(folder, note)
+    write_table(folder)
     note(f"{len(files)} files")
     _name_next(folder)
 
@@ -438,9 +437,8 @@ def age(
         seed,
         read_rates(rates, rate),
         output,
-        note,
         finish=lambda draft, one: (
-            draw_pictures(draft, one, note) if pictures else None
+            draw_pictures(draft, one) if pictures else None
         ),
     )
     rows = [

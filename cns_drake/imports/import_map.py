@@ -13,6 +13,7 @@ from cns_drake.base.errors import InputError
 from cns_drake.base.files import draft_folder
 from cns_drake.base.interrupts import uninterrupted
 from cns_drake.base.map_folder import LANES_NAME, MESH_FOLDER, check_new_map
+from cns_drake.base.progress import doing
 from cns_drake.imports import map_files
 from cns_drake.imports.cityjson import import_cityjson
 from cns_drake.imports.dressing.dressed_city import dress_city
@@ -29,7 +30,6 @@ from cns_drake.roads.lane_path import POINT_SPACING
 from cns_drake.roads.u_turn import TIGHTEST_RADIUS
 from cns_drake.roads.waypoints import load_waypoint_path, read_waypoints
 
-Progress = Callable[[str], None]
 # Gets the folder, and stage -> its numbers of structures and triangles.
 Finish = Callable[[Path, Mapping[str, tuple[int, int]]], None]
 
@@ -41,7 +41,6 @@ def import_city(
     source: Path,
     output: Path,
     options: ImportOptions,
-    progress: Progress = lambda line: None,
     finish: Finish = lambda folder, sizes: None,
 ) -> ImportReport:
     """Writes a map folder from a file of a real city.
@@ -51,7 +50,6 @@ def import_city(
             OpenDRIVE (.xodr).
         output: the folder to write, which must not exist yet.
         options: the options of the import.
-        progress: called with messages of one line on the progress.
         finish: called with the folder and the sizes of its stages (see
             `write_world`), to add files. By then the folder contains all other
             files and has its final name, but is still in a temporary place. If
@@ -66,15 +64,15 @@ def import_city(
     """
     _check(source, output, options)
     own = None if options.along is None else [drive_along(options.along)]
-    progress(f"reading {source}")
+    doing(f"reading {source}")
     if source.suffix == ".xodr":
-        return _import_roads(source, output, options, progress, finish)
+        return _import_roads(source, output, options, finish)
     city = _read(source, options)
     staged = stage_city(source, city, options)
     changes = None
     if options.grow is not None:
         staged, changes = grow(staged, options.grow, options.seed)
-    progress(f"{len(staged.kept)} structures; looking for streets")
+    doing("looking for streets")
     ground = ground_of(staged.kept, options.dressed)
     space = find_free_space(staged.kept, ground)
     side = options.drive_on or ("left" if city.keeps_left else "right")
@@ -93,12 +91,12 @@ def import_city(
         (draft / MESH_FOLDER).mkdir()
         map_files.draw_overview(draft / "from_above.png", bare, space, drives)
         if options.dressed:
-            progress("dressing buildings and streets")
+            doing("dressing buildings and streets")
             dressing = dress_city(staged, city, drives, ground, options.seed)
             staged = dressing.city
             names = {one.structure.name for one in bare}
             added = [o for o in staged.kept if o.structure.name not in names]
-        progress(f"writing {output}")
+        doing(f"writing {output}")
         lanes = lanes_of_streets(
             city.streets,
             city.street_places,
@@ -178,15 +176,14 @@ def _import_roads(
     source: Path,
     output: Path,
     options: ImportOptions,
-    progress: Progress,
     finish: Finish,
 ) -> ImportReport:
     with uninterrupted():  # This imports the whole city generator.
         from cns_drake.imports.opendrive.town import build_town, write_town
 
-    town = build_town(source, options.seed, progress, options.dressed)
+    town = build_town(source, options.seed, options.dressed)
     with draft_folder(output) as draft:
-        report, sizes = write_town(draft, source, town, progress)
+        report, sizes = write_town(draft, source, town)
         map_files.write_report(draft, report)
         finish(draft, sizes)
     return report

@@ -5,7 +5,7 @@ of drives. Each row of the table therefore contains a checksum of its input
 files. If a checksum changes, the figures of the row are computed again.
 """
 
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from dataclasses import astuple, dataclass, fields
 from pathlib import Path
 from typing import get_type_hints
@@ -15,6 +15,7 @@ from cns_drake.base.csv_files import read_records, write_csv
 from cns_drake.base.errors import InputError
 from cns_drake.base.files import is_there, user_errors
 from cns_drake.base.map_folder import MapFolder, drive_name
+from cns_drake.base.progress import doing
 from cns_drake.recording.schedule import frames_within
 from cns_drake.scenarios import scenario_files
 from cns_drake.scenarios.scenario import Scenario
@@ -50,14 +51,12 @@ class DriveRow:
 
 def drive_rows(
     folder: Path,
-    progress: Callable[[str], None] = lambda line: None,
     sizes: Mapping[str, tuple[int, int]] | None = None,
 ) -> list[DriveRow]:
     """Returns the table rows of those drives of a map whose stage exists.
 
     Args:
         folder: folder of the map.
-        progress: called with a line of text before slow steps.
         sizes: stage -> its numbers of structures and triangles, if known. For a
             stage without an entry, the world is loaded to count them, which
             takes long.
@@ -89,7 +88,7 @@ def drive_rows(
         checksum = f"{zlib.crc32(meshes, total):08x}"
         row = known.get(checksum)
         if row is None:
-            progress(f"measuring {drive_name(path)}")
+            doing(f"measuring {drive_name(path)}")
             size = (sizes or {}).get(str(scenario.stage))
             row = _measure(scenario, checksum, size)
         rows.append(row)
@@ -98,7 +97,6 @@ def drive_rows(
 
 def write_table(
     folder: Path,
-    progress: Callable[[str], None] = lambda line: None,
     sizes: Mapping[str, tuple[int, int]] | None = None,
 ) -> None:
     """Updates the table of drives in a map's folder.
@@ -109,7 +107,7 @@ def write_table(
     Raises:
         InputError: as `drive_rows`, or if the table cannot be written.
     """
-    rows = drive_rows(folder, progress, sizes)
+    rows = drive_rows(folder, sizes)
     if not rows:
         return
     names = [field.name for field in fields(DriveRow)]

@@ -21,6 +21,7 @@ from pydrake.multibody.tree import ModelInstanceIndex
 from cns_drake.base.errors import InputError, errors_at, value_errors
 from cns_drake.base.files import is_there, read_bytes
 from cns_drake.base.map_folder import MapFolder
+from cns_drake.base.progress import doing
 from cns_drake.scene.drake_errors import PARSER_ERRORS, collected_errors
 from cns_drake.scene.gazebo_worlds import (
     is_gazebo_world,
@@ -45,6 +46,7 @@ def _parse_models(parser: Parser, path: Path) -> list[ModelInstanceIndex]:
     """
     _check_file(path)
     check_model(path)
+    doing(f"parsing {path.name}")
     with _parse_faults(path):
         models = parser.AddModels(str(path))
     if not models:
@@ -104,6 +106,7 @@ def _parse_world(
         _parse_models(parser, path)
         return ()
     text, notes = simplify_world(path, root, model_paths)
+    doing(f"parsing {path.name}")
     with _parse_faults(path):
         parser.AddModelsFromString(text, "sdf")
     return notes

@@ -103,7 +103,6 @@ class ImportCity(MakeMap):
             self.source,
             self.folder,
             self.options,
-            reporter.note,
             lambda draft, _: finish(draft),
         )
 

@@ -81,11 +81,11 @@ def reproduce_maps(
         jobs = plan_recordings(
             [*drives, *controls], output, pages=pages if with_pages else {}
         )
-    waiting = {job.name for job in jobs}
     recordings = []
     for scenario in (*drives, *controls):
-        info = recording_info(scenario, output, scenario.name in waiting)
-        if quick and not is_recorded(scenario, output):
+        is_waiting = not is_recorded(scenario, output)
+        info = recording_info(scenario, output, is_waiting and not quick)
+        if quick and is_waiting:
             info = replace(info, made_by=DriveSimulation(scenario))
         recordings.append(info)
     # The order is that of `cns-eval report`.

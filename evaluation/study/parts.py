@@ -37,6 +37,7 @@ from cns_drake.base.files import (
     completing,
     file_name,
     make_folder,
+    user_errors,
 )
 from cns_drake.base.jobs.fingerprint import code_digest, fingerprint
 from cns_drake.base.jobs.step import Reporter, Step
@@ -47,6 +48,8 @@ _METHODS = "evaluation.methods"
 _OWN_MODULE = re.compile(r"evaluation(\.[a-z]\w*)+")
 _MAGIC = b"cns-eval part 2\n"
 _LEVEL = 1
+# Field of the header of a part whose value was removed.
+_SPENT = "spent"
 # Greatest size of a line of inputs [bytes].
 _MOST_INPUTS = 1 << 24
 # Limits of the uncompressed size: this multiple of the compressed bytes, or
@@ -305,6 +308,36 @@ class Part:
             **({"stored": True} if is_stored else {}),
         }
         make_folder(self.path.parent)
+        self._write(header, data)
+
+    def spend(self) -> None:
+        """Removes the value, and keeps what it was made of.
+
+        Results that were made from the value stay up to date. To have the value
+        made again, see `restore`.
+
+        Raises:
+            InputError: if there is no such file, or it is damaged.
+        """
+        with self._opened() as (header, _):
+            if _SPENT in header:
+                return
+        self._write({**header, "bytes": 0, _SPENT: True}, b"")
+
+    def restore(self) -> None:
+        """Removes the file if its value was removed, so that it is made again.
+
+        Raises:
+            InputError: if the file cannot be removed.
+        """
+        is_spent = False
+        with contextlib.suppress(InputError), self._opened() as (header, _):
+            is_spent = _SPENT in header
+        if is_spent:
+            with user_errors(self.path):
+                self.path.unlink()
+
+    def _write(self, header: Mapping, data: bytes) -> None:
         with (
             completing(self.path) as unfinished,
             open(unfinished, "wb") as stream,
@@ -336,6 +369,8 @@ class Part:
             InputError: if there is no such file, or it is damaged.
         """
         with self._opened() as (header, stream):
+            if _SPENT in header:
+                raise InputError(f"{self.path}: its value was removed")
             data = stream.read()
             if "stored" not in header:
                 data = zstandard.ZstdDecompressor().decompress(data)
@@ -376,7 +411,7 @@ class Part:
                 if size != header["bytes"]:
                     raise ValueError("cut off")
                 stream.seek(start)
-                if "stored" not in header:
+                if not {"stored", _SPENT} & header.keys():
                     claimed = zstandard.frame_content_size(stream.read(18))
                     if not 0 <= claimed <= _most(size):
                         raise ValueError(f"{size} bytes stand for {claimed}")
@@ -431,6 +466,10 @@ class MakePart(Step):
         inputs = self._inputs()
         self.part.write(inputs, self.function(reporter, *self.arguments))
 
+    def parts(self) -> Iterator[Part]:
+        """Yields the parts among the arguments of the function."""
+        return _parts_in(self.arguments)
+
     def _inputs(self) -> dict[str, object]:
         """Returns all inputs of the result, ready for JSON.
 
@@ -442,6 +481,14 @@ class MakePart(Step):
             "arguments": _identity(self.arguments),
             "code": code_digest(self.function.__module__),
         }
+
+
+def _parts_in(argument: object) -> Iterator[Part]:
+    if isinstance(argument, Part):
+        yield argument
+    elif isinstance(argument, tuple):
+        for one in argument:
+            yield from _parts_in(one)
 
 
 def _identity(argument: Any) -> object:
@@ -498,6 +545,17 @@ class SurveyFiles:
                 protocol, what `evaluation.study.surveys.described_key` returns.
         """
         return Part(self.folder / f"described_{file_name(key)}.data")
+
+    def spend(self) -> None:
+        """Removes all descriptions, once results were made from them.
+
+        They take three quarters of the space; see `Part.spend`.
+
+        Raises:
+            InputError: a file cannot be written.
+        """
+        for path in sorted(self.folder.glob("described_*.data")):
+            Part(path).spend()
 
 
 @dataclass(frozen=True)

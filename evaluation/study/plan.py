@@ -9,6 +9,7 @@ from pathlib import Path
 from cns_drake.base import terminal
 from cns_drake.base.files import make_folder
 from cns_drake.base.jobs.cluster import Cluster
+from cns_drake.base.jobs.processes import nothing_left
 from cns_drake.base.jobs.running import Job, run_jobs
 from cns_drake.base.jobs.step import Steps
 from cns_drake.base.version import __version__
@@ -80,7 +81,9 @@ class Study:
     def jobs(self) -> list[Job]:
         """Returns the jobs whose results `assemble` puts into a report.
 
-        For a city with one stage, only its route is drawn.
+        For a city with one stage, only its route is drawn. Descriptions that
+        an earlier report removed (see `assemble`) are made again by the jobs if
+        new results need them.
 
         Raises:
             InputError: see `cities`.
@@ -89,6 +92,7 @@ class Study:
         if self._costed_pairs:
             needs = tuple(job.name for job in jobs)
             jobs.append(self._cost_job(self._costed_pairs[0], needs))
+        _restore(jobs)
         return jobs
 
     @property
@@ -106,6 +110,9 @@ class Study:
         on_note: Callable[[str], None] = lambda text: None,
     ) -> Path:
         """Writes the report, once all jobs are done.
+
+        What it was made from stays, except descriptions of places, which take
+        most of the space. They are made again if new results need them.
 
         The report consists of these files:
 
@@ -156,7 +163,12 @@ class Study:
             report.illustrations.insert(0, shown)
         if self._costed_pairs:
             report.costs = self._files.part("costs", "costs").read()
-        return page.write_report(report, self.output)
+        written = page.write_report(report, self.output)
+        for city in self.cities:
+            for job in self._city_jobs(city):
+                if isinstance(job.step, Survey):
+                    job.step.files.spend()
+        return written
 
     def _result(self, pair: Pair, key: str) -> Part:
         """Returns the file with the result of a run, which `key` names."""
@@ -381,6 +393,35 @@ class Study:
         report.recognitions += compared
         report.drives.update(files.part("pages", city.name).read())
         report.illustrations += figures.illustrations(city, files.figures)
+
+
+def _restore(jobs: Sequence[Job]) -> None:
+    """Has removed descriptions made again that results to come need.
+
+    Args:
+        jobs: all jobs of a study, each behind those that it needs.
+    """
+    names = {job.name for job in jobs}
+    # Files that will be written, and folders of surveys of new recordings.
+    stale: set[Path] = set()
+    needed: list[Part] = []
+    for job in jobs:
+        if isinstance(job.step, Survey):
+            stale.update(part.path for part in job.step.missing())
+            if not names.issuperset(job.needs):
+                stale.add(job.step.files.folder)
+            continue
+        steps = job.step.steps if isinstance(job.step, Steps) else [job.step]
+        for step in steps:
+            if isinstance(step, MakePart):
+                inputs = list(step.parts())
+                read = {one.path for one in inputs}
+                read |= {one.path.parent for one in inputs}
+                if not stale.isdisjoint(read) or not nothing_left(step):
+                    stale.add(step.part.path)
+                    needed += inputs
+    for part in needed:
+        part.restore()
 
 
 def _survey_names(recordings: Iterable[RecordingInfo]) -> tuple[str, ...]:

@@ -6,6 +6,7 @@ drive, a function that opens the drive, instead of the drive.
 """
 
 from collections.abc import Callable, Mapping, Set
+import contextlib
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Protocol, TypeAlias
@@ -377,6 +378,16 @@ class Survey(Step):
         # A drive that is surveyed for the first time is not read for this.
         asked = map(self.files.described, self._asked)
         return all(one.path.is_file() for one in asked) and not self._missing()
+
+    def missing(self) -> list[Part]:
+        """Returns the files of an earlier survey that are missing or stale.
+
+        That is none if there is no recording yet, or no earlier survey.
+        """
+        with contextlib.suppress(InputError):
+            if self.files.folder.is_dir():
+                return list(self._missing())
+        return []
 
     def run(self, reporter: Reporter) -> None:
         missing = self._missing()

@@ -20,6 +20,7 @@ from cns_drake.base.map_folder import (
     STRUCTURES_NAME,
     stage_name,
 )
+from cns_drake.base.progress import doing
 from cns_drake.base.yaml_files import MarkedYamlLoader, read_yaml
 from cns_drake.city.generation.city_structures import City, make_city, meshes_of
 from cns_drake.city.geometry.structures import (
@@ -377,7 +378,7 @@ def render_city(
         InputError: if the stages cannot be used or the city has too many
             structures.
     """
-    progress(f"{len(city.structures)} structures")
+    doing(f"drawing {len(city.structures)} structures")
     names = [structure.name for structure in city.structures]
     source = world / STAGES_NAME
     stages = load_stages(source, names, stages_text)
@@ -475,6 +476,7 @@ def generate_city(
         # The linked folder may belong to another map.
         raise InputError(f"{world / MESH_FOLDER}: a link instead of a folder")
     files = _rendered(world, progress, repair_stages)
+    doing("writing the stages")
     with user_errors(world / MESH_FOLDER):
         (world / MESH_FOLDER).mkdir(exist_ok=True)
     for name, content in files.items():
@@ -489,6 +491,7 @@ def _rendered(
     world: Path, progress: Callable[[str], None], repair_stages: bool
 ) -> dict[str, str]:
     """Returns the text of every file to write, by relative path."""
+    doing("laying out the city")
     city = make_city(world)
     text = _stages_text(world, city, repair_stages, progress)
     files = render_city(world, city, progress, text)

@@ -21,6 +21,7 @@ from shapely.geometry.base import BaseGeometry
 
 from cns_drake.base.errors import InputError, value_errors
 from cns_drake.base.map_folder import LANES_NAME, MESH_FOLDER, stage_name
+from cns_drake.base.progress import doing
 from cns_drake.city.generation.city_structures import City, Streets, build_along
 from cns_drake.city.generation.generate import render_stages
 from cns_drake.city.generation.starter import starter_plan, starter_stages
@@ -378,7 +379,6 @@ class Town:
 def build_town(
     source: Path,
     seed: int,
-    progress: Callable[[str], None] = lambda line: None,
     dressed: bool = False,
 ) -> Town:
     """Returns a town, built at random along the roads of an OpenDRIVE file.
@@ -386,7 +386,6 @@ def build_town(
     Args:
         source: the file.
         seed: seed of all random draws.
-        progress: called with messages of one line on the progress.
         dressed: whether to paint the road marks of the file.
 
     Raises:
@@ -395,7 +394,7 @@ def build_town(
     faults = ImportFaults()
     roads = read_roads(source, faults)
     try:
-        return _build(source, roads, seed, faults, progress, dressed)
+        return _build(source, roads, seed, faults, dressed)
     except GEOSException as error:
         raise InputError(
             f"{source}: an area cannot be used: {error}"
@@ -407,7 +406,6 @@ def _build(
     roads: RoadMap,
     seed: int,
     faults: ImportFaults,
-    progress: Callable[[str], None],
     dressed: bool,
 ) -> Town:
     with value_errors(source):
@@ -446,10 +444,7 @@ def _build(
             "marks", ground, surface.heights, streets.areas.carriageway
         )
         marks += road_marks("bridge_marks", raised)
-    progress(
-        f"{len(roads.roads)} roads, {len(things)} signals and objects;"
-        " building along them"
-    )
+    doing(f"building along {len(roads.roads)} roads")
     city = build_along(
         Streets(
             areas=streets.areas,
@@ -577,7 +572,7 @@ def _kinds(
 
 
 def write_town(
-    draft: Path, source: Path, town: Town, progress: Callable[[str], None]
+    draft: Path, source: Path, town: Town
 ) -> tuple[ImportReport, dict[str, tuple[int, int]]]:
     """Writes all files of a town to a map folder.
 
@@ -585,7 +580,6 @@ def write_town(
         draft: the folder, which has the map's name.
         source: imported file, named in messages and comments.
         town: the town.
-        progress: called with messages of one line on the progress.
 
     Returns:
         What was imported, and name of a stage -> numbers of its structures and
@@ -601,7 +595,6 @@ def write_town(
         town.stages,
         stages,
         source,
-        progress,
         origin=f"Imported by cns-drake from {source.name}.",
     )
     (draft / MESH_FOLDER).mkdir(exist_ok=True)

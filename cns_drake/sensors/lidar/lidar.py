@@ -29,6 +29,7 @@ from pydrake.systems.framework import (
 
 from cns_drake.base.compiled import compiled
 from cns_drake.base.elementary import product, rotated
+from cns_drake.base.progress import doing
 from cns_drake.ray_casting import moving_groups
 from cns_drake.ray_casting.ray_casting_scene import RayCastingScene
 from cns_drake.ray_casting.ray_groups import Motion
@@ -810,6 +811,7 @@ class SeenGeometry:
         unseen = self._lidar.unseen
         if unseen is None:
             unseen = frozenset([self._lidar.parent_frame_id]) - {world}
+        doing("reading meshes")
         self._geometries = self._reader.read(
             one
             for one in records
@@ -834,6 +836,7 @@ class SeenGeometry:
         calc_X_WF: Callable[[FrameId], RigidTransform],
         p_WS: np.ndarray,
     ) -> None:
+        doing("preparing the ray casting")
         structures, self._materials = self._lidar.structures, None
         names = [
             structure_name(geometry.name, is_scoped=structures is None)

@@ -3,6 +3,7 @@
 from dataclasses import replace
 import shutil
 
+from helpers.listening import listening
 from helpers.small_map import write_small_map
 import pytest
 import yaml
@@ -34,9 +35,10 @@ def folder(tmp_path):
 
 def measured(folder):
     """The rows, and the drives that were measured."""
-    lines = []
-    rows = drive_rows(folder, lines.append)
-    return rows, [line.split()[-1] for line in lines]
+    with listening() as heard:
+        rows = drive_rows(folder)
+    said = [one.partition("measuring ") for one in heard.activities]
+    return rows, [name for _, found, name in said if found]
 
 
 def test_figures_are_those_of_the_drive_and_the_stage(folder):

@@ -14,6 +14,7 @@ import zstandard
 
 from cns_drake.base.errors import InputError
 from cns_drake.base.jobs.fingerprint import fingerprint
+from cns_drake.base.jobs.processes import nothing_left
 from cns_drake.base.jobs.step import Reporter
 from evaluation.study import parts
 from evaluation.study.parts import MakePart, Part, decode, encode
@@ -302,6 +303,47 @@ def test_a_step_whose_part_holds_something_else_is_not_done(tmp_path):
         _replaced(step.part, data=zstandard.compress(encode(value)))
         assert step.part.read() == value
         assert not step.is_done()
+
+
+def test_a_value_that_is_removed_keeps_its_results(tmp_path):
+    part = Part(tmp_path / "one.data")
+    part.restore()
+    part.write(INPUTS, np.arange(10_000.0))
+    result = MakePart(Part(tmp_path / "result.data"), summed, (("a", part),))
+    result.run(Reporter())
+    before = part.identity()
+    for _ in range(2):
+        part.spend()
+        assert part.path.stat().st_size < 1000
+        assert part.is_current(INPUTS)
+        assert part.identity() == before
+        assert nothing_left(result)
+        assert not part.fits(np.ndarray)
+        with pytest.raises(InputError, match="its value was removed"):
+            part.read()
+    (read,) = result.parts()
+    read.restore()
+    assert not part.path.exists()
+    assert not nothing_left(result)
+    with pytest.raises(InputError, match=r"one\.data"):
+        part.spend()
+    part.write(INPUTS, np.arange(10_000.0))
+    part.restore()  # There is nothing to restore.
+    assert len(part.read()) == 10_000
+    assert nothing_left(result)
+
+
+def test_a_damaged_part_is_not_restored(tmp_path):
+    part = Part(tmp_path / "one.data")
+    part.write(INPUTS, [1])
+    content = part.path.read_bytes()[:-1]
+    part.path.write_bytes(content)
+    part.restore()
+    assert part.path.read_bytes() == content
+
+
+def summed(reporter: Reporter, named: tuple[str, Part]) -> float:
+    return float(named[1].read().sum())
 
 
 def measured(reporter: Reporter, value: float) -> list[Measured]:

@@ -6,7 +6,10 @@ from helpers import studies
 from helpers.small_towns import drive
 import pytest
 
+from cns_drake.base.errors import InputError
+from evaluation.study.chosen_methods import choose_methods
 from evaluation.study.collection import find_recordings
+from evaluation.study.parts import Part
 from evaluation.study.plan import Study
 from evaluation.study.surveys import Survey
 
@@ -74,3 +77,39 @@ def test_a_new_recording_under_an_old_name(tmp_path, few_methods):
     kept = {path for path in after if after[path] == before[path]}
     assert {path.parent.name for path in kept} == {"metropolis_04"}
     assert len(kept) == 3 + len(few_methods)
+
+
+def test_values_that_no_result_needs_are_removed(tmp_path, few_methods):
+    """They are made again for new results, which are as of one run."""
+    for stage, route in (("01", "a"), ("04", "b")):
+        drive(tmp_path / "in" / f"metropolis_{stage}", stage, route)
+    found = find_recordings(tmp_path / "in")
+    methods = choose_methods()
+
+    def run(folder, methods):
+        study = Study(found, tmp_path / folder, methods)
+        done = studies.do(study.jobs())
+        study.assemble()
+        return done
+
+    whole = run("whole", methods)
+    assert set(whole) >= {"survey metropolis_01", "survey metropolis_04"}
+    assert run("whole", methods) == []
+    surveys = tmp_path / "whole" / "parts" / "surveys"
+    for path in surveys.rglob("*.data"):
+        if not path.name.startswith("described"):
+            Part(path).read()
+        else:
+            assert path.stat().st_size < 2000
+            with pytest.raises(InputError, match="its value was removed"):
+                Part(path).read()
+    run("later", methods[:1])
+    # New results of one method need its descriptions alone.
+    shape = surveys.relative_to(tmp_path / "whole")
+    old = tmp_path / "later" / shape / "metropolis_01" / "fine.data"
+    before = old.stat().st_mtime_ns
+    assert "survey metropolis_01" in run("later", methods)
+    assert old.stat().st_mtime_ns == before
+    for name in ("queries.csv", "place_recognition.csv", "why.csv"):
+        expected = (tmp_path / "whole" / name).read_bytes()
+        assert (tmp_path / "later" / name).read_bytes() == expected
