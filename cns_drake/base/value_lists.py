@@ -32,6 +32,8 @@ def spread(value: Any, *, whole: bool = False) -> Any:
             than 10,000 numbers, or they are not whole although they must be.
     """
     if not is_spread(value):
+        if whole and isinstance(value, Mapping) and _SPREAD & set(value):
+            raise ValueError("a list needs from, to and count, nothing else")
         return value
     first, last, count = (value[name] for name in ("from", "to", "count"))
     are_numbers = all(

@@ -133,18 +133,21 @@ def _repeated(
         return first, repeat.number(f"{name}End", first)
 
     if distance <= 0.0 < length and not thing.kind.startswith("tree"):
+        columns = (
+            (start, start + length),
+            ends("t", thing.t),
+            ends("zOffset", thing.z),
+            ends("width", width),
+            ends("height", height),
+        )
+        swept = np.array(columns).T
+        if swept[:, 3:].max() > _LARGEST:
+            raise ValueError(
+                f"line {repeat.line}: repeat: a size of over {_LARGEST:g} m"
+            )
+        begin = max(start, 0.0) if start + length > 0.0 else start
         yield thing._replace(
-            name=f"{thing.name}_{number}",
-            s=start,
-            swept=np.array(
-                [
-                    (start, start + length),
-                    ends("t", thing.t),
-                    ends("zOffset", thing.z),
-                    ends("width", width),
-                    ends("height", height),
-                ]
-            ).T,
+            name=f"{thing.name}_{number}", s=begin, swept=swept
         )
         return
     step = distance if distance > 0.0 else _TREES
@@ -333,9 +336,9 @@ def _swept(
     and its foot follows the road. `ends` is the thing's `swept`.
     """
     start, end = ends[:, 0]
-    if end > road.length + 1.0:
+    if end > road.length + 1.0 or start < 0.0:
         faults.add("object beyond the end of its road, cut", thing.name)
-    s, inside = stations(road, start, min(end, road.length))
+    s, inside = stations(road, max(start, 0.0), min(end, road.length))
     t, rise, width, height = (
         np.interp(s, ends[:, 0], column) for column in ends.T[1:]
     )

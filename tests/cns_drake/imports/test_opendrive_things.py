@@ -8,6 +8,7 @@ import pytest
 import shapely
 from shapely.geometry import LineString, box
 
+from cns_drake.base.errors import InputError
 from cns_drake.imports.opendrive.lanes import lane_bands, split_levels
 from cns_drake.imports.opendrive.road_reader import read_roads
 from cns_drake.imports.opendrive.things import thing_structures
@@ -257,6 +258,22 @@ def test_a_wall_ends_with_its_road(tmp_path):
     assert found.footprint_W.bounds == pytest.approx((5, 5.85, 70, 6.15))
     ((kind, number, _),) = faults.rows()
     assert (kind, number) == ("object beyond the end of its road, cut", 1)
+    # It may begin before its road, too, where it is not as high.
+    wall = WALL.replace('repeat s="5"', 'repeat s="-10"')
+    wall = wall.format(t0=6, t1=6, length=20, high=3.2)
+    (found,), faults = bent_road(tmp_path / "b.xodr", "<line/>", wall)
+    assert found.footprint_W.bounds == pytest.approx((0, 5.85, 10, 6.15))
+    vertices = triangles_of(found).reshape(-1, 3)
+    assert vertices[vertices[:, 0] == 0.0, 2].max() == pytest.approx(2.3)
+    assert [kind for kind, *_ in faults.rows()] == [
+        "object beyond the end of its road, cut"
+    ]
+
+
+def test_a_wall_has_a_size_of_this_world(tmp_path):
+    wall = WALL.format(t0=6, t1=6, length=20, high=1001)
+    with pytest.raises(InputError, match="repeat: a size of over 1000 m"):
+        bent_road(tmp_path / "a.xodr", "<line/>", wall)
 
 
 def test_trees_without_a_distance_stay_trees(tmp_path):

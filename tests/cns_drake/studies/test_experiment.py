@@ -423,6 +423,12 @@ FAULTS = [
     ("database: {a: {from: 1, to: 1, count: 2}}", "database.a: 1 is .*twice"),
     ("seeds: {from: 0, to: 1, count: 1}", "seeds: .*from and to .* count"),
     ("seeds: {from: 0, to: 1, count: 3}", "seeds: .*not all whole"),
+    ("seeds: {from: 1, to: 3}", "seeds: .*a list needs from, to and count"),
+    (
+        "levels: {from: 1, to: 2, count: 2, step: 1}\n"
+        "cases: {a: {query: {x: [1, 2]}}}",
+        "levels: .*a list needs from, to and count, nothing else",
+    ),
     ("seeds: []", "seeds: "),
     ("seeds: [1, 1]", "seeds: 1 is there twice"),
     ("seeds: -1", "seeds.0: "),
@@ -510,6 +516,13 @@ def test_faults_are_one_line_with_file_and_field(read, text, fault):
     with pytest.raises(InputError, match=rf"mine\.yaml: {fault}") as error:
         read(text)
     assert "\n" not in str(error.value)
+
+
+def test_an_experiment_may_be_wide(read):
+    """Fields are set in linear time; copies of all of them took minutes."""
+    wide = ", ".join(f"f{k}: {k}" for k in range(20_000))
+    (only,) = conditions(read(f"query: {{a: {{{wide}}}}}\n"))
+    assert only.changes == {"query": {"a": {f"f{k}": k for k in range(20_000)}}}
 
 
 def test_grids_have_an_end(read):
