@@ -24,12 +24,8 @@ import os
 from pathlib import Path
 from typing import Any, NamedTuple
 
-from mcap.records import Channel, Message
-from mcap.writer import CompressionType, Writer
-
 from cns_drake.base import files
 from cns_drake.base.drives import ros_types
-from cns_drake.base.drives.mcap_records import Fault, read_records
 from cns_drake.base.errors import InputError
 from cns_drake.base.files import part_path, user_errors
 from cns_drake.base.version import __version__
@@ -37,12 +33,8 @@ from cns_drake.recording import rosbag2_metadata
 from cns_drake.recording.recording_folder import PartFile, RecordingFolder
 from cns_drake.recording.rosbag2_metadata import Topic, to_yaml
 from cns_drake.recording.schedule import START_NS, Schedule
+from cns_drake.recording.topic_chunks import TopicChunks, messages_by_time
 
-_CHUNK_BYTES = 1024 * 1024
-# A killed process loses the open chunk. Without a LiDAR, a chunk of 1 MiB takes
-# many seconds to fill, so chunks are also flushed by time. A kill may lose one
-# second; part of it is reserved for frames on their way to the file.
-_FLUSH_PERIOD_NS = 800_000_000
 # Number of batches that may wait to be written: about two frames with one LiDAR
 # and traffic, so that a frame does not wait for the one before. A batch is a
 # large message with the small ones before it. A killed process loses waiting
@@ -146,7 +138,6 @@ class BagWriter:
         # message of all [ns].
         self._latest_ns: dict[str, int] = {}
         self._span_ns: tuple[int, int] | None = None
-        self._flushed_ns = start_ns
         # False while a record is being written. If an interrupt comes then, the
         # writer's index does not describe the file and must not be used.
         self._intact = False
@@ -166,7 +157,7 @@ class BagWriter:
             self._stream = self._open_part()
         try:
             with self._writing():
-                self._writer, self._channel_ids = self._begin(self._stream)
+                self._chunks, self._channel_ids = self._begin(self._stream)
         except BaseException:
             self._close_part()
             raise
@@ -208,22 +199,11 @@ class BagWriter:
         Raises:
             InputError: if the file cannot be read.
         """
-        topics: dict[int, str] = {}
         with user_errors(self._part), open(self._part, "rb") as stream:
-            for record in read_records(stream):
-                if isinstance(record, Fault):
-                    return
-                if isinstance(record, Channel):
-                    topics[record.id] = record.topic
-                elif isinstance(record, Message):
-                    if record.channel_id not in topics:
-                        return
-                    yield RecordedMessage(
-                        topics[record.channel_id],
-                        record.log_time,
-                        record.data,
-                        record.sequence,
-                    )
+            for topic, message in messages_by_time(stream):
+                yield RecordedMessage(
+                    topic, message.log_time, message.data, message.sequence
+                )
 
     def write(
         self, topic: str, stamp_ns: int, data: bytes, sequence: int
@@ -254,10 +234,7 @@ class BagWriter:
         self._check_order(topic, stamp_ns)
         channel_id = self._channel_ids[topic]
         with self._writing():
-            if stamp_ns - self._flushed_ns >= _FLUSH_PERIOD_NS:
-                self._writer.flush()
-                self._flushed_ns = stamp_ns
-            self._writer.add_message(
+            self._chunks.add_message(
                 channel_id, stamp_ns, data, stamp_ns, sequence
             )
         self._counts[topic] += 1
@@ -332,15 +309,14 @@ class BagWriter:
 
     def _begin(
         self, stream: io.BytesIO | PartFile
-    ) -> tuple[Writer, dict[str, int]]:
+    ) -> tuple[TopicChunks, dict[str, int]]:
         """Writes the records before the messages.
 
         Returns:
-            The writer, and topic -> channel id.
+            The writer of messages, and topic -> channel id.
         """
-        writer = Writer(
-            stream, chunk_size=_CHUNK_BYTES, compression=CompressionType.ZSTD
-        )
+        chunks = TopicChunks(stream)
+        writer = chunks.writer
         writer.start(profile="ros2", library=f"cns-drake {__version__}")
         for name, value in self._attachments.items():
             start_ns = self._start_ns
@@ -362,13 +338,13 @@ class BagWriter:
             for topic in self._topics
         }
         writer.flush()
-        return writer, channel_ids
+        return chunks, channel_ids
 
     def _end(self) -> None:
-        self._writer.add_metadata(
+        self._chunks.writer.add_metadata(
             "rosbag2", {"serialized_metadata": to_yaml(self._information())}
         )
-        self._writer.finish()
+        self._chunks.finish({v: k for k, v in self._channel_ids.items()})
         self._stream.flush()
 
     def _publish(self) -> None:

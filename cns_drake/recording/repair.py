@@ -16,14 +16,15 @@ from mcap.records import (
     Metadata,
     Schema,
 )
-from mcap.writer import CompressionType, Writer
 
+from cns_drake.base.drives.mcap_messages import STAMPED_RECORD
 from cns_drake.base.drives.mcap_records import Fault, read_records
 from cns_drake.base.errors import InputError
 from cns_drake.base.files import check_writable, completing, user_errors
 from cns_drake.base.progress import doing
 from cns_drake.base.version import __version__
 from cns_drake.recording import rosbag2_metadata
+from cns_drake.recording.topic_chunks import TopicChunks
 
 # Schemas and channels are kept in memory; more of them is no recording.
 _DEFINITIONS_LIMIT = 64 * 1024 * 1024
@@ -57,10 +58,10 @@ def repair_mcap(
 ) -> Repair:
     """Writes the readable part of an MCAP file as a whole, indexed file.
 
-    Messages keep their order, times, numbers and bytes; attachments and
-    metadata are kept as well. A file of ROS 2 also gets a metadata record
-    `rosbag2` with its message counts, so that ROS 2 can open the file without a
-    rosbag2 folder.
+    Messages keep their times, numbers and bytes, and on each topic their order;
+    attachments and metadata are kept as well. A file of ROS 2 also gets a
+    metadata record `rosbag2` with its message counts, so that ROS 2 can open
+    the file without a rosbag2 folder.
 
     Args:
         path: any MCAP file, whole or damaged; it is only read.
@@ -172,7 +173,8 @@ def _copy(
 ) -> Repair:
     """Writes records as a whole MCAP file, which will be `output`."""
     profile, schemas, channels = definitions
-    writer = Writer(stream, compression=CompressionType.ZSTD)
+    chunks = TopicChunks(stream)
+    writer = chunks.writer
     writer.start(profile=profile, library=f"cns-drake {__version__} repair")
     schema_ids = {0: 0} | {
         number: writer.register_schema(
@@ -202,8 +204,9 @@ def _copy(
                 record.media_type,
                 record.data,
             )
-        elif isinstance(record, Metadata) and record.name != _ROSBAG2:
-            writer.add_metadata(record.name, record.metadata)
+        elif isinstance(record, Metadata):
+            if record.name not in (_ROSBAG2, STAMPED_RECORD):
+                writer.add_metadata(record.name, record.metadata)
         elif isinstance(record, Message):
             if record.channel_id in channel_ids:
                 if not counts:
@@ -211,7 +214,7 @@ def _copy(
                 start_ns = min(start_ns, record.log_time)
                 end_ns = max(end_ns, record.log_time)
                 counts[record.channel_id] += 1
-                writer.add_message(
+                chunks.add_message(
                     channel_ids[record.channel_id],
                     record.log_time,
                     record.data,
@@ -243,7 +246,12 @@ def _copy(
             _ROSBAG2,
             {"serialized_metadata": rosbag2_metadata.to_yaml(information)},
         )
-    writer.finish()
+    chunks.finish(
+        {
+            channel_ids[number]: channel.topic
+            for number, channel in channels.items()
+        }
+    )
     seconds = (end_ns - start_ns) / 1e9
     total = sum(counts.values())
     return Repair(output, total, seconds, num_faults, first_fault)

@@ -1,9 +1,19 @@
-"""An MCAP file by the `mcap` package."""
+"""MCAP files by the `mcap` package."""
 
+from collections.abc import Callable
 import io
+from pathlib import Path
+import struct
 
+from mcap.data_stream import RecordBuilder
+from mcap.reader import SeekingReader
+from mcap.records import Footer
+from mcap.summary import Summary
 from mcap.writer import CompressionType, Writer
 import numpy as np
+
+# Where the summary begins, its offsets and its checksum; then the magic bytes.
+_END = struct.Struct("<QQI8s")
 
 
 def write_mcap(
@@ -30,3 +40,23 @@ def write_mcap(
     writer.add_attachment(3, 4, "last.txt", "text/plain", b"last")
     writer.finish()
     return stream.getvalue()
+
+
+def edit_summary(path: Path, change: Callable[[Summary], None]) -> None:
+    """Changes the summary section of a file; it has no checksum then."""
+    data = path.read_bytes()
+    start, _, _, magic = _END.unpack(data[-_END.size :])
+    summary = SeekingReader(io.BytesIO(data)).get_summary()
+    change(summary)
+    builder = RecordBuilder()
+    for record in (
+        *summary.schemas.values(),
+        *summary.channels.values(),
+        *filter(None, [summary.statistics]),
+        *summary.chunk_indexes,
+        *summary.attachment_indexes,
+        *summary.metadata_indexes,
+        Footer(start, 0, 0),
+    ):
+        record.write(builder)
+    path.write_bytes(data[:start] + builder.end() + magic)

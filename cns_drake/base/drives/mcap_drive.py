@@ -10,14 +10,14 @@ import numpy as np
 
 from cns_drake.base import points as point_arrays
 from cns_drake.base.drives import mcap_messages, point_layouts, ros_types
-from cns_drake.base.drives.drive import (
-    IMU_DTYPE,
-    ODOMETRY_DTYPE,
-    Drive,
-    index_instances,
-)
+from cns_drake.base.drives.drive import ODOMETRY_DTYPE, Drive, index_instances
 from cns_drake.base.drives.mcap_file import McapFile
 from cns_drake.base.drives.mcap_messages import StaticTransforms, checked_poses
+from cns_drake.base.drives.message_rows import (
+    MessageRows,
+    transform_row,
+    vehicle_frames,
+)
 from cns_drake.base.errors import InputError, value_errors
 from cns_drake.base.json_text import parse_json
 
@@ -53,8 +53,10 @@ class McapDrive(Drive):
     Contradictions raise an error: two poses for one stamp, two mounts of a
     sensor, or a frame that changes during the drive.
 
-    Opening reads the file's index. The first use of stamps or poses reads the
-    whole file once; reading a scan reads one chunk.
+    Opening reads the file's index; reading a scan reads one chunk. The first
+    use of stamps or poses reads the chunks that hold odometry. If the file does
+    not state that the log times are the stamps, it also reads all clouds. In
+    recordings of cns-drake, each chunk holds one topic, and the file states it.
     """
 
     def __init__(self, path: Path, lidar: str | None = None):
@@ -132,10 +134,10 @@ class McapDrive(Drive):
         odometry = self._message(_ODOMETRY_TOPIC, last)
         places = self._file.locate(_TF_TOPIC)
         found = [
-            mcap_messages.transform_row(edge)
+            transform_row(edge)
             for place in places[places["log_time_ns"] > last["log_time_ns"]]
             for edge in self._message(_TF_TOPIC, place).transforms
-            if _vehicle_frames(edge) == _vehicle_frames(odometry)
+            if vehicle_frames(edge) == vehicle_frames(odometry)
         ]
         rows = np.array(found, ODOMETRY_DTYPE)
         return rows[rows["stamp_ns"] > mcap_messages.stamp_ns(odometry.header)]
@@ -236,11 +238,19 @@ class McapDrive(Drive):
     def scan(self, index: int) -> np.ndarray:
         if not 0 <= index < len(self):
             raise IndexError(f"scan {index} of {len(self)}")
-        message = self._message(self._lidar_topic, self._scans[index])
+        place = self._scans[index]
+        message = self._message(self._lidar_topic, place)
         stamp_ns = mcap_messages.stamp_ns(message.header)
         with self._faults(
             f"{self._lidar_topic}: scan {index} at {stamp_ns} ns"
         ):
+            self._check_frame(message.header.frame_id)
+            logged_ns = int(place["log_time_ns"])
+            if self._logged_stamps_ns is not None and stamp_ns != logged_ns:
+                raise ValueError(
+                    f"its log time is {logged_ns} ns, though the file states"
+                    " that log times are stamps"
+                )
             points = point_layouts.to_points(message)
             point_arrays.check_range(points, point_arrays.FARTHEST_RETURN)
             return point_layouts.from_layout(
@@ -285,19 +295,13 @@ class McapDrive(Drive):
         if _IMU_TOPIC not in self._message_types:
             return None
         places = self._file.locate(_IMU_TOPIC)
-        rows = np.zeros(len(places), IMU_DTYPE)
-        first = self._first(_IMU_TOPIC).header
-        for position, data in self._file.visit(places):
-            message = self._decode(_IMU_TOPIC, data)
-            self._check_frame(
-                _IMU_TOPIC,
-                mcap_messages.stamp_ns(message.header),
-                message.header.frame_id,
-                first.frame_id,
-            )
-            rows[position] = mcap_messages.imu_row(message)
-        self._check_agreement(_IMU_TOPIC, rows)
-        return rows
+        rows = MessageRows(ros_types.IMU, len(places))
+        with self._faults(_IMU_TOPIC):
+            for index, data in self._file.visit(places):
+                rows.add(index, data)
+        imu = rows.rows()
+        self._check_agreement(_IMU_TOPIC, imu)
+        return imu
 
     @property
     def image_stamps_ns(self) -> np.ndarray:
@@ -341,8 +345,7 @@ class McapDrive(Drive):
 
     def _is_posed(self, scan: np.void, odometry: np.ndarray) -> bool:
         """Returns whether one of the first messages has a scan's stamp."""
-        with self._faults(self._lidar_topic):
-            wanted, _ = mcap_messages.read_cloud_header(self._file.read(scan))
+        wanted, _ = self._read_cloud_header(self._file.read(scan))
         backward = odometry[0]["log_time_ns"] > odometry[-1]["log_time_ns"]
         for place in odometry:
             header = self._message(_ODOMETRY_TOPIC, place).header
@@ -378,26 +381,26 @@ class McapDrive(Drive):
     @cached_property
     def _stamps_and_odometry(self) -> tuple[np.ndarray, np.ndarray]:
         """Stamps of all scans, and the odometry, in one pass."""
-        num_scans = len(self._all_scans)
         places = self._file.locate(_ODOMETRY_TOPIC)
-        stamps_ns = np.zeros(num_scans, np.int64)
-        odometry = np.zeros(len(places), ODOMETRY_DTYPE)
-        lidar_frame = self._first(self._lidar_topic).header.frame_id
-        vehicle_frames = _vehicle_frames(self._first(_ODOMETRY_TOPIC))
-        together = np.concatenate([self._all_scans, places])
-        for position, data in self._file.visit(together):
-            if position < num_scans:
-                topic, first = self._lidar_topic, lidar_frame
-                with self._faults(topic):
-                    stamp_ns, frame = mcap_messages.read_cloud_header(data)
-                stamps_ns[position] = stamp_ns
+        rows = MessageRows(ros_types.ODOMETRY, len(places))
+        logged_ns = self._logged_stamps_ns
+        if logged_ns is None:
+            clouds = self._all_scans
+            stamps_ns = np.zeros(len(clouds), np.int64)
+        else:
+            clouds = self._all_scans[:0]
+            stamps_ns = logged_ns
+        for index, data in self._file.visit(np.concatenate([clouds, places])):
+            if index < len(clouds):
+                stamps_ns[index], frame = self._read_cloud_header(data)
+                with self._faults(
+                    f"{self._lidar_topic}: at {stamps_ns[index]} ns"
+                ):
+                    self._check_frame(frame)
             else:
-                message = self._decode(_ODOMETRY_TOPIC, data)
-                row = mcap_messages.odometry_row(message)
-                odometry[position - num_scans] = row
-                topic, first = _ODOMETRY_TOPIC, vehicle_frames
-                stamp_ns, frame = row[0], _vehicle_frames(message)
-            self._check_frame(topic, stamp_ns, frame, first)
+                with self._faults(_ODOMETRY_TOPIC):
+                    rows.add(index - len(clouds), data)
+        odometry = rows.rows()
         disorder = np.flatnonzero(np.diff(stamps_ns) <= 0)
         if len(disorder):
             raise InputError(
@@ -408,21 +411,34 @@ class McapDrive(Drive):
         return stamps_ns, odometry
 
     @cached_property
+    def _logged_stamps_ns(self) -> np.ndarray | None:
+        """Stamps (N,) of all scans from the file's index; None if not there."""
+        records = self._file.metadata(mcap_messages.STAMPED_RECORD)
+        number = str(len(self._all_scans))
+        if [one.get(self._lidar_topic) for one in records] != [number]:
+            return None
+        for place in self._all_scans[[0, -1]]:
+            stamp_ns, _ = self._read_cloud_header(self._file.read(place))
+            if stamp_ns != place["log_time_ns"]:
+                return None
+        return self._all_scans["log_time_ns"].astype(np.int64)
+
+    @cached_property
     def X_BS(self) -> np.ndarray:
         """Pose of the LiDAR S on the vehicle B, (4, 4), from /tf_static."""
-        return self._mount(self._first(self._lidar_topic))
+        return self._mount(self._lidar_frame)
 
     @cached_property
     def X_BI(self) -> np.ndarray | None:
         """Pose of the IMU I on the vehicle B, (4, 4); None without an IMU."""
         if _IMU_TOPIC not in self._message_types:
             return None
-        return self._mount(self._first(_IMU_TOPIC))
+        return self._mount(self._first(_IMU_TOPIC).header.frame_id)
 
-    def _mount(self, message: Any) -> np.ndarray:
-        """Returns the pose X_BS (4, 4) of a message's frame on the vehicle."""
+    def _mount(self, frame: str) -> np.ndarray:
+        """Returns the pose (4, 4) of a sensor's frame on the vehicle."""
         base = self._first(_ODOMETRY_TOPIC).child_frame_id
-        return self._transforms.pose(base, message.header.frame_id)
+        return self._transforms.pose(base, frame)
 
     @cached_property
     def _transforms(self) -> StaticTransforms:
@@ -445,15 +461,25 @@ class McapDrive(Drive):
         """Turns a ValueError into an InputError that names file and place."""
         return value_errors(f"{self._path}: {where}")
 
-    def _check_frame(
-        self, topic: str, stamp_ns: int, frame: str, first: str
-    ) -> None:
-        """Refuses a message whose frame differs from the first one's."""
-        if frame != first:
-            raise InputError(
-                f"{self._path}: {topic}: at {stamp_ns} ns in frame {frame!r},"
-                f" at first in {first!r}"
+    @cached_property
+    def _lidar_frame(self) -> str:
+        return self._first(self._lidar_topic).header.frame_id
+
+    def _check_frame(self, frame: str) -> None:
+        """Refuses a scan in another frame than the first.
+
+        Raises:
+            ValueError: the frame is another.
+        """
+        if frame != self._lidar_frame:
+            raise ValueError(
+                f"in frame {frame!r}, at first in {self._lidar_frame!r}"
             )
+
+    def _read_cloud_header(self, data: memoryview) -> tuple[int, str]:
+        """Returns the stamp [ns] and the frame of a scan."""
+        with self._faults(self._lidar_topic):
+            return mcap_messages.read_cloud_header(data)
 
     def _check_agreement(self, topic: str, rows: np.ndarray) -> None:
         """Refuses two different messages with one stamp."""
@@ -536,7 +562,3 @@ def _drive_name(path: Path) -> str:
 
 def _lidar_name(topic: str) -> str:
     return topic.strip("/").split("/")[0]
-
-
-def _vehicle_frames(message: Any) -> str:
-    return f"{message.header.frame_id} -> {message.child_frame_id}"

@@ -18,21 +18,22 @@ import functools
 import os
 from pathlib import Path
 import struct
-from typing import BinaryIO
+from typing import Any, BinaryIO
 import zlib
 
 from mcap.exceptions import McapError
 from mcap.opcode import Opcode
-from mcap.reader import SeekingReader
 from mcap.records import (
     Attachment,
+    AttachmentIndex,
     Channel,
     Chunk,
     Message,
+    Metadata,
+    MetadataIndex,
     Schema,
     Statistics,
 )
-from mcap.summary import Summary
 import numpy as np
 import zstandard
 
@@ -59,6 +60,11 @@ _RECORD_LIMIT_BYTES = CHUNK_LIMIT_BYTES + _CHUNK_FIELDS_BYTES
 # The last record: its header, where the summary begins, its offsets, its
 # checksum.
 _FOOTER = struct.Struct("<BQQQI")
+# A chunk's index, after its record header: where the chunk begins, and the size
+# of the table of message indexes that follows, with a channel id and an offset
+# in each entry.
+_CHUNK_INDEX = struct.Struct("<16xQ8xI")
+_CHUNK_INDEX_ENTRY = struct.Struct("<HQ")
 # A message, after its record header: channel id, sequence, two times.
 _MESSAGE_HEADER = struct.Struct("<HIQQ")
 # A message index, after its record header: channel id, length of the rest.
@@ -95,6 +101,15 @@ def _read_body(stream: BinaryIO, limit: int, what: str) -> bytes:
     return body
 
 
+def _read_chunk_index(body: bytes) -> tuple[int, dict[int, int]]:
+    """Returns where a chunk begins, and channel id -> offset of its index."""
+    start, size = _CHUNK_INDEX.unpack_from(body)
+    table = body[_CHUNK_INDEX.size : _CHUNK_INDEX.size + size]
+    if len(table) != size:
+        raise ValueError("the index of a chunk is cut off")
+    return start, dict(_CHUNK_INDEX_ENTRY.iter_unpack(table))
+
+
 @dataclass
 class _Contents:
     """The contents of a file, by type of record.
@@ -107,6 +122,7 @@ class _Contents:
         indexes: for each block, channel id -> offset of the message index
             [bytes].
         attachments: (name, offset in the file [bytes]) of each.
+        metadata: the same of each metadata record.
         found: channel id -> (block, offset in it, log time [ns]) of each
             message; None if the index has them.
         statistics: the file's own, if any.
@@ -117,24 +133,46 @@ class _Contents:
     blocks: list[int] = field(default_factory=list)
     indexes: list[dict[int, int]] = field(default_factory=list)
     attachments: list[tuple[str, int]] = field(default_factory=list)
+    metadata: list[tuple[str, int]] = field(default_factory=list)
     found: dict[int, list[tuple[int, int, int]]] | None = None
     statistics: Statistics | None = None
 
     @classmethod
-    def of(cls, summary: Summary) -> "_Contents":
-        """Returns the contents of a file, as its summary section lists them."""
-        chunks = sorted(
-            summary.chunk_indexes, key=lambda chunk: chunk.chunk_start_offset
-        )
-        return cls(
-            summary.schemas,
-            summary.channels,
-            [chunk.chunk_start_offset for chunk in chunks],
-            [chunk.message_index_offsets for chunk in chunks],
-            [(one.name, one.offset) for one in summary.attachment_indexes],
-            None,
-            summary.statistics,
-        )
+    def of(cls, summary: bytes) -> "_Contents":
+        """Returns the contents of a file, as its summary section lists them.
+
+        The `mcap` package takes longer to read the section than all poses.
+        """
+        contents = cls()
+        chunks: list[tuple[int, dict[int, int]]] = []
+        position = 0
+        while position < len(summary):
+            start = position + RECORD_HEADER.size
+            opcode, length = RECORD_HEADER.unpack(summary[position:start])
+            position = start + length
+            if position > len(summary):
+                raise ValueError("a record reaches beyond the summary")
+            body = summary[start:position]
+            if opcode == Opcode.CHUNK_INDEX:
+                chunks.append(_read_chunk_index(body))
+            elif opcode == Opcode.SCHEMA:
+                schema = Schema.read(RecordContent(body))
+                contents.schemas[schema.id] = schema
+            elif opcode == Opcode.CHANNEL:
+                channel = Channel.read(RecordContent(body))
+                contents.channels[channel.id] = channel
+            elif opcode == Opcode.STATISTICS:
+                contents.statistics = Statistics.read(RecordContent(body))
+            elif opcode == Opcode.ATTACHMENT_INDEX:
+                one = AttachmentIndex.read(RecordContent(body))
+                contents.attachments.append((one.name, one.offset))
+            elif opcode == Opcode.METADATA_INDEX:
+                other = MetadataIndex.read(RecordContent(body))
+                contents.metadata.append((other.name, other.offset))
+        chunks.sort(key=lambda chunk: chunk[0])
+        contents.blocks = [start for start, _ in chunks]
+        contents.indexes = [offsets for _, offsets in chunks]
+        return contents
 
     def is_whole(self) -> bool:
         """Returns whether all contents are there that the statistics count.
@@ -180,11 +218,7 @@ class McapFile:
         self.path = Path(path)
         check_regular(self.path)
         with self._reading() as stream:
-            self._check_ends(stream)
-            summary = SeekingReader(
-                stream, record_size_limit=SUMMARY_LIMIT_BYTES
-            ).get_summary()
-        self._contents = _Contents.of(summary or Summary())
+            self._contents = _Contents.of(self._read_summary(stream))
         if not self._contents.is_whole():
             self._contents = self._read_through()
         self._channels: dict[str, list[Channel]] = {}
@@ -238,7 +272,8 @@ class McapFile:
         Raises:
             InputError: if the chunk that contains the message is damaged.
         """
-        return self._message(self._chunk(int(location["chunk"])), location)
+        place: Any = location.item()
+        return self._message(self._chunk(place[0]), place)
 
     def visit(self, locations: np.ndarray) -> Iterator[tuple[int, memoryview]]:
         """Yields many messages in file order, unpacking each chunk once.
@@ -253,8 +288,9 @@ class McapFile:
             InputError: if a chunk is damaged.
         """
         order = np.lexsort((locations["offset"], locations["chunk"]))
-        for i in order.tolist():
-            yield i, self.read(locations[i])
+        places = locations[order].tolist()
+        for index, place in zip(order.tolist(), places, strict=True):
+            yield index, self._message(self._chunk(place[0]), place)
 
     def attachment(self, name: str) -> bytes | None:
         """Returns the content of the attachment of this name, if any.
@@ -280,6 +316,23 @@ class McapFile:
             content = data
         return content
 
+    def metadata(self, name: str) -> list[dict[str, str]]:
+        """Returns the contents of all metadata records of this name.
+
+        Raises:
+            InputError: a record cannot be read.
+        """
+        found = []
+        for one, offset in self._contents.metadata:
+            if one == name:
+                with self._reading() as stream:
+                    stream.seek(offset)
+                    limit = _ATTACHMENT_LIMIT_BYTES
+                    body = _read_body(stream, limit, "a metadata record")
+                    content = Metadata.read(RecordContent(body))
+                    found.append(content.metadata)
+        return found
+
     def _kind(self, channel: Channel) -> str:
         schema = self._contents.schemas.get(channel.schema_id)
         name = "a message without a type" if schema is None else schema.name
@@ -303,8 +356,10 @@ class McapFile:
                 ],
                 LOCATION,
             )
-        places = np.sort(locations[["chunk", "offset"]])
-        if (places[1:] == places[:-1]).any():
+        chunk, offset = locations["chunk"], locations["offset"]
+        order = np.lexsort((offset, chunk))
+        twice = np.diff(chunk[order]) == 0
+        if (twice & (np.diff(offset[order]) == 0)).any():
             raise InputError(
                 f"{self.path}: {topic}: the index lists a message twice"
             )
@@ -313,7 +368,10 @@ class McapFile:
 
     def _indexed(self, numbers: list[int]) -> np.ndarray:
         """Returns the locations (N,) of channels' messages from the index."""
-        parts = [np.empty(0, LOCATION)]
+        # Arrays of a few rows each would take longer to join than to read.
+        parts: list[bytes] = []
+        blocks: list[int] = []
+        channels: list[int] = []
         with self._reading() as stream:
             # Many indexes at one place could claim more than the file holds.
             left = stream.seek(0, os.SEEK_END)
@@ -322,10 +380,18 @@ class McapFile:
                     if number not in offsets:
                         continue
                     part = self._read_index(stream, offsets[number], left)
-                    part["chunk"], part["channel_id"] = block, number
-                    left -= len(part) * _INDEX_ENTRY.itemsize
+                    left -= len(part)
                     parts.append(part)
-        return np.concatenate(parts)
+                    blocks.append(block)
+                    channels.append(number)
+        entries = np.frombuffer(b"".join(parts), _INDEX_ENTRY)
+        counts = [len(part) // _INDEX_ENTRY.itemsize for part in parts]
+        locations = np.empty(len(entries), LOCATION)
+        locations["chunk"] = np.repeat(np.array(blocks, "<u4"), counts)
+        locations["offset"] = entries["offset"]
+        locations["log_time_ns"] = entries["log_time"]
+        locations["channel_id"] = np.repeat(np.array(channels, "<u2"), counts)
+        return locations
 
     def _read_through(self) -> _Contents:
         """Finds everything in the file without any index.
@@ -354,6 +420,8 @@ class McapFile:
                     contents.channels.setdefault(record.id, record)
                 elif isinstance(record, Attachment):
                     contents.attachments.append((record.name, start))
+                elif isinstance(record, Metadata):
+                    contents.metadata.append((record.name, start))
                 elif isinstance(record, Message):
                     if contents.blocks[-1:] != [start]:
                         contents.blocks.append(start)
@@ -374,17 +442,16 @@ class McapFile:
         return contents
 
     @staticmethod
-    def _read_index(stream: BinaryIO, offset: int, left: int) -> np.ndarray:
-        """Returns the index at an offset, which has at most `left` bytes."""
+    def _read_index(stream: BinaryIO, offset: int, left: int) -> bytes:
+        """Returns the entries of an index, which has at most `left` bytes."""
         stream.seek(offset + RECORD_HEADER.size)
         _, length = _INDEX_HEADER.unpack(stream.read(_INDEX_HEADER.size))
         if length > left:
             raise ValueError("the indexes of the chunks overlap")
-        entries = np.frombuffer(stream.read(length), _INDEX_ENTRY)
-        part = np.zeros(len(entries), LOCATION)
-        part["offset"] = entries["offset"]
-        part["log_time_ns"] = entries["log_time"]
-        return part
+        entries = stream.read(length)
+        if len(entries) != length or length % _INDEX_ENTRY.itemsize:
+            raise ValueError("the index of a chunk is cut off")
+        return entries
 
     def _unpack(self, number: int) -> memoryview:
         """Reads and uncompresses a chunk whose checksum is right."""
@@ -397,8 +464,8 @@ class McapFile:
                 return memoryview(RECORD_HEADER.pack(opcode, len(body)) + body)
             return memoryview(uncompress(Chunk.read(RecordContent(body))))
 
-    def _message(self, chunk: memoryview, location: np.void) -> memoryview:
-        _, offset, expected_time_ns, expected_channel_id = location.item()
+    def _message(self, chunk: memoryview, place: Any) -> memoryview:
+        _, offset, expected_time_ns, expected_channel_id = place
         with self._faults():
             start = offset + RECORD_HEADER.size
             _, length = RECORD_HEADER.unpack(chunk[offset:start])
@@ -414,8 +481,11 @@ class McapFile:
                 raise ValueError("a message is not where the index says")
         return body[_MESSAGE_HEADER.size :]
 
-    def _check_ends(self, stream: BinaryIO) -> None:
-        """Refuses a file that is not whole, or whose summary is damaged."""
+    def _read_summary(self, stream: BinaryIO) -> bytes:
+        """Returns the summary section; refuses a file that is not whole.
+
+        The result is empty for a file without this section.
+        """
         if stream.read(len(MAGIC)) != MAGIC:
             raise InputError(f"{self.path}: not an MCAP file")
         size = stream.seek(0, os.SEEK_END)
@@ -426,18 +496,22 @@ class McapFile:
                 f" {_REPAIR}"
             )
         end = stream.seek(max(size - len(MAGIC) - _FOOTER.size, 0))
-        _, _, start, _, checksum = _FOOTER.unpack(stream.read(_FOOTER.size))
+        footer = stream.read(_FOOTER.size)
+        opcode, _, start, _, checksum = _FOOTER.unpack(footer)
+        if opcode != Opcode.FOOTER:
+            raise ValueError("the footer is missing")
+        if start == 0:
+            return b""
         if start > end:
             raise ValueError("the summary begins behind its end")
-        if start > 0 and end - start > SUMMARY_LIMIT_BYTES:
+        if end - start > SUMMARY_LIMIT_BYTES:
             raise ValueError(f"a summary of {end - start} bytes")
-        if start > 0 and checksum > 0:
-            stream.seek(start)
-            # Up to the checksum itself.
-            summary = stream.read(end + _FOOTER.size - 4 - start)
-            if zlib.crc32(summary) != checksum:
-                raise ValueError("the checksum of the summary is wrong")
-        stream.seek(0)
+        stream.seek(start)
+        summary = stream.read(end - start)
+        # The checksum is also that of the footer up to the checksum itself.
+        if checksum > 0 and zlib.crc32(summary + footer[:-4]) != checksum:
+            raise ValueError("the checksum of the summary is wrong")
+        return summary
 
     @contextlib.contextmanager
     def _reading(self) -> Iterator:

@@ -21,6 +21,10 @@ _MOST_FIELDS = 256
 _LONGEST_NAME = 1 << 10
 # The header of CDR that gives the order of bytes.
 _ENCAPSULATION_BYTES = 4
+# Name of the metadata record of an MCAP file that gives, for each topic, the
+# number of messages that were seen to have their log time as their stamp. If
+# these are all of its messages, the file's index has their stamps.
+STAMPED_RECORD = "log_times_are_header_stamps"
 
 
 def decode(data: bytes | memoryview, message_type: str) -> Any:
@@ -74,47 +78,22 @@ def read_cloud_header(data: bytes | memoryview) -> tuple[int, str]:
     return sec * 1_000_000_000 + nanosec, frame_id
 
 
+def read_stamp(data: bytes | memoryview) -> int | None:
+    """Returns the stamp of a message that begins with a header [ns].
+
+    It is None if the message is too short. For a message without a header, the
+    result means nothing.
+    """
+    if len(data) < _ENCAPSULATION_BYTES + 8:
+        return None
+    order = "<" if data[1] & 1 else ">"
+    sec, nanosec = struct.unpack_from(f"{order}iI", data, _ENCAPSULATION_BYTES)
+    return sec * 1_000_000_000 + nanosec
+
+
 def stamp_ns(header: Any) -> int:
     """Returns the time of a message's header [ns]."""
     return header.stamp.sec * 1_000_000_000 + header.stamp.nanosec
-
-
-def odometry_row(message: Any) -> tuple:
-    """Returns a message nav_msgs/msg/Odometry as a record of `ODOMETRY_DTYPE`.
-
-    The dtype is `cns_drake.base.drives.drive.ODOMETRY_DTYPE`.
-    """
-    pose, twist = message.pose.pose, message.twist.twist
-    return (
-        stamp_ns(message.header),
-        xyz(pose.position),
-        xyzw(pose.orientation),
-        xyz(twist.linear),
-        xyz(twist.angular),
-    )
-
-
-def transform_row(message: Any) -> tuple:
-    """Returns a geometry_msgs/msg/TransformStamped as `odometry_row` does.
-
-    The velocities are zero.
-    """
-    transform = message.transform
-    place = xyz(transform.translation), xyzw(transform.rotation)
-    return stamp_ns(message.header), *place, 0.0, 0.0
-
-
-def imu_row(message: Any) -> tuple:
-    """Returns a message sensor_msgs/msg/Imu as a record of `IMU_DTYPE`.
-
-    The dtype is `cns_drake.base.drives.drive.IMU_DTYPE`.
-    """
-    return (
-        stamp_ns(message.header),
-        xyzw(message.orientation),
-        xyz(message.angular_velocity),
-        xyz(message.linear_acceleration),
-    )
 
 
 def xyz(v: Any) -> tuple[float, float, float]:

@@ -7,6 +7,7 @@ continues at the next intact chunk.
 """
 
 from collections.abc import Callable, Iterator
+import contextlib
 from dataclasses import dataclass
 import io
 import os
@@ -34,6 +35,8 @@ import zstandard
 MAGIC = b"\x89MCAP0\r\n"
 # Opcode and length.
 RECORD_HEADER = struct.Struct("<BQ")
+# The beginning of a chunk's content: the time of its earliest message.
+_CHUNK_TIME = struct.Struct("<Q")
 # A broken or hostile length must not be taken for the size of a buffer. A
 # chunk holds a few scans.
 CHUNK_LIMIT_BYTES = 1 << 26
@@ -223,6 +226,28 @@ def locate_records(
             if opcode == Opcode.FOOTER:
                 return
         position = end
+
+
+def chunk_times(stream: BinaryIO) -> Iterator[tuple[int, int]]:
+    """Yields each chunk's place and the time of its earliest message.
+
+    The chunks are not uncompressed. The iterator ends where the file is damaged
+    or ends.
+
+    Yields:
+        The offset of a chunk in the file [bytes], and the log time [ns].
+    """
+    size = stream.seek(0, os.SEEK_END)
+    position = len(MAGIC)
+    with contextlib.suppress(_DamageError, struct.error):
+        while True:
+            opcode, end = _read_header(stream, position, size)
+            if opcode == Opcode.CHUNK:
+                yield (
+                    position,
+                    *_CHUNK_TIME.unpack(stream.read(_CHUNK_TIME.size)),
+                )
+            position = end
 
 
 class _DamageError(McapError):

@@ -107,7 +107,13 @@ def test_a_real_run_ends_in_one_line_and_goes_on(tmp_path, request, disk):
     whole = recorded(tmp_path / "whole" / "tiny_01")
     with (tmp_path / "whole/tiny_01/tiny_01_0.mcap").open("rb") as stream:
         chunks = make_reader(stream).get_summary().chunk_indexes
-    half = chunks[2].chunk_start_offset + 100  # Two chunks of four.
+    # The third of four spans of 16 frames begins there.
+    start_ns = chunks[0].message_start_time + 32 * 50_000_000
+    half = 100 + min(
+        chunk.chunk_start_offset
+        for chunk in chunks
+        if chunk.message_start_time == start_ns
+    )
     output, preexec = tmp_path, None
     if disk == "tmpfs":
         small = request.getfixturevalue("tmpfs")

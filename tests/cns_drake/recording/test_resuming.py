@@ -15,6 +15,7 @@ import pytest
 
 from cns_drake.base import files
 from cns_drake.base.errors import InputError
+from cns_drake.recording import topic_chunks
 from cns_drake.recording.schedule import frame_stamp_ns
 
 
@@ -100,15 +101,16 @@ def test_interrupted_again_while_frames_are_taken_over(folder, whole):
     assert contents(folder) == whole
 
 
-def test_chunks_of_full_size_are_cut_alike(tmp_path):
-    # Without the flush of each second: chunks end within frames.
-    record(tmp_path / "whole" / "drive_01", 12, size=100_000)
+def test_chunks_of_full_size_are_cut_alike(tmp_path, monkeypatch):
+    # Each frame has 0.4 MB: spans end by their size, chunks within spans.
+    monkeypatch.setattr(topic_chunks, "_MOST_HELD_BYTES", 3_000_000)
+    record(tmp_path / "whole" / "drive_01", 20, size=100_000)
     folder = tmp_path / "drive_01"
     folder.mkdir()
     whole = contents(tmp_path / "whole" / "drive_01")
-    leave(folder, whole["drive_01_0.mcap"][:4_000_000])
-    taken_over = record(folder, 12, size=100_000)
-    assert 8 <= taken_over <= 9
+    # Two spans of 30 messages each, and a part of the third one.
+    leave(folder, whole["drive_01_0.mcap"][:7_000_000])
+    assert record(folder, 20, size=100_000) == 14
     assert contents(folder) == whole
 
 

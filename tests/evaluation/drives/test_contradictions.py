@@ -5,6 +5,7 @@ import sys
 
 from helpers import bent_drive
 from helpers.contradictions import CONTRADICTIONS, read_messages, write_messages
+from helpers.mcap_bytes import edit_summary
 import numpy as np
 import pytest
 
@@ -79,23 +80,12 @@ def test_two_attachments_of_a_name_that_differ(recording):
         _ = open_drive(path).scenario
 
 
-def test_a_channel_that_the_summary_does_not_name(recording, monkeypatch):
+def test_a_channel_that_the_summary_does_not_name(recording):
     path, messages, attachments = recording
-    data = write_messages(messages, attachments)
-    path.write_bytes(data)
-    from mcap.reader import SeekingReader
-
-    read = SeekingReader.get_summary
-
-    def forget(reader):
-        summary = read(reader)
-        summary.channels.pop(max(summary.channels), None)
-        return summary
-
-    monkeypatch.setattr(SeekingReader, "get_summary", forget)
-    # The summary is optional: the file itself names the channel.
+    path.write_bytes(write_messages(messages, attachments))
     whole = open_drive(path).X_WS
-    monkeypatch.undo()
+    edit_summary(path, lambda one: one.channels.pop(max(one.channels)))
+    # The summary is optional: the file itself names the channel.
     np.testing.assert_array_equal(open_drive(path).X_WS, whole)
 
 

@@ -1,7 +1,7 @@
 """MCAP files without what the format leaves to the writer, and cut ones."""
 
 from helpers.drive_files import make_scan, write_recording, yaw_pose
-from mcap.reader import SeekingReader
+from helpers.mcap_bytes import edit_summary
 from mcap.writer import CompressionType, IndexType
 import numpy as np
 import pytest
@@ -101,32 +101,26 @@ def drop_counts(summary):
         drop_counts,
     ],
 )
-def test_part_of_a_summary(tmp_path, monkeypatch, change, counted):
+def test_part_of_a_summary(tmp_path, change, counted):
     path = record(tmp_path)
     wanted = everything(path)
-    read = SeekingReader.get_summary
 
-    def forgetful(reader):
-        summary = read(reader)
+    def forget(summary):
         change(summary)
         if not counted:
             summary.statistics = None
-        return summary
 
-    monkeypatch.setattr(SeekingReader, "get_summary", forgetful)
+    edit_summary(path, forget)
     assert everything(path) == wanted
 
 
-def test_messages_that_are_counted_but_not_there(tmp_path, monkeypatch):
+def test_messages_that_are_counted_but_not_there(tmp_path):
     path = record(tmp_path)
-    read = SeekingReader.get_summary
 
-    def boastful(reader):
-        summary = read(reader)
+    def boast(summary):
         summary.statistics.message_count += 1
-        return summary
 
-    monkeypatch.setattr(SeekingReader, "get_summary", boastful)
+    edit_summary(path, boast)
     with pytest.raises(InputError, match=r"13 of 14 messages .*repair"):
         open_drive(path)
 
