@@ -26,8 +26,9 @@ from cns_drake.base.drives.mcap_records import (
 # A killed process loses the messages that are held. It may lose a second; part
 # of it is reserved for frames on their way to the file.
 _SPAN_NS = 800_000_000
-# So that cameras of any size do not fill the memory.
-_MOST_HELD_BYTES = 1 << 26
+# Several LiDARs or cameras make more than that in a span. Their messages must
+# not fill the memory.
+_MOST_HELD_BYTES = 1 << 24
 _CHUNK_BYTES = 1 << 20
 
 

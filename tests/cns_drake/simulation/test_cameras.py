@@ -19,6 +19,7 @@ from scipy.spatial.transform import Rotation
 from cns_drake.base.drives.mcap_drive import McapDrive
 from cns_drake.base.errors import InputError
 from cns_drake.command_line.simulating import _camera_fields
+from cns_drake.recording import topic_chunks
 from cns_drake.scenarios.scenario_files import load_scenario
 from cns_drake.sensors.camera import camera_scene
 from cns_drake.simulation.simulation import simulate
@@ -238,14 +239,18 @@ def test_camera_of_the_command_line():
 
 @pytest.mark.slow
 def test_an_interrupted_recording_goes_on_to_the_same_bytes(
-    recording, tmp_path
+    recording, tmp_path, monkeypatch
 ):
-    mcap = (recording / "tiny_01_0.mcap").read_bytes()
+    # Each frame is written when the next one begins.
+    monkeypatch.setattr(topic_chunks, "_SPAN_NS", 1)
+    scenario = load_scenario(recording / "scenario.yaml")
+    whole = simulate(scenario, tmp_path / "whole").folder
+    mcap = (whole / "tiny_01_0.mcap").read_bytes()
     folder = tmp_path / "tiny_01"
     folder.mkdir()
     (folder / "tiny_01_0.mcap.part").write_bytes(mcap[: len(mcap) * 7 // 10])
-    shutil.copy(recording / "fingerprint.txt", folder / "fingerprint.txt.part")
-    run = simulate(load_scenario(recording / "scenario.yaml"), tmp_path)
+    shutil.copy(whole / "fingerprint.txt", folder / "fingerprint.txt.part")
+    run = simulate(scenario, tmp_path)
     assert 0 < run.resumed_frames < FRAMES
     assert (folder / "tiny_01_0.mcap").read_bytes() == mcap
 

@@ -175,7 +175,7 @@ def test_interrupted_anywhere_it_goes_on_to_the_same_bytes(
 ):
     mcap = (recording / "tiny_01_0.mcap").read_bytes()
     resumed = []
-    for size in (len(mcap), len(mcap) // 2, len(mcap) * 9 // 10):
+    for size in (len(mcap), len(mcap) * 3 // 4, len(mcap) * 9 // 10):
         output = tmp_path / str(size)
         folder = output / "tiny_01"
         folder.mkdir(parents=True)
