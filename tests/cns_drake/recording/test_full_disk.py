@@ -150,7 +150,7 @@ def test_a_real_run_ends_in_one_line_and_goes_on(tmp_path, request, disk):
     # A tmpfs has room for whole pages only.
     assert run.resumed_frames in ({16, 32} if disk == "tmpfs" else {32})
     assert notes == [
-        "tiny_01: found an interrupted run, reading it",
+        "tiny_01: found an interrupted run",
         f"tiny_01: {run.resumed_frames} of {FRAMES} frames are there; going"
         " on with the next one",
     ]
