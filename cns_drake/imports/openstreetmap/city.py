@@ -15,6 +15,7 @@ import re
 import numpy as np
 import shapely
 from shapely.geometry import LineString, Point, Polygon
+from shapely.geometry.base import BaseGeometry
 from shapely.strtree import STRtree
 
 from cns_drake.base.errors import InputError
@@ -30,6 +31,13 @@ from cns_drake.imports.foreign_city import (
     make_imported,
 )
 from cns_drake.imports.openstreetmap import reading, streets
+from cns_drake.imports.openstreetmap.passages import (
+    Openings,
+    Passage,
+    Passages,
+    note_walled_up,
+    passages_of,
+)
 from cns_drake.imports.openstreetmap.reading import (
     Local,
     OsmArea,
@@ -173,8 +181,28 @@ def import_openstreetmap(
     )
     coasts = streets.coasts_of(features.ways) if dressed else []
     limits = local(np.array([low, high])) + _SEA * np.array([[-1.0], [1.0]])
+    passages = passages_of(features.ways, local, faults)
+    driven = streets.drivable_streets(features.ways, local, bridges)
+    note_walled_up(
+        [(one.name, LineString(one.line)) for one in driven],
+        [
+            (local.polygon(polygon), heights(one.tags)[0])
+            for one in buildings
+            if not _is_gone(one.tags)
+            for polygon in one.polygons
+        ],
+        passages,
+        faults,
+    )
     found = [
-        *make_buildings(buildings, local, year_attribute, faults, once=dressed),
+        *make_buildings(
+            buildings,
+            local,
+            year_attribute,
+            faults,
+            once=dressed,
+            passages=passages,
+        ),
         *streets.street_surfaces(features, local, bridges),
         *streets.crossing_stripes(features, local),
         *streets.ground_areas(features, local, dressed),
@@ -190,7 +218,7 @@ def import_openstreetmap(
         (latitude, longitude),
         "WGS 84",
         faults,
-        streets.drivable_streets(features.ways, local, bridges),
+        driven,
         streets.street_places(features, local),
         any(
             tags.get("driving_side") == "left"
@@ -281,7 +309,9 @@ def _count_unused(
 def _barriers(
     features: reading.OsmFeatures, local: Local
 ) -> Iterator[Imported]:
-    for name, tags, line, _ in features.ways:
+    openings = Openings(features.ways, local)
+    for way in features.ways:
+        name, tags, line, _ = way
         kind = tags.get("barrier")
         if kind == "hedge":
             (width, usual), semantic_class = _HEDGE, "vegetation"
@@ -291,7 +321,9 @@ def _barriers(
             continue
         where = (name, features.faults)
         high = tag_value(tags, "height", length, _TALLEST, where) or usual
-        strip = LineString(local(line)).buffer(width / 2.0, cap_style="flat")
+        course = LineString(local(line))
+        strip: BaseGeometry = course.buffer(width / 2.0, cap_style="flat")
+        strip = strip.difference(openings.across(way, course, features.faults))
         look = streets.Look("Barrier", semantic_class, None, high)
         yield from streets.raised(f"{kind}_{name}", look, [strip], where)
 
@@ -327,6 +359,8 @@ _INSIDE = 0.9
 _ALL_OF_IT = 0.9
 # Remainders of an outline that are narrower than this are dropped [m].
 _SLIVER = 0.25
+# Least height of a passage, and of the building above it [m].
+_LEAST_CLEAR, _LINTEL = 2.0, 0.4
 
 
 @dataclass(frozen=True)
@@ -376,6 +410,7 @@ def make_buildings(
     year_attribute: str | None,
     faults: ImportFaults,
     once: bool = False,
+    passages: Sequence[Passage] = (),
 ) -> Iterator[Imported]:
     """Yields buildings, made from outlines and building parts.
 
@@ -390,7 +425,9 @@ def make_buildings(
         once: whether an outline inside the outline of another building is
             treated as a part of this building, and outlines that occur twice
             are made once.
+        passages: ways for which buildings are opened.
     """
+    through = Passages(passages)
     outlines: list[_Block] = []
     parts: list[_Block] = []
     for name, tags, polygons in areas:
@@ -425,7 +462,7 @@ def make_buildings(
     taken: dict[str, int] = {}
     for whole, blocks in groups:
         walls, roofs = [], []
-        for block in blocks:
+        for block in _opened(blocks, through, faults):
             wall, top = extruded(
                 block.polygon,
                 block.low,
@@ -453,6 +490,34 @@ def make_buildings(
             lod=1.0,
         )
         yield replace(made, is_gone=True) if _is_gone(whole.tags) else made
+
+
+def _opened(
+    blocks: Iterable[_Block], passages: Passages, faults: ImportFaults
+) -> Iterator[_Block]:
+    """Yields the solids of a building, with an opening for each passage.
+
+    Above an opening, a solid stays whole, with its roof.
+    """
+    for one in blocks:
+        found = passages.through(one.polygon, one.low)
+        if found is None:
+            yield one
+            continue
+        area, clear = found
+        below_roof = one.high - one.roof - _LINTEL
+        if below_roof < _LEAST_CLEAR:
+            below_roof = one.high - _LINTEL
+        clear = min(clear, below_roof)
+        if clear < max(_LEAST_CLEAR, one.low):
+            faults.add("building too low for its passage, not opened", one.name)
+            yield one
+            continue
+        for piece in parts_of(one.polygon.difference(area)):
+            if not piece.buffer(-_SLIVER).is_empty:
+                yield one.replaced(piece, one.low, clear)
+        roof = min(one.roof, one.high - clear - 0.1)
+        yield replace(one, low=clear, roof=roof)
 
 
 def _taken_once(

@@ -27,6 +27,7 @@ from cns_drake.imports.foreign_city import (
     make_imported,
 )
 from cns_drake.imports.openstreetmap import reading
+from cns_drake.imports.openstreetmap.passages import is_tunnel
 from cns_drake.imports.openstreetmap.reading import Local, OsmWay, has_tag
 from cns_drake.imports.openstreetmap.tags import (
     TABLES,
@@ -85,7 +86,7 @@ def bridges_of(ways: Iterable[OsmWay], local: Local) -> Bridges:
         or street_width(way.tags) is not None
         or path_width(way.tags) is not None
     ]
-    tunnels = {way.name for way in used if has_tag(way.tags, "tunnel")}
+    tunnels = {way.name for way in used if is_tunnel(way.tags)}
     open_ways = [way for way in used if way.name not in tunnels]
     lines = [LineString(local(way.line)) for way in open_ways]
     tree = STRtree(lines)
@@ -263,7 +264,7 @@ def street_surfaces(
 
 def _is_elsewhere(name: str, tags: reading.Tags, bridges: Bridges) -> bool:
     """Returns whether a way is not a line on the ground."""
-    is_line = not (has_tag(tags, "tunnel") or has_tag(tags, "area"))
+    is_line = not (is_tunnel(tags) or has_tag(tags, "area"))
     return not is_line or name in bridges.over_streets
 
 
@@ -309,7 +310,7 @@ def street_places(features: reading.OsmFeatures, local: Local) -> StreetPlaces:
         if path_width(tags) is not None
         and tags.get("highway") not in ("steps", "cycleway")
         and tags.get("footway") != "crossing"
-        and not has_tag(tags, "tunnel")
+        and not is_tunnel(tags)
         and not has_tag(tags, "area")
     ]
     return StreetPlaces(
@@ -330,7 +331,7 @@ def crossing_stripes(
     marked = {number for number, tags in features.crossings if is_marked(tags)}
     for _, tags, line, nodes in features.ways:
         width = street_width(tags)
-        if width is None or has_tag(tags, "tunnel"):
+        if width is None or is_tunnel(tags):
             continue
         for k, number in enumerate(nodes):
             if number not in marked:
@@ -427,9 +428,7 @@ def _plain_look(tags: reading.Tags) -> Look | None:
 
 
 def _look(tags: reading.Tags) -> Look | None:
-    if tags.get("tunnel", "no") != "no" or tags.get("layer", "").startswith(
-        "-"
-    ):
+    if is_tunnel(tags) or tags.get("layer", "").startswith("-"):
         return None
     if tags.get("leisure") == "pitch":
         return _pitch(tags)

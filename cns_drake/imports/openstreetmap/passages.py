@@ -1,0 +1,219 @@
+"""Ways in OpenStreetMap that lead through buildings, walls and fences.
+
+https://wiki.openstreetmap.org/wiki/Tag:tunnel%3Dbuilding_passage
+"""
+
+from collections import Counter
+from collections.abc import Iterable, Sequence
+from typing import NamedTuple
+
+import numpy as np
+import shapely
+from shapely import STRtree
+from shapely.geometry import LineString, Polygon
+from shapely.geometry.base import BaseGeometry
+
+from cns_drake.imports.openstreetmap.reading import (
+    Local,
+    OsmWay,
+    Tags,
+    has_tag,
+)
+from cns_drake.imports.openstreetmap.tags import (
+    length,
+    path_width,
+    street_width,
+    tag_value,
+)
+from cns_drake.imports.options import ImportFaults
+
+_RAILS = ("rail", "light_rail", "tram")
+# Usual clear heights of passages: of streets, paths and railways [m].
+_STREET, _PATH, _RAIL = 4.5, 2.8, 5.5
+_TRACK = 3.5
+_TALLEST = 30.0
+# A passage reaches beyond the walls by the first length, because ways and
+# outlines meet only nearly; on each side, it is wider than its way by the
+# second one [m].
+_BEYOND, _ASIDE = 0.3, 0.25
+# A way leads through a building if more than this is inside [m].
+_THROUGH = 0.5
+# Walls do not block a way if they begin above this height [m].
+_HEADROOM = 2.0
+
+
+class Passage(NamedTuple):
+    """A way that leads through what is built.
+
+    Attributes:
+        name: id of the way.
+        course: the way's line in W [m].
+        area: the area that the passage needs in W [m].
+        height: clear height above the ground [m].
+    """
+
+    name: str
+    course: LineString
+    area: BaseGeometry
+    height: float
+
+
+def is_tunnel(tags: Tags) -> bool:
+    """Returns whether a way is below the ground or in a mountain.
+
+    Passages through buildings are not.
+    """
+    is_below = tags.get("layer", "").startswith("-")
+    return has_tag(tags, "tunnel") and (
+        tags["tunnel"] != "building_passage" or is_below
+    )
+
+
+def width_of(tags: Tags) -> float | None:
+    """Returns the width of a street, path or track [m]; None for others."""
+    if tags.get("railway") in _RAILS:
+        return _TRACK
+    return street_width(tags) or path_width(tags)
+
+
+def _on_the_ground(tags: Tags) -> bool:
+    return not (is_tunnel(tags) or has_tag(tags, "area"))
+
+
+def passages_of(
+    ways: Iterable[OsmWay], local: Local, faults: ImportFaults
+) -> list[Passage]:
+    """Returns the ways that lead through buildings or under roofs.
+
+    They have the tag `tunnel=building_passage` or `covered`. `local` converts
+    longitudes and latitudes to coordinates in metres, and `faults` counts tags
+    that cannot be read.
+    """
+    found = []
+    for name, tags, line, _ in ways:
+        is_passage = has_tag(tags, "tunnel") or has_tag(tags, "covered")
+        width = width_of(tags)
+        if not (is_passage and width and _on_the_ground(tags)):
+            continue
+        usual = _STREET if street_width(tags) else _PATH
+        if tags.get("railway") in _RAILS:
+            usual = _RAIL
+        clear = tag_value(
+            tags, "maxheight", length, _TALLEST, (name, faults), _HEADROOM
+        )
+        course = LineString(local(line))
+        area = _longer(course).buffer(width / 2.0 + _ASIDE, cap_style="flat")
+        found.append(Passage(name, course, area, clear or usual))
+    return found
+
+
+def _longer(course: LineString) -> LineString:
+    """Returns a line that is extended a little beyond both ends."""
+    places = shapely.get_coordinates(course)
+    ends = []
+    for end, before in ((0, 1), (-1, -2)):
+        out = places[end] - places[before]
+        out /= max(float(np.hypot(*out)), 1e-9)
+        ends.append(places[end] + _BEYOND * out)
+    return LineString([ends[0], *places, ends[1]])
+
+
+class Passages:
+    """Finds the passages through a building."""
+
+    def __init__(self, passages: Sequence[Passage]):
+        self._passages = passages
+        self._tree = STRtree([one.course for one in passages])
+
+    def through(
+        self, polygon: Polygon, low: float
+    ) -> tuple[BaseGeometry, float] | None:
+        """Returns area and clear height of the passages through a solid.
+
+        Args:
+            polygon: footprint of the solid in W [m].
+            low: height of its lowest point [m].
+
+        Returns:
+            The area in W [m] and the height above the ground [m]; None if no
+            way leads through the solid.
+        """
+        found = [
+            one
+            for k in self._tree.query(polygon, "intersects")
+            if (one := self._passages[k]).height > low
+            and one.course.intersection(polygon).length > _THROUGH
+        ]
+        if not found:
+            return None
+        area = shapely.union_all([one.area for one in found])
+        return area, max(one.height for one in found)
+
+
+def note_walled_up(
+    streets: Iterable[tuple[str, LineString]],
+    solids: Sequence[tuple[Polygon, float]],
+    passages: Sequence[Passage],
+    faults: ImportFaults,
+) -> None:
+    """Counts streets that lead through buildings without a passage.
+
+    Args:
+        streets: ids and lines of the streets in W [m].
+        solids: footprints of buildings in W, and the heights at which they
+            begin [m].
+        passages: the passages; they are not counted.
+        faults: counts the streets.
+    """
+    low = [polygon for polygon, begin in solids if begin < _HEADROOM]
+    tree = STRtree(low)
+    open_ways = {one.name for one in passages}
+    for name, line in streets:
+        if name not in open_ways and any(
+            low[k].intersection(line).length > _THROUGH
+            for k in tree.query(line, "intersects")
+        ):
+            faults.add("street into a building without a passage", name)
+
+
+class Openings:
+    """Finds where ways lead through walls, fences and hedges."""
+
+    def __init__(self, ways: Iterable[OsmWay], local: Local):
+        used = [
+            way
+            for way in ways
+            if width_of(way.tags)
+            and _on_the_ground(way.tags)
+            and not has_tag(way.tags, "bridge")
+        ]
+        self._ways = used
+        self._lines = [LineString(local(way.line)) for way in used]
+        self._tree = STRtree(self._lines)
+        # A way that ends at a wall goes on if another one begins there.
+        self._arms: Counter[int] = Counter()
+        for way in used:
+            self._arms.update(way.nodes)
+            self._arms.update(way.nodes[1:-1])
+
+    def across(
+        self, barrier: OsmWay, course: LineString, faults: ImportFaults
+    ) -> BaseGeometry:
+        """Returns the areas of the ways that lead through a barrier, in W.
+
+        A way leads through it at a common node. Both openings and ways that
+        cross the barrier without a common node are counted in `faults`.
+        `course` is the line of the barrier in W [m].
+        """
+        on_it = {n for n in barrier.nodes if self._arms[n] > 1}
+        areas = []
+        for k in self._tree.query(course, "intersects"):
+            way, line = self._ways[k], self._lines[k]
+            if on_it & {*way.nodes}:
+                half = (width_of(way.tags) or 0.0) / 2.0 + _ASIDE
+                areas.append(line.buffer(half, cap_style="square"))
+            elif line.crosses(course):
+                faults.add("way across a barrier, without an opening", way.name)
+        if areas:
+            faults.add("barrier across a way, opened", barrier.name)
+        return shapely.union_all(areas)
