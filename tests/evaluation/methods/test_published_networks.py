@@ -5,7 +5,9 @@ import io
 import itertools
 import math
 import pickle
+import struct
 import sys
+import tracemalloc
 import types
 import zipfile
 
@@ -198,8 +200,20 @@ def test_dpa_net_in_closed_form():
     np.testing.assert_allclose(dpa_net(weights, cloud), wanted, rtol=1e-3)
 
 
-class FloatStorage:
-    """Stands for PyTorch's type of that name."""
+def storage(name):
+    """Returns a class that stands for PyTorch's type of that name."""
+    return type(name, (), {"__module__": "torch"})
+
+
+# BFloat16 is the upper half of a float32.
+STORAGES = {
+    kind: storage(name)
+    for kind, name in {
+        **{"f4": "FloatStorage", "f2": "HalfStorage", "f8": "DoubleStorage"},
+        **{"u2": "BFloat16Storage", "i8": "LongStorage"},
+        "c8": "ComplexFloatStorage",
+    }.items()
+}
 
 
 class Ran:
@@ -211,7 +225,9 @@ class Ran:
         return setattr, (Ran, "ran", True)
 
 
-def save(path, state, monkeypatch, around=lambda state: state):
+def save(
+    path, state, monkeypatch, around=lambda state: state, *, as_parameter=False
+):
     """Writes tensors as `torch.save` does."""
     content, numbers = io.BytesIO(), itertools.count()
     names = types.ModuleType("torch._utils")
@@ -225,15 +241,27 @@ def save(path, state, monkeypatch, around=lambda state: state):
             steps = tuple(s // v.itemsize for s in v.strides)
             return rebuild, (v, 0, v.shape, steps, False, OrderedDict())
 
+    class Parameter(Tensor):
+        def __reduce__(self):
+            arguments = (Tensor(self.values), True, OrderedDict())
+            return rebuild_parameter, arguments
+
     def rebuild(*arguments):
         raise AssertionError
 
-    rebuild.__module__ = FloatStorage.__module__ = "torch._utils"
-    rebuild.__qualname__ = rebuild.__name__ = "_rebuild_tensor_v2"
-    FloatStorage.__module__ = "torch"
-    names._rebuild_tensor_v2 = rebuild
+    def rebuild_parameter(*arguments):
+        raise AssertionError
+
+    for function, name in (
+        (rebuild, "_rebuild_tensor_v2"),
+        (rebuild_parameter, "_rebuild_parameter"),
+    ):
+        function.__module__ = "torch._utils"
+        function.__qualname__ = function.__name__ = name
+        setattr(names, name, function)
     torch = types.ModuleType("torch")
-    torch.FloatStorage = FloatStorage
+    for kind in STORAGES.values():
+        setattr(torch, kind.__name__, kind)
     monkeypatch.setitem(sys.modules, "torch", torch)
     monkeypatch.setitem(sys.modules, "torch._utils", names)
     with zipfile.ZipFile(path, "w") as archive:
@@ -246,9 +274,11 @@ def save(path, state, monkeypatch, around=lambda state: state):
                 # The storage of an array in another order is its transpose.
                 flat = one.ravel(order="K")
                 archive.writestr(f"archive/data/{key}", flat.tobytes())
-                return "storage", FloatStorage, key, "cpu", one.size
+                kind = STORAGES[one.dtype.str[1:]]
+                return "storage", kind, key, "cpu", one.size
 
-        state = OrderedDict((k, Tensor(v)) for k, v in state.items())
+        made = Parameter if as_parameter else Tensor
+        state = OrderedDict((k, made(v)) for k, v in state.items())
         Pickler(content, 2).dump(around(state))
         archive.writestr("archive/data.pkl", content.getvalue())
     return path
@@ -265,6 +295,9 @@ def test_weights_as_saved(tmp_path, monkeypatch):
     for around in (
         lambda state: state,
         lambda state: {"epoch": 3, "net": state, "run": Ran()},
+        lambda state: {"state": [Ran(), {"model": state}]},
+        lambda state: {f"module.{k}": v for k, v in state.items()},
+        lambda state: {"a": {f"x.model.{k}": v for k, v in state.items()}},
     ):
         path = save(tmp_path / "w.pth", values, monkeypatch, around)
         found = read_weights(path, shapes)
@@ -272,6 +305,105 @@ def test_weights_as_saved(tmp_path, monkeypatch):
         assert found.keys() == shapes.keys()
         for name, value in found.items():
             np.testing.assert_array_equal(value, values[name])
+
+
+def test_weights_in_other_numbers(tmp_path, monkeypatch):
+    values = RNG.normal(size=(2, 3)).astype(np.float32)
+    path = tmp_path / "w.pth"
+
+    def read(stored, **options):
+        save(path, {"a": stored}, monkeypatch, **options)
+        (found,) = read_weights(path, {"a": (2, 3)}).values()
+        assert found.dtype == np.float32
+        return found
+
+    np.testing.assert_array_equal(read(values, as_parameter=True), values)
+    np.testing.assert_array_equal(read(values.astype("f8")), values)
+    half = values.astype("f2")
+    np.testing.assert_array_equal(read(half), half.astype(np.float32))
+    brain = (values.view(np.uint32) >> 16).astype("u2")
+    np.testing.assert_allclose(read(brain), values, rtol=2**-7)
+    np.testing.assert_array_equal(
+        read(np.arange(6).reshape(2, 3)), [[0, 1, 2], [3, 4, 5]]
+    )
+    with pytest.raises(InputError, match=r"a: numbers of the type Complex"):
+        read(values.astype("c8"))
+    with pytest.raises(InputError, match=r"a: not all are finite numbers"):
+        read(np.full((2, 3), 1e300))
+
+
+def test_one_of_two_sets_of_weights_is_named(tmp_path, monkeypatch, capsys):
+    values = {"a": np.ones(2, np.float32)}
+    path = save(
+        tmp_path / "w.pth",
+        values,
+        monkeypatch,
+        lambda state: {"net": state, "ema": {"module.a": state["a"]}, "n": {}},
+    )
+    read_weights(path, {"a": (2,)})
+    assert "w.pth: the weights in net are read, not in ema" in (
+        capsys.readouterr().err
+    )
+
+
+def hostile(path, pickled, **data):
+    with zipfile.ZipFile(path, "w", zipfile.ZIP_DEFLATED) as archive:
+        archive.writestr("a/data.pkl", pickled)
+        for key, content in data.items():
+            archive.writestr(f"a/data/{key[1:]}", content)
+    return path
+
+
+def nested(number, levels):
+    """A pickle of lists in lists, `number` ** `levels` when walked."""
+    lists = b"](" + b"K\x01" * number + b"eq\x00"
+    for k in range(1, levels):
+        lists += (
+            b"]("
+            + b"h"
+            + bytes([k - 1])
+            + (b"h" + bytes([k - 1])) * (number - 1)
+            + b"eq"
+            + bytes([k])
+        )
+    return b"\x80\x02" + lists
+
+
+_AGAIN = (
+    b"(X\x07\x00\x00\x00storagectorch\nFloatStorage\n"
+    b"X\x01\x00\x00\x000X\x03\x00\x00\x00cpuM\x01\x00tQ"
+)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(
+    ("pickled", "data"),
+    [
+        # A place in the memory of the unpickler, far behind all others.
+        (b"\x80\x02Nr" + struct.pack("<I", 1 << 30) + b".", {}),
+        # The same numbers again and again.
+        (b"\x80\x02](" + _AGAIN * 40 + b"e.", {"_0": bytes(100_000_000)}),
+        (nested(10, 9) + b".", {}),
+        # A type that is called with them.
+        (nested(10, 9) + b"0ctorch\nFloatStorage\nh\x08\x85R.", {}),
+        (b"\x80\x02N" + b"\x85" * 500_000 + b".", {}),
+        (b"\x80\x02}q\x00X\x01\x00\x00\x00ah\x00s.", {}),
+        (b"\x80\x02cos\nsystem\nX\x05\x00\x00\x00falseR.", {}),
+    ],
+    ids=["memory", "again", "nested", "called", "deep", "itself", "code"],
+)
+def test_small_files_of_weights_take_little_memory(tmp_path, pickled, data):
+    path = hostile(tmp_path / "w.pth", pickled, **data)
+    tracemalloc.start()
+    try:
+        with pytest.raises(InputError, match=r"w\.pth: ") as error:
+            read_weights(path, {"a": (2, 3)})
+        _, most = tracemalloc.get_traced_memory()
+    finally:
+        tracemalloc.stop()
+    assert "\n" not in str(error.value)
+    # A step of a pickle makes at most one object.
+    assert most < 300_000_000
 
 
 @pytest.mark.parametrize(
@@ -294,6 +426,9 @@ def test_other_weights(tmp_path, monkeypatch, changes, message):
 def test_files_that_are_no_weights(tmp_path):
     path = tmp_path / "w.pth"
     with pytest.raises(InputError, match=r"w\.pth: No such file"):
+        make_method("dpa-net", {"weights": path})
+    path.write_bytes(b"\x80\x02\x8a\nl\xfc\x9cF\xf9 j\xa8P\x19.\x80\x02.")
+    with pytest.raises(InputError, match=r"w\.pth: .* PyTorch before 1\.6"):
         make_method("dpa-net", {"weights": path})
     path.write_bytes(b"text")
     with pytest.raises(InputError, match=r"w\.pth: no weights of PyTorch"):
