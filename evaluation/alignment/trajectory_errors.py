@@ -157,7 +157,9 @@ def trajectory_errors(
             f" drive, of {_LEAST_POSES} at least: the estimate spans"
             f" {_seconds(stamps_ns)}, {drive.name} {_seconds(own)}"
         )
-    X_WB, _ = truth.interpolate(stamps_ns[inside], _LONGEST_GAP_NS)
+    X_WB, _ = truth.interpolate(
+        stamps_ns[inside], _LONGEST_GAP_NS, "the estimated pose"
+    )
     Y_WB = estimate.X_WB[inside]
     _, _, E = segment_errors(X_WB, Y_WB)
     return TrajectoryErrors(

@@ -24,7 +24,7 @@ from cns_drake.base.errors import InputError, value_errors
 from cns_drake.base.files import is_there, read_text
 from cns_drake.base.yaml_files import YamlLoader, parse_yaml
 from evaluation.clouds.cloud_files import read_cloud
-from evaluation.drives.scan_files import FileDrive, list_stamped
+from evaluation.drives.scan_files import FileDrive, first_there, list_stamped
 from evaluation.drives.text_tables import (
     pose_matrices,
     read_quaternions,
@@ -68,17 +68,19 @@ class CnsFolderDrive(FileDrive):
         Raises:
             InputError: there is no such drive, or its poses cannot be used.
         """
+        chosen: list[str] = []
         folders = [path / name for name in _FOLDERS if (path / name).is_dir()]
-        if not folders:
+        folder = first_there(folders, chosen)
+        if folder is None:
             raise InputError(
                 f"{path}: CNS: neither {' nor '.join(_FOLDERS)} in it"
             )
-        files, stamps_ns = list_stamped(folders[0], ".pcd")
+        files, stamps_ns = list_stamped(folder, ".pcd")
         trajectory = read_quaternions(path / _POSES, ",")
         X_WB = trajectory.at(stamps_ns, _TOLERANCE_NS)
         resolved = path.resolve()
         self._imu_path = path / _IMU
-        mount = _find_mount(resolved)
+        mount = _find_mount(resolved, chosen)
         name, scenario = resolved.name, read_scenario(path)
         if mount is not None and mount.parent == resolved.parent.parent:
             name = f"{resolved.parent.name}_{resolved.name}".lower()
@@ -97,13 +99,14 @@ class CnsFolderDrive(FileDrive):
                 *(trajectory.path, self._imu_path, path / SCENARIO),
                 *([] if mount is None else [mount]),
             ],
+            notes=tuple(chosen),
             scenario=scenario,
             unit="cns",
         )
 
     @cached_property
     def notes(self) -> tuple[str, ...]:
-        notes: list[str] = []
+        notes = list(super().notes)
         read_cloud(self._files[0], on_note=notes.append)
         return tuple(notes)
 
@@ -127,11 +130,12 @@ def holds_cns(path: Path) -> bool:
     return (path / _POSES).is_file() or (path / _FOLDERS[0]).is_dir()
 
 
-def _find_mount(path: Path) -> Path | None:
-    for folder in (path, path.parent, path.parent.parent):
-        if is_there(folder / _MOUNT):
-            return folder / _MOUNT
-    return None
+def _find_mount(path: Path, notes: list[str]) -> Path | None:
+    folders = (path, path.parent, path.parent.parent)
+    return first_there(
+        [folder / _MOUNT for folder in folders if is_there(folder / _MOUNT)],
+        notes,
+    )
 
 
 def _read_mount(path: Path | None) -> np.ndarray:

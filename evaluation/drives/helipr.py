@@ -90,7 +90,15 @@ class HeliprDrive(FileDrive):
         Raises:
             InputError: there is no such drive, or its poses cannot be used.
         """
+        is_chosen = lidar is not None or _is_lidar_folder(path.resolve())
         drive, lidar = _choose(path, lidar)
+        there = _lidars(drive)
+        chosen: tuple[str, ...] = ()
+        if not is_chosen and len(there) > 1:
+            chosen = (
+                f"{path}: the scans of {lidar} are read (--lidar reads those of"
+                f" another: {', '.join(one for one in there if one != lidar)})",
+            )
         files, stamps_ns = list_stamped(drive / _SCANS / lidar, ".bin")
         in_utm = (drive / _POSES / f"global_{lidar}_gt.txt").is_file()
         poses_name = f"global_{lidar}_gt.txt" if in_utm else f"{lidar}_gt.txt"
@@ -102,13 +110,14 @@ class HeliprDrive(FileDrive):
         drive = drive.resolve()
         super().__init__(
             name=f"{drive.name}_{lidar}",
+            session=drive.name,
             world_frame=f"helipr{f'/{DATUM}' if in_utm else drive}",
             files=kept,
             stamps_ns=stamps_ns[spanned],
             X_WS=X_WS,
             read=partial(read_scan, lidar),
             tables=[trajectory.path],
-            notes=notes,
+            notes=chosen + notes,
             datum=DATUM if in_utm else None,
             unit=_UNITS.get(lidar),
         )

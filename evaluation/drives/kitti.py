@@ -41,7 +41,7 @@ from cns_drake.base.files import is_there, read_bytes, read_text
 from cns_drake.base.json_text import parse_json
 from cns_drake.base.listing import listed
 from cns_drake.base.number_rows import parse_rows
-from evaluation.drives.scan_files import BinDrive, read_packed
+from evaluation.drives.scan_files import BinDrive, first_there, read_packed
 from evaluation.drives.text_tables import (
     check_increasing,
     parse_seconds,
@@ -94,10 +94,10 @@ class KittiDrive(BinDrive):
         with value_errors(times_path):
             stamps_ns = parse_seconds(times)
         check_increasing(times_path, stamps_ns, "row")
-        poses_path = _poses_path(path)
+        notes: list[str] = []
+        poses_path = _poses_path(path, notes)
         X_C0C = read_poses(poses_path)
         counts = len(stamps_ns), len(X_C0C)
-        notes: list[str] = []
         stamps_ns = _rows_of_scans(times_path, stamps_ns, numbers, notes)
         X_C0C = _rows_of_scans(poses_path, X_C0C, numbers, notes)
         # If scans are missing, one table may have a row for each number and the
@@ -245,18 +245,16 @@ def _rows_of_scans(
     return rows[numbers]
 
 
-def _poses_path(path: Path) -> Path:
+def _poses_path(path: Path, notes: list[str]) -> Path:
     resolved = path.resolve()
-    for candidate in (
-        resolved.parent.parent / "poses" / f"{resolved.name}.txt",
-        path / "poses.txt",
-    ):
-        if candidate.is_file():
-            return candidate
-    raise InputError(
-        f"{path}: KITTI: no poses, neither ../../poses/{resolved.name}.txt nor"
-        " poses.txt"
-    )
+    common = resolved.parent.parent / "poses" / f"{resolved.name}.txt"
+    found = first_there([common, path / "poses.txt"], notes)
+    if found is None:
+        raise InputError(
+            f"{path}: KITTI: no poses, neither ../../poses/{resolved.name}.txt"
+            " nor poses.txt"
+        )
+    return found
 
 
 def _read_first_pose(path: Path) -> np.ndarray:

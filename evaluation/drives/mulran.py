@@ -17,6 +17,7 @@ from cns_drake.base.errors import InputError
 from evaluation.drives.scan_files import (
     DATUM,
     BinDrive,
+    first_there,
     is_local,
     keep_spanned,
     list_stamped,
@@ -60,7 +61,8 @@ class MulranDrive(BinDrive):
         Raises:
             InputError: there is no such drive, or its poses cannot be used.
         """
-        folder = _scan_folder(path)
+        chosen: list[str] = []
+        folder = _scan_folder(path, chosen)
         if folder is None:
             raise InputError(
                 f"{path}: MulRan: neither {' nor '.join(_FOLDERS)} in it"
@@ -69,6 +71,7 @@ class MulranDrive(BinDrive):
         trajectory = read_matrices(path / _POSES, ",")
         X_UB, spanned = trajectory.interpolate(stamps_ns, _LONGEST_GAP_NS)
         kept, notes = keep_spanned(files, spanned, trajectory.path)
+        notes = (*chosen, *notes)
         name = path.resolve().name
         local = is_local(trajectory.X_WB)
         if local:
@@ -110,11 +113,9 @@ class MulranDrive(BinDrive):
 
 def holds_mulran(path: Path) -> bool:
     """Returns whether a folder looks like a drive of MulRan."""
-    return (path / _POSES).is_file() or _scan_folder(path) is not None
+    return (path / _POSES).is_file() or _scan_folder(path, []) is not None
 
 
-def _scan_folder(path: Path) -> Path | None:
-    for name in _FOLDERS:
-        if (path / name).is_dir():
-            return path / name
-    return None
+def _scan_folder(path: Path, notes: list[str]) -> Path | None:
+    folders = [path / name for name in _FOLDERS if (path / name).is_dir()]
+    return first_there(folders, notes)

@@ -18,6 +18,7 @@ from cns_drake.base.errors import InputError
 from evaluation.drives.scan_files import (
     FileDrive,
     check_below,
+    first_there,
     keep_spanned,
     list_stamped,
     read_packed,
@@ -74,7 +75,8 @@ class NcltDrive(FileDrive):
             path / _SCANS, ".bin", parse_microseconds
         )
         name = path.resolve().name
-        trajectory, unknown = read_angles(_poses_path(path))
+        chosen: list[str] = []
+        trajectory, unknown = read_angles(_poses_path(path, chosen))
         X_NB, spanned = trajectory.interpolate(stamps_ns, _LONGEST_GAP_NS)
         kept, notes = keep_spanned(files, spanned, trajectory.path)
         super().__init__(
@@ -85,7 +87,7 @@ class NcltDrive(FileDrive):
             X_WS=_X_WN @ X_NB @ _X_BS,
             read=lambda path, stamp_ns: read_scan(path),
             tables=[trajectory.path],
-            notes=unknown + notes,
+            notes=(*chosen, *unknown, *notes),
             unit="hdl-32e-upside-down",
         )
 
@@ -115,14 +117,15 @@ def read_scan(path: Path) -> np.ndarray:
     return points
 
 
-def _poses_path(path: Path) -> Path:
+def _poses_path(path: Path, notes: list[str]) -> Path:
     resolved = path.resolve()
     name = f"groundtruth_{resolved.name}.csv"
     beside = resolved.parent
-    for folder in (path, beside, beside / "ground_truth"):
-        if (folder / name).is_file():
-            return folder / name
-    raise InputError(
-        f"{path}: NCLT: no {name}, neither in it nor beside it nor in"
-        " ../ground_truth"
-    )
+    folders = (path, beside, beside / "ground_truth")
+    found = first_there([folder / name for folder in folders], notes)
+    if found is None:
+        raise InputError(
+            f"{path}: NCLT: no {name}, neither in it nor beside it nor in"
+            " ../ground_truth"
+        )
+    return found

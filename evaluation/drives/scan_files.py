@@ -1,6 +1,7 @@
 """Drives that are stored as one file for each scan."""
 
 from collections.abc import Callable, Iterable, Mapping
+import filecmp
 from functools import cached_property
 from pathlib import Path
 from typing import Any
@@ -76,6 +77,7 @@ class FileDrive(Drive):
         datum: str | None = None,
         scenario: Mapping | None = None,
         unit: str | None = None,
+        session: str | None = None,
     ):
         """Describes a drive of N >= 1 scans.
 
@@ -95,8 +97,10 @@ class FileDrive(Drive):
                 none.
             scenario: see `evaluation.drives.Drive.scenario`.
             unit: name of the LiDAR's unit, if the data set has only one.
+            session: see `evaluation.drives.Drive.session`; by default the name.
         """
         self.name = name
+        self._session = session or name
         self.world_frame = world_frame
         self._files = files
         self._stamps_ns = stamps_ns
@@ -118,6 +122,10 @@ class FileDrive(Drive):
     @property
     def X_WS(self) -> np.ndarray:
         return self._X_WS
+
+    @property
+    def session(self) -> str:
+        return self._session
 
     @property
     def files(self) -> tuple[Path, ...]:
@@ -201,6 +209,29 @@ def list_stamped(
     order = np.argsort(stamps_ns, kind="stable")
     check_increasing(folder, stamps_ns[order], "scan")
     return [files[i] for i in order], stamps_ns[order]
+
+
+def first_there(candidates: Iterable[Path], notes: list[str]) -> Path | None:
+    """Returns the first of several files or folders that exists, or None.
+
+    If others exist, too, that are not the same, a note is added to `notes`.
+    """
+    there = [one for one in candidates if one.exists()]
+    if not there:
+        return None
+    first, *others = there
+    others = [one for one in others if not _is_same(first, one)]
+    if others:
+        named = ", ".join(map(str, others))
+        notes.append(f"{first}: read; not read: {named}")
+    return first
+
+
+def _is_same(first: Path, second: Path) -> bool:
+    if first.samefile(second):
+        return True
+    both = first.is_file() and second.is_file()
+    return both and filecmp.cmp(first, second, shallow=False)
 
 
 def keep_spanned(

@@ -255,7 +255,10 @@ class Trajectory:
     X_WB: np.ndarray
 
     def interpolate(
-        self, stamps_ns: np.ndarray, longest_gap_ns: int
+        self,
+        stamps_ns: np.ndarray,
+        longest_gap_ns: int,
+        wanted_for: str = "the scan",
     ) -> tuple[np.ndarray, np.ndarray]:
         """Returns interpolated poses at given times (SLERP and linear).
 
@@ -263,6 +266,7 @@ class Trajectory:
             stamps_ns: (M,) int64 times of the wanted poses [ns].
             longest_gap_ns: greatest time between two poses that are
                 interpolated [ns].
+            wanted_for: what has these times, for the error message.
 
         Returns:
             (K, 4, 4) poses at the times between the first and the last pose of
@@ -288,8 +292,10 @@ class Trajectory:
         if (gaps > longest_gap_ns).any():
             worst = int(gaps.argmax())
             raise InputError(
-                f"{self.path}: time: no pose for the scan at"
-                f" {wanted[worst]} ns: nothing for {gaps[worst] * 1e-9:.2f} s"
+                f"{self.path}: time: no pose for {wanted_for} at"
+                f" {wanted[worst]} ns: the poses there are"
+                f" {gaps[worst] * 1e-9:.2f} s apart, more than"
+                f" {longest_gap_ns * 1e-9:g} s"
             )
         # Differences of int64 are exact, and small enough for a double.
         fraction = (wanted - own[before]) / np.where(exact, 1, gaps)

@@ -8,7 +8,7 @@ import os
 from pathlib import Path
 import re
 
-from cns_drake.base.drives.drive import driven_way
+from cns_drake.base.drives.drive import SCENARIO, driven_way
 from cns_drake.base.drives.lidar_fields import LidarField
 from cns_drake.base.errors import InputError, one_line
 from cns_drake.base.listing import listed, natural_key
@@ -20,15 +20,19 @@ from evaluation.report.reference import NO_REFERENCE, Reference
 from evaluation.study.chosen_methods import MethodChoice
 from evaluation.study.surveys import DriveSource, RecordedDrive, described_key
 
-# The names of drives that state map and stage, the second ones as those of NCLT
-# and Boreas, the last ones as MulRan's.
+# The names of drives that state map and stage, the first ones as those of NCLT,
+# Boreas and rosbag2, which end in a date and a time, the last ones as MulRan's.
 _NAMES = (
+    re.compile(r"(?P<map>.*?)[-_]?(?P<stage>\d{4}([-_])\d\d?\3\d\d?(\D.*)?)"),
     re.compile(r"(?P<map>.+)_(?P<stage>[^_]+)"),
-    re.compile(r"(?P<map>.*?)-?(?P<stage>\d{4}-\d\d-\d\d.*)"),
     re.compile(r"(?P<map>.*\D)(?P<stage>\d+)"),
 )
 # A whole disk has more folders, and takes minutes to search.
 _MOST_FOLDERS = 10_000
+_GUESSED = (
+    " Map and stage were guessed from the drive's name; a scenario.yaml in its"
+    " folder states them."
+)
 _UNPLACED = "map and stage are unknown: no scenario, and no name <map>_<stage>"
 
 
@@ -49,6 +53,7 @@ class RecordingInfo:
             `path` with its default options.
         lidar_field: number of rings and field of view of the LiDAR; None if
             unknown.
+        is_guessed: whether map and stage come from the name of the drive.
     """
 
     name: str
@@ -59,6 +64,7 @@ class RecordingInfo:
     needs: tuple[str, ...] = ()
     made_by: DriveSource | None = None
     lidar_field: LidarField | None = None
+    is_guessed: bool = False
 
     @property
     def source(self) -> DriveSource:
@@ -243,7 +249,8 @@ def find_recordings(
     A recording states its map and stage in its scenario. Without a scenario,
     they are taken from its name: `<map>_<stage>`, or without `_` as in KAIST01,
     or `<map>-<date>`. If the name is only a date, as in NCLT, the world frame
-    is the map. A recording without map and stage is left out, with a note.
+    is the map. What is left out is told by a note: recordings without map and
+    stage, and those in deeper folders.
 
     Args:
         folder: the folder.
@@ -260,9 +267,7 @@ def find_recordings(
     folder = Path(folder)
     if not folder.is_dir():
         raise InputError(f"{folder}: no such folder")
-    paths = _find_drives(folder)
-    if not paths:
-        raise InputError(f"{folder}: no recorded drive in it")
+    paths = _find_drives(folder, on_note)
     placed = {path: _place(path, on_note, lidar, columns) for path in paths}
     found = [one for one in placed.values() if one is not None]
     if not found:
@@ -281,6 +286,7 @@ def nothing_to_compare(cities: Iterable[City]) -> list[str]:
         " stages: `cns-drake import --years` makes stages of a real city, and"
         " a second drive (sequence_NN.yaml) goes through one of them."
         " --exclude-recent compares a drive with itself."
+        + (_GUESSED if any(map(_is_guessed, city.stages.values())) else "")
         for city in cities
         if not city.change_pairs()
     ]
@@ -312,15 +318,16 @@ def group_cities(
     ]
 
 
-def _find_drives(folder: Path) -> list[Path]:
-    """Returns the paths of the drives in a folder, in order."""
-    paths = []
-    nested = []
-    for child in listed(folder):
-        if _is_drive(child):
-            paths.append(child)
-        elif child.is_dir():
-            nested.append(child)
+def _find_drives(folder: Path, on_note: Callable[[str], None]) -> list[Path]:
+    """Returns the paths of the drives in a folder, in order.
+
+    Raises:
+        InputError: there is none, or there are too many folders.
+    """
+    children = listed(folder)
+    drives = [path for path in children if _holds_drive(path)]
+    nested = [path for path in children if path.is_dir() and path not in drives]
+    deeper: list[Path] = []
     below = (path for child in nested for path in _folders(child, 2))
     for number, path in enumerate(below):
         if number == _MOST_FOLDERS:
@@ -328,9 +335,34 @@ def _find_drives(folder: Path) -> list[Path]:
                 f"{folder}: more than {_MOST_FOLDERS} folders in it; give the"
                 " folder of the recordings"
             )
-        if (holds_cns(path) or holds_kitti(path)) and _is_drive(path):
-            paths.append(path)
-    return sorted(paths, key=lambda path: natural_key(str(path)))
+        if _holds_drive(path):
+            is_export = holds_cns(path) or holds_kitti(path)
+            (drives if is_export else deeper).append(path)
+    for path in sorted(deeper, key=_natural):
+        on_note(
+            f"{path}: left out: not directly in {folder}; give its folder, or"
+            " move it up"
+        )
+    paths: list[Path] = []
+    unnamed: list[Path] = []
+    for path in sorted(drives, key=_natural):
+        is_placed = not holds_kitti(path) or (path / SCENARIO).is_file()
+        (paths if is_placed else unnamed).append(path)
+    if unnamed:
+        fault = (
+            f"{unnamed[0]}: no {SCENARIO}, which states map and stage of a"
+            f" drive in KITTI's layout ({len(unnamed)} drives have none)"
+        )
+        if not paths:
+            raise InputError(fault)
+        on_note(f"{fault}; left out")
+    if not paths:
+        raise InputError(f"{folder}: no recorded drive in it")
+    return paths
+
+
+def _natural(path: Path) -> tuple:
+    return natural_key(str(path))
 
 
 def _folders(folder: Path, levels: int) -> Iterator[Path]:
@@ -347,10 +379,12 @@ def _folders(folder: Path, levels: int) -> Iterator[Path]:
             yield from _folders(path, levels - 1)
 
 
-def _is_drive(path: Path) -> bool:
-    if path.suffix == ".part" or not find_readers(path):
-        return False
-    return not holds_kitti(path) or (path / "scenario.yaml").is_file()
+def _holds_drive(path: Path) -> bool:
+    return path.suffix != ".part" and bool(find_readers(path))
+
+
+def _is_guessed(recording: RecordingInfo) -> bool:
+    return recording.is_guessed
 
 
 def _place(
@@ -365,11 +399,12 @@ def _place(
         on_note(note)
     scenario = drive.scenario or {}
     way = driven_way(scenario)
-    if {"map", "stage"} <= set(scenario):
+    is_guessed = not {"map", "stage"} <= set(scenario)
+    if not is_guessed:
         map_name = one_line(Path(str(scenario["map"])).name)
         stage = one_line(scenario["stage"])
     else:
-        matches = (name.fullmatch(drive.name) for name in _NAMES)
+        matches = (name.fullmatch(drive.session) for name in _NAMES)
         match = next(filter(None, matches), None)
         if match is None:
             return None
@@ -386,6 +421,7 @@ def _place(
         way,
         made_by=source,
         lidar_field=drive.lidar_field,
+        is_guessed=is_guessed,
     )
 
 

@@ -7,6 +7,7 @@ from functools import cached_property
 from pathlib import Path
 
 from cns_drake.base import terminal
+from cns_drake.base.errors import InputError
 from cns_drake.base.files import make_folder
 from cns_drake.base.jobs.cluster import Cluster
 from cns_drake.base.jobs.processes import nothing_left
@@ -468,8 +469,8 @@ def write_report(
         The path of `report.html`.
 
     Raises:
-        InputError: a recording cannot be read, or the output cannot be
-            written.
+        InputError: a recording cannot be read, there is nothing to compare and
+            maps and stages were guessed, or the output cannot be written.
     """
     methods = choose_methods(own_methods, settings)
     found = find_recordings(recordings, on_note, lidar, columns)
@@ -481,6 +482,14 @@ def write_report(
     reference = reference_for({one.map_name for one in found})
     study = Study(found, output, methods, protocol, with_costs, reference)
     jobs = study.jobs()
+    alone = nothing_to_compare(study.cities)
+    # A wrong guess must not lead to an empty report.
+    if (
+        len(alone) == len(study.cities)
+        and protocol.exclude_recent is None
+        and any(one.is_guessed for one in found)
+    ):
+        raise InputError(f"{recordings}: {alone[0]}")
     make_folder(output)
     run_jobs(jobs, cluster)
     return study.assemble(on_note=on_note)

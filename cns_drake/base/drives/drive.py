@@ -217,6 +217,14 @@ class Drive(abc.ABC):
         return None
 
     @property
+    def session(self) -> str:
+        """Name of the drive without that of its LiDAR.
+
+        Without a scenario, it tells the map and the stage.
+        """
+        return self.name
+
+    @property
     def files(self) -> tuple[Path, ...]:
         """All files that are read, also when a scan or its labels are asked.
 

@@ -2,18 +2,21 @@
 
 import json
 
-from helpers.drive_files import make_scan, write_recording, yaw_pose
+from helpers.drive_files import T0_NS, make_scan, write_recording, yaw_pose
 from helpers.eval_program import assert_refused, run
 import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
 from cns_drake.base import poses
+from cns_drake.base.errors import InputError
 from evaluation.alignment.trajectory_errors import (
     aligned_offsets,
     segment_errors,
+    trajectory_errors,
 )
 from evaluation.drives import open_drive
+from evaluation.drives.text_tables import parse_seconds, read_quaternions
 
 STEP = 2.5
 # The first pose more than 100 m of path behind another.
@@ -55,6 +58,25 @@ def moved(X):
     """Returns the same trajectory in another world."""
     turn = Rotation.from_rotvec([0.3, -0.2, 2.0]).as_matrix()
     return poses.make_pose(turn, np.array([40.0, -7.0, 3.0])) @ X
+
+
+def test_true_poses_that_are_too_far_apart(tmp_path):
+    """As of keyframes: the gap is in the drive, and no scan is meant."""
+    X = bent_poses(5)
+    stamps_ns = [T0_NS + k * 2_000_000_000 for k in range(5)]
+    scan = make_scan(np.ones((3, 3)))
+    folder = tmp_path / "sparse_01"
+    write_recording(folder, [scan] * 5, X, stamps_ns=stamps_ns)
+    middle = np.array(stamps_ns[:-1]) + 1_000_000_000
+    path = write_tum(tmp_path / "e.tum", middle, np.array(X[:-1]))
+    with pytest.raises(InputError) as error:
+        trajectory_errors(
+            open_drive(folder), read_quaternions(path, None, parse_seconds)
+        )
+    assert str(error.value).endswith(
+        f"no pose for the estimated pose at {middle[0]} ns: the poses there"
+        " are 2.00 s apart, more than 1 s"
+    )
 
 
 def score(capsys, drive, path, *options):

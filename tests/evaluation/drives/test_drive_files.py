@@ -195,3 +195,40 @@ def test_digests_are_kept_until_a_file_changes(tmp_path, monkeypatch):
     assert file_digests([path]) == [digest(b"pointz")]
     monkeypatch.setenv("XDG_CACHE_HOME", "/proc/nowhere")
     assert file_digests([path]) == [digest(b"pointz")]
+
+
+def test_the_one_of_two_tables_that_is_read_is_named(tmp_path):
+    folder = kitti(tmp_path)
+    common = tmp_path / "poses" / "07.txt"
+    own = folder / "poses.txt"
+    own.write_bytes(common.read_bytes())
+    assert open_drive(folder, columns=4).notes == ()
+    write_matrices(own, None, make_poses(3, seed=5), " ")
+    assert f"{common}: read; not read: {own}" in open_drive(folder).notes
+    # NCLT's ground truth, beside the session and in a folder.
+    folder = nclt(tmp_path)
+    common = tmp_path / "ground_truth" / "groundtruth_2012-01-08.csv"
+    own = tmp_path / "groundtruth_2012-01-08.csv"
+    own.symlink_to(common)
+    assert open_drive(folder).notes == ()
+    own.unlink()
+    own.write_text(common.read_text().replace("-3.0", "-4.0"))
+    assert open_drive(folder).notes == (f"{own}: read; not read: {common}",)
+
+
+def test_the_one_of_two_folders_or_mounts_that_is_read_is_named(tmp_path):
+    folder = cns(tmp_path)
+    (folder / "LiDAR").mkdir()
+    nearer = folder.parent / "transformation_lidar.yaml"
+    nearer.write_text(MATRIX.replace("1.6", "1.8"))
+    read = (folder / "pcd", nearer)
+    others = (folder / "LiDAR", tmp_path / "transformation_lidar.yaml")
+    assert open_drive(folder).notes == tuple(
+        f"{one}: read; not read: {other}"
+        for one, other in zip(read, others, strict=True)
+    )
+    folder = mulran(tmp_path)
+    (folder / "Ouster").mkdir()
+    assert open_drive(folder).notes[0] == (
+        f"{folder / 'sensor_data/Ouster'}: read; not read: {folder / 'Ouster'}"
+    )

@@ -210,7 +210,7 @@ def long_gap(stamps_ns, X_UB):
         (mirrored, "row 1: no rotation matrix"),
         (lost_for_a_while, "easting: .* is no UTM coordinate"),
         (other_day, "time: no pose for any scan"),
-        (long_gap, "time: no pose for the scan at .* nothing for 2.01 s"),
+        (long_gap, "time: no pose for the scan at .* 2.01 s apart"),
     ],
 )
 def test_poses_that_cannot_be_used(tmp_path, change, fault):

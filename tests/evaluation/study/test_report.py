@@ -3,7 +3,7 @@ import csv
 import io
 import json
 
-from helpers import dataset_folders, studies
+from helpers import dataset_folders, helipr_drive, studies
 from helpers.contradictions import add_images
 from helpers.drive_files import T0_NS, make_scan, write_recording, yaw_pose
 from helpers.small_towns import drive
@@ -125,6 +125,76 @@ def test_what_cannot_be_placed_is_left_out(tmp_path):
     assert found.name == "town_1"
     (note,) = notes
     assert note.startswith(f"{tmp_path / 'unnamed'}: left out: map and")
+
+
+@pytest.mark.parametrize(
+    ("names", "stages"),
+    [
+        (("rosbag2_2024_01_15-10_32_11", "rosbag2_2024_03_02-09_05_47"), None),
+        (("town_2012-2-4", "town_2012-10-28"), ["2012-2-4", "2012-10-28"]),
+        (("old_town_1", "old_town_2"), ["1", "2"]),
+        (("KAIST9", "KAIST10"), ["9", "10"]),
+    ],
+)
+def test_names_with_dates_and_numbers(tmp_path, names, stages):
+    for name in names:
+        drive(tmp_path / name, "01", "a", scenario=False)
+    (city,) = find_cities(tmp_path)
+    ((first, second),) = city.recognition_pairs()
+    assert (first.name, second.name) == names
+    if stages:
+        assert list(city.stages) == stages
+
+
+def test_sessions_of_helipr_are_stages(tmp_path):
+    for name in ("KAIST04", "KAIST05"):
+        helipr_drive.write_drive(tmp_path / name)
+    notes = []
+    found = find_recordings(tmp_path, notes.append)
+    assert [(one.map_name, one.stage) for one in found] == [
+        ("KAIST", "04"),
+        ("KAIST", "05"),
+    ]
+    assert len(notes) == 2
+    assert "the scans of Ouster are read (--lidar reads" in notes[0]
+    assert len(find_recordings(tmp_path, notes.append, lidar="Avia")) == 2
+    assert len(notes) == 2
+
+
+def test_a_wrong_guess_makes_no_empty_report(tmp_path):
+    for name in ("walk_dry", "night_wet"):
+        drive(tmp_path / "in" / name, "01", "a", scenario=False)
+    with pytest.raises(InputError, match=r"in: night: nothing to .*guessed"):
+        write_report(tmp_path / "in", tmp_path / "out", Cluster(1))
+    assert not (tmp_path / "out").exists()
+
+
+def test_drives_in_deeper_folders_are_told(tmp_path):
+    for place in ("town_01", "night/town_02", "a/b/town_03", ".old/town_04"):
+        folder = tmp_path / place
+        folder.parent.mkdir(parents=True, exist_ok=True)
+        drive(folder, folder.name[-2:], "a", city="town")
+    notes = []
+    (found,) = find_recordings(tmp_path, notes.append)
+    assert found.name == "town_01"
+    assert [
+        note.partition(": left out: not directly")[0] for note in notes
+    ] == [
+        str(tmp_path / "a/b/town_03"),
+        str(tmp_path / "night/town_02"),
+    ]
+
+
+def test_sequences_of_kitti_need_a_scenario(tmp_path):
+    for number in ("05", "11"):
+        (tmp_path / "sequences" / number / "velodyne").mkdir(parents=True)
+    with pytest.raises(InputError, match=r"05: no scenario\.yaml.*2 drives"):
+        find_recordings(tmp_path)
+    drive(tmp_path / "town_01", "01", "a", city="town")
+    notes = []
+    find_recordings(tmp_path, notes.append)
+    (note,) = notes
+    assert note.endswith("(2 drives have none); left out")
 
 
 def test_columns_are_the_users_and_what_is_assumed_is_said(tmp_path):
