@@ -56,6 +56,14 @@ Costs = Annotated[
         "too. These numbers differ from run to run.",
     ),
 ]
+Tables = Annotated[
+    bool,
+    typer.Option(
+        "--tables",
+        help="Write wide tables, too (.csv, .md and .tex): survival, tcr, "
+        "place_recognition, poses and others. They are views of the results.",
+    ),
+]
 
 # Parameter name -> its type, annotated with the option, and its default.
 Options = Mapping[str, tuple[Any, Any]]

@@ -26,6 +26,7 @@ def reproduce(
     method: options.MethodFiles = None,
     parameter: commands.MethodSettings = None,
     costs: commands.Costs = True,
+    tables: commands.Tables = False,
     protocol: RetrievalProtocol,
 ) -> None:
     """Simulate the drives of maps and report on them.
@@ -60,6 +61,7 @@ def reproduce(
             own_methods=method or (),
             settings=parameter or (),
             with_costs=costs,
+            with_tables=tables,
             on_note=note,
         )
     typer.echo(report)

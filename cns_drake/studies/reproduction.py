@@ -36,6 +36,7 @@ def reproduce_maps(
     own_methods: Sequence[Path] = (),
     settings: Sequence[str] = (),
     with_costs: bool = False,
+    with_tables: bool = False,
     on_note: Callable[[str], None] = lambda text: None,
 ) -> Path:
     """Records the drives of maps, evaluates them and reports.
@@ -60,6 +61,7 @@ def reproduce_maps(
         own_methods: Python files of further methods.
         settings: settings of methods, each `METHOD.NAME=VALUE`.
         with_costs: whether times are measured.
+        with_tables: whether the report has wide tables, too.
         on_note: is called with each note for the user.
 
     Raises:
@@ -106,7 +108,7 @@ def reproduce_maps(
         for name, page in pages.items()
         if page.is_file()
     }
-    return study.assemble(addresses, on_note)
+    return study.assemble(addresses, on_note, with_tables=with_tables)
 
 
 def _drives(folder: Path) -> list[Scenario]:

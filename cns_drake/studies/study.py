@@ -212,7 +212,7 @@ class Study:
             is_there(self.output / name)  # Nothing else may have its name.
         self._made.make(self.cluster)
         engine = self._plan(drives)
-        results, queries = engine.run()
+        results, queries = engine.run(self.cluster)
         return write_page(
             results,
             queries,
@@ -357,7 +357,6 @@ class Study:
             self._tasks,
             self._variants,
             self.output,
-            self.cluster,
             self.on_note,
         )
         prints: dict[tuple[str, int], list[str]] = {}

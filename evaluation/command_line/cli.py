@@ -353,14 +353,16 @@ def report(
     jobs: commands.Jobs = None,
     scheduler: commands.Scheduler = None,
     costs: commands.Costs = True,
+    tables: commands.Tables = False,
     *,
     protocol: RetrievalProtocol,
 ) -> None:
     """Evaluate all recordings in a folder and write a report.
 
     The command compares the drives of each map in place recognition and
-    structural change. It writes tables, figures and report.html. To resume
-    after an interruption, run the same command again.
+    structural change. It writes results.csv and queries.csv, as cns-drake study
+    stages does, figures and report.html. To resume after an interruption, run
+    the same command again.
 
     Args:
         recordings: Folder that contains the recordings.
@@ -384,6 +386,7 @@ def report(
         reference_for=reference_for,
         lidar=lidar,
         columns=columns,
+        with_tables=tables,
     )
     print(path)
     suggest_comparison(path.parent)

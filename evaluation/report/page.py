@@ -39,7 +39,7 @@ from evaluation.report.page_data import (
 from evaluation.report.reference import NO_REFERENCE, Reference
 from evaluation.results.charts import draw, styles
 from evaluation.results.drawing import save
-from evaluation.results.table import OWN, RESULTS, STAGE, Results
+from evaluation.results.table import OWN, STAGE, Results
 from evaluation.results.table_forms import (
     MISSING,
     Table,
@@ -86,6 +86,8 @@ class Report:
     """The contents of a report.
 
     Attributes:
+        results: the results of all pairs and of their controls, with or without
+            the gate as the report's protocol says.
         changes: change between the stages of each map.
         pairs: place recognition results of each pair of drives and, if there
             is one, of its control (the same routes without a change of the
@@ -108,6 +110,7 @@ class Report:
             protocol differs from that of the report.
     """
 
+    results: Results = field(default_factory=lambda: Results((), ()))
     changes: list[ChangeResult] = field(default_factory=list)
     pairs: list[rows.Controlled] = field(default_factory=list)
     recognitions: list[PlaceRecognition] = field(default_factory=list)
@@ -122,16 +125,6 @@ class Report:
     pages: Mapping[str, str] = field(default_factory=dict)
     reference: Reference = NO_REFERENCE
     repeated: list[PlaceRecognition] = field(default_factory=list)
-
-    @functools.cached_property
-    def results(self) -> Results:
-        """The results of all pairs and of their controls as one table."""
-        return Results.of(
-            [
-                *rows.place_rows(self.pairs, self.tracks, self.evidence),
-                *rows.change_rows(self.pairs, self.changes),
-            ]
-        )
 
     @functools.cached_property
     def survivals(self) -> list[rows.Survival]:
@@ -205,12 +198,15 @@ def chart_illustrations(report: Report, folder: Path) -> list[Illustration]:
     return shown
 
 
-def write_report(report: Report, folder: Path) -> Path:
-    """Writes all files of a report, except figures.
+def write_report(
+    report: Report, folder: Path, *, with_tables: bool = False
+) -> Path:
+    """Writes the page and the text of a report.
 
     Args:
         report: the report.
         folder: folder to write.
+        with_tables: whether to write the wide tables, too.
 
     Returns:
         The path of `report.html`.
@@ -218,8 +214,21 @@ def write_report(report: Report, folder: Path) -> Path:
     Raises:
         InputError: a file cannot be written.
     """
-    results = report.recognitions
     tables = _shown_tables(report)
+    if with_tables:
+        _write_tables(report, tables, folder)
+    text = _render("report.md", **_content(report, tables))
+    write_text(folder / "report.md", text.rstrip() + "\n")
+    path = folder / "report.html"
+    write_page(path, report)
+    return path
+
+
+def _write_tables(
+    report: Report, tables: Mapping[str, Sequence[Table]], folder: Path
+) -> None:
+    """Writes wide tables, which are views of the results."""
+    results = report.recognitions
     every = [*results, *report.repeated]
     queries = result_tables.query_table(results, report.tracks, report.evidence)
     # Evidence is of the queries that the other results got wrong.
@@ -234,8 +243,8 @@ def write_report(report: Report, folder: Path) -> Path:
         "metrics": result_tables.metric_numbers(every),
         "differences": result_tables.difference_numbers(report.differences),
         "why": result_tables.fault_numbers(results, report.evidence),
-        "queries": replace(queries, rows=queries.rows + again.rows),
-        "queries_unchanged": result_tables.query_table(
+        "query_details": replace(queries, rows=queries.rows + again.rows),
+        "query_details_unchanged": result_tables.query_table(
             [
                 replace(control, pair=one.pair)
                 for one, control in report.pairs
@@ -247,7 +256,6 @@ def write_report(report: Report, folder: Path) -> Path:
     }
     if report.costs:
         numbers["costs"] = result_tables.cost_numbers(report.costs)
-    report.results.write_csv(folder / RESULTS)
     for name, table in numbers.items():
         table.write_csv(folder / f"{name}.csv")
         if name not in ("why", "differences") and name in tables:
@@ -257,11 +265,6 @@ def write_report(report: Report, folder: Path) -> Path:
             }
             for ending, texts in forms.items():
                 write_text(folder / f"{name}.{ending}", "\n".join(texts))
-    text = _render("report.md", **_content(report, tables))
-    write_text(folder / "report.md", text.rstrip() + "\n")
-    path = folder / "report.html"
-    write_page(path, report)
-    return path
 
 
 def write_page(path: Path, report: Report) -> None:

@@ -101,15 +101,6 @@ class Reference:
         """Names of the maps with published place recognition."""
         return {key[0] for key in self.recognitions}
 
-    def compares_back(self, map_name: str, earlier: str, last: str) -> bool:
-        """Returns whether the publication has results of a reverse pair.
-
-        In a reverse pair, the database is the drive through the last stage, and
-        the query is the drive through an earlier stage.
-        """
-        pair = (map_name, last, earlier)
-        return any(key[:3] == pair for key in self.recognitions)
-
     def change(self, map_name: str, stages: Sequence[str]) -> float | None:
         """Returns the published TCR_sym of a pair of stages, in any order."""
         first, second = sorted(stages)

@@ -8,31 +8,20 @@ and not to the routes.
 """
 
 from collections import Counter
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 import math
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
-import numpy as np
-
-from evaluation.change.drive_change import ChangeResult
-from evaluation.recognition.fault_kinds import PairEvidence
-from evaluation.recognition.place_outcome import (
-    PlaceOutcome,
-    place_numbers,
-    pose_numbers,
-)
 from evaluation.recognition.place_recognition import PlaceRecognition
 from evaluation.report.result_tables import MethodDifference
 from evaluation.results import table_forms as tables
 from evaluation.results.headlines import listed, told_apart
 from evaluation.results.summaries import Ranked, median_kept, ranking
 from evaluation.results.table import (
-    LAST,
     OWN,
     STAGE,
     Results,
     Row,
-    made_by,
 )
 
 EXPERIMENT = "stages"
@@ -40,106 +29,6 @@ _SEED = 1
 NO_CONTROL = "no control"
 # A result, and that of its control, if there is one.
 Controlled = tuple[PlaceRecognition, PlaceRecognition | None]
-
-
-def place_rows(
-    pairs: Iterable[Controlled],
-    tracks: Mapping[str, Any],
-    evidence: Mapping[tuple[str, str], PairEvidence],
-) -> Iterator[Row]:
-    """Yields the results of place recognition as rows of the table of results.
-
-    The rows of all controls come first. A control measures the same two routes
-    without a change of the city: its database is driven in the query's stage.
-
-    Args:
-        pairs: result on each pair of drives, with the result on the pair's
-            control.
-        tracks: name of a drive with queries -> the drive's time stamps and
-            poses.
-        evidence: names of database and query -> overlaps of the pair's scans.
-    """
-
-    def outcome(
-        result: PlaceRecognition, overlaps: np.ndarray | None
-    ) -> PlaceOutcome:
-        found = result.retrieval
-        frames, track = found.query_frames, tracks[result.query]
-        return PlaceOutcome.of(
-            result.method,
-            result.protocol.gate,
-            found,
-            (track.stamps_ns[frames], track.X_WS[frames, :3, 3]),
-            [result.database] * len(found.database_frames),
-            np.full(len(frames), np.nan) if overlaps is None else overlaps,
-            result.protocol.radius,
-        )
-
-    outcomes = []
-    for changed, unchanged in pairs:
-        both = changed.database, changed.query
-        known = evidence.get(both)
-        after = outcome(changed, getattr(known, "overlaps", None))
-        before = None
-        if unchanged is not None:
-            before = outcome(unchanged, getattr(known, "unchanged", None))
-        outcomes.append((changed, after, before))
-    for stage in (LAST, OWN):
-        for changed, after, before in outcomes:
-            now = before if stage == LAST else after
-            if now is None:
-                continue
-            for task, numbers in (
-                ("place", place_numbers),
-                ("pose", pose_numbers),
-            ):
-                for number in numbers(now, before):
-                    yield Row.of(
-                        number,
-                        experiment=EXPERIMENT,
-                        map=changed.pair[0],
-                        database=changed.database,
-                        query=changed.query,
-                        seed=_SEED,
-                        factors={STAGE: stage},
-                        task=task,
-                        **made_by(changed.asked),
-                    )
-
-
-def change_rows(
-    pairs: Iterable[Controlled], changes: Iterable[ChangeResult]
-) -> Iterator[Row]:
-    """Yields rows with the TCR_sym of each pair of drives and of its control.
-
-    TCR_sym is the symmetric temporal change ratio. A control measures the same
-    two routes in one stage, where nothing has changed.
-    """
-    of_stages = {
-        (one.map_name, *stages): one.report
-        for one in changes
-        for stages in (one.stages, one.stages[::-1])
-    }
-    keys = {one.pair: one for one, _ in pairs}
-    for pair in filter(of_stages.__contains__, keys):
-        outcome, report = keys[pair], of_stages[pair]
-        for stage, change in ((LAST, report.control), (OWN, report.change)):
-            if change is not None:
-                yield Row(
-                    experiment=EXPERIMENT,
-                    map=pair[0],
-                    database=outcome.database,
-                    query=outcome.query,
-                    seed=_SEED,
-                    factors={STAGE: stage},
-                    task="change",
-                    method="",
-                    gate=False,
-                    **made_by(outcome.asked),
-                    metric="tcr_sym",
-                    value=float(change.symmetric),
-                    n=change.num_in_hull,
-                )
 
 
 def ranked_methods(

@@ -70,19 +70,6 @@ _ANSWERS = {
     "overlap": float,
     "visible_change": float,
 }
-# Columns of the table of queries that `cns-eval report` writes -> the same ones
-# here; and the values of those that it lacks.
-_OF_REPORT = {
-    "query": "query_stage",
-    "query_drive": "query",
-    "match_drive": "database",
-}
-_SAME_IN_REPORT = {
-    "experiment": "stages",
-    "seed": "1",
-    STAGE: OWN,
-    "task": "place",
-}
 _NEEDED_ANSWERS = ("query_frame", "correct", "has_match", "score")
 # Type -> value that stands for an empty cell.
 _EMPTY: dict[type, object] = {int: -1, float: math.nan, str: ""}
@@ -418,8 +405,7 @@ class QueryRows:
 
         `path` is this file or the folder that contains it. All columns of a
         query except `query_frame`, `correct`, `has_match` and `score` may be
-        missing. The table can also be that of a report by `cns-eval report`,
-        whose columns have other names.
+        missing.
 
         Raises:
             InputError: as `Results.read`.
@@ -711,10 +697,6 @@ class _Cells:
                 )
         needed = tuple(needed)
         width = len(names)
-        same: Mapping[str, str] = {}
-        if file.name == QUERIES and {"db", *_OF_REPORT} <= {*names}:
-            same = _SAME_IN_REPORT
-            names = [*(_OF_REPORT.get(name, name) for name in names), *same]
         missing = [name for name in needed if name not in names]
         for former, command in _FORMER:
             if missing and former <= set(names):
@@ -730,8 +712,6 @@ class _Cells:
             raise InputError(f"{file}: line 1: column '{name}' is there twice")
         others = {*needed, *known}
         factors = [name for name in names if name not in others]
-        if same:
-            factors = [STAGE]
         for name in factors:
             if name in _NAMED:
                 raise InputError(f"{file}: line 1: '{name}' names no factor")
@@ -745,7 +725,6 @@ class _Cells:
                     f"{file}: line {number}: {len(row)} cells instead of"
                     f" {width}"
                 )
-            row += same.values()
         return cls(file, columns, tuple(factors), rows)
 
     def keyed(

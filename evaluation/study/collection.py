@@ -148,21 +148,16 @@ class City:
     def recognition_pairs(self, *, with_itself: bool = False) -> list[Pair]:
         """Returns the pairs (database, query) for place recognition.
 
-        Each earlier stage is paired with the last stage as the query. If the
-        reference also has numbers for the reversed pair, in which the last
-        stage is the database, that pair is added.
+        Each earlier stage is paired with the last stage as the query. Two
+        drives are compared both ways.
 
         Args:
             with_itself: whether to add a pair of each stage with itself, for
                 loop closure.
         """
-        pairs = []
-        for earlier, last in self.change_pairs():
-            pairs.append((earlier, last))
-            if self.reference.compares_back(
-                self.name, earlier.stage, last.stage
-            ):
-                pairs.append((last, earlier))
+        pairs = self.change_pairs()
+        if len(pairs) == 1:
+            pairs += [(later, earlier) for earlier, later in pairs]
         if with_itself:
             pairs += [(one, one) for one in self.stages.values()]
         return pairs

@@ -72,7 +72,9 @@ class Comparison:
 class Engine:
     """Measures pairs of drives by tasks and methods.
 
-    Add all pairs of each map with `add`, then call `run`.
+    Add all pairs of each map with `add`, then call `run`. If other jobs make
+    the results of comparisons, append these to `measured`, with the files of
+    their results, and call `write_tables` once the jobs are done.
 
     Attributes:
         experiment: name of the experiment, which stands in the tables.
@@ -80,7 +82,6 @@ class Engine:
         methods: key of a method -> the method, and the columns of its
             settings.
         output: folder of the results.
-        cluster: runs the jobs.
         on_note: is called with notes on what is left out, and on how long the
             study takes.
         jobs: name -> job.
@@ -91,7 +92,6 @@ class Engine:
     tasks: Mapping[str, Task]
     methods: Mapping[str, tuple[MethodChoice, Mapping[str, Any]]]
     output: Path
-    cluster: Cluster
     on_note: Callable[[str], None] = lambda text: None
     jobs: dict[str, Job] = field(default_factory=dict)
     measured: list[Comparison] = field(default_factory=list)
@@ -129,7 +129,7 @@ class Engine:
         self._notes |= planned.notes
         self.measured += comparisons
 
-    def run(self) -> tuple[Results, QueryRows]:
+    def run(self, cluster: Cluster) -> tuple[Results, QueryRows]:
         """Runs all jobs, writes both tables, and returns them.
 
         Raises:
@@ -138,18 +138,26 @@ class Engine:
         for text in self._notes:
             self.on_note(text)
         make_folder(self.output)
-        self._announce()
-        run_jobs(self.jobs.values(), self.cluster)
+        self._announce(cluster)
+        run_jobs(self.jobs.values(), cluster)
         note("writing the tables and the page")
+        return self.write_tables()
+
+    def write_tables(self) -> tuple[Results, QueryRows]:
+        """Writes both tables of finished jobs, and returns them.
+
+        Raises:
+            InputError: a job has not been done, or a file cannot be written.
+        """
         results = Results.of(self._rows())
         queries = QueryRows.of(self._answers())
         results.write_csv(self.output / RESULTS)
         queries.write_csv(self.output / QUERIES)
         return results, queries
 
-    def _announce(self) -> None:
+    def _announce(self, cluster: Cluster) -> None:
         """Says how long a long study takes."""
-        workers = self.cluster.slots or num_cores()
+        workers = cluster.slots or num_cores()
         longest = _LONG * workers
         if sum(job.cost for job in self.jobs.values()) <= longest:
             return

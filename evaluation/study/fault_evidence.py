@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 import math
 
@@ -42,31 +42,31 @@ def explain_faults(
     reporter: Reporter,
     drives: tuple[Part, Part],
     methods: tuple[MethodChoice, ...],
-    results: tuple[Part, ...],
+    result: Part,
     protocol: RetrievalProtocol,
 ) -> PairEvidence | None:
     """Returns evidence on why methods rank wrong places first for queries.
 
-    The result is None if a drive is compared with itself and never passes a
-    place twice.
+    The result is None if no query has a match.
 
     Args:
         reporter: reports progress.
         drives: files with the scans (`KeptDrive`) of the database and of the
             query.
         methods: methods of the results.
-        results: file with each method's result on the pair.
+        result: file with the `PairResult` of the pair.
         protocol: protocol of the results.
     """
-    found = []
-    for choice, part in zip(methods, results, strict=True):
+    for choice in methods:
         # The method registers the type of its descriptions.
         choice.make()
-        found.append(part.read())
-    if None in found or not found:
+    pair = result.read()
+    if None in pair.recognitions or not methods:
         return None
     database, query = (part.read() for part in drives)
-    return find_evidence(database, query, found, protocol)
+    evidence = find_evidence(database, query, pair.recognitions, protocol)
+    # Visible change is that of the queries as the protocol shows them.
+    return replace(evidence, overlaps=pair.outcomes[0].columns["overlap"])
 
 
 def find_evidence(

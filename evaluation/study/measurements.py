@@ -1,7 +1,7 @@
 """Measures methods on one recording or on two."""
 
 from collections.abc import Callable
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from typing import TypeAlias
 
 import numpy as np
@@ -26,7 +26,7 @@ from evaluation.recognition.place_recognition import (
     judge_retrieval,
 )
 from evaluation.recognition.protocol import RetrievalProtocol
-from evaluation.recognition.retrieval import compare_with_gates
+from evaluation.recognition.retrieval import Retrieval, compare_with_gates
 from evaluation.study.chosen_methods import MethodChoice
 from evaluation.study.parts import Part
 from evaluation.study.surveys import (
@@ -49,38 +49,117 @@ _MANY = 5000
 _NUM_TRIALS = 12
 
 
-def recognise_places(
+@dataclass(frozen=True)
+class PairResult:
+    """The results of methods on two drives of one world.
+
+    Attributes:
+        outcomes: outcomes for the tables: two for each method, without and with
+            the gate; empty if they were not asked for.
+        recognitions: for each method, its result by the protocol's own gate;
+            None if no query has a match.
+    """
+
+    outcomes: list[PlaceOutcome]
+    recognitions: list[PlaceRecognition | None]
+
+
+def recognise_pair(
     reporter: Reporter,
     names: tuple[str, str, str],
-    described: tuple[Part, Part],
-    choice: MethodChoice,
+    described: tuple[tuple[Part, ...], tuple[Part, ...]],
+    scans: tuple[Part, Part] | None,
+    methods: tuple[MethodChoice, ...],
     protocol: RetrievalProtocol,
-) -> PlaceRecognition | None:
-    """Returns the result of a method on two drives of one world.
-
-    The result is None if a drive is compared with itself and never passes a
-    place twice.
+) -> PairResult:
+    """Returns the results of methods on two drives of one world.
 
     Args:
-        reporter: reports progress.
+        reporter: reports notes.
         names: names of the map, and of the stages of database and query.
-        described: files with the descriptions of the database and of the query.
-        choice: the method.
+        described: for the database and for the query, one file per method with
+            its descriptions.
+        scans: files with the scans (`KeptDrive`) of database and query; None if
+            no outcomes are asked for.
+        methods: the methods.
         protocol: protocol of the comparison.
     """
-    # The method comes first, because it registers the type of its
-    # descriptions.
-    method = choice.make()
-    (placed, database), (placed_query, query) = (p.read() for p in described)
-    check_same_world(placed, placed_query)
-    radii = [protocol.gate_radius]
-    (retrieval,) = compare_with_gates(method, database, query, protocol, radii)
-    if database.name == query.name and not retrieval.matches.any():
-        # A route need not close a loop.
-        reporter.note(f"{query.name}: it never comes back to where it was")
-        return None
-    return judge_retrieval(
-        method, database.name, query.name, retrieval, protocol, pair=names
+    found = PairResult([], [])
+    overlaps = None
+    for k, choice in enumerate(
+        track(methods, "comparing", len(methods), "methods")
+    ):
+        # The method comes first, because it registers the type of its
+        # descriptions.
+        method = choice.make()
+        (placed, database), (placed_query, query) = (
+            parts[k].read() for parts in described
+        )
+        check_same_world(placed, placed_query)
+        both = compare_with_gates(
+            method, database, query, protocol, [None, protocol.radius]
+        )
+        has_match = both[0].matches.any()
+        if not (has_match or found.recognitions):
+            # Routes need not meet, nor close a loop.
+            reporter.note(
+                f"{query.name}: no query lies within {protocol.radius:g} m of a"
+                f" place of {database.name}"
+            )
+        if scans is not None and overlaps is None:
+            overlaps = _kept_overlaps(scans, database, query, both[0], protocol)
+        for is_gated, one in zip((False, True), both, strict=True):
+            if overlaps is not None:
+                outcome = PlaceOutcome.of(
+                    choice.key,
+                    is_gated,
+                    one,
+                    (query.queries.stamps_ns, query.queries.p_WSs),
+                    [database.name] * len(one.database_frames),
+                    overlaps,
+                    protocol.radius,
+                )
+                found.outcomes.append(outcome)
+        result = None
+        if has_match:
+            result = judge_retrieval(
+                method,
+                database.name,
+                query.name,
+                both[protocol.gate],
+                protocol,
+                pair=names,
+            )
+        found.recognitions.append(result)
+    return found
+
+
+def outcomes_of(reporter: Reporter, result: Part) -> list[PlaceOutcome]:
+    """Returns the outcomes in a file with a `PairResult`."""
+    return result.read().outcomes
+
+
+def _kept_overlaps(
+    scans: tuple[Part, Part],
+    database: DescribedDrive,
+    query: DescribedDrive,
+    found: Retrieval,
+    protocol: RetrievalProtocol,
+) -> np.ndarray:
+    """Returns how much of each query's scan its best match shows, (Q,)."""
+    kept, asked = (part.read() for part in scans)
+    return best_overlaps(
+        [
+            gather(kept, frame, 1, protocol.max_range).astype(np.float32)
+            for frame in database.places.frames.tolist()
+        ],
+        database.places.X_WS,
+        [
+            protocol.query_scan(asked, frame).astype(np.float32)
+            for frame in query.queries.frames.tolist()
+        ],
+        query.queries.X_WS,
+        found.matches,
     )
 
 

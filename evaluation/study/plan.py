@@ -19,19 +19,27 @@ from evaluation.recognition.protocol import FAIR_PROTOCOL, RetrievalProtocol
 from evaluation.report import page, result_tables
 from evaluation.report.curve_figures import draw_pr_curves
 from evaluation.report.reference import NO_REFERENCE, Reference
+from evaluation.results.table import LAST, OWN, SETTINGS, STAGE, Results
 from evaluation.study import figures, measurements
 from evaluation.study.chosen_methods import MethodChoice, choose_methods
 from evaluation.study.collection import (
     City,
     Pair,
     RecordingInfo,
+    Run,
     find_recordings,
     group_cities,
     nothing_to_compare,
 )
+from evaluation.study.engine import Comparison, Engine, made_tasks
 from evaluation.study.fault_evidence import explain_faults
 from evaluation.study.parts import MakePart, Part, StudyFiles
+from evaluation.study.recorded import RecordedCondition, recorded_comparisons
 from evaluation.study.surveys import Further, Survey
+from evaluation.study.tasks.change import ChangeTask, surveyed_change
+from evaluation.study.tasks.place import PlaceTask, PoseTask
+from evaluation.study.tasks.task import Pair as ComparedPair
+from evaluation.study.tasks.task import Task
 
 # Expected seconds: for the maps of a drive of 3000 scans, for its places or
 # queries, to draw a city or a change, and to compare two drives by a method.
@@ -39,6 +47,12 @@ _MAP_COST = 12.0
 _ROLE_COST = 10.0
 _DRAWING_COST = 7.0
 _RECOGNITION_COST = 2.0
+# The experiment whose rows a report writes, its tasks and its seed.
+_EXPERIMENT = "stages"
+_TASKS: Mapping[str, type[Task]] = {
+    task.name: task for task in (PlaceTask, PoseTask, ChangeTask)
+}
+_SEED = 1
 
 
 @dataclass(frozen=True)
@@ -109,6 +123,8 @@ class Study:
         self,
         pages: Mapping[str, str] | None = None,
         on_note: Callable[[str], None] = lambda text: None,
+        *,
+        with_tables: bool = False,
     ) -> Path:
         """Writes the report, once all jobs are done.
 
@@ -119,22 +135,28 @@ class Study:
 
         - `report.html`: the whole report, in one file.
         - `report.md`: the report as Markdown.
+        - `results.csv`, `queries.csv`: the results and the answers to queries,
+          the same as those of the experiment `stages`.
+        - `figures`: a folder with figures. Figures that exist are kept.
+
+        If they are asked for, wide tables follow. They are views of the same
+        results:
+
         - Tables, each as .csv (with all numbers), .md and .tex: `survival`,
           `tcr`, `place_recognition`, `poses`, and `costs` if costs were
           measured.
-        - `results.csv`: the results, in the same form as those of studies.
         - `metrics.csv`: the metrics of other benchmarks.
         - `differences.csv`: the differences between methods.
         - `why.csv`: the reasons for wrong best places.
-        - `queries.csv`, `queries_unchanged.csv`: each query of the pairs of
-          drives, and of their controls.
-        - `figures`: a folder with figures. Figures that exist are kept.
+        - `query_details.csv`, `query_details_unchanged.csv`: each query of the
+          pairs of drives, and of their controls.
 
         Args:
             pages: name of a recording -> address of its 3-D page, relative to
                 the report. Recordings without a page are left out.
             on_note: is called with a note on each city without a pair to
                 compare. The report contains these notes, too.
+            with_tables: whether to write the wide tables.
 
         Returns:
             The path of `report.html`.
@@ -153,6 +175,7 @@ class Study:
         ]
         for city in self.cities:
             self._collect(city, report)
+        report.results = self._results()
         if self.protocol.exclude_recent is None:
             report.notes = nothing_to_compare(self.cities)
         for note in report.notes:
@@ -164,17 +187,69 @@ class Study:
             report.illustrations.insert(0, shown)
         if self._costed_pairs:
             report.costs = self._files.part("costs", "costs").read()
-        written = page.write_report(report, self.output)
+        written = page.write_report(
+            report, self.output, with_tables=with_tables
+        )
         for city in self.cities:
             for job in self._city_jobs(city):
                 if isinstance(job.step, Survey):
                     job.step.files.spend()
         return written
 
-    def _result(self, pair: Pair, key: str) -> Part:
-        """Returns the file with the result of a run, which `key` names."""
-        names = (one.name for one in pair)
-        return self._files.part("recognition", *names, key)
+    def _results(self) -> Results:
+        """Writes the two tables; returns the results that the page shows."""
+        columns = {
+            one.key: {
+                f"{SETTINGS}{one.name}.{name}": value
+                for name, value in one.settings
+            }
+            for one in self.methods
+        }
+        engine = Engine(
+            _EXPERIMENT,
+            made_tasks({name: {} for name in _TASKS}, _TASKS, _EXPERIMENT),
+            {one.key: (one, columns[one.key]) for one in self.methods},
+            self._files.output,
+        )
+        for city in self.cities:
+            engine.measured += self._comparisons(city)
+        results, _ = engine.write_tables()
+        shown = (
+            row
+            for row in results.rows
+            if row.task == "change" or row.gate == self.protocol.gate
+        )
+        return Results(results.factors, tuple(shown))
+
+    def _comparisons(self, city: City) -> list[Comparison]:
+        """Returns the comparisons of the experiment `stages`."""
+        found = recorded_comparisons(
+            city,
+            [
+                RecordedCondition({STAGE: LAST}, LAST, True, self.protocol),
+                RecordedCondition({STAGE: OWN}, OWN, False, self.protocol),
+            ],
+            _SEED,
+            # The page says which pairs have no control.
+            lambda text: None,
+            both_ways=True,
+        )
+        comparisons = list(found)
+        for one in comparisons:
+            place = self._outcomes(one.pair)
+            change = self._files.part("change", one.pair.name)
+            one.parts.update(place=place, pose=place, change=change)
+        return comparisons
+
+    def _outcomes(self, pair: ComparedPair) -> Part:
+        return self._files.part("place", pair.name)
+
+    def _result(self, pair: Pair, run: Run | None = None) -> Part:
+        """Returns the file with the results of a pair, or of a second run."""
+        names = [one.name for one in pair]
+        return self._files.part(
+            "recognition", *names, *([] if run is None else [run.queries])
+        )
 
     def _evidence(self, pair: Pair) -> Part:
         """Returns the file with evidence on why best places are wrong."""
@@ -228,7 +303,20 @@ class Study:
             self._recognition_job(city, pair, name, explains=name in pairs)
             for name, pair in (pairs | controls).items()
         ]
-        return jobs
+        # Two pairs may share a control.
+        compared = {one.pair.name: one for one in self._comparisons(city)}
+        return jobs + [self._tcr_job(one) for one in compared.values()]
+
+    def _tcr_job(self, one: Comparison) -> Job:
+        """Returns the job that measures change, as in the table of results."""
+        names = one.pair.database.name, one.pair.query.name
+        step = MakePart(
+            one.parts["change"],
+            surveyed_change,
+            tuple(self._files.survey(name).drive for name in names),
+        )
+        needs = tuple(f"survey {name}" for name in dict.fromkeys(names))
+        return Job(f"tcr {one.pair.name}", step, needs, _RECOGNITION_COST)
 
     def _further(self, city: City, drive: RecordingInfo) -> tuple[Further, ...]:
         """Returns the descriptions of a drive that repeated runs need."""
@@ -301,42 +389,59 @@ class Study:
         """Returns the job that runs the methods on a pair.
 
         With `explains`, the job also finds why best places are wrong, and
-        repeats runs by the protocol of published numbers. Without it, as for a
-        control, the job finds only how much of each query's scan its matches
-        show.
+        repeats runs by the protocol of published numbers.
         """
         database, query = pair
+        names = city.name, database.stage, query.stage
         surveys = [self._files.survey(one.name) for one in pair]
-        steps = [
-            MakePart(
-                self._result(pair, run.queries),
-                measurements.recognise_places,
+        scans = surveys[0].scans, surveys[1].scans
+
+        def recognise(
+            part: Part, runs: Sequence[Run], scans: tuple[Part, Part] | None
+        ) -> MakePart:
+            described = (
+                tuple(surveys[0].described(run.places) for run in runs),
+                tuple(surveys[1].described(run.queries) for run in runs),
+            )
+            return MakePart(
+                part,
+                measurements.recognise_pair,
                 (
-                    (city.name, database.stage, query.stage),
-                    (
-                        surveys[0].described(run.places),
-                        surveys[1].described(run.queries),
-                    ),
-                    run.method,
-                    run.protocol,
+                    names,
+                    described,
+                    scans,
+                    tuple(run.method for run in runs),
+                    runs[0].protocol,
                 ),
             )
-            for run in city.runs(pair, self.methods, self.protocol)
-            if explains or not run.repeats
+
+        runs = city.runs(pair, self.methods, self.protocol)
+        result = self._result(pair)
+        own = [run for run in runs if not run.repeats]
+        steps = [recognise(result, own, scans)]
+        steps += [
+            MakePart(part, measurements.outcomes_of, (result,))
+            for part in {
+                self._outcomes(one.pair)
+                for one in self._comparisons(city)
+                if (one.pair.database.name, one.pair.query.name)
+                == (database.name, query.name)
+            }
         ]
-        asked = self.methods if explains else self.methods[:1]
-        evidence = MakePart(
-            self._evidence(pair),
-            explain_faults,
-            (
-                tuple(one.scans for one in surveys),
-                asked,
-                tuple(self._result(pair, one.key) for one in asked),
-                self.protocol,
-            ),
-        )
-        steps.insert(len(self.methods), evidence)
-        cost = _RECOGNITION_COST * (1 + len(steps))
+        if explains:
+            steps.append(
+                MakePart(
+                    self._evidence(pair),
+                    explain_faults,
+                    (scans, self.methods, result, self.protocol),
+                )
+            )
+            steps += [
+                recognise(self._result(pair, run), [run], None)
+                for run in runs
+                if run.repeats
+            ]
+        cost = _RECOGNITION_COST * (1 + len(self.methods) + len(steps))
         step = Steps(steps[0].output, tuple(steps))
         return Job(name, step, _survey_names(pair), cost)
 
@@ -364,22 +469,24 @@ class Study:
         compared = []
         for pair in self._pairs(city):
             control = city.unchanged_pair(*pair)
+            found = self._result(pair).read().recognitions
+            unchanged = self._result(control).read() if control else None
+            for k, result in enumerate(found):
+                if result is None:
+                    continue
+                compared.append(result)
+                if pair[0] is not pair[1]:
+                    before = unchanged and unchanged.recognitions[k]
+                    report.pairs.append((result, before))
             for run in city.runs(pair, self.methods, self.protocol):
-                result = self._result(pair, run.queries).read()
                 if run.repeats:
-                    report.repeated.append(result)
-                elif result is not None:
-                    compared.append(result)
-                    if pair[0] is not pair[1]:
-                        unchanged = None
-                        if control is not None:
-                            beside = self._result(control, run.queries)
-                            unchanged = beside.read()
-                        report.pairs.append((result, unchanged))
+                    (result,) = self._result(pair, run).read().recognitions
+                    if result is not None:
+                        report.repeated.append(result)
             evidence = self._evidence(pair).read()
-            before = control and self._evidence(control).read()
-            if before is not None:
-                evidence = replace(evidence, unchanged=before.overlaps)
+            if evidence is not None and unchanged is not None:
+                overlaps = unchanged.outcomes[0].columns["overlap"]
+                evidence = replace(evidence, unchanged=overlaps)
             if evidence is not None:
                 report.evidence[pair[0].name, pair[1].name] = evidence
             names = {one.name for one in (*pair, *(control or ()))}
@@ -442,6 +549,7 @@ def write_report(
     reference_for: Callable[[set[str]], Reference] = lambda maps: NO_REFERENCE,
     lidar: str | None = None,
     columns: int | None = None,
+    with_tables: bool = False,
 ) -> Path:
     """Measures all recordings in a folder, and writes a report on them.
 
@@ -464,6 +572,7 @@ def write_report(
         lidar: name of the LiDAR, for recordings with several.
         columns: number of columns of `.bin` files; by default guessed from the
             values.
+        with_tables: whether to write the wide tables, too.
 
     Returns:
         The path of `report.html`.
@@ -492,4 +601,4 @@ def write_report(
         raise InputError(f"{recordings}: {alone[0]}")
     make_folder(output)
     run_jobs(jobs, cluster)
-    return study.assemble(on_note=on_note)
+    return study.assemble(on_note=on_note, with_tables=with_tables)

@@ -46,9 +46,7 @@ def recorded_comparisons(
         both_ways: whether the two drives of a map are compared both ways.
     """
     conditions = list(conditions)
-    pairs = city.change_pairs()
-    if both_ways and len(pairs) == 1:
-        pairs += [(later, earlier) for earlier, later in pairs]
+    pairs = city.recognition_pairs() if both_ways else city.change_pairs()
     for pair in pairs:
         control = city.unchanged_pair(*pair)
         for condition in conditions:

@@ -8,6 +8,7 @@ drive, a function that opens the drive, instead of the drive.
 from collections.abc import Callable, Mapping, Set
 import contextlib
 from dataclasses import dataclass, field
+import math
 from pathlib import Path
 from typing import Protocol, TypeAlias
 
@@ -186,15 +187,21 @@ class KeptDrive:
     instances: Mapping[int, Mapping] | None
     scans: dict[int, np.ndarray] = field(default_factory=dict)
 
+    def __len__(self) -> int:
+        """Returns the number of frames of the drive."""
+        return len(self.X_WS)
+
     def keep(self, frame: int, scan: np.ndarray, max_range: float) -> None:
         """Stores a scan in `scans`.
 
         Args:
             frame: number of the frame.
             scan: structured array (M,) in the sensor's frame.
-            max_range: points with a greater absolute x, y or z are left out
-                [m].
+            max_range: greatest absolute x, y and z of a point in the sensor's
+                frame [m], however the sensor is turned and tilted.
         """
+        # A corner of the cube may lie on an axis of a turned sensor.
+        max_range *= math.sqrt(3.0)
         names = [one for one in scan.dtype.names or () if one in _KEPT_FIELDS]
         kept = within_range(xyz(scan), max_range)
         # A view would hold all fields.

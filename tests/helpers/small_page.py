@@ -1,11 +1,18 @@
 """A small report for tests of pages: two drives, two methods."""
 
+from types import MappingProxyType
+
 import numpy as np
 
 from evaluation.maps.thumbnails import thumbnail
 from evaluation.methods import make_method
 from evaluation.recognition.costs import Cost
 from evaluation.recognition.fault_kinds import PairEvidence
+from evaluation.recognition.place_outcome import (
+    PlaceOutcome,
+    place_numbers,
+    pose_numbers,
+)
 from evaluation.recognition.place_recognition import judge_retrieval
 from evaluation.recognition.pose_errors import PoseErrors
 from evaluation.recognition.protocol import PAPER_PROTOCOL
@@ -15,6 +22,7 @@ from evaluation.report.page import Report
 from evaluation.report.page_data import Illustration, make_drive
 from evaluation.report.reference import Finding, Judgement, Reference
 from evaluation.report.result_tables import DriveTrack
+from evaluation.results.table import LAST, OWN, STAGE, Results, Row, made_by
 
 PLACES = 5.0 * np.arange(10)
 QUERIES = np.array([0.0, 10.0, 20.0, 30.0, 100.0])
@@ -86,7 +94,56 @@ def make_content(folder, **changed):
             "metropolis_04": _drive("metropolis_04", QUERIES, 2, 0.5 * np.pi),
         },
     }
-    return Report(**(values | changed))
+    values |= changed
+    return Report(**{"results": make_results(values["pairs"]), **values})
+
+
+def make_results(pairs, evidence=MappingProxyType({})):
+    """Returns the table of pairs of results and of those of their controls."""
+    rows = []
+    for changed, unchanged in pairs:
+        known = evidence.get((changed.database, changed.query))
+        after = _outcome(changed, getattr(known, "overlaps", None))
+        before = _outcome(unchanged, getattr(known, "unchanged", None))
+        for stage, now in ((LAST, before), (OWN, after)):
+            if now is None:
+                continue
+            key = {
+                "experiment": "stages",
+                "map": changed.pair[0],
+                "database": changed.database,
+                "query": changed.query,
+                "seed": 1,
+                "factors": {STAGE: stage},
+                **made_by(changed.asked),
+            }
+            rows += [
+                Row.of(number, **key, task=task)
+                for task, numbers in (
+                    ("place", place_numbers),
+                    ("pose", pose_numbers),
+                )
+                for number in numbers(now, before)
+            ]
+    return Results.of(rows)
+
+
+def _outcome(result, overlaps):
+    if result is None:
+        return None
+    found = result.retrieval
+    number = len(found.query_frames)
+    if overlaps is None:
+        overlaps = np.full(number, np.nan)
+    return PlaceOutcome.of(
+        result.method,
+        result.protocol.gate,
+        found,
+        (np.arange(number), np.zeros((number, 3))),
+        [result.database] * len(found.database_frames),
+        overlaps,
+        result.protocol.radius,
+    )
 
 
 def _poses(xs, y, yaw):

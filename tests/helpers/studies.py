@@ -46,7 +46,7 @@ def report(recordings, output, methods=None, protocol=FAIR_PROTOCOL):
     chosen = choose_methods() if methods is None else tuple(methods)
     study = Study(found, output, chosen, protocol, reference=reference)
     do(study.jobs())
-    return study.assemble()
+    return study.assemble(with_tables=True)
 
 
 def leave_figures_unrendered(patch):

@@ -98,10 +98,16 @@ def measure_change(
         Name of a metric, such as `tcr_sym` -> pair of its value and the number
         of voxels from which the value is computed.
     """
-    a, b = (
-        Surveyed(name, *part.read())
-        for name, part in (("database", first), ("query", second))
+    return changes_of(
+        *(
+            Surveyed(name, *part.read())
+            for name, part in (("database", first), ("query", second))
+        )
     )
+
+
+def changes_of(a: Surveyed, b: Surveyed) -> dict[str, tuple[float, int]]:
+    """Returns how much changed between two maps, as `measure_change` does."""
     # The spread over grids is not reported: it would take sixteen times as
     # long.
     report = compare_maps(a, b, grids=())
@@ -118,3 +124,22 @@ def measure_change(
     ):
         found[name] = float(side.ratio), side.num_in_hull
     return found
+
+
+def surveyed_change(
+    reporter: Reporter, first: Part, second: Part
+) -> dict[str, tuple[float, int]]:
+    """Returns how much changed between two drives that were surveyed.
+
+    Args:
+        reporter: unused.
+        first, second: files with the `SurveyedDrive` of the database and of the
+            query.
+
+    Returns:
+        As `measure_change`.
+    """
+    drives = [part.read() for part in (first, second)]
+    return changes_of(
+        *(Surveyed(one.name, one.coarse, one.positions) for one in drives)
+    )

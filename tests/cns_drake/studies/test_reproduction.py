@@ -48,7 +48,8 @@ def planned(monkeypatch):
         lambda jobs, cluster: runs.append({job.name: job for job in jobs}),
     )
 
-    def assemble(study, pages, on_note):
+    def assemble(study, pages, on_note, *, with_tables):
+        assert not with_tables
         assert callable(on_note)
         assert (study.protocol, study.with_costs) == (FAIR_PROTOCOL, False)
         runs[-1]["recordings"] = {one.name: one for one in study.recordings}
@@ -169,7 +170,12 @@ def test_quick_gives_the_same_tables(tmp_path, monkeypatch):
     own = tmp_path / "counting.py"
     own.write_text(COUNTING)
     quick = reproduction.reproduce_maps(
-        [str(town)], tmp_path / "quick", cluster, quick=True, own_methods=[own]
+        [str(town)],
+        tmp_path / "quick",
+        cluster,
+        quick=True,
+        own_methods=[own],
+        with_tables=True,
     )
     assert {path.name for path in (tmp_path / "quick").iterdir()} == {"report"}
     full = reproduction.reproduce_maps(
@@ -178,13 +184,16 @@ def test_quick_gives_the_same_tables(tmp_path, monkeypatch):
         cluster,
         with_pages=False,
         own_methods=[own],
+        with_tables=True,
     )
     assert (tmp_path / "full" / "town_01_stage_04" / "metadata.yaml").is_file()
     for name in (
         "place_recognition.csv",
         "poses.csv",
+        "results.csv",
         "queries.csv",
-        "queries_unchanged.csv",
+        "query_details.csv",
+        "query_details_unchanged.csv",
         "survival.csv",
         "tcr.csv",
     ):
@@ -192,7 +201,7 @@ def test_quick_gives_the_same_tables(tmp_path, monkeypatch):
         assert ours.read_text() == theirs.read_text(), name
     rows = _rows(quick.parent / "place_recognition.csv")
     assert "counting" in {row["method"] for row in rows}
-    rows = _rows(quick.parent / "queries_unchanged.csv")
+    rows = _rows(quick.parent / "query_details_unchanged.csv")
     assert {row["match_drive"] for row in rows} == {"town_01_stage_04"}
 
 

@@ -54,16 +54,8 @@ def test_only_its_own_protocol_is_compared():
     assert not reference.covers(result("solid", usual, ("town", "01", "02")))
 
 
-def test_pairs_compared_both_ways():
-    reference = reference_for({"suburbia"})
-    assert reference.compares_back("suburbia", "01", "02")
-    assert not reference.compares_back("metropolis", "01", "04")
-    assert not reference.compares_back("town", "01", "02")
-
-
 def test_a_city_of_one_s_own_has_no_reference():
     assert reference_for({"town"}) is NO_REFERENCE
-    assert not NO_REFERENCE.compares_back("suburbia", "01", "02")
     assert NO_REFERENCE.change("suburbia", ("01", "02")) is None
     assert NO_REFERENCE.judge([], []) == []
 

@@ -6,7 +6,7 @@ from math import nan
 import re
 from types import SimpleNamespace
 
-from helpers.small_page import make_content
+from helpers.small_page import make_content, make_results
 import numpy as np
 import pytest
 
@@ -234,10 +234,10 @@ def test_visible_change_stands_beside_that_of_the_control(tmp_path):
         overlaps=np.array([0.5, 0.7, 0.6, 0.6, nan]),
         unchanged=np.array([0.8, 0.8, 0.8, 0.8, nan]),
     )
-    content = replace(content, evidence={pair: known})
+    results = make_results(content.pairs, {pair: known})
     found = {
         (row[STAGE], row.metric): row.value
-        for row in content.results.where(method="scan-context++").rows
+        for row in results.where(method="scan-context++").rows
         if row.metric.startswith("visible_change")
     }
     assert found == {

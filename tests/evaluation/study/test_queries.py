@@ -92,7 +92,7 @@ def best_f1(rows):
 
 
 def test_place_recognition(report):
-    groups = read_queries(report / "queries.csv")
+    groups = read_queries(report / "query_details.csv")
     table = read(report / "place_recognition.csv")
     # Two modes; two pairs by each method, and the paper's own by its protocol.
     of_paper = [key for key in groups if key[-1] == "paper"]
@@ -125,8 +125,8 @@ def test_place_recognition(report):
 
 
 def test_survival(report):
-    changed = read_queries(report / "queries.csv")
-    unchanged = read_queries(report / "queries_unchanged.csv")
+    changed = read_queries(report / "query_details.csv")
+    unchanged = read_queries(report / "query_details_unchanged.csv")
     table = read(report / "survival.csv")
     assert {key for key in changed if key[-1] == "fair"} == unchanged.keys()
     assert len(table) == len(unchanged)
@@ -150,7 +150,7 @@ def test_survival(report):
 
 
 def test_poses(report):
-    groups = read_queries(report / "queries.csv")
+    groups = read_queries(report / "query_details.csv")
     table = read(report / "poses.csv")
     assert len(table) == sum(key[-1] == "fair" for key in groups)
     some = 0
@@ -208,7 +208,9 @@ def test_the_protocol_stands_in_every_row(report):
 
 
 def test_the_control_takes_the_place_of_the_earlier_drive(report):
-    for key, rows in read_queries(report / "queries_unchanged.csv").items():
+    for key, rows in read_queries(
+        report / "query_details_unchanged.csv"
+    ).items():
         drives = {(r["match_drive"], r["query_drive"]) for r in rows}
         control = ("riverside_01_stage_02", "riverside_02")
         assert drives == {control if key[1] == "01" else control[::-1]}
@@ -216,7 +218,7 @@ def test_the_control_takes_the_place_of_the_earlier_drive(report):
 
 def test_where_and_when(report):
     found = 0
-    for row in read(report / "queries.csv"):
+    for row in read(report / "query_details.csv"):
         sign = -1.0 if row["query"] == "02" else 1.0
         frame = int(row["query_frame"])
         assert float(row["query_x"]) == pytest.approx(10.0 * frame)
@@ -248,9 +250,7 @@ def test_a_report_is_read_as_a_study(report):
     """The answers have the keys of the results, and give the same AUC."""
     rows = Results.read(report).where({STAGE: OWN}, metric="auc").rows
     results = {row.but(): row.value for row in rows}
-    found = {
-        one.but(): one for one in QueryRows.read(report / "queries.csv").answers
-    }
+    found = {one.but(): one for one in QueryRows.read(report).answers}
     assert set(results) <= set(found)
     for key, value in results.items():
         assert pr_curve(found[key].outcomes).auc == pytest.approx(value)

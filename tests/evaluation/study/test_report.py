@@ -266,7 +266,7 @@ def test_change_beside_the_paper(report):
     # Visible change: the mean of the queries' own.
     seen = {
         row["query_frame"]: row["overlap"]
-        for row in read_csv(report / "queries.csv")
+        for row in read_csv(report / "query_details.csv")
         if row["overlap"]
     }
     shares = np.array(list(seen.values()), dtype=float)
@@ -331,7 +331,7 @@ def test_each_protocol_is_that_of_the_single_command(recordings, report):
             alone = run(*drives, make_method(name, {}), protocol=protocol)
             assert found[name, protocol.name] == alone.metrics.auc
     assert ("layered-overlap", "paper") not in found
-    for name in ("survival", "differences", "queries_unchanged"):
+    for name in ("survival", "differences", "query_details_unchanged"):
         rows = read_csv(report / f"{name}.csv")
         assert {row["protocol"] for row in rows} == {"fair"}
 
@@ -403,10 +403,11 @@ def test_report_is_the_same_for_any_number_of_workers(
         tmp_path,
         Cluster(num_workers=2),
         reference_for=reference_for,
+        with_tables=True,
     )
     files = studies.report_files(tmp_path)
-    assert "results.csv" in files
-    assert len(files) == 20 + 18
+    assert {"results.csv", "queries.csv"} < set(files)
+    assert len(files) == 21 + 18
     assert files == studies.report_files(report)
 
 
@@ -461,7 +462,8 @@ def test_report_of_a_single_stage(tmp_path):
     page = path.read_text()
     assert "Queries, one by one" not in page
     assert "Which method survives" not in page
-    for name in ("survival", "queries", "queries_unchanged"):
+    tables = ("survival", "query_details", "query_details_unchanged")
+    for name in (*tables, "results", "queries"):
         assert read_csv(tmp_path / "out" / f"{name}.csv") == []
 
 

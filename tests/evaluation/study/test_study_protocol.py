@@ -56,7 +56,7 @@ def test_loop_closure_beside_the_pairs(tmp_path, capsys):
     # The paper has values for the pair, but none for a loop.
     assert rows[0]["paper's AUC"] == "0.2582"
     assert rows[1]["paper's AUC"] == ""
-    queries = [r for r in read(out / "queries.csv") if r["db"] == "04"]
+    queries = [r for r in read(out / "query_details.csv") if r["db"] == "04"]
     for row in queries:
         if row["match_stamp_ns"]:
             age = int(row["query_stamp_ns"]) - int(row["match_stamp_ns"])
@@ -93,7 +93,7 @@ def test_another_protocol_measures_anew(tmp_path):
         RetrievalProtocol(place_spacing=20.0, radius=12.0),
     ):
         studies.report(tmp_path / "in", out, SOLID, protocol)
-        (first, *_) = read(out / "queries.csv")
+        (first, *_) = read(out / "query_details.csv")
         recognised = read(out / "place_recognition.csv")[0]
         seen.append((first["places"], recognised["N (with a match)"]))
     assert [places for places, _ in seen] == ["9", "5", "5"]
