@@ -4,6 +4,7 @@ from collections import Counter
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 import contextlib
 from dataclasses import dataclass, replace
+import functools
 import itertools
 from pathlib import Path
 import re
@@ -476,12 +477,14 @@ def _unlike(
 
 
 def _shipped(wanted: Mapping[str, object]) -> _Table:
-    rows = [
-        row
-        for path in sorted(_BASELINES.glob("*.csv"))
-        for row in Results.read(path).where(wanted).rows
-    ]
+    rows = [row for one in _baselines() for row in one.where(wanted).rows]
     return _Table(_SHIPPED, _by_place(rows), {})
+
+
+@functools.cache
+def _baselines() -> list[Results]:
+    """Returns the shipped tables."""
+    return [Results.read(path) for path in sorted(_BASELINES.glob("*.csv"))]
 
 
 def _common(

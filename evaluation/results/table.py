@@ -169,8 +169,7 @@ class Key:
         """
         if any(one.partition(".")[0] == "protocol" for one in names):
             names = (*names, "protocol", "protocol_digest")
-        names = (*names, "version")
-        known = [name for name in KEYS if name not in names]
+        known = [name for name in KEYS if name not in (*names, "version")]
         without_settings = "method" in names
         applying = (
             (name, value)

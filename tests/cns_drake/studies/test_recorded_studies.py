@@ -17,6 +17,7 @@ from evaluation.recognition.place_recognition import run
 from evaluation.recognition.protocol import FAIR_PROTOCOL, RetrievalProtocol
 from evaluation.results.table import Results
 from evaluation.study import engine
+from evaluation.study.chosen_methods import MethodChoice
 
 
 @pytest.fixture(scope="module")
@@ -31,6 +32,7 @@ def folder(tmp_path_factory):
 @pytest.fixture(autouse=True)
 def in_this_process(monkeypatch):
     studies.run_here(monkeypatch, engine)
+    studies.leave_figures_unrendered(monkeypatch)
     monkeypatch.setattr(study_module, "write_page", lambda *_, **options: None)
 
 
@@ -83,6 +85,26 @@ def test_the_numbers_are_those_of_the_single_commands(folder, tmp_path):
     assert {(row.map, row.database, row.query) for row in results.rows} == {
         ("metropolis", "metropolis_01", "metropolis_04")
     }
+
+
+@pytest.mark.slow
+def test_a_report_writes_the_tables_of_the_stages(folder, tmp_path):
+    """Rows and answers, with and without the gate, of both ways."""
+    for names in (["btc", "solid"], ["solid"]):
+        output = tmp_path / str(len(names))
+        fields = {"tasks": ["place", "pose", "change"], "methods": names}
+        stages = {"drives": "both-ways", "both": {"stage": ["last", "own"]}}
+        results = measure(
+            output / "study", folder, **{"name": "stages", **fields, **stages}
+        )
+        assert len({row.query for row in results.rows}) == 2
+        studies.report(folder, output / "report", map(MethodChoice, names))
+        for table in ("results.csv", "queries.csv"):
+            one, other = (
+                (output / path / table).read_text()
+                for path in ("study", "report")
+            )
+            assert one == other, table
 
 
 def test_protocols_may_vary(folder, tmp_path):

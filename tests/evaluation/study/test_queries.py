@@ -199,7 +199,7 @@ def test_poses(report):
 
 
 def test_the_protocol_stands_in_every_row(report):
-    for name in ("queries", "poses", "place_recognition"):
+    for name in ("query_details", "poses", "place_recognition"):
         for row in read(report / f"{name}.csv"):
             assert row["radius"] == "7.5"
             number = "10" if row["method"] == "btc" else "1"

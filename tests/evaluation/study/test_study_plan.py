@@ -70,8 +70,9 @@ def test_pairs_wait_for_their_surveys(tmp_path):
         "survey metropolis_01_stage_04",
         "survey metropolis_04",
     )
-    # Four surveys, one city, two changes, two pairs and a control.
-    assert len(jobs) == 4 + 1 + 2 + 3
+    # Four surveys, one city, two changes; two pairs and a control, each with
+    # its change for the table.
+    assert len(jobs) == 4 + 1 + 2 + 2 * 3
 
 
 def test_a_control_takes_the_place_of_one_drive():

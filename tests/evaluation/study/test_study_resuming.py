@@ -40,10 +40,9 @@ def test_every_attempt_gets_further(tmp_path, monkeypatch, few_methods):
     whole, broken = tmp_path / "whole", tmp_path / "broken"
     studies.do(measuring_jobs(tmp_path / "in", whole))
     expected = parts(whole)
-    # Two maps and the scans of each drive, a description by each method;
-    # results, and reasons for wrong ones.
-    methods = len(few_methods)
-    assert len(expected) == 2 * (3 + methods) + methods + 1
+    # Two maps and the scans of each drive, a description by each method; both
+    # ways results, those for the table, and reasons for wrong ones.
+    assert len(expected) == 2 * (3 + len(few_methods)) + 2 * 3
     replace = os.replace
 
     def replace_and_stop(source, target):
