@@ -278,6 +278,10 @@ class PairOfDrives:
                 f"{self.source}: {side}.fresh: it is a field of both, and of no"
                 " case"
             )
+        if "version" in changes:
+            raise InputError(
+                f"{self.source}: {side}.version: this field is now `redraw`"
+            )
         others = _DATABASE_FIELDS if side == "query" else _QUERY_FIELDS
         for name in others:
             if name in changes:
@@ -348,15 +352,15 @@ class PairOfDrives:
                     f" {drive.stage} of the {side}"
                 )
             older = "query" if side == "database" else "database"
-            if "version" in left:
+            if "redraw" in left:
                 raise InputError(
-                    f"{self.source}: {side}.version: a city drawn anew does not"
+                    f"{self.source}: {side}.redraw: a city drawn anew does not"
                     f" age by {older}.years; give one of them"
                 )
             drive = self._elsewhere(older, drive, self.age, *age, seed)
-        if "version" in left:
-            version = left.pop("version")
-            drive = self._elsewhere(side, drive, self.redraw, version)
+        if "redraw" in left:
+            wanted = left.pop("redraw")
+            drive = self._elsewhere(side, drive, self.redraw, wanted)
         family = {n: left.pop(n) for n in FAMILY_FIELDS if n in left}
         if family:
             drive = self._decayed(side, drive, family, seed)

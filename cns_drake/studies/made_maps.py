@@ -166,7 +166,7 @@ class MadeMaps:
             InputError: the seed is out of range.
         """
         if type(seed) is not int or not 0 <= seed < 2**31:
-            raise InputError(f"version: {seed!r} is no number from 0 on")
+            raise InputError(f"redraw: {seed!r} is no number from 0 on")
         source = map_folder(drive).path.resolve()
         folder, stage = self.redrawn(drive, seed)
         path = Path(folder)

@@ -314,7 +314,7 @@ def test_seeds_are_those_of_what_is_drawn(query_drive):
         ({"database": {"viewpoint": "lane", "stage": "first"}}, False),
         ({"database": {"years": 0}}, False),
         ({"database": {"years": 3}}, True),
-        ({"database": {"version": 3}}, False),
+        ({"database": {"redraw": 3}}, False),
         ({"database": {"distractors": 10}}, False),
     ],
 )
@@ -539,7 +539,7 @@ def test_maps_that_are_made(query_drive):
             cases={
                 "old": {"database": {"years": [5, 20]}},
                 "young": {"query": {"years": 5, "rates": 1}},
-                "other": {"both": {"version": 7}},
+                "other": {"both": {"redraw": 7}},
             },
             seeds=[1, 2],
         ),
@@ -594,9 +594,10 @@ FAULTS = [
     ("cases: {a: {query: {stage: next}}}", "query.stage: 'next'"),
     ("{database: {stage: '01'}, query: {years: 5}}", "years: stage last ages"),
     (
-        "{database: {version: 3}, query: {years: 5}}",
-        "database.version: a city drawn anew does not age by query.years",
+        "{database: {redraw: 3}, query: {years: 5}}",
+        "database.redraw: a city drawn anew does not age by query.years",
     ),
+    ("both: {version: 3}", "database.version: this field is now `redraw`"),
     ("query: {without: [nothing]}", "query.without: .*no structure nothing to"),
     ("both: {without: [nothing]}", "database.without: .*no structure nothing"),
     ("query: {map: nowhere}", "query: map: 'nowhere' is neither"),

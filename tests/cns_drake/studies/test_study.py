@@ -615,7 +615,7 @@ def test_maps_of_conditions_are_made_first(town, tmp_path, monkeypatch):
     monkeypatch.setattr(engine, "run_jobs", stop)
     wanted = experiment(
         town,
-        database={"version": [3, 8], "years": [0, 5]},
+        database={"redraw": [3, 8], "years": [0, 5]},
         both={"rates": 2},
         cases={"slow": {"database": {"rates": 1}}},
         seeds=[1, 2],
