@@ -7,6 +7,8 @@ from helpers.eval_program import assert_refused, run
 import numpy as np
 import pytest
 
+from evaluation.results.table import QueryRows, Results
+
 
 def test_the_protocol_is_the_users(capsys, towns):
     both = ["pr", towns / "town_01", towns / "town_02", "--method", "solid"]
@@ -55,6 +57,41 @@ def test_the_protocol_is_the_users(capsys, towns):
     assert "2 scans a place, the middle scan gives the pose" in out
     _, out, _ = run(capsys, *both, *options, "--set", "place=first")
     assert "2 scans a place, the first scan gives the pose" in out
+
+
+@pytest.mark.slow
+def test_a_pair_writes_the_tables_of_a_study(capsys, towns, tmp_path):
+    """Each row says how it was made; the answers give the results."""
+    both = ["pr", towns / "town_01", towns / "town_02", "--method", "solid"]
+    made = {}
+    for name, *options in (
+        ("fair",),
+        ("gate", "--gate"),
+        ("wide", "--radius", "25"),
+        ("high", "--sensor-height", "1.9"),
+        ("set", "--set", "ranges=20"),
+    ):
+        out = tmp_path / name
+        status, printed, _ = run(
+            capsys, *both, *options, "--json", "--output", out
+        )
+        assert status == 0
+        rows = Results.read(out).where(task="place").rows
+        (answers,) = QueryRows.read(out).answers
+        values = {row.metric: row.value for row in rows}
+        assert values["auc"] == json.loads(printed)["auc"]
+        assert answers.outcomes.recall_at(1) == values["r1"]
+        assert {row.n for row in rows} == {len(answers.outcomes)}
+        made[name] = rows[0]
+    digests = {name: row.protocol_digest for name, row in made.items()}
+    assert digests["fair"] == digests["gate"] == digests["set"]
+    assert len({digests[name] for name in ("fair", "wide", "high")}) == 3
+    assert made["set"].label == "solid, ranges 20"
+    assert [made[one].protocol for one in made] == [
+        *("fair", "fair", "own", "own", "fair")
+    ]
+    both = ["compare", tmp_path / "fair", tmp_path / "wide"]
+    assert_refused(capsys, both, "no condition in common")
 
 
 @pytest.mark.slow
