@@ -258,6 +258,7 @@ def _larger_than_real(changes: Sequence[ChangeResult]) -> Finding:
         for name, result in widest.items()
         if result.report.change.symmetric >= real
     ]
+    cities = "city" if len(widest) == 1 else "cities"
     values = ", ".join(
         f"{name} {result.report.change.symmetric:.4f}"
         for name, result in widest.items()
@@ -267,7 +268,7 @@ def _larger_than_real(changes: Sequence[ChangeResult]) -> Finding:
         f" ({real:.4f}).",
         FITTED,
         f"TCR_sym between the first and the last stage: {values}. It reaches"
-        f" KAIST's in {len(reached)} of {len(widest)} cities. The cities were"
+        f" KAIST's in {len(reached)} of {len(widest)} {cities}. The cities were"
         " fitted to the paper's values, which reach KAIST's only in Suburbia"
         " (0.1840) and Metropolis (0.2920).",
         "Table I",

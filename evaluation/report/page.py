@@ -73,10 +73,7 @@ _SCATTER = {"kind": "scatter", "x": "tcr_sym", "y": "auc"}
 # Controls, in which nothing changes, show no trend.
 _CHANGED: dict[str, str] = {**_SCATTER, STAGE: OWN}
 _DUMBBELL = {"kind": "dumbbell", "over": STAGE, "metric": "auc"}
-_SURVIVAL = (
-    "AUC without the change (hollow) and with it (filled), and the share that"
-    " is kept"
-)
+_SURVIVAL = "AUC of each method without and with the change, and what it keeps"
 # Width of charts [px].
 _WIDTH = 480
 

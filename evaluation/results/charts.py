@@ -511,6 +511,8 @@ def _scatter(chart: _Chart) -> tuple[str, Figure]:
             )
             axes.plot(one.x, one.y, style, color=colour)
     axes.set(xlabel=plain(words(x_name)), ylabel=plain(words(y_name)))
+    # On a phone there is room for a few numbers.
+    axes.locator_params(axis="x", nbins=6)
     axes.grid(alpha=0.3)
     # The sign of a correlation with the metric itself, not with its failure.
     selected = Results.of(

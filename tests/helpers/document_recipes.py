@@ -514,6 +514,16 @@ RECIPES = {
         prints=("first/town_01: 2 frames",),
         makes=("drive.html",),
     ),
+    "a look first": Recipe(
+        ".venv/bin/cns-drake simulate riverside_01 --output first --recording",
+        changes=(
+            ("--frames 200", "--frames 2"),
+            ("riverside_01", "town/sequence_01.yaml"),
+        ),
+        after=("start a city",),
+        prints=("first/town_01: 2 frames",),
+        makes=("drive.html",),
+    ),
     "decay": Recipe(
         "maps: riverside\ndrives: stages",
         changes=(("riverside", "town"), ("0, 0.3, 0.6", "0, 0.6")),
