@@ -258,7 +258,6 @@ def _larger_than_real(changes: Sequence[ChangeResult]) -> Finding:
         for name, result in widest.items()
         if result.report.change.symmetric >= real
     ]
-    cities = "city" if len(widest) == 1 else "cities"
     values = ", ".join(
         f"{name} {result.report.change.symmetric:.4f}"
         for name, result in widest.items()
@@ -267,10 +266,10 @@ def _larger_than_real(changes: Sequence[ChangeResult]) -> Finding:
         f"The change meets or surpasses that of four years at KAIST"
         f" ({real:.4f}).",
         FITTED,
-        f"TCR_sym between the first and the last stage: {values}. It reaches"
-        f" KAIST's in {len(reached)} of {len(widest)} {cities}. The cities were"
-        " fitted to the paper's values, which reach KAIST's only in Suburbia"
-        " (0.1840) and Metropolis (0.2920).",
+        f"TCR_sym between the first and the last stage: {values}. Cities"
+        f" in which it reaches KAIST's: {len(reached)} of {len(widest)}. They"
+        " were fitted to the paper's values, which reach KAIST's only in"
+        " Suburbia (0.1840) and Metropolis (0.2920).",
         "Table I",
     )
 

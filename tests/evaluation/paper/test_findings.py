@@ -26,6 +26,7 @@ def asked(method):
     scans = 10 if method == "btc" else 1
     return {
         "protocol": replace(PAPER_PROTOCOL, scans_per_place=scans),
+        "protocol_name": "paper",
         "database": "a",
         "query": "b",
     }
@@ -84,7 +85,7 @@ def test_none_as_in_the_paper():
         "was fitted",
         *["does not hold"] * 3,
     ]
-    assert "KAIST's in 0 of 1 cities." in found[0].evidence
+    assert "it reaches KAIST's: 0 of 1." in found[0].evidence
     assert "is BTC on 5. If all queries count for" in found[1].evidence
     assert found[1].evidence.endswith("is best on 0 of 5 pairs (BTC on 5).")
     assert "RING++ +1.00" in found[2].evidence
@@ -138,6 +139,7 @@ def test_a_verdict_names_the_tables_that_contradict_it():
     for one in own:
         asked_so = {"turn_queries": True, "tilt_queries": 1.5}
         one.protocol = replace(one.protocol, **asked_so)
+        one.protocol_name = "fair"
     (ring,) = findings(own + by_paper, [])
     assert ring.verdict == "holds"
     assert ring.claim.endswith("as the paper counts.")
