@@ -3,8 +3,10 @@
 https://wiki.openstreetmap.org/wiki/Tag:tunnel%3Dbuilding_passage
 """
 
-from collections import Counter
 from collections.abc import Iterable, Sequence
+from itertools import pairwise
+import math
+import re
 from typing import NamedTuple
 
 import numpy as np
@@ -20,6 +22,7 @@ from cns_drake.imports.openstreetmap.reading import (
     has_tag,
 )
 from cns_drake.imports.openstreetmap.tags import (
+    is_inside,
     length,
     path_width,
     street_width,
@@ -38,6 +41,8 @@ _TALLEST = 30.0
 _BEYOND, _ASIDE = 0.3, 0.25
 # A way leads through a building if more than this is inside [m].
 _THROUGH = 0.5
+# Values of `maxheight` that are no heights, but usual.
+_NO_HEIGHTS = ("default", "none", "below_default", "no_sign", "no_indications")
 # Walls do not block a way if they begin above this height [m].
 _HEADROOM = 2.0
 
@@ -77,7 +82,8 @@ def width_of(tags: Tags) -> float | None:
 
 
 def _on_the_ground(tags: Tags) -> bool:
-    return not (is_tunnel(tags) or has_tag(tags, "area"))
+    is_above = not re.fullmatch(r"-?0*|.*;.*", tags.get("level", "0"))
+    return not (is_tunnel(tags) or is_inside(tags) or is_above)
 
 
 def passages_of(
@@ -85,9 +91,9 @@ def passages_of(
 ) -> list[Passage]:
     """Returns the ways that lead through buildings or under roofs.
 
-    They have the tag `tunnel=building_passage` or `covered`. `local` converts
-    longitudes and latitudes to coordinates in metres, and `faults` counts tags
-    that cannot be read.
+    They have the tag `tunnel=building_passage` or `covered`, and are lines or
+    areas on the ground. `local` converts longitudes and latitudes to
+    coordinates in metres, and `faults` counts tags that cannot be read.
     """
     found = []
     for name, tags, line, _ in ways:
@@ -98,11 +104,20 @@ def passages_of(
         usual = _STREET if street_width(tags) else _PATH
         if tags.get("railway") in _RAILS:
             usual = _RAIL
-        clear = tag_value(
-            tags, "maxheight", length, _TALLEST, (name, faults), _HEADROOM
-        )
+        clear = None
+        if tags.get("maxheight") not in _NO_HEIGHTS:
+            where = (name, faults)
+            clear = tag_value(
+                tags, "maxheight", length, _TALLEST, where, _HEADROOM
+            )
         course = LineString(local(line))
-        area = _longer(course).buffer(width / 2.0 + _ASIDE, cap_style="flat")
+        area: BaseGeometry
+        if has_tag(tags, "area") and course.is_closed and len(line) > 3:
+            area = shapely.make_valid(Polygon(course))
+            area = area.buffer(_BEYOND, join_style="mitre")
+        else:
+            half = width / 2.0 + _ASIDE
+            area = _longer(course).buffer(half, cap_style="flat")
         found.append(Passage(name, course, area, clear or usual))
     return found
 
@@ -185,16 +200,20 @@ class Openings:
             for way in ways
             if width_of(way.tags)
             and _on_the_ground(way.tags)
-            and not has_tag(way.tags, "bridge")
+            and not (has_tag(way.tags, "bridge") or has_tag(way.tags, "area"))
         ]
         self._ways = used
         self._lines = [LineString(local(way.line)) for way in used]
         self._tree = STRtree(self._lines)
-        # A way that ends at a wall goes on if another one begins there.
-        self._arms: Counter[int] = Counter()
-        for way in used:
-            self._arms.update(way.nodes)
-            self._arms.update(way.nodes[1:-1])
+        # Node -> the places to which ways lead from there.
+        self._arms: dict[int, list[np.ndarray]] = {}
+        for way, line in zip(used, self._lines, strict=True):
+            places = shapely.get_coordinates(line)
+            for (node, place), (other, beyond) in pairwise(
+                zip(way.nodes, places, strict=True)
+            ):
+                self._arms.setdefault(node, []).append(beyond)
+                self._arms.setdefault(other, []).append(place)
 
     def across(
         self, barrier: OsmWay, course: LineString, faults: ImportFaults
@@ -205,10 +224,13 @@ class Openings:
         cross the barrier without a common node are counted in `faults`.
         `course` is the line of the barrier in W [m].
         """
-        on_it = {n for n in barrier.nodes if self._arms[n] > 1}
+        on_it = self._crossings(barrier, shapely.get_coordinates(course))
+        edges = {frozenset(pair) for pair in pairwise(barrier.nodes)}
         areas = []
         for k in self._tree.query(course, "intersects"):
             way, line = self._ways[k], self._lines[k]
+            if edges & {frozenset(pair) for pair in pairwise(way.nodes)}:
+                continue  # It leads along the barrier.
             if on_it & {*way.nodes}:
                 half = (width_of(way.tags) or 0.0) / 2.0 + _ASIDE
                 areas.append(line.buffer(half, cap_style="square"))
@@ -217,3 +239,34 @@ class Openings:
         if areas:
             faults.add("barrier across a way, opened", barrier.name)
         return shapely.union_all(areas)
+
+    def _crossings(self, barrier: OsmWay, places: np.ndarray) -> set[int]:
+        """Returns the nodes of a barrier at which ways lead to both sides.
+
+        At its ends, where another barrier may begin, two ways are enough.
+        `places` are the places of its nodes in W [m].
+        """
+        found = set()
+        last = len(places) - 1
+        is_closed = barrier.nodes[0] == barrier.nodes[-1]
+        for k, node in enumerate(barrier.nodes):
+            arms = self._arms.get(node, [])
+            if len(arms) < 2:
+                continue
+            if k in (0, last) and not is_closed:
+                found.add(node)
+                continue
+            before = places[k - 1 if k else last - 1]
+            after = places[k + 1 if k < last else 1]
+            to_before = _turn(places[k], after, before)
+            sides = {_turn(places[k], after, arm) < to_before for arm in arms}
+            if len(sides) > 1:
+                found.add(node)
+        return found
+
+
+def _turn(place: np.ndarray, start: np.ndarray, end: np.ndarray) -> float:
+    """Returns the angle from one direction to another, from 0 to 2 pi."""
+    first, second = start - place, end - place
+    angle = math.atan2(second[1], second[0]) - math.atan2(first[1], first[0])
+    return angle % (2.0 * math.pi)

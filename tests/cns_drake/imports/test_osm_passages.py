@@ -69,6 +69,8 @@ STREET = {"tunnel": "building_passage"}
         (STREET | {"layer": "0", "width": "4", "maxheight": "30"}, 2.0, 11.6),
         (STREET | {"highway": "footway", "width": "3"}, 1.5, 2.8),
         (STREET | {"highway": "", "railway": "tram"}, 1.75, 5.5),
+        (STREET | {"maxheight": "default"}, 3.5, 4.5),
+        (STREET | {"level": "0"}, 3.5, 4.5),
     ],
 )
 def test_a_passage_is_open_up_to_its_height(tmp_path, way, half, clear):
@@ -87,7 +89,9 @@ def test_a_passage_is_open_up_to_its_height(tmp_path, way, half, clear):
     whole = 20.0 * 42.0 * 12.0
     opening = 20.0 * 2.0 * (half + 0.25) * clear
     assert volume(house) == pytest.approx(whole - opening, rel=2e-3)
-    assert "street into a building" not in " ".join(faults_of(city))
+    kinds = " ".join(faults_of(city))
+    assert "street into a building" not in kinds
+    assert "maxheight" not in kinds
 
 
 @pytest.mark.parametrize("roof", ["gabled", "pyramidal"])
@@ -115,6 +119,47 @@ def test_the_street_leads_through(tmp_path):
         assert f"road_w{inside}" not in found
         assert is_solid(found[f"building_w{number}"], (0, 0, 1))
         assert faults_of(city)["tunnel, left out"] == 1
+
+
+def test_an_area_of_people_leads_through(tmp_path):
+    osm = OsmWriter()
+    number = osm.box(-10, -20, 20, 40, **HOUSE)
+    osm.box(-10, -2, 20, 6, highway="pedestrian", area="yes", covered="yes")
+    _, found = read(osm, tmp_path)
+    house = found[f"building_w{number}"]
+    for x in (-9.9, 0.02, 9.9):
+        assert not is_solid(house, (x, 1.013, 1))
+        assert not is_solid(house, (x, 3.9, 1))
+        assert is_solid(house, (x, -3, 1))
+        assert is_solid(house, (x, 1.013, 3))
+
+
+@pytest.mark.parametrize(
+    "way", [{"indoor": "yes"}, {"level": "1"}, {"layer": "-1"}, {"level": "-1"}]
+)
+def test_what_is_inside_or_on_another_level_opens_nothing(tmp_path, way):
+    path = {"highway": "footway", "covered": "yes"} | way
+    osm, number, _ = gatehouse(path)
+    _, found = read(osm, tmp_path)
+    assert is_solid(found[f"building_w{number}"], (0.02, 0.013, 1))
+
+
+def test_a_courtyard_is_reached_through_both_walls(tmp_path):
+    osm = OsmWriter()
+    rings = [
+        osm.way([(-r, -r), (r, -r), (r, r), (-r, r)], closed=True)
+        for r in (20, 10)
+    ]
+    number = osm.relation(
+        {"outer": rings[:1], "inner": rings[1:]}, type="multipolygon", **HOUSE
+    )
+    osm.way([(-60, 0.5), (60, 0.5)], highway="service", width="3", **STREET)
+    _, found = read(osm, tmp_path)
+    house = found[f"building_r{number}"]
+    for x in (-15, 0, 15):
+        assert not is_solid(house, (x, 0.5, 1))
+        assert is_solid(house, (x, 0.5, 6)) == (x != 0)
+        assert is_solid(house, (x, 15.1, 1))
 
 
 def test_a_street_that_is_walled_up_is_named(tmp_path):
@@ -190,6 +235,46 @@ def test_a_wall_stays_whole_where_no_way_leads_through(tmp_path, beyond, way):
     city, found = read(osm, tmp_path)
     assert is_solid(found[name], (0.02, 0.013, 1))
     assert "barrier across a way, opened" not in faults_of(city)
+
+
+def test_two_walls_that_meet_at_a_gate_are_open(tmp_path):
+    osm = OsmWriter()
+    gate, west, east = osm.node(0, 0), osm.node(-50, 0), osm.node(50, 0)
+    walls = [
+        osm.way_of([osm.node(0, y), gate], barrier="wall") for y in (-20, 20)
+    ]
+    osm.way_of([west, gate], highway="service", width="3")
+    osm.way_of([gate, east], highway="service", width="3")
+    _, found = read(osm, tmp_path)
+    for number, side in zip(walls, (-1, 1), strict=True):
+        assert not is_solid(found[f"wall_w{number}"], (0, side * 1.0, 1))
+        assert is_solid(found[f"wall_w{number}"], (0.02, side * 5.0, 1))
+
+
+@pytest.mark.parametrize("closed", [False, True])
+def test_ways_on_one_side_of_a_wall_lead_not_through_it(tmp_path, closed):
+    osm = OsmWriter()
+    foot = osm.node(0, 0)
+    nodes = [osm.node(0, -20), foot, osm.node(0, 20)]
+    if closed:
+        nodes += [osm.node(20, 20), osm.node(20, -20), nodes[0]]
+    number = osm.way_of(nodes, barrier="fence")
+    for y in (-20, 20):
+        osm.way_of([foot, osm.node(-50, y)], highway="footway")
+    _, found = read(osm, tmp_path)
+    assert is_solid(found[f"fence_w{number}"], (0.02, 0.013, 1))
+    osm.way_of([foot, osm.node(10, 3)], highway="footway")
+    _, found = read(osm, tmp_path)
+    assert not is_solid(found[f"fence_w{number}"], (0.02, 0.013, 1))
+
+
+def test_a_way_along_a_wall_does_not_remove_it(tmp_path):
+    osm = OsmWriter()
+    nodes = [osm.node(x, 0) for x in (-40, 0, 40)]
+    number = osm.way_of(nodes, barrier="wall")
+    osm.way_of(nodes, highway="footway")
+    _, found = read(osm, tmp_path)
+    assert is_solid(found[f"wall_w{number}"], (-20.03, 0.02, 1))
 
 
 def test_a_way_across_a_wall_without_a_common_node_is_named(tmp_path):
