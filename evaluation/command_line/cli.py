@@ -408,7 +408,8 @@ def compare(
     RESULTS are files like results.csv, or folders that contain one. The command
     ranks the methods in these tables and in the shipped tables by their means
     over the conditions that all tables share, with 95 % t intervals over maps
-    (over conditions if there is only one map). For AUC, if a queries.csv lies
+    (over conditions if there is only one map), if there are four or more. For
+    AUC, if a queries.csv lies
     next to each table, the command also prints the AUC difference of any two
     methods, with a p-value that is corrected by Holm's method for the number of
     differences. Kendall's tau says how similarly two tables rank the methods.
@@ -435,12 +436,14 @@ def compare(
     for note in found.notes:
         terminal.note(note)
     rows = [
-        (one.method, f"{number(one.value)}  {_interval_text(one.interval)}")
+        (one.method, f"{number(one.value)}{_known_interval(one.interval)}")
         for one in found.ranked
     ]
     if rows:
         where = f"mean of {found.conditions or 'its own'} conditions"
-        rows.insert(0, ("method", f"{metric}, {where}  [95 %]"))
+        known = any(_known_interval(one.interval) for one in found.ranked)
+        level = "  [95 %]" if known else ""
+        rows.insert(0, ("method", f"{metric}, {where}{level}"))
     for one in found.differences:
         interval = _interval_text(one.difference.interval)
         rows.append(
@@ -584,6 +587,13 @@ def _recognition_rows(result: PlaceRecognition) -> Iterator[tuple[str, str]]:
         limits = f"{SUCCESS_TRANSLATION:g} m and {SUCCESS_ROTATION_DEG:g} deg"
         yield f"within {limits}", f"{number(pose.success)}  (of N)"
     yield "protocol", result.protocol.to_text()
+
+
+def _known_interval(interval: Interval) -> str:
+    """Returns an interval after two spaces; nothing if it is unknown."""
+    if isnan(interval.low):
+        return ""
+    return f"  {_interval_text(interval)}"
 
 
 def _interval_text(interval: Interval) -> str:
