@@ -235,7 +235,8 @@ def _kitti_inner_files(drive: McapDrive) -> dict[str, str]:
     elapsed_ns = drive.stamps_ns - drive.stamps_ns[0]
     # LiDARs after the first one add their own name.
     is_first = drive.lidar_name == drive.lidar_names[0]
-    name = drive.name if is_first else f"{drive.name}_{drive.lidar_name}"
+    lidar = drive.lidar_name.strip("/").replace("/", "_")
+    name = drive.name if is_first else f"{drive.name}_{lidar}"
     calibration = {f"P{camera}": _PROJECTION for camera in range(4)}
     calibration["Tr"] = _X_CS
     return {

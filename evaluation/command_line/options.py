@@ -54,8 +54,8 @@ LidarName = Annotated[
     typer.Option(
         "--lidar",
         metavar="NAME",
-        help="LiDAR to read, if a recording has several. Its name is part of "
-        "its topic, /NAME/points.",
+        help="LiDAR to read, if a recording has several: the name in its "
+        "topic /NAME/points, or the whole topic.",
     ),
 ]
 Columns = Annotated[

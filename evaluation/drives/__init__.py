@@ -10,6 +10,7 @@ from cns_drake.base.drives.drive import (
     check_same_world,
 )
 from cns_drake.base.errors import InputError
+from cns_drake.base.listing import listed
 
 __all__ = [
     "Drive",
@@ -65,6 +66,12 @@ def open_drive(
         raise InputError(
             f"{path}: the recording was not finished (cns-drake repair saves"
             " what is whole)"
+        )
+    one = [path] if ".mcap.zst" in path.name else []
+    for file in listed(path, "*.mcap.zst*") if path.is_dir() else one:
+        raise InputError(
+            f"{file}: the whole recording is compressed (rosbag2's mode"
+            " `file`); uncompress it first"
         )
     raise InputError(
         f"{path}: not a recorded drive (a folder with an .mcap file, or"

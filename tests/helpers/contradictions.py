@@ -89,20 +89,22 @@ def write_messages(messages: list[RecordedMessage], attachments: list) -> bytes:
     return stream.getvalue()
 
 
-def add_images(path: Path, topic: str, images: dict[int, bytes]) -> None:
-    """Adds camera images to a recording: time [ns] -> file."""
+def add_images(
+    path: Path, topic: str, images: dict[int, bytes], late_ns: int = 0
+) -> None:
+    """Adds camera images to a recording: stamp [ns] -> file.
+
+    Their log times are later than their stamps by `late_ns`.
+    """
     messages, attachments = read_messages(path.read_bytes())
     kind = "sensor_msgs/msg/CompressedImage"
-    header = messages[-1].body.header
-    messages += [
-        RecordedMessage(
-            topic,
-            kind,
-            TYPES.types[kind](header, "", np.frombuffer(data, np.uint8)),
-            time_ns,
+    for stamp_ns, data in images.items():
+        time = TYPES.types["builtin_interfaces/msg/Time"](
+            *divmod(stamp_ns, 10**9)
         )
-        for time_ns, data in images.items()
-    ]
+        header = TYPES.types["std_msgs/msg/Header"](time, "camera")
+        body = TYPES.types[kind](header, "", np.frombuffer(data, np.uint8))
+        messages.append(RecordedMessage(topic, kind, body, stamp_ns + late_ns))
     path.write_bytes(write_messages(messages, attachments))
 
 

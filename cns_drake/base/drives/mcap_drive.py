@@ -20,6 +20,7 @@ from cns_drake.base.drives.message_rows import (
 )
 from cns_drake.base.errors import InputError, value_errors
 from cns_drake.base.json_text import parse_json
+from cns_drake.base.listing import listed
 
 _LIDAR_TOPIC = "/lidar/points"
 _ODOMETRY_TOPIC = "/odometry"
@@ -64,8 +65,8 @@ class McapDrive(Drive):
 
         Args:
             path: the .mcap file, or the folder that holds it.
-            lidar: name of the LiDAR; its scans are on the topic
-                /<lidar>/points.
+            lidar: name of the LiDAR, whose scans are on the topic
+                /<lidar>/points; or a topic of scans, with any name.
 
         Raises:
             InputError: if there is no complete recording at `path`, or no
@@ -307,20 +308,32 @@ class McapDrive(Drive):
     def image_stamps_ns(self) -> np.ndarray:
         """(M,) int64 time of each image of the first camera [ns].
 
-        The times are the images' log times, converted to the clock of the
-        scans' stamps.
+        The times are the stamps of the images. Images that were recorded in
+        another order are sorted by them.
         """
-        if not self._camera_topics:
-            return super().image_stamps_ns
-        images = self._file.locate(self._camera_topics[0])
-        start_ns = int(self._scans["log_time_ns"][0])
-        times_ns = images["log_time_ns"].astype(np.int64) - start_ns
-        return self.stamps_ns[0] + times_ns
+        return self._images[0]
 
     def image(self, index: int) -> bytes:
         topic = self._camera_topics[0]
-        place = self._file.locate(topic)[index]
-        return self._message(topic, place).data.tobytes()
+        return self._message(topic, self._images[1][index]).data.tobytes()
+
+    @cached_property
+    def _images(self) -> tuple[np.ndarray, np.ndarray]:
+        """Stamps (M,) [ns] and places of the first camera's images."""
+        if not self._camera_topics:
+            return super().image_stamps_ns, self._all_scans[:0]
+        topic = self._camera_topics[0]
+        places = self._file.locate(topic)
+        stamps_ns = self._read_logged_stamps(topic)
+        if stamps_ns is None:
+            stamps_ns = np.zeros(len(places), np.int64)
+            with self._faults(topic):
+                for index, data in self._file.visit(places):
+                    stamps_ns[index] = mcap_messages.read_stamp(data) or 0
+        if (stamps_ns == 0).any():
+            raise InputError(f"{self._path}: {topic}: an image has no stamp")
+        order = np.argsort(stamps_ns, kind="stable")
+        return stamps_ns[order], places[order]
 
     @cached_property
     def _scans(self) -> np.ndarray:
@@ -413,15 +426,20 @@ class McapDrive(Drive):
     @cached_property
     def _logged_stamps_ns(self) -> np.ndarray | None:
         """Stamps (N,) of all scans from the file's index; None if not there."""
+        return self._read_logged_stamps(self._lidar_topic)
+
+    def _read_logged_stamps(self, topic: str) -> np.ndarray | None:
+        """Returns a topic's log times [ns], if the file calls them stamps."""
+        places = self._file.locate(topic)
         records = self._file.metadata(mcap_messages.STAMPED_RECORD)
-        number = str(len(self._all_scans))
-        if [one.get(self._lidar_topic) for one in records] != [number]:
+        if [one.get(topic) for one in records] != [str(len(places))]:
             return None
-        for place in self._all_scans[[0, -1]]:
-            stamp_ns, _ = self._read_cloud_header(self._file.read(place))
+        for place in places[[0, -1]]:
+            with self._faults(topic):
+                stamp_ns = mcap_messages.read_stamp(self._file.read(place))
             if stamp_ns != place["log_time_ns"]:
                 return None
-        return self._all_scans["log_time_ns"].astype(np.int64)
+        return places["log_time_ns"].astype(np.int64)
 
     @cached_property
     def X_BS(self) -> np.ndarray:
@@ -497,16 +515,19 @@ class McapDrive(Drive):
     def _find_lidar_topic(self, lidar: str | None) -> str:
         """Returns the named LiDAR's topic, /lidar/points, or the only one."""
         clouds = self._cloud_topics()
+        topics = self._file.topics
+        wanted = _LIDAR_TOPIC
         if lidar is not None:
             wanted = f"/{lidar}/points"
-        elif _LIDAR_TOPIC in self._file.topics or len(clouds) != 1:
-            wanted = _LIDAR_TOPIC
-        else:
+            named = (lidar, wanted, f"/{lidar}")
+            wanted = next((one for one in named if one in topics), wanted)
+        elif _LIDAR_TOPIC not in topics and len(clouds) == 1:
             wanted = clouds[0]
-        if wanted not in self._file.topics and clouds:
+        if wanted not in topics and clouds:
+            advice = "" if lidar else "; --lidar takes one of them"
             raise InputError(
                 f"{self._path}: no topic {wanted} (point clouds:"
-                f" {' '.join(clouds)})"
+                f" {' '.join(clouds)}{advice})"
             )
         return wanted
 
@@ -539,14 +560,14 @@ class McapDrive(Drive):
 def holds_mcap(path: Path) -> bool:
     """Returns whether `path` is an .mcap file or a folder with one."""
     if path.is_dir():
-        return any(path.glob("*.mcap"))
+        return bool(listed(path, "*.mcap"))
     return path.suffix == ".mcap"
 
 
 def _mcap_path(path: Path) -> Path:
     if not path.is_dir():
         return path
-    files = sorted(path.glob("*.mcap"))
+    files = listed(path, "*.mcap")
     if len(files) != 1:
         raise InputError(f"{path}: {len(files)} .mcap files instead of one")
     return files[0]
@@ -561,4 +582,6 @@ def _drive_name(path: Path) -> str:
 
 
 def _lidar_name(topic: str) -> str:
-    return topic.strip("/").split("/")[0]
+    """Returns NAME for the topic /NAME/points, and other topics as they are."""
+    name = topic.removeprefix("/").removesuffix("/points")
+    return name if topic == f"/{name}/points" else topic

@@ -21,6 +21,9 @@ _MOST_FIELDS = 256
 _LONGEST_NAME = 1 << 10
 # The header of CDR that gives the order of bytes.
 _ENCAPSULATION_BYTES = 4
+# What compressed data begin with -> the name of the compression. No message in
+# CDR begins alike.
+_COMPRESSIONS = {b"\x28\xb5\x2f\xfd": "zstd", b"\x04\x22\x4d\x18": "lz4"}
 # Name of the metadata record of an MCAP file that gives, for each topic, the
 # number of messages that were seen to have their log time as their stamp. If
 # these are all of its messages, the file's index has their stamps.
@@ -38,6 +41,7 @@ def decode(data: bytes | memoryview, message_type: str) -> Any:
         ValueError: the data are not a message of this type, or are longer than
             any plausible message of this type.
     """
+    _check_uncompressed(data)
     if len(data) > _LONGEST.get(message_type, len(data)):
         raise ValueError(
             f"a message of {len(data)} bytes, more than one of its type holds"
@@ -53,13 +57,28 @@ def decode(data: bytes | memoryview, message_type: str) -> Any:
         ) from error
 
 
+def _check_uncompressed(data: bytes | memoryview) -> None:
+    """Refuses a message that rosbag2 has compressed.
+
+    Raises:
+        ValueError: the message is compressed.
+    """
+    name = _COMPRESSIONS.get(bytes(data[:4]))
+    if name is not None:
+        raise ValueError(
+            f"each message is compressed by {name} (rosbag2's mode `message`);"
+            " convert the recording to one without compression"
+        )
+
+
 def read_cloud_header(data: bytes | memoryview) -> tuple[int, str]:
     """Returns the stamp [ns] and frame of a PointCloud2, and nothing else.
 
     Raises:
-        ValueError: if the message is cut off, or has an implausibly long frame
-            name or too many fields.
+        ValueError: if the message is cut off or compressed, or has an
+            implausibly long frame name or too many fields.
     """
+    _check_uncompressed(data)
     try:
         order = "<" if data[1] & 1 else ">"
         body = data[_ENCAPSULATION_BYTES:]
@@ -81,8 +100,8 @@ def read_cloud_header(data: bytes | memoryview) -> tuple[int, str]:
 def read_stamp(data: bytes | memoryview) -> int | None:
     """Returns the stamp of a message that begins with a header [ns].
 
-    It is None if the message is too short. For a message without a header, the
-    result means nothing.
+    It is None if the message is too short. For a message without a header, or
+    one that is compressed, the result means nothing.
     """
     if len(data) < _ENCAPSULATION_BYTES + 8:
         return None

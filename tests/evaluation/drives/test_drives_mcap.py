@@ -16,14 +16,17 @@ from helpers.drive_files import (
     write_recording,
     yaw_pose,
 )
-from mcap.writer import CompressionType
+import lz4.frame
+from mcap.writer import CompressionType, Writer
 import numpy as np
 import pytest
+import zstandard
 
 from cns_drake.base import poses
 from cns_drake.base.drives import mcap_file
 from cns_drake.base.drives.point_layouts import to_points
 from cns_drake.base.errors import InputError
+from cns_drake.recording.repair import repair_mcap
 from evaluation import drives
 from evaluation.drives import check_same_world, open_drive
 
@@ -157,27 +160,88 @@ def test_a_clock_that_was_set_back_is_noted(tmp_path, back_ns, is_noted):
 
 
 def test_images_are_those_of_the_first_camera(tmp_path):
-    """Log times may be of another clock than stamps."""
+    """Images may be recorded late, in another order, or by another clock."""
     path, _, _ = record(tmp_path / "s")
     assert len(open_drive(path).image_stamps_ns) == 0
-    messages, attachments = read_messages(path.read_bytes())
-    ahead = [one.copy(log_time=one.log_time + 10**15) for one in messages]
-    path.write_bytes(write_messages(ahead, attachments))
-    log_ns = T0_NS + 10**15
     for topic, start in (
         ("/depth/compressedDepth", 5),
         ("/front/image", 7),
         ("/left/image", 9),
     ):
-        times = [log_ns + start, log_ns - 2, log_ns + 2 * PERIOD_NS]
-        add_images(path, topic, {t: f"{topic} {t}".encode() for t in times})
+        for late_ns, offset in ((10**15, start), (0, -2), (10**10, PERIOD_NS)):
+            stamp_ns = T0_NS + offset
+            image = f"{topic} {offset}".encode()
+            add_images(path, topic, {stamp_ns: image}, late_ns)
     drive = open_drive(path)
     np.testing.assert_array_equal(
-        drive.image_stamps_ns, [T0_NS - 2, T0_NS + 7, T0_NS + 2 * PERIOD_NS]
+        drive.image_stamps_ns, [T0_NS - 2, T0_NS + 7, T0_NS + PERIOD_NS]
     )
     assert [drive.image(k) for k in range(3)] == [
-        f"/front/image {log_ns + t}".encode() for t in (-2, 7, 2 * PERIOD_NS)
+        f"/front/image {offset}".encode() for offset in (-2, 7, PERIOD_NS)
     ]
+
+
+def test_stamps_of_images_from_the_index(tmp_path, monkeypatch):
+    path, _, _ = record(tmp_path / "s")
+    times = T0_NS + PERIOD_NS * np.arange(7)
+    add_images(path, "/front/image", {t: b"%d" % t for t in times.tolist()})
+    repair_mcap(path, tmp_path / "whole.mcap")
+    drive = open_drive(tmp_path / "whole.mcap")
+    monkeypatch.setattr(mcap_file.McapFile, "visit", None)
+    np.testing.assert_array_equal(drive.image_stamps_ns, times)
+    assert drive.image(3) == b"%d" % times[3]
+
+
+def test_an_image_without_a_stamp_is_refused(tmp_path):
+    path, _, _ = record(tmp_path / "s")
+    add_images(path, "/front/image", {T0_NS: b"a", 0: b"b"}, T0_NS)
+    with pytest.raises(InputError, match="/front/image: an image has no stamp"):
+        _ = open_drive(path).image_stamps_ns
+
+
+@pytest.mark.parametrize(
+    ("compress", "name"),
+    [(zstandard.compress, "zstd"), (lz4.frame.compress, "lz4")],
+)
+@pytest.mark.parametrize("topic", ["/lidar/points", "/odometry", "/tf_static"])
+def test_compressed_messages_are_named_as_such(
+    tmp_path, monkeypatch, compress, name, topic
+):
+    add_message = Writer.add_message
+    numbers = {"/lidar/points": 1, "/odometry": 2, "/tf_static": 3}
+
+    def add(writer, channel_id, log_time, data, *others):
+        if channel_id == numbers[topic]:
+            data = compress(data)
+        add_message(writer, channel_id, log_time, data, *others)
+
+    monkeypatch.setattr(Writer, "add_message", add)
+    path, _, _ = record(tmp_path / "s")
+    with pytest.raises(
+        InputError, match=f"{topic}: each message is compressed by {name}"
+    ):
+        _ = open_drive(path).X_WS
+
+
+@pytest.mark.parametrize("ending", ["zstd", "zst"])
+def test_a_compressed_file_is_named_as_such(tmp_path, ending):
+    path, _, _ = record(tmp_path / "s")
+    packed = path.with_name(f"{path.name}.{ending}")
+    packed.write_bytes(zstandard.compress(path.read_bytes()))
+    path.unlink()
+    for one in (packed, packed.parent):
+        with pytest.raises(InputError, match=f"{packed.name}: the whole rec"):
+            open_drive(one)
+
+
+def test_hidden_files_are_no_recordings(tmp_path):
+    path, scans, _ = record(tmp_path / "s")
+    # macOS leaves such a file beside each on disks of other systems.
+    (path.parent / f"._{path.name}").write_bytes(b"\0\5\x16\7" * 9)
+    assert len(open_drive(path.parent)) == len(scans)
+    path.unlink()
+    with pytest.raises(InputError, match="not a recorded drive"):
+        open_drive(path.parent)
 
 
 def test_scenario_and_structures(tmp_path):
@@ -258,6 +322,37 @@ def test_one_lidar_of_several_by_name(tmp_path):
         InputError, match=r"no topic /rear/points \(point clouds: /roof/points"
     ):
         drives.open(path, lidar="rear")
+
+
+LIDARS = ("/velodyne_points", "/livox/lidar", "/roof/points", "/roof")
+
+
+@pytest.mark.parametrize(
+    ("name", "topic"),
+    [
+        *((topic, topic) for topic in LIDARS),
+        ("velodyne_points", "/velodyne_points"),
+        ("livox/lidar", "/livox/lidar"),
+        ("roof", "/roof/points"),
+    ],
+)
+def test_a_lidar_on_any_topic(tmp_path, name, topic):
+    path, scans, _ = record(tmp_path / "s", lidar_topic=LIDARS[0])
+    messages, attachments = read_messages(path.read_bytes())
+    clouds = [one for one in messages if one.topic == LIDARS[0]]
+    for number, other in enumerate(LIDARS[1:], start=1):
+        # Number k has the scans from k on.
+        messages += [one.copy(topic=other) for one in clouds[number:]]
+    path.write_bytes(write_messages(messages, attachments))
+    drive = drives.open(path, lidar=name)
+    first = scans[LIDARS.index(topic)]
+    np.testing.assert_array_equal(drive.scan(0)["x"], first["x"])
+    # All names that it lists can be given.
+    assert len(set(drive.lidar_names)) == len(LIDARS)
+    for one in drive.lidar_names:
+        assert drives.open(path, lidar=one).lidar_name == one
+    with pytest.raises(InputError, match=r"/roof; --lidar takes one of them"):
+        drives.open(path)
 
 
 def test_memory_does_not_grow_with_the_drive(tmp_path):
