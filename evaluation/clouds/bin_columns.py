@@ -140,6 +140,9 @@ def _period(values: np.ndarray, places: np.ndarray) -> int | None:
         places: (N,) positions of the values in the file, correct modulo any
             number of columns.
     """
+    # Beams without a return are stored as zeros or NaN, alike in all columns.
+    is_value = np.isfinite(values) & (values != 0.0)
+    values, places = values[is_value], places[is_value]
     num_bins = min(_MOST_BINS, len(values) // _FILLED)
     candidates = [k for k in _CANDIDATES if k * _FILLED <= len(values)]
     if num_bins < 2 or not candidates:
@@ -166,7 +169,9 @@ def _period(values: np.ndarray, places: np.ndarray) -> int | None:
         return None
     half = found // 2
     if found % 2 == 0 and half in told:
-        table = tables[found] / tables[found].sum(axis=1, keepdims=True)
+        counts = tables[found].sum(axis=1, keepdims=True)
+        # A column may hold nothing but zeros.
+        table = tables[found] / np.maximum(counts, 1.0)
         apart = np.abs(table[:2] - table[half : half + 2]).sum(axis=1) / 2.0
         if told[half] >= _HALF * told[found] and (apart < _HALF).all():
             return half

@@ -47,6 +47,8 @@ _GROUND, _TRIALS, _VOTERS = 0.5, 200, 2000
 _FINEST, _STEP, _SIZES = 0.001, 0.025, 400
 # DPA-Net's attention: numbers of points, of heads, and of samples per head.
 _CENTRES, _HEADS, _SAMPLES = 1024, 8, 8
+# Least mean distance of points from their centre [m].
+_LEAST_EXTENT = 1e-3
 _TINY = 1e-6
 
 
@@ -57,7 +59,8 @@ def prepare(points: np.ndarray) -> np.ndarray:
         points: (N, 3) points, x ahead, y left, z up [m].
 
     Returns:
-        (4096, 3) float32, or (0, 3) if there are no points above the ground.
+        (4096, 3) float32, or (0, 3) if there are no points above the ground,
+        or all of them are at one place.
     """
     rng = np.random.default_rng(0)
     points = _without_ground(points, rng)
@@ -71,12 +74,16 @@ def prepare(points: np.ndarray) -> np.ndarray:
     chosen = thin(points, _FINEST + _STEP * size)
     chosen = np.concatenate([chosen, _drawn(points, chosen, rng)])
     centre = chosen.mean(axis=0)
-    scale = 0.5 / np.linalg.norm(chosen - centre, axis=1).mean()
-    points, chosen = (scale * (one - centre) for one in (points, chosen))
+    extent = np.linalg.norm(chosen - centre, axis=1).mean()
+    if extent < _LEAST_EXTENT:
+        return np.zeros((0, 3), np.float32)
+    points, chosen = (0.5 / extent * (one - centre) for one in (points, chosen))
     points, chosen = (
         one[(np.abs(one) <= 1.0).all(axis=1)] for one in (points, chosen)
     )
-    chosen = np.concatenate([chosen, _drawn(points, chosen, rng)])
+    # Chosen points are means, of which a voxel may have no point within.
+    source = points if len(points) else chosen
+    chosen = np.concatenate([chosen, _drawn(source, chosen, rng)])
     return (chosen * [-1.0, 1.0, 1.0]).astype(np.float32)
 
 
@@ -86,6 +93,11 @@ def _without_ground(points: np.ndarray, rng: np.random.Generator) -> np.ndarray:
         return points[:0]
     a, b, c = points[rng.integers(len(points), size=(3, _TRIALS))]
     normals = np.cross(b - a, c - a)
+    # Three points on a line, such as one drawn twice, are in no one plane.
+    is_plane = np.linalg.norm(normals, axis=1) > _TINY
+    normals, a = normals[is_plane], a[is_plane]
+    if len(normals) == 0:
+        return points
     normals /= np.linalg.norm(normals, axis=1, keepdims=True) + _TINY
     offsets = (normals * a).sum(axis=1)
     voters = points[rng.integers(len(points), size=_VOTERS)]

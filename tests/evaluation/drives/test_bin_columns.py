@@ -77,6 +77,24 @@ def test_layouts_of_programs(tmp_path, kind, number, shuffled):
         read_cloud(path)
 
 
+@pytest.mark.parametrize("empty", [0.0, np.nan])
+@pytest.mark.parametrize(
+    ("kind", "number"),
+    [("xyz", 3), ("bytes", 4), ("zeros", 5), ("timed", 6), ("ouster", 8)],
+)
+def test_beams_without_a_return(tmp_path, kind, number, empty):
+    points = columns(kind)
+    for share in (0.3, 0.5, 0.75):
+        stored = np.full((round(NUM / (1.0 - share)), number), empty, "<f4")
+        beams = RNG.choice(len(stored), NUM, replace=False)
+        stored[np.sort(beams)] = points
+        path = tmp_path / f"{share}.bin"
+        stored.tofile(path)
+        layout = find_layout([path])
+        assert layout.columns == number
+        assert "do not show" not in layout.note
+
+
 def test_beams_that_alternate_are_no_columns(tmp_path):
     # A low beam, then a high one, as a VLP-16 fires.
     low, high = street(), street()

@@ -132,6 +132,44 @@ def test_preparation():
     assert prepare(ground).shape == prepare(ground[:0]).shape == (0, 3)
 
 
+def collapsed():
+    """Yields clouds of which nothing but one place is above the ground."""
+    x, y = np.meshgrid(np.linspace(-40, 40, 50), np.linspace(-40, 40, 50))
+    ground = np.stack([x.ravel(), y.ravel(), np.full(2500, -1.6)], axis=1)
+    for number in (0, 1, 2, 100):
+        yield np.r_[ground, np.tile([5.0, 3.0, 1.0], (number, 1))]
+    yield ground[:2]
+    yield np.tile([[5.0, 3.0, 1.0]], (3000, 1))
+
+
+def test_clouds_at_one_place_have_no_descriptor():
+    for points in collapsed():
+        assert prepare(points).shape == (0, 3)
+    # Two places are enough. Points of a grid are often drawn on one line.
+    ground = next(collapsed())
+    two = [[5.0, 3.0, 1.0], [8.0, -3.0, 4.0]]
+    assert prepare(np.r_[ground, two]).shape == (4096, 3)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("name", ["svt-net", "dpa-net"])
+def test_collapsed_clouds_are_no_candidates(tmp_path, monkeypatch, name):
+    shapes = {"svt-net": _SVT_NET, "dpa-net": _DPA_NET}[name]
+    weights = {
+        key: RNG.uniform(0.5, 1.0, shape).astype(np.float32) * 0.1
+        for key, shape in shapes.items()
+    }
+    path = save(tmp_path / "w.pth", weights, monkeypatch)
+    method = make_method(name, {"weights": path})
+    ground = next(collapsed())
+    clouds = [street(4000), *collapsed()]
+    clouds.append(np.r_[ground, [[5.0, 3.0, 1.0], [8.0, -3.0, 4.0]]])
+    described = [method.describe(one) for one in clouds]
+    scores = method.score(described[0], method.build_database(described))
+    assert np.isfinite(scores[[0, -1]]).all()
+    assert np.isnan(scores[1:-1]).all()
+
+
 def blank(shapes, **values):
     """Returns weights of 0, of normalisations that change nothing, and some."""
     weights = {n: np.zeros(s, np.float32) for n, s in shapes.items()}
