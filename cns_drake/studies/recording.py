@@ -40,7 +40,7 @@ def record_all(
     *,
     overwrite: bool = True,
 ) -> None:
-    """Records scenarios as `<output>/<name>/`, with progress on stderr.
+    """Records scenarios as `<output>/<name>/`.
 
     A finished recording of the same scenario and world is kept; an interrupted
     one is continued.
@@ -57,7 +57,7 @@ def record_all(
     """
     jobs = plan_recordings(scenarios, output, overwrite=overwrite)
     make_folder(output)
-    run_jobs(jobs, cluster)
+    run_jobs(jobs, cluster, "drives")
 
 
 def plan_recordings(
@@ -112,10 +112,15 @@ def plan_recordings(
         Job(
             name=step.scenario.name,
             step=step,
-            cost=_LOADING + _FRAME * (step.scenario.frames or _USUAL_FRAMES),
+            cost=_LOADING + _FRAME * usual_frames([step.scenario]),
         )
         for step in waiting
     ]
+
+
+def usual_frames(scenarios: Sequence[Scenario]) -> int:
+    """Returns the number of frames of drives; a guess if it is not given."""
+    return sum(one.frames or _USUAL_FRAMES for one in scenarios)
 
 
 @dataclass(frozen=True)

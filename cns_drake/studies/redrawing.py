@@ -60,8 +60,7 @@ def redraw_cities(
 ) -> dict[int, Path]:
     """Draws the city of a map anew with several seeds.
 
-    Shows progress on stderr. A city that exists is kept if its inputs and the
-    program have not changed.
+    A city that exists is kept if its inputs and the program have not changed.
 
     Args:
         map_folder: folder of the map, with `roads.yaml` and `city.yaml`.
@@ -149,7 +148,7 @@ class MakeMap(Step):
 
 
 def make_maps(steps: Sequence[MakeMap], output: Path, cluster: Cluster) -> None:
-    """Makes maps, with progress on stderr; finished maps are kept.
+    """Makes maps; finished maps are kept.
 
     Args:
         steps: a step for each map.
@@ -166,7 +165,7 @@ def make_maps(steps: Sequence[MakeMap], output: Path, cluster: Cluster) -> None:
     if steps:
         files.make_folder(output)
     jobs = [Job(f"city {one.folder.name}", one, cost=_COST) for one in steps]
-    run_jobs(jobs, cluster)
+    run_jobs(jobs, cluster, "cities")
 
 
 @dataclass(frozen=True)

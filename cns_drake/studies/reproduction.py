@@ -11,18 +11,31 @@ from cns_drake.base.jobs.cluster import Cluster
 from cns_drake.base.jobs.running import run_jobs
 from cns_drake.base.listing import natural_key
 from cns_drake.base.map_folder import MapFolder
+from cns_drake.base.progress import doing
 from cns_drake.scenarios import scenario_files
 from cns_drake.scenarios.scenario import Scenario
 from cns_drake.scenarios.shipped import recordable_map, recordable_maps
 from cns_drake.simulation.simulated_drive import DriveSimulation
 from cns_drake.studies.comparisons import control_drive
+from cns_drake.studies.forecast import forecast
 from cns_drake.studies.map_pictures import plan_pictures
-from cns_drake.studies.recording import is_recorded, plan_recordings
+from cns_drake.studies.recording import (
+    is_recorded,
+    plan_recordings,
+    usual_frames,
+)
 from evaluation.paper import reference_for
 from evaluation.recognition.protocol import FAIR_PROTOCOL, RetrievalProtocol
 from evaluation.study.chosen_methods import choose_methods
 from evaluation.study.collection import RecordingInfo
 from evaluation.study.plan import Study
+
+# Mean sizes of a page, and of a frame of a drive: in the recording, and in the
+# report's folder, in the end and while the report is made [bytes].
+_PAGE_BYTES = 18e6
+_RECORDED_BYTES = 170e3
+_KEPT_BYTES = 18e3
+_SPENT_BYTES = 50e3
 
 
 def reproduce_maps(
@@ -62,7 +75,8 @@ def reproduce_maps(
         settings: settings of methods, each `METHOD.NAME=VALUE`.
         with_costs: whether times are measured.
         with_tables: whether the report has wide tables, too.
-        on_note: is called with each note for the user.
+        on_note: is called with each note for the user, first with how long the
+            jobs take on this machine, and what space they need.
 
     Raises:
         InputError: a map is unknown, the folder cannot be made, or a step
@@ -102,7 +116,19 @@ def reproduce_maps(
         with_costs,
         reference_for(folder.name for folder in folders),
     )
-    run_jobs([*jobs, *study.jobs(), *pictures], cluster)
+    doing("planning the jobs")
+    planned = [*jobs, *study.jobs(), *pictures]
+    shown = len(drives) if with_pages and not quick else 0
+    frames = usual_frames([*drives, *controls])
+    kept = shown * _PAGE_BYTES + frames * (
+        _KEPT_BYTES if quick else _KEPT_BYTES + _RECORDED_BYTES
+    )
+    told = forecast(
+        planned, cluster, output, kept + frames * _SPENT_BYTES, kept
+    )
+    if told is not None:
+        on_note(told)
+    run_jobs(planned, cluster)
     addresses = {
         name: f"../pages/{page.name}"
         for name, page in pages.items()

@@ -36,7 +36,9 @@ def do(jobs):
 def run_here(patch, *modules):
     """Has modules run their jobs in this process."""
     for module in modules:
-        patch.setattr(module, "run_jobs", lambda jobs, cluster: do(jobs))
+        patch.setattr(
+            module, "run_jobs", lambda jobs, cluster, unit="": do(jobs)
+        )
 
 
 def report(recordings, output, methods=None, protocol=FAIR_PROTOCOL):

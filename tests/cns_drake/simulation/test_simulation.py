@@ -1,6 +1,7 @@
 """Runs from a scenario to a recording, and their errors."""
 
 from helpers.bag_recordings import contents
+from helpers.listening import listening
 from helpers.small_map import scenario_values, write_small_map
 import pytest
 from rosbags.highlevel import AnyReader
@@ -8,11 +9,13 @@ import yaml
 
 from cns_drake.base.errors import InputError
 from cns_drake.base.jobs.cluster import Cluster
+from cns_drake.base.progress import doing
 from cns_drake.scenarios.scenario_files import (
     load_scenario,
     make_scenario,
     world_file,
 )
+from cns_drake.simulation import loaded_drive, simulation
 from cns_drake.simulation.loaded_drive import load_stage
 from cns_drake.simulation.simulation import simulate
 from cns_drake.studies.recording import is_recorded, record_all
@@ -43,6 +46,35 @@ def test_progress_is_reported_to_the_last_frame(scenario, tmp_path):
     assert frames[-1] == (7, 7)
     assert run.num_frames == 7
     assert run.simulated_s == pytest.approx(0.3)
+
+
+def test_each_phase_is_told_before_it_begins(scenario, tmp_path, monkeypatch):
+    def telling(name, work):
+        def run(*values, **named):
+            doing(name)
+            return work(*values, **named)
+
+        return run
+
+    for module, name in (
+        (loaded_drive, "plan_drive"),
+        (loaded_drive, "load_world"),
+        (simulation, "make_station"),
+        (simulation, "_advance"),
+    ):
+        work = telling(name, getattr(module, name))
+        monkeypatch.setattr(module, name, work)
+    with listening() as heard:
+        simulate(scenario, tmp_path)
+    file = world_file(scenario).name
+    assert heard.activities == [
+        *("planning the drive", "plan_drive", "reading the stage"),
+        *("load_world", f"parsing {file}", "parsing vehicle.sdf"),
+        *("building the diagram", "make_station", "_advance"),
+        *("reading meshes", "preparing the ray casting", "simulating"),
+        "closing the recording",
+    ]
+    assert heard.counts("simulating")[-1] == (7, 7)
 
 
 def test_same_scenario_same_bytes(scenario, tmp_path):

@@ -143,7 +143,7 @@ def test_versions_that_are_none(tmp_path):
 def test_only_what_is_asked_for_is_drawn(tmp_path, monkeypatch):
     drawn = []
     monkeypatch.setattr(
-        redrawing, "run_jobs", lambda jobs, cluster: drawn.extend(jobs)
+        redrawing, "run_jobs", lambda jobs, cluster, unit="": drawn.extend(jobs)
     )
     folders = draw_fresh_cities(
         ["suburbia"], [2, 4], tmp_path, Cluster(), "mine"

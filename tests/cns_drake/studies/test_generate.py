@@ -56,7 +56,7 @@ def test_interrupted_killed_and_run_again(scenarios, files, tmp_path):
     # Ctrl-C reaches every process of the terminal.
     output = tmp_path / "output"
     run = Generation(files, output, "--jobs", "2")
-    run.wait_for("left; ")
+    run.wait_for("simulating, ")
     os.killpg(run.process.pid, signal.SIGINT)
     status, results = run.end()
     assert (status, results) == (130, [])
@@ -66,7 +66,7 @@ def test_interrupted_killed_and_run_again(scenarios, files, tmp_path):
 
     # A parent that is killed cannot end its processes; they do so themselves.
     run = Generation(files, output, "--jobs", "2")
-    run.wait_for("left; ")
+    run.wait_for("simulating, ")
     run.process.kill()
     status, _ = run.end()
     assert status == -signal.SIGKILL
@@ -181,7 +181,7 @@ def test_families_on_other_cities_share_them(
         monkeypatch.setattr(
             module,
             "run_jobs",
-            lambda jobs, cluster: done.extend(studies.do(jobs)),
+            lambda jobs, cluster, unit="": done.extend(studies.do(jobs)),
         )
 
     def generate(stage, **values):

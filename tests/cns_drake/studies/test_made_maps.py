@@ -48,7 +48,7 @@ def steps(monkeypatch):
     monkeypatch.setattr(
         redrawing,
         "run_jobs",
-        lambda jobs, cluster: runs.append([job.step for job in jobs]),
+        lambda jobs, cluster, unit="": runs.append([job.step for job in jobs]),
     )
     return runs
 

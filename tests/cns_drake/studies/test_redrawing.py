@@ -50,7 +50,9 @@ def redraw_here(town, seeds, output):
     """Draws cities in the process of the test."""
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(
-            redrawing, "run_jobs", lambda jobs, cluster: studies.do(jobs)
+            redrawing,
+            "run_jobs",
+            lambda jobs, cluster, unit="": studies.do(jobs),
         )
         return redraw_cities(town, "02", seeds, output, Cluster())
 

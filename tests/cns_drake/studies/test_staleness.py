@@ -51,7 +51,7 @@ def reproduce(tmp_path, monkeypatch):
     monkeypatch.setattr(
         reproduction,
         "run_jobs",
-        lambda jobs, cluster: done.append(set(studies.do(jobs))),
+        lambda jobs, cluster, unit="": done.append(set(studies.do(jobs))),
     )
 
     def run(**options):

@@ -44,7 +44,7 @@ def jobs_done(monkeypatch):
     monkeypatch.setattr(
         engine,
         "run_jobs",
-        lambda jobs, cluster: runs.append(studies.do(jobs)),
+        lambda jobs, cluster, unit="": runs.append(studies.do(jobs)),
     )
 
     def page(results, queries, folder, **options):
@@ -760,7 +760,9 @@ def test_a_case_with_fewer_levels_is_noted(town, tmp_path):
 
 @pytest.mark.parametrize("given", [[3, 1], 3, [5, 4, 2]])
 def test_fresh_cities_have_their_numbers(tmp_path, monkeypatch, given):
-    monkeypatch.setattr(redrawing, "run_jobs", lambda jobs, cluster: None)
+    monkeypatch.setattr(
+        redrawing, "run_jobs", lambda jobs, cluster, unit="": None
+    )
     wanted = experiment("suburbia", both={"fresh": given})
     study = Study(wanted, tmp_path, "mine.yaml", Cluster())
     monkeypatch.setattr(study, "_pairs", lambda folder: [(folder, folder)])
