@@ -44,8 +44,11 @@ from cns_drake.scene.surfaces import (
     merge_triangles,
 )
 
-# Masks of geometry: all rays hit solids; some rays also hit proxies.
-SOLID, PROXY = 1, 2
+# Masks of geometry: triangles, curved shapes, and proxies of these.
+FLAT = 1
+CURVED = 2
+PROXY = 4
+SOLID = FLAT | CURVED
 ALL = SOLID | PROXY
 # Owner of the primitives of proxies.
 PROXY_OWNER = -2
@@ -64,13 +67,13 @@ class Primitives(NamedTuple):
         buffers: slot, format and array of each buffer.
         owners: (P,) int32 for each primitive, the number of its member in the
             group.
-        mask: `SOLID`, or `PROXY` for polyhedra around curved shapes.
+        mask: `FLAT`, `CURVED`, or `PROXY` for polyhedra around curved shapes.
     """
 
     kind: int
     buffers: list[tuple[int, int, np.ndarray]]
     owners: np.ndarray
-    mask: int = SOLID
+    mask: int = CURVED
 
 
 def merge_first(group: RayGroup) -> Iterator[Primitives]:
@@ -87,7 +90,7 @@ def merge_first(group: RayGroup) -> Iterator[Primitives]:
         if isinstance(surface, TriangleSurface)
     ]
     if flat:
-        yield _as_primitives(flat, SOLID)
+        yield _as_primitives(flat, FLAT)
     if group.frame_id is not None:
         yield from merge_curved(members)
         return
@@ -411,8 +414,7 @@ class EmbreeHierarchy:
 
         Args:
             rays: the rays.
-            mask: bits of the geometry that can be hit: `SOLID`, `PROXY` or
-                `ALL`.
+            mask: bits of the geometry that can be hit, such as `SOLID`.
             with_normals: whether to find normals as well.
         """
         num_rays = len(rays.d_Sset)
@@ -509,15 +511,27 @@ class EmbreeScene:
         """Moves all groups to their current poses."""
         self._first.place(placed)
 
-    def cast_rays(self, rays: Rays, with_normals: bool) -> Hits:
-        """Casts rays on the scene; returns the hits."""
-        hits = self._first.cast(rays, with_normals=with_normals)
+    def cast_rays(
+        self, rays: Rays, with_normals: bool, solid: int = SOLID
+    ) -> Hits:
+        """Casts rays on the scene; returns the hits.
+
+        Args:
+            rays: the rays.
+            with_normals: whether to find normals as well.
+            solid: what can be hit: `SOLID`, or only `CURVED` shapes.
+        """
+        hits = self._first.cast(
+            rays, mask=solid | PROXY, with_normals=with_normals
+        )
         if self._second.rows:
-            self._cast_again(rays, hits, with_normals)
+            self._cast_again(rays, hits, with_normals, solid)
         self._axes.cast(rays, hits)
         return hits
 
-    def _cast_again(self, rays: Rays, hits: Hits, with_normals: bool) -> None:
+    def _cast_again(
+        self, rays: Rays, hits: Hits, with_normals: bool, solid: int
+    ) -> None:
         """Updates hits of rays that may meet curved shapes that never move."""
         is_near = self._near.contain(rays.p_OSset)
         is_unsure = hits.owner == PROXY_OWNER
@@ -531,7 +545,7 @@ class EmbreeScene:
             reach = np.minimum(in_second.ranges, rest.max_ranges)
             in_first = self._first.cast(
                 rest._replace(max_ranges=reach),
-                mask=SOLID,
+                mask=solid,
                 with_normals=with_normals,
             )
             is_first = in_first.owner >= 0

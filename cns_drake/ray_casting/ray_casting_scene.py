@@ -11,7 +11,12 @@ from pydrake.math import RigidTransform
 
 from cns_drake.base.compiled import compiled
 from cns_drake.ray_casting import moving_groups
-from cns_drake.ray_casting.embree_hierarchy import EmbreeScene
+from cns_drake.ray_casting.embree_hierarchy import (
+    CURVED,
+    SOLID,
+    EmbreeScene,
+)
+from cns_drake.ray_casting.exact_triangles import ExactTriangles
 from cns_drake.ray_casting.ray_groups import (
     Motion,
     group_geometries,
@@ -95,6 +100,8 @@ class RayCastingScene:
         self._scene: EmbreeScene = EmbreeScene(
             solid, num_threads, None if previous is None else previous._scene
         )
+        self._solid = solid
+        self._flat: ExactTriangles | None = None
         self._moving = moving_groups.MovingGroups(self._groups, self._p_WO)
         self._owners = np.array([g.members[0][0] for g in self._groups], int)
         self._normal_matrices: np.ndarray | None = None
@@ -159,6 +166,7 @@ class RayCastingScene:
         R_WSset: np.ndarray = _IDENTITY,
         times: np.ndarray = _AT_ONCE,
         with_normals: bool = False,
+        exact: bool = False,
     ) -> SceneHits:
         """Returns the first hits of N rays from one or several poses of S.
 
@@ -175,6 +183,10 @@ class RayCastingScene:
                 sensor's turn to 1 at its end; by default 0.
             with_normals: whether to return also the normals of the surfaces, as
                 they are at the start of the turn.
+            exact: whether rays meet triangles in double precision, from exact
+                origins. This takes several times as long, and the first time
+                as long as building the scene. Then normals must be asked for,
+                and all rays have the same time.
 
         Raises:
             ValueError: N is not a multiple of K, L, M or T.
@@ -197,17 +209,36 @@ class RayCastingScene:
             np.ascontiguousarray(d_Sset, dtype=float),
             np.ascontiguousarray(times, dtype=np.float32),
         )
+        kinds = CURVED if exact else SOLID
         if self._planes:
-            hits = self._cast_on_planes(rays, with_normals)
+            hits = self._cast_on_planes(rays, with_normals, kinds)
         else:
-            hits = self._scene.cast_rays(rays, with_normals)
+            hits = self._scene.cast_rays(rays, with_normals, kinds)
+        if exact:
+            self._cast_exactly(p_OSset, rays, hits)
         is_outside = np.zeros(0, bool)
         if with_normals:
             matrices = self._calc_normal_matrices()
             is_outside = _face_origins(hits, matrices, rays.d_Oset())
         return SceneHits(hits.ranges, hits.owner, hits.normals, is_outside)
 
-    def _cast_on_planes(self, rays: Rays, with_normals: bool) -> Hits:
+    def _cast_exactly(
+        self, p_OSset: np.ndarray, rays: Rays, hits: Hits
+    ) -> None:
+        """Updates hits on all but triangles by those on triangles."""
+        if self._flat is None:
+            self._flat = ExactTriangles(self._solid)
+        missed = np.flatnonzero(hits.owner < 0)
+        hits.ranges[missed] = rays.max_ranges_of(missed)
+        p_Oset = np.ascontiguousarray(
+            p_OSset[np.arange(len(rays.d_Sset)) % len(p_OSset)], dtype=float
+        )
+        self._flat.cast(p_Oset, rays.d_Oset(), float(rays.times[0]), hits)
+        hits.ranges[hits.owner < 0] = np.inf
+
+    def _cast_on_planes(
+        self, rays: Rays, with_normals: bool, kinds: int
+    ) -> Hits:
         """Casts rays on half spaces first, and then on all other geometry.
 
         A ray that hits a plane is followed no farther than that. Rays hit a
@@ -220,7 +251,7 @@ class RayCastingScene:
             times = _AT_ONCE if group.motion is None else rays.times
             _meet_plane(group.X_OL_at(times).copy(), rays, row, limits, met)
         hits = self._scene.cast_rays(
-            rays._replace(max_ranges=limits), with_normals
+            rays._replace(max_ranges=limits), with_normals, kinds
         )
         _take_planes(met, limits, self._owners, hits)
         return hits

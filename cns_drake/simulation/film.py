@@ -26,6 +26,7 @@ from cns_drake.base.jobs.step import Reporter, Step
 from cns_drake.base.progress import doing
 from cns_drake.motion.trajectory import Trajectory
 from cns_drake.pictures.meshcat_drawing import height_rgb
+from cns_drake.recording.messages import rendered_intrinsics
 from cns_drake.scenarios.planning import plan_drive
 from cns_drake.scenarios.scenario import Scenario
 from cns_drake.scenarios.scenario_files import map_folder
@@ -286,7 +287,8 @@ def _draw_points(
     p_WQset: np.ndarray,
 ) -> None:
     """Draws the points that a camera sees, coloured by height."""
-    K = CameraInfo(camera.width, camera.height, camera.fov_y).intrinsic_matrix()
+    info = CameraInfo(camera.width, camera.height, camera.fov_y)
+    K = rendered_intrinsics(info)
     x, y, z = K @ (X_WC.inverse() @ p_WQset.T)
     column, row = np.floor([x, y] / np.maximum(z, 0.1)).astype(int)
     seen = (z > 0.1) & (column >= 0) & (row >= 0)

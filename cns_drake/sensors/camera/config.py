@@ -7,7 +7,8 @@ from pydantic import Field
 
 from cns_drake.sensors.sensor_config import Section, Triple
 
-_Pixels = Annotated[int, Field(ge=1, le=4096)]
+# In Drake, the principal point of a single pixel lies on its edge: an error.
+_Pixels = Annotated[int, Field(ge=2, le=4096)]
 _Angle = Annotated[float, Field(ge=-7.0, le=7.0)]
 
 
@@ -15,8 +16,8 @@ class CameraSection(Section):
     """A pinhole camera without distortion. It does not see its own car.
 
     Attributes:
-        width: width of the image in pixels.
-        height: height of the image in pixels.
+        width: width of the image in pixels, at least 2.
+        height: height of the image in pixels, at least 2.
         rate: images per second [Hz]. The scan rate of the first LiDAR must be a
             multiple of this rate, because each image has the stamp of a scan.
         fov_y: vertical field of view [rad].

@@ -410,7 +410,8 @@ class Lidar(LeafSystem):
         """Casts N rays on the geometry that the LiDAR sees in a Context.
 
         The rays do not depend on the LiDAR's pattern or noise. Ranges are exact
-        to 1e-4 m for rays that start within 1 km of the LiDAR.
+        to 1e-4 m for rays that start within 1 km of the LiDAR. Triangles are
+        met in double precision, half spaces and curved shapes in single.
 
         Args:
             context: context of the LiDAR.
@@ -447,6 +448,7 @@ class Lidar(LeafSystem):
             ranges,
             times=np.array([float(self.causal)]),
             with_normals=True,
+            exact=True,
         )
         return RayHits(
             hits.ranges, _ids_of(seen.built, hits.geometry), hits.normals_W

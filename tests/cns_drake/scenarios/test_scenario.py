@@ -133,6 +133,8 @@ def test_returns_and_weather_are_replaced(small_map):
             {"cameras": {"lidar": {}}},
             r"cameras: 'lidar' is the name of another",
         ),
+        ({"cameras": {"a": {"width": 1, "height": 480}}}, r"a.width: .*equal"),
+        ({"cameras": {"a": {"height": 1}}}, r"cameras.a.height: .*equal to 2"),
         ({"cameras": {"9": {"rate": 2}}}, r"cameras: the name '9' cannot be"),
         ({"lidars": {"a": {"preset": "x"}}}, r"lidars.a.preset: unknown"),
         ({"lidars": {"a b": {}}}, r"scenario.yaml: lidars.a b"),
