@@ -28,7 +28,7 @@ from evaluation.study.parts import Part
 
 # Expected time to load a stage, and to simulate a frame with the default LiDAR
 # [s]; assumed frames of a drive without a number.
-_LOADING = 3.0
+_LOADING = 8.0
 _FRAME = 0.014
 _USUAL_FRAMES = 3000
 

@@ -43,10 +43,10 @@ from evaluation.study.tasks.task import Task
 
 # Expected seconds: for the maps of a drive of 3000 scans, for its places or
 # queries, to draw a city or a change, and to compare two drives by a method.
-_MAP_COST = 12.0
+_MAP_COST = 19.0
 _ROLE_COST = 10.0
-_DRAWING_COST = 7.0
-_RECOGNITION_COST = 2.0
+_DRAWING_COST = 5.0
+_RECOGNITION_COST = 3.5
 # The experiment whose rows a report writes, its tasks and its seed.
 _EXPERIMENT = "stages"
 _TASKS: Mapping[str, type[Task]] = {
