@@ -7,6 +7,9 @@ https://registry.khronos.org/glTF/specs/2.0/glTF-2.0.html
 """
 
 from collections import Counter
+from collections.abc import Sequence
+import contextlib
+from dataclasses import dataclass
 from pathlib import Path
 import re
 import struct
@@ -159,11 +162,45 @@ def _unread(top: Any, nodes: list[Any], primitives: list[Any]) -> Counter[str]:
     return +counts
 
 
-# Names of the list of a PLY face with the numbers of its vertices.
-_PLY_FACE = ("vertex_indices", "vertex_index")
 # Elements of PLY that are no shapes.
 _PLY_OTHER = ("vertex", "face", "camera", "material")
 _HEADER_LIMIT_BYTES = 1 << 16
+_CORNERS = 3
+
+
+# Type of a number in PLY -> its type in NumPy.
+_PLY_TYPES = {
+    "char": "i1", "uchar": "u1", "short": "i2", "ushort": "u2",
+    "int": "i4", "uint": "u4", "float": "f4", "double": "f8",
+    "int8": "i1", "uint8": "u1", "int16": "i2", "uint16": "u2",
+    "int32": "i4", "uint32": "u4", "float32": "f4", "float64": "f8",
+}  # fmt: skip
+_PLY_ORDERS = {"binary_little_endian": "<", "binary_big_endian": ">"}
+
+
+@dataclass(frozen=True)
+class _PlyElement:
+    """An element of a PLY header.
+
+    Attributes:
+        name: name of the element.
+        count: number of its rows.
+        properties: name and type of each value of a row. A list has two types,
+            those of its length and of its values.
+    """
+
+    name: str
+    count: int
+    properties: list[tuple[str, tuple[str, ...]]]
+
+    @property
+    def faces(self) -> list[str]:
+        """Names of the lists of vertices."""
+        return [
+            name
+            for name, types in self.properties
+            if len(types) > 1 and name.startswith("vert")
+        ]
 
 
 def _check_ply(path: Path) -> tuple[str, ...]:
@@ -171,37 +208,90 @@ def _check_ply(path: Path) -> tuple[str, ...]:
 
     Raises:
         ValueError: surfaces in the file would not be read, such as triangle
-            strips.
+            strips, or be wrong.
     """
-    head, found, _ = read_bytes(path, _LIMIT_BYTES).partition(b"end_header")
+    content = read_bytes(path, _LIMIT_BYTES)
+    head, found, body = content.partition(b"end_header")
     if not found or len(head) > _HEADER_LIMIT_BYTES:
         return ()  # Open3D says what is wrong.
-    # Element -> its number of rows and the names of its lists.
-    elements: list[tuple[str, str, list[str]]] = []
+    elements: list[_PlyElement] = []
+    encoding = ""
     for line in head.decode("ascii", "replace").splitlines():
         match line.split():
-            case ["element", name, count]:
-                elements.append((name, count, []))
-            case ["property", "list", _, _, name] if elements:
-                elements[-1][2].append(name)
-    for name in repeated(name for name, _, _ in elements):
+            case ["format", encoding, *_]:
+                pass
+            case ["element", name, count] if count.isdecimal():
+                elements.append(_PlyElement(name, int(count), []))
+            case ["property", "list", *types, name] if elements:
+                elements[-1].properties.append((name, tuple(types)))
+            case ["property", kind, name] if elements:
+                elements[-1].properties.append((name, (kind,)))
+    for name in repeated(one.name for one in elements):
         raise ValueError(f"has the element {name} of PLY twice; export it once")
     notes = []
-    for name, count, lists in elements:
-        faces = [one for one in lists if one.startswith("vert")]
-        if name == "face" and len(faces) > 1 and {*faces} & {*_PLY_FACE}:
+    for one in elements:
+        faces = one.faces
+        if one.name == "face" and len(faces) > 1:
             raise ValueError(
                 f"has two lists of vertices in each face, {' and '.join(faces)}"
             )
-        if name in _PLY_OTHER or count == "0":
+        if one.name in _PLY_OTHER or one.count == 0:
             continue
         if faces:
             raise ValueError(
-                f"has surfaces in the element {name} of PLY, which is not read;"
-                " export it with faces"
+                f"has surfaces in the element {one.name} of PLY, which is not"
+                " read; export it with faces"
             )
-        notes.append(f"{count} elements {name} of PLY ignored")
+        notes.append(f"{one.count} elements {one.name} of PLY ignored")
+    # A row ends the header, by either line end.
+    _, _, body = body.partition(b"\n")
+    least = _CORNERS
+    # Open3D refuses damaged files itself.
+    with contextlib.suppress(
+        LookupError, OverflowError, ValueError, struct.error
+    ):
+        least = _least_corners(elements, encoding, body)
+    if least < _CORNERS:
+        # Open3D would read its corners from beyond the list.
+        raise ValueError(f"has a face of PLY with {least} corners")
     return tuple(notes)
+
+
+def _least_corners(
+    elements: Sequence[_PlyElement], encoding: str, body: bytes
+) -> int:
+    """Returns the least number of corners of a face in a PLY file.
+
+    Raises:
+        LookupError, OverflowError, ValueError, struct.error: the faces are
+            behind other lists, or the file is damaged.
+    """
+    names = [one.name for one in elements]
+    k = names.index("face")
+    face, before = elements[k], elements[:k]
+    kinds = [types for _, types in face.properties]
+    (at,) = [i for i, types in enumerate(kinds) if len(types) > 1]
+    if encoding == "ascii":
+        first = sum(one.count for one in before)
+        rows = body.split(b"\n", first + face.count)[first:]
+        rows = rows[: face.count]
+        return min(int(row.split(None, at + 1)[at]) for row in rows)
+    order = _PLY_ORDERS[encoding]
+    sizes = [np.dtype(_PLY_TYPES[kind[0]]).itemsize for kind in kinds]
+    place = sum(
+        one.count * np.dtype(_PLY_TYPES[kind]).itemsize
+        for one in before
+        for _, (kind,) in one.properties
+    )
+    number = struct.Struct(order + np.dtype(_PLY_TYPES[kinds[at][0]]).char)
+    each = np.dtype(_PLY_TYPES[kinds[at][1]]).itemsize
+    ahead, other = sum(sizes[:at]), sum(sizes)
+    least = _CORNERS
+    for _ in range(face.count):
+        (corners,) = number.unpack_from(body, place + ahead)
+        least = min(least, corners)
+        place += other + each * corners
+    return least
 
 
 _STL_HEADER_BYTES = 84

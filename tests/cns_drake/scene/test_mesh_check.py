@@ -256,6 +256,44 @@ def test_what_is_read_as_a_whole_is_not_refused(tmp_path, name, text, notes):
     assert unread_parts(tmp_path / name) == notes
 
 
+def binary_ply(order, faces, size="uchar", end="\n", more=b""):
+    """The square with faces, one property before their list and one after."""
+    kind = {"<": "little", ">": "big"}[order]
+    head = (
+        f"ply\nformat binary_{kind}_endian 1.0\nelement vertex 4\nproperty"
+        " double x\nproperty double y\nproperty double z\n"
+        f"element face {len(faces)}\nproperty short id\nproperty list {size}"
+        " int vertex_indices\nproperty uchar red\nend_header\n"
+    )
+    length = {"uchar": "B", "int": "i"}[size]
+    rows = [struct.pack(order + "3d", *p) for p in (A, B, C, D)]
+    rows += [
+        struct.pack(f"{order}h{length}{len(f)}iB", 7, len(f), *f, 255)
+        for f in faces
+    ]
+    return head.replace("\n", end).encode() + b"".join(rows) + more
+
+
+@pytest.mark.parametrize("corners", [0, 1, 2])
+def test_faces_of_ply_have_three_corners(tmp_path, corners):
+    """Open3D 0.19 reads the other ones from memory that is not theirs."""
+    path = tmp_path / "thing.ply"
+    few, good = tuple(range(corners)), (0, 1, 2, 3)
+    row = " ".join(map(str, (corners, *few)))
+    texts = [ply(FACES.format("vertex_index").replace("face 1", "face 2"),
+                 f"4 0 1 2 3\n{row}\n").encode()]  # fmt: skip
+    for order in "<>":
+        texts.append(binary_ply(order, [good, few, good]))
+        texts.append(binary_ply(order, [few], "int", "\r\n", b"more"))
+    for text in texts:
+        path.write_bytes(text)
+        with pytest.raises(ValueError, match=f"PLY with {corners} corners"):
+            unread_parts(path)
+    for order in "<>":
+        path.write_bytes(binary_ply(order, [good, (2, 1, 0)]))
+        assert unread_parts(path) == ()
+
+
 def test_a_binary_stl_may_begin_like_a_text(tmp_path):
     path = tmp_path / "solid.stl"
     facets = [struct.pack("<12fH", *(0.0,) * 3, *A, *B, *C, 0)] * 2
