@@ -283,8 +283,16 @@ class _Simplifier:
     def add_world(self, root: Element, world: Element, target: Element) -> None:
         """Adds the models of a world; `root` is the root of its file."""
         self._note_references(root)
-        saved = world.findall("state//model/pose")
-        self.skip("saved places of models (state)", len(saved))
+        saved = world.findall("state//model")
+        placed = [
+            one
+            for one in saved
+            if one.find("pose") is not None or one.find("link/pose") is not None
+        ]
+        self.skip("saved places of models (state)", len(placed))
+        scales = [(one.findtext("scale") or "1 1 1").split() for one in saved]
+        scaled = [one for one in scales if {*map(float, one)} != {1.0}]
+        self.skip("saved scales of models (state)", len(scaled))
         angles = world.findall("state//joint/angle")
         self.skip("saved positions of joints (state)", len(angles))
         for tag in ("insertions", "deletions"):
@@ -295,7 +303,7 @@ class _Simplifier:
     def _note_references(self, root: Element) -> None:
         begins = [*root.iterfind(".//joint/axis/initial_position")]
         begins += root.iterfind(".//joint/axis2/initial_position")
-        moved = [one for one in begins if float(one.text or "nan") != 0.0]
+        moved = [one for one in begins if float((one.text or "").strip() or 0)]
         self.skip("initial positions of joints", len(moved))
         for element in root.iter():
             for key in ("relative_to", "attached_to", "placement_frame"):

@@ -36,6 +36,7 @@ _OTHER_NUMBERS = {
     ("mesh", "scale"),
     ("axis", "initial_position"),
     ("axis2", "initial_position"),
+    ("model", "scale"),
     *(
         ("material", colour)
         for colour in ("ambient", "diffuse", "specular", "emissive")

@@ -442,6 +442,8 @@ def door(position, axis="axis", more=""):
         (door("-1e-3", "axis2"), 1),
         (door("0.0"), 0),
         (door("+0", "axis2"), 0),
+        (door(" "), 0),
+        (door(""), 0),
         # Controllers are plugins, which are noted as such.
         (
             door(
@@ -462,6 +464,31 @@ def test_joints_that_do_not_begin_at_zero_are_noted(
     assert notes == [
         f"{path}: {number} initial positions of joints ignored"
     ] * bool(number)
+
+
+@pytest.mark.parametrize(
+    ("saved", "note"),
+    [
+        (
+            "<link name='l'><pose>1 0 0 0 0 0</pose></link>",
+            "1 saved places of models (state) ignored",
+        ),
+        (
+            "<pose>1 0 0 0 0 0</pose><link name='l'><pose/></link>",
+            "1 saved places of models (state) ignored",
+        ),
+        ("<scale>1 2 1</scale>", "1 saved scales of models (state) ignored"),
+        ("<scale>1 1.0 1</scale>", None),
+    ],
+)
+def test_what_else_is_saved_of_a_model_is_named(tmp_path, saved, note):
+    path = write(
+        tmp_path,
+        f"<model name='m'><pose>5 0 1 0 0 0</pose>{link()}</model>"
+        f"<state world_name='w'><model name='m'>{saved}</model></state>",
+    )
+    notes = [one.split(": ")[1] for one in load_world(path).notes]
+    assert notes == ([note] if note else [])
 
 
 def test_joints_of_included_models_are_noted(tmp_path, models):
