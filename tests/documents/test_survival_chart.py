@@ -154,3 +154,18 @@ def test_the_first_table_has_the_medians_over_pairs():
             assert float(shown.removesuffix(" %")) * unit == pytest.approx(
                 np.median(values), abs=0.0051
             ), (row[0], name)
+
+
+def test_the_readme_says_how_networks_of_others_do():
+    shares = draw.outside_shares()
+    assert len(shares) == 9
+    assert shares["learned"]["Metropolis", ""] == pytest.approx(0.97)
+    # RING++ and BTC were not run in Metropolis.
+    assert [city for city, _ in shares["RING++"]] == ["Suburbia"]
+    networks = [*shares["SVT-Net"].values(), *shares["DPA-Net"].values()]
+    assert len(networks) == 6
+    text = " ".join(documents.read("README.md").text.split())
+    assert f"keep at most {100.0 * max(networks):.0f} % of this" in text
+    assert min(min(one.values()) for one in shares.values()) in networks
+    # The methods that the title counts are named in the text.
+    assert "layered overlap and the learned method" in text

@@ -1,6 +1,9 @@
+from helpers.small_page import make_content
 import numpy as np
 import pytest
 
+from evaluation.report.page import write_report
+from evaluation.results.ranges import range_of
 from evaluation.results.table_forms import Cell, Table, keyed, ranked
 
 PLAIN = Table(
@@ -107,3 +110,31 @@ def test_ranks(values, ranks):
 
 def test_empty_table_has_its_header():
     assert Table(("a", "b"), ()).to_csv() == "a,b\n"
+
+
+def test_every_column_of_numbers_has_a_range(tmp_path, monkeypatch):
+    """A new column is entered in the table of ranges, or fails here."""
+    content = make_content(tmp_path)
+    unknown, columns = set(), 0
+    made = Table.__post_init__
+
+    def note(table):
+        made(table)
+        nonlocal columns
+        groups = [name for name, span in table.groups for _ in range(span)]
+        groups = groups or [""] * len(table.header)
+        for k, names in enumerate(zip(table.header, groups, strict=True)):
+            cells = [row[k] for row in table.rows]
+            numbers = [
+                one
+                for one in cells
+                if isinstance(one, Cell | float) or type(one) is int
+            ]
+            columns += bool(numbers)
+            if numbers and not any(map(range_of, names)):
+                unknown.add(" ".join(names))
+
+    monkeypatch.setattr(Table, "__post_init__", note)
+    write_report(content, tmp_path)
+    assert columns > 50
+    assert unknown == set()
