@@ -8,6 +8,8 @@ with the sensor sections of scenarios.
 
 from collections.abc import Callable
 from dataclasses import dataclass, field
+import math
+import sys
 from typing import Any, TypeAlias
 
 from drake import lcmt_drake_signal, lcmt_point_cloud
@@ -26,6 +28,7 @@ from pydrake.systems import framework
 from pydrake.systems import lcm as drake_lcm
 from pydrake.systems.framework import Context, DiagramBuilder, OutputPort
 from pydrake.systems.lcm import LcmBuses, LcmInterfaceSystem
+from pydrake.systems.primitives import ZeroOrderHold
 
 from cns_drake.base.errors import describe_validation_error
 from cns_drake.scene.drake_releases import find_bus
@@ -74,6 +77,11 @@ class LidarConfig:
         motion_distortion: whether beams are cast at their own firing times.
         causal: whether a scan covers the turn that ends at its time, so that a
             controller can use it at once.
+        capture_offset: time of the first published scan [s]; the others follow
+            turn by turn. So several LiDARs can take turns.
+        output_delay: time from a scan's capture to its publication [s], less
+            than a turn. The message keeps the time of the capture. The ports of
+            the `Lidar` are not delayed.
         returns: `ideal` or `calibrated`.
         echoes: which echoes of a beam calibrated returns report.
         unit_seed: seed of the errors that this individual unit has, in
@@ -103,6 +111,8 @@ class LidarConfig:
     faint_dropout: float = 0.0
     motion_distortion: bool = False
     causal: bool = False
+    capture_offset: float = 0.0
+    output_delay: float = 0.0
     returns: str = "ideal"
     echoes: str = "strongest"
     unit_seed: int = 0
@@ -118,8 +128,8 @@ class ImuConfig:
         name: name of the systems; the channel is `DRAKE_IMU_<name>`.
         X_PB: pose of the sensor B in a frame P of the plant. The field
             `base_frame` of this pose names P; by default P is the world frame.
-        rate: samples per second; by default the rate in the file `kalibr`, or
-            else 20.
+        rate: samples per second, any number as for `add_imu`; by default the
+            rate in the file `kalibr`, or else 20.
         kalibr: path of a file in Kalibr's format with the noise densities; by
             default there is no noise.
         accelerometer_turn_on_bias: standard deviation of the constant bias of
@@ -141,7 +151,7 @@ class ImuConfig:
 
     name: str = "imu"
     X_PB: Transform = field(default_factory=Transform)
-    rate: int | None = None
+    rate: float | None = None
     kalibr: str | None = None
     accelerometer_turn_on_bias: float = 0.0
     gyroscope_turn_on_bias: float = 0.0
@@ -216,6 +226,10 @@ def ApplyLidarConfig(
         ApplyLidarConfig(LidarConfig(name="roof", rate=10), builder)
     """
     section = _section(config, LidarSection, ("rate",))
+    period = LIDAR_PRESETS[section.preset].pattern.period
+    if config.rate is not None:
+        period = 1.0 / config.rate
+    _check_timing(config, period)
     scene_graph = scene_graph or builder.GetSubsystemByName("scene_graph")
     lidar = add_described_lidar(
         section,
@@ -224,11 +238,7 @@ def ApplyLidarConfig(
         *_place(config, builder, plant),
         name=config.name,
         seed=config.seed,
-        period=(
-            1.0 / config.rate
-            if config.rate
-            else LIDAR_PRESETS[section.preset].pattern.period
-        ),
+        period=period,
         motion_distortion=section.motion_distortion,
         causal=config.causal,
     )
@@ -238,9 +248,11 @@ def ApplyLidarConfig(
         "POINT_CLOUD",
         [lidar.GetOutputPort("point_cloud_W")],
         PointCloudToLcm("world"),
-        lidar.pattern.period,
+        period,
         lcm_buses,
         lcm,
+        config.capture_offset,
+        config.output_delay,
     )
     return lidar
 
@@ -277,14 +289,13 @@ def ApplyImuConfig(
 
         ApplyImuConfig(ImuConfig(rate=200), builder)
     """
-    section = _section(config, ImuSection)
-    rate = _checked_rate(config, section.sample_rate(_RATE))
-    ideal = section.replaced(rate=None).is_ideal
+    section = _section(config, ImuSection, ("rate",))
+    rate = config.rate or section.sample_rate(_RATE)
     imu = add_imu(
         builder,
         *_place(config, builder, plant),
         rate=rate,
-        noise=None if ideal else section.noise(config.seed),
+        noise=None if section.is_ideal else section.noise(config.seed),
         name=config.name,
     )
     ports = imu.ports()
@@ -355,9 +366,10 @@ def _section(
     """
     source = _caller(config)
     rate = config.rate
-    if rate is not None and not 0.0 < rate <= HIGHEST_RATE:
+    highest = sys.float_info.max if kind is ImuSection else HIGHEST_RATE
+    if rate is not None and not 0.0 < rate <= highest:
         raise ValueError(
-            f"{source}: rate: {rate:g} is not above 0 and up to {HIGHEST_RATE}"
+            f"{source}: rate: {rate:g} is not above 0 and up to {highest:g}"
         )
     given = {
         name: getattr(config, name)
@@ -371,6 +383,21 @@ def _section(
         raise ValueError(text) from None
 
 
+def _check_timing(config: LidarConfig, period: float) -> None:
+    """Checks when scans are published, as Drake does for its cameras.
+
+    Raises:
+        ValueError: the offset or the delay is out of range.
+    """
+    for name, most in (("capture_offset", math.inf), ("output_delay", period)):
+        value = getattr(config, name)
+        if not 0.0 <= value < most:
+            raise ValueError(
+                f"{_caller(config)}: {name}: {value:g} is not from 0 to below "
+                f"{most:g} s"
+            )
+
+
 def _place(
     config: Config, builder: DiagramBuilder, plant: MultibodyPlant | None
 ) -> tuple[Frame, RigidTransform]:
@@ -380,7 +407,8 @@ def _place(
         ValueError: X_PB is not finite, or the systems that publish would have
             the names of others.
     """
-    check_free(builder, f"{config.name}_to_lcm", f"{config.name}_publisher")
+    systems = ("to_lcm", "publisher", "delay")
+    check_free(builder, *(f"{config.name}_{system}" for system in systems))
     plant = plant or builder.GetSubsystemByName("plant")
     frame = plant.world_frame()
     if config.X_PB.base_frame is not None:
@@ -430,6 +458,8 @@ def _publish(
     period: float,
     lcm_buses: LcmBuses | None,
     lcm: Interface | None,
+    offset: float = 0.0,
+    delay: float = 0.0,
 ) -> None:
     """Adds systems that convert ports to an LCM message and publish it.
 
@@ -445,6 +475,8 @@ def _publish(
         period: time between two messages [s].
         lcm_buses: see `ApplyLidarConfig`.
         lcm: see `ApplyLidarConfig`.
+        offset: time of the first conversion [s].
+        delay: time from a conversion to the publication [s].
 
     Raises:
         RuntimeError: there is no such bus.
@@ -467,13 +499,22 @@ def _publish(
         lcmt_point_cloud if is_cloud else lcmt_drake_signal,
         lcm,
         publish_period=period,
+        publish_offset=offset + delay,
         use_cpp_serializer=is_cloud,
     )
     builder.AddNamedSystem(f"{config.name}_to_lcm", to_lcm)
     for index, port in enumerate(ports):
         builder.Connect(port, to_lcm.get_input_port(index))
     builder.AddNamedSystem(f"{config.name}_publisher", publisher)
-    builder.Connect(to_lcm.get_output_port(), publisher.get_input_port())
+    message = to_lcm.get_output_port()
+    if delay:
+        hold = builder.AddNamedSystem(
+            f"{config.name}_delay",
+            ZeroOrderHold(period, message.Allocate(), offset),
+        )
+        builder.Connect(message, hold.get_input_port())
+        message = hold.get_output_port()
+    builder.Connect(message, publisher.get_input_port())
 
 
 class _SignalToLcm(framework.LeafSystem):

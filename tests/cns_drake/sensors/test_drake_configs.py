@@ -128,6 +128,7 @@ def test_fields_are_those_of_a_scenario(struct, section):
     if struct is LidarConfig:
         # These are as in `add_lidar`.
         own = {"rate": None, "resolution": 0.0, "causal": False}
+        own |= {"capture_offset": 0.0, "output_delay": 0.0}
         assert {name: fields.pop(name) for name in own} == own
         names -= own.keys()
     assert set(fields) == names
@@ -384,13 +385,78 @@ APPLIED = (
 )
 
 
-@pytest.mark.parametrize(("struct", "apply"), APPLIED[1:])
-def test_rates_out_of_range(struct, apply):
-    for rate in (1, 1000):
+@pytest.mark.parametrize(
+    ("struct", "apply", "good", "bad"),
+    [
+        (OdometryConfig, ApplyOdometryConfig, (1, 1000), (1001, 10**9)),
+        (ImuConfig, ApplyImuConfig, (0.5, 62.5, 1600), (np.inf, np.nan)),
+    ],
+)
+def test_rates_out_of_range(struct, apply, good, bad):
+    """An IMU has any rate that `add_imu` takes."""
+    for rate in good:
         apply(struct(rate=rate), make_site()[0], lcm=DrakeLcm("memq://"))
-    for rate in (0, -1, 1001, 10**9):
+    for rate in (0, -1, *bad):
         with pytest.raises(ValueError, match="rate"):
             apply(struct(rate=rate), make_site()[0], lcm=DrakeLcm("memq://"))
+
+
+def test_rates_of_an_imu_are_those_of_add_imu():
+    for rate in (62.5, 1600):
+        builder, plant = make_site()
+        imu = ApplyImuConfig(
+            ImuConfig(rate=rate), builder, lcm=DrakeLcm("memq://")
+        )
+        body = plant.world_body()
+        other = add_imu(builder, body, X_RS, rate=rate, name="other")
+        assert imu.rate == other.rate == rate
+        with pytest.raises(ValueError, match="rate"):
+            add_imu(builder, body, X_RS, rate=-rate, name="third")
+
+
+def test_scans_are_captured_after_an_offset_and_published_after_a_delay():
+    """Messages keep the time of the capture; a scan under way is not there."""
+    channel = "DRAKE_POINT_CLOUD_lidar"
+    for offset, delay, end, captures in (
+        (0.0, 0.0, 0.25, (0.0, 0.1, 0.2)),
+        (0.03, 0.0, 0.25, (0.03, 0.13, 0.23)),
+        (0.03, 0.06, 0.28, (0.03, 0.13)),
+        (0.03, 0.06, 0.295, (0.03, 0.13, 0.23)),
+        (0.0, 0.09, 0.28, (0.0, 0.1)),
+        (0.25, 0.02, 0.26, ()),
+    ):
+        builder, _ = make_site()
+        lcm = DrakeLcm("memq://")
+        config = LidarConfig(
+            preset="vlp-16",
+            rate=10.0,
+            columns=20,
+            capture_offset=offset,
+            output_delay=delay,
+        )
+        ApplyLidarConfig(config, builder, lcm=lcm)
+        _, received = advance(builder, lcm, end, channel)
+        clouds = [points_of(message) for message in received[channel]]
+        times = [cloud.utime for cloud, _ in clouds]
+        assert times == [round(1e6 * time) for time in captures]
+        assert all(len(points) > 100 for _, points in clouds)
+
+
+@pytest.mark.parametrize(
+    "fields",
+    [
+        {"capture_offset": -0.1},
+        {"capture_offset": np.inf},
+        {"output_delay": -0.1},
+        {"output_delay": 0.1},
+        {"output_delay": np.nan},
+    ],
+)
+def test_times_of_capture_out_of_range(fields):
+    builder, _ = make_site()
+    config = LidarConfig(rate=10.0, **fields)
+    with pytest.raises(ValueError, match=f"lidar: {next(iter(fields))}: "):
+        ApplyLidarConfig(config, builder, lcm=DrakeLcm("memq://"))
 
 
 @pytest.mark.parametrize(("struct", "apply"), APPLIED)
