@@ -230,6 +230,23 @@ def compare_with_gates(
     ]
 
 
+def matches_within_radius(
+    database: DescribedDrive,
+    query: DescribedDrive,
+    protocol: RetrievalProtocol,
+) -> np.ndarray:
+    """Returns which places are true matches of each query, (Q, D) bool.
+
+    They are the places that the protocol allows, within its radius.
+    """
+    p_WQs, p_WPs = query.queries.p_WSs, database.places.p_WSs
+    is_near = [
+        np.linalg.norm(p_WQ - p_WPs, axis=1) <= protocol.radius
+        for p_WQ in p_WQs
+    ]
+    return np.array(is_near) & _known_places(database, query, protocol)
+
+
 def _known_places(
     database: DescribedDrive,
     query: DescribedDrive,

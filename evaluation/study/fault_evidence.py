@@ -42,7 +42,8 @@ def explain_faults(
     reporter: Reporter,
     drives: tuple[Part, Part],
     methods: tuple[MethodChoice, ...],
-    result: Part,
+    results: tuple[Part, ...],
+    overlaps: Part,
     protocol: RetrievalProtocol,
 ) -> PairEvidence | None:
     """Returns evidence on why methods rank wrong places first for queries.
@@ -54,19 +55,21 @@ def explain_faults(
         drives: files with the scans (`KeptDrive`) of the database and of the
             query.
         methods: methods of the results.
-        result: file with the `PairResult` of the pair.
+        results: file with each method's `MethodResult` on the pair.
+        overlaps: file with how much of each query's scan its best match shows.
         protocol: protocol of the results.
     """
-    for choice in methods:
+    found = []
+    for choice, part in zip(methods, results, strict=True):
         # The method registers the type of its descriptions.
         choice.make()
-    pair = result.read()
-    if None in pair.recognitions or not methods:
+        found.append(part.read().recognition)
+    if None in found or not found:
         return None
     database, query = (part.read() for part in drives)
-    evidence = find_evidence(database, query, pair.recognitions, protocol)
+    evidence = find_evidence(database, query, found, protocol)
     # Visible change is that of the queries as the protocol shows them.
-    return replace(evidence, overlaps=pair.outcomes[0].columns["overlap"])
+    return replace(evidence, overlaps=overlaps.read())
 
 
 def find_evidence(

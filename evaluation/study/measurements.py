@@ -26,7 +26,10 @@ from evaluation.recognition.place_recognition import (
     judge_retrieval,
 )
 from evaluation.recognition.protocol import RetrievalProtocol
-from evaluation.recognition.retrieval import Retrieval, compare_with_gates
+from evaluation.recognition.retrieval import (
+    compare_with_gates,
+    matches_within_radius,
+)
 from evaluation.study.chosen_methods import MethodChoice
 from evaluation.study.parts import Part
 from evaluation.study.surveys import (
@@ -50,104 +53,102 @@ _NUM_TRIALS = 12
 
 
 @dataclass(frozen=True)
-class PairResult:
-    """The results of methods on two drives of one world.
+class MethodResult:
+    """The result of a method on two drives of one world.
 
     Attributes:
-        outcomes: outcomes for the tables: two for each method, without and with
-            the gate; empty if they were not asked for.
-        recognitions: for each method, its result by the protocol's own gate;
-            None if no query has a match.
+        outcomes: outcomes for the tables, without and with the gate; empty if
+            they were not asked for.
+        recognition: the result by the protocol's own gate; None if no query has
+            a match.
     """
 
     outcomes: list[PlaceOutcome]
-    recognitions: list[PlaceRecognition | None]
+    recognition: PlaceRecognition | None
 
 
-def recognise_pair(
+def recognise_places(
     reporter: Reporter,
     names: tuple[str, str, str],
-    described: tuple[tuple[Part, ...], tuple[Part, ...]],
-    scans: tuple[Part, Part] | None,
-    methods: tuple[MethodChoice, ...],
+    described: tuple[Part, Part],
+    overlaps: Part | None,
+    choice: MethodChoice,
     protocol: RetrievalProtocol,
-) -> PairResult:
-    """Returns the results of methods on two drives of one world.
+) -> MethodResult:
+    """Returns the result of a method on two drives of one world.
 
     Args:
         reporter: reports notes.
         names: names of the map, and of the stages of database and query.
-        described: for the database and for the query, one file per method with
-            its descriptions.
-        scans: files with the scans (`KeptDrive`) of database and query; None if
-            no outcomes are asked for.
-        methods: the methods.
+        described: files with the descriptions of the database and of the query.
+        overlaps: file with the result of `shown_overlaps`; None if no outcomes
+            are asked for.
+        choice: the method.
         protocol: protocol of the comparison.
     """
-    found = PairResult([], [])
-    overlaps = None
-    for k, choice in enumerate(
-        track(methods, "comparing", len(methods), "methods")
-    ):
-        # The method comes first, because it registers the type of its
-        # descriptions.
-        method = choice.make()
-        (placed, database), (placed_query, query) = (
-            parts[k].read() for parts in described
-        )
-        check_same_world(placed, placed_query)
-        both = compare_with_gates(
-            method, database, query, protocol, [None, protocol.radius]
-        )
-        has_match = both[0].matches.any()
-        if not (has_match or found.recognitions):
-            # Routes need not meet, nor close a loop.
-            reporter.note(
-                f"{query.name}: no query lies within {protocol.radius:g} m of a"
-                f" place of {database.name}"
+    # The method comes first, because it registers the type of its
+    # descriptions.
+    method = choice.make()
+    (placed, database), (placed_query, query) = (p.read() for p in described)
+    check_same_world(placed, placed_query)
+    both = compare_with_gates(
+        method, database, query, protocol, [None, protocol.radius]
+    )
+    outcomes = []
+    if overlaps is not None:
+        shown = overlaps.read()
+        outcomes = [
+            PlaceOutcome.of(
+                choice.key,
+                is_gated,
+                one,
+                (query.queries.stamps_ns, query.queries.p_WSs),
+                [database.name] * len(one.database_frames),
+                shown,
+                protocol.radius,
             )
-        if scans is not None and overlaps is None:
-            overlaps = _kept_overlaps(scans, database, query, both[0], protocol)
-        for is_gated, one in zip((False, True), both, strict=True):
-            if overlaps is not None:
-                outcome = PlaceOutcome.of(
-                    choice.key,
-                    is_gated,
-                    one,
-                    (query.queries.stamps_ns, query.queries.p_WSs),
-                    [database.name] * len(one.database_frames),
-                    overlaps,
-                    protocol.radius,
-                )
-                found.outcomes.append(outcome)
-        result = None
-        if has_match:
-            result = judge_retrieval(
-                method,
-                database.name,
-                query.name,
-                both[protocol.gate],
-                protocol,
-                pair=names,
-            )
-        found.recognitions.append(result)
-    return found
+            for is_gated, one in zip((False, True), both, strict=True)
+        ]
+    if not both[0].matches.any():
+        # Routes need not meet, nor close a loop.
+        reporter.note(
+            f"{query.name}: no query lies within {protocol.radius:g} m of a"
+            f" place of {database.name}"
+        )
+        return MethodResult(outcomes, None)
+    own = both[protocol.gate]
+    result = judge_retrieval(
+        method, database.name, query.name, own, protocol, pair=names
+    )
+    return MethodResult(outcomes, result)
 
 
-def outcomes_of(reporter: Reporter, result: Part) -> list[PlaceOutcome]:
-    """Returns the outcomes in a file with a `PairResult`."""
-    return result.read().outcomes
+def outcomes_of(
+    reporter: Reporter, results: tuple[Part, ...]
+) -> list[PlaceOutcome]:
+    """Returns the outcomes in files with a `MethodResult` each."""
+    return [one for part in results for one in part.read().outcomes]
 
 
-def _kept_overlaps(
+def shown_overlaps(
+    reporter: Reporter,
     scans: tuple[Part, Part],
-    database: DescribedDrive,
-    query: DescribedDrive,
-    found: Retrieval,
+    described: tuple[Part, Part],
+    choice: MethodChoice,
     protocol: RetrievalProtocol,
 ) -> np.ndarray:
-    """Returns how much of each query's scan its best match shows, (Q,)."""
+    """Returns how much of each query's scan its best match shows, (Q,).
+
+    Args:
+        reporter: unused.
+        scans: files with the scans (`KeptDrive`) of database and query.
+        described: files with a method's descriptions of both, for the poses.
+        choice: the method.
+        protocol: protocol by which the queries are shown.
+    """
+    choice.make()  # It registers the type of its descriptions.
     kept, asked = (part.read() for part in scans)
+    (_, database), (_, query) = (part.read() for part in described)
     return best_overlaps(
         [
             gather(kept, frame, 1, protocol.max_range).astype(np.float32)
@@ -159,7 +160,7 @@ def _kept_overlaps(
             for frame in query.queries.frames.tolist()
         ],
         query.queries.X_WS,
-        found.matches,
+        matches_within_radius(database, query, protocol),
     )
 
 

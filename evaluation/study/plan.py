@@ -26,7 +26,6 @@ from evaluation.study.collection import (
     City,
     Pair,
     RecordingInfo,
-    Run,
     find_recordings,
     group_cities,
     nothing_to_compare,
@@ -244,12 +243,10 @@ class Study:
     def _outcomes(self, pair: ComparedPair) -> Part:
         return self._files.part("place", pair.name)
 
-    def _result(self, pair: Pair, run: Run | None = None) -> Part:
-        """Returns the file with the results of a pair, or of a second run."""
-        names = [one.name for one in pair]
-        return self._files.part(
-            "recognition", *names, *([] if run is None else [run.queries])
-        )
+    def _result(self, pair: Pair, key: str) -> Part:
+        """Returns the file with the result of a run, which `key` names."""
+        names = (one.name for one in pair)
+        return self._files.part("recognition", *names, key)
 
     def _evidence(self, pair: Pair) -> Part:
         """Returns the file with evidence on why best places are wrong."""
@@ -396,31 +393,38 @@ class Study:
         surveys = [self._files.survey(one.name) for one in pair]
         scans = surveys[0].scans, surveys[1].scans
 
-        def recognise(
-            part: Part, runs: Sequence[Run], scans: tuple[Part, Part] | None
-        ) -> MakePart:
-            described = (
-                tuple(surveys[0].described(run.places) for run in runs),
-                tuple(surveys[1].described(run.queries) for run in runs),
+        overlaps = self._files.part("overlaps", *(one.name for one in pair))
+        steps = []
+        if self.methods:
+            first = self.methods[0]
+            described = tuple(one.described(first.key) for one in surveys)
+            steps.append(
+                MakePart(
+                    overlaps,
+                    measurements.shown_overlaps,
+                    (scans, described, first, self.protocol),
+                )
             )
-            return MakePart(
-                part,
-                measurements.recognise_pair,
-                (
-                    names,
-                    described,
-                    scans,
-                    tuple(run.method for run in runs),
-                    runs[0].protocol,
-                ),
-            )
-
         runs = city.runs(pair, self.methods, self.protocol)
-        result = self._result(pair)
-        own = [run for run in runs if not run.repeats]
-        steps = [recognise(result, own, scans)]
+        for run in runs:
+            if explains or not run.repeats:
+                arguments = (
+                    names,
+                    (
+                        surveys[0].described(run.places),
+                        surveys[1].described(run.queries),
+                    ),
+                    None if run.repeats else overlaps,
+                    run.method,
+                    run.protocol,
+                )
+                part = self._result(pair, run.queries)
+                steps.append(
+                    MakePart(part, measurements.recognise_places, arguments)
+                )
+        own = tuple(self._result(pair, one.key) for one in self.methods)
         steps += [
-            MakePart(part, measurements.outcomes_of, (result,))
+            MakePart(part, measurements.outcomes_of, (own,))
             for part in {
                 self._outcomes(one.pair)
                 for one in self._comparisons(city)
@@ -433,15 +437,10 @@ class Study:
                 MakePart(
                     self._evidence(pair),
                     explain_faults,
-                    (scans, self.methods, result, self.protocol),
+                    (scans, self.methods, own, overlaps, self.protocol),
                 )
             )
-            steps += [
-                recognise(self._result(pair, run), [run], None)
-                for run in runs
-                if run.repeats
-            ]
-        cost = _RECOGNITION_COST * (1 + len(self.methods) + len(steps))
+        cost = _RECOGNITION_COST * len(steps)
         step = Steps(steps[0].output, tuple(steps))
         return Job(name, step, _survey_names(pair), cost)
 
@@ -469,24 +468,25 @@ class Study:
         compared = []
         for pair in self._pairs(city):
             control = city.unchanged_pair(*pair)
-            found = self._result(pair).read().recognitions
-            unchanged = self._result(control).read() if control else None
-            for k, result in enumerate(found):
-                if result is None:
-                    continue
-                compared.append(result)
-                if pair[0] is not pair[1]:
-                    before = unchanged and unchanged.recognitions[k]
-                    report.pairs.append((result, before))
             for run in city.runs(pair, self.methods, self.protocol):
+                found = self._result(pair, run.queries).read().recognition
+                if found is None:
+                    continue
                 if run.repeats:
-                    (result,) = self._result(pair, run).read().recognitions
-                    if result is not None:
-                        report.repeated.append(result)
+                    report.repeated.append(found)
+                    continue
+                compared.append(found)
+                if pair[0] is not pair[1]:
+                    before = None
+                    if control is not None:
+                        beside = self._result(control, run.queries).read()
+                        before = beside.recognition
+                    report.pairs.append((found, before))
             evidence = self._evidence(pair).read()
-            if evidence is not None and unchanged is not None:
-                overlaps = unchanged.outcomes[0].columns["overlap"]
-                evidence = replace(evidence, unchanged=overlaps)
+            if evidence is not None and control is not None:
+                drives = (one.name for one in control)
+                unchanged = self._files.part("overlaps", *drives).read()
+                evidence = replace(evidence, unchanged=unchanged)
             if evidence is not None:
                 report.evidence[pair[0].name, pair[1].name] = evidence
             names = {one.name for one in (*pair, *(control or ()))}

@@ -36,7 +36,7 @@ def test_costs_in_the_report(tmp_path, monkeypatch):
         name: files.survey("town_01").described(name).read()[1]
         for name in shipped_methods()
     }
-    path = study.assemble()
+    path = study.assemble(with_tables=True)
     with (output / "costs.csv").open(newline="") as stream:
         rows = {row["method"]: row for row in csv.DictReader(stream)}
     assert tuple(rows) == shipped_methods()

@@ -41,8 +41,10 @@ def test_every_attempt_gets_further(tmp_path, monkeypatch, few_methods):
     studies.do(measuring_jobs(tmp_path / "in", whole))
     expected = parts(whole)
     # Two maps and the scans of each drive, a description by each method; both
-    # ways results, those for the table, and reasons for wrong ones.
-    assert len(expected) == 2 * (3 + len(few_methods)) + 2 * 3
+    # ways what matches show, results, those for the table, and reasons for
+    # wrong ones.
+    methods = len(few_methods)
+    assert len(expected) == 2 * (3 + methods) + 2 * (methods + 3)
     replace = os.replace
 
     def replace_and_stop(source, target):
@@ -88,7 +90,7 @@ def test_values_that_no_result_needs_are_removed(tmp_path, few_methods):
     def run(folder, methods):
         study = Study(found, tmp_path / folder, methods)
         done = studies.do(study.jobs())
-        study.assemble()
+        study.assemble(with_tables=True)
         return done
 
     whole = run("whole", methods)

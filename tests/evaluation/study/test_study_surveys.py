@@ -17,7 +17,7 @@ from evaluation.drives.sampling import within_range
 from evaluation.recognition.description import describe_drive
 from evaluation.recognition.protocol import PAPER_PROTOCOL
 from evaluation.study.chosen_methods import choose_methods
-from evaluation.study.measurements import recognise_pair
+from evaluation.study.measurements import recognise_places
 from evaluation.study.parts import MakePart, Part, SurveyFiles
 from evaluation.study.surveys import (
     RecordedDrive,
@@ -235,10 +235,10 @@ def test_drives_of_two_worlds_are_not_compared(tmp_path, recorded):
     other = Source(Elsewhere(recorded))
     survey(other, (solid,), surveys[1])
     part = Part(tmp_path / "results" / "solid.data")
-    described = tuple((one.described(solid.name),) for one in surveys)
+    described = tuple(one.described(solid.name) for one in surveys)
     names = ("metropolis", "01", "04")
-    arguments = names, described, None, (solid,), PAPER_PROTOCOL
-    step = MakePart(part, recognise_pair, arguments)
+    arguments = names, described, None, solid, PAPER_PROTOCOL
+    step = MakePart(part, recognise_places, arguments)
     with pytest.raises(InputError, match="poses in frame 'utm'"):
         step.run(Reporter())
     assert not part.path.parent.exists()
