@@ -263,7 +263,7 @@ def test_processes_change_nothing(town, tmp_path, jobs_done, capsys):
             *("study", path, "--jobs", "2", "--output", tmp_path / "there"),
         )
     assert status == 0
-    assert any(line.endswith("3 of 3 jobs") for line in err.splitlines())
+    assert any(line.endswith("3 of 3 jobs done") for line in err.splitlines())
     assert out == f"{tmp_path / 'there' / 'index.html'}\n"
     assert contents(tmp_path / "there") == contents(tmp_path / "here")
 

@@ -1,6 +1,7 @@
 """A study that is interrupted again and again, at every file."""
 
 import os
+from pathlib import Path
 
 from helpers import studies
 from helpers.small_towns import drive
@@ -49,7 +50,9 @@ def test_every_attempt_gets_further(tmp_path, monkeypatch, few_methods):
 
     def replace_and_stop(source, target):
         replace(source, target)
-        raise KeyboardInterrupt
+        # Digests of files are kept elsewhere.
+        if broken in Path(target).parents:
+            raise KeyboardInterrupt
 
     for done in range(len(expected)):
         assert len(parts(broken)) == done
