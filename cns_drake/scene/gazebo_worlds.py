@@ -115,8 +115,8 @@ def read_xml(path: Path) -> Element:
     Raises:
         InputError: the file cannot be read, or is not the XML of a model.
     """
-    check_model(path)
-    return read_elements(path, encoding="utf-8")
+    root = check_model(path)
+    return read_elements(path, encoding="utf-8") if root is None else root
 
 
 # Elements that Drake reads differently from Gazebo.

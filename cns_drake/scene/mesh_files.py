@@ -219,7 +219,9 @@ def _parse_small_obj(
 def _parse_obj(path: Path) -> tuple[np.ndarray, np.ndarray]:
     check_obj(path)
     mesh = ReadObjToTriangleSurfaceMesh(path)
-    triangles = [[t.vertex(k) for k in range(3)] for t in mesh.triangles()]
+    triangles = [
+        (t.vertex(0), t.vertex(1), t.vertex(2)) for t in mesh.triangles()
+    ]
     return (
         np.asarray(mesh.vertices(), dtype=float).reshape(-1, 3),
         np.asarray(triangles, dtype=np.int32).reshape(-1, 3),

@@ -51,22 +51,28 @@ def lacks_size(shape: ElementTree.Element) -> bool:
     return any(shape.find(name) is None for name in SIZES.get(shape.tag, ()))
 
 
-def check_model(path: Path) -> None:
+def check_model(path: Path) -> Element | None:
     """Checks an SDF or URDF file, and the SDF files that it includes.
+
+    Returns:
+        The root element of the file; None if it is of another kind, of which
+        nothing is checked.
 
     Raises:
         InputError: a file cannot be read, is not XML, or has an invalid number,
             an impossible size, two values for one element, a name that is too
             long, or an invalid face in the mesh of a collision.
     """
-    seen: set[Path] = set()
+    roots: dict[Path, Element] = {}
     waiting = [path]
     while waiting:
         file = waiting.pop()
-        if file.resolve() in seen or file.suffix.lower() not in _MODELS:
+        if file.resolve() in roots or file.suffix.lower() not in _MODELS:
             continue
-        seen.add(file.resolve())
-        waiting += _ModelCheck(file).included
+        check = _ModelCheck(file)
+        roots[file.resolve()] = check.root
+        waiting += check.included
+    return roots.get(path.resolve())
 
 
 class _ModelCheck:
@@ -75,7 +81,8 @@ class _ModelCheck:
     def __init__(self, path: Path):
         self.included: list[Path] = []
         self._path = path
-        self._walk(read_elements(path, encoding="utf-8"), [])
+        self.root = read_elements(path, encoding="utf-8")
+        self._walk(self.root, [])
 
     def _walk(self, element: Element, parents: list[str]) -> None:
         for key, value in element.items():

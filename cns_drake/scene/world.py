@@ -39,13 +39,18 @@ from cns_drake.scene.structure_table import StructureTable, load_structure_table
 
 
 def _parse_models(parser: Parser, path: Path) -> list[ModelInstanceIndex]:
-    """Parses a file, and returns its models.
+    """Checks and parses a file, and returns its models.
 
     Raises:
         InputError: the file is missing, cannot be parsed, or has no models.
     """
     _check_file(path)
     check_model(path)
+    return _add_models(parser, path)
+
+
+def _add_models(parser: Parser, path: Path) -> list[ModelInstanceIndex]:
+    """Parses a file that was checked, and returns its models."""
     doing(f"parsing {path.name}")
     with _parse_faults(path):
         models = parser.AddModels(str(path))
@@ -100,10 +105,13 @@ def _parse_world(
     parser: Parser, path: Path, model_paths: Collection[Path]
 ) -> tuple[str, ...]:
     """Parses a world, and returns notes about omitted parts."""
-    _check_file(path)
-    root = None if path.suffix.lower() == ".urdf" else read_xml(path)
-    if root is None or not is_gazebo_world(path, root):
+    if path.suffix.lower() == ".urdf":
         _parse_models(parser, path)
+        return ()
+    _check_file(path)
+    root = read_xml(path)
+    if not is_gazebo_world(path, root):
+        _add_models(parser, path)
         return ()
     text, notes = simplify_world(path, root, model_paths)
     doing(f"parsing {path.name}")
