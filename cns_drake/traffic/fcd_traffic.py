@@ -52,6 +52,8 @@ _KINDS_BY_WORD = (
 # teleports a vehicle that has waited for too long.
 _FASTEST = 80.0
 _FASTEST_OF = {"bicycle": 20.0, "person": 12.0}
+# A trace with more jumps has other units. Each would need a track of its own.
+_MOST_JUMPS = 1000
 _CARS = tuple(kind for kind in KINDS if kind.semantic_class == "car")
 
 
@@ -124,6 +126,11 @@ def read_fcd(path: Path) -> FcdTrace:
         vehicles, [_kind_name(one) for one in vehicles], times, jumps
     )
     persons = _without_jumps(persons, ["person"] * len(persons), times, jumps)
+    if len(jumps) > _MOST_JUMPS:
+        raise InputError(
+            f"{path}: {len(jumps)} jumps from one timestep to the next, such as"
+            f" that of {jumps[0]}; times must be in seconds, places in metres"
+        )
     if jumps:
         notes += (
             f"{path}: left out: {len(jumps)} jumps from one timestep to the"

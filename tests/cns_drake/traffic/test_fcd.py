@@ -7,6 +7,7 @@ from pydrake.geometry import SceneGraph
 import pytest
 
 from cns_drake.base.errors import InputError
+from cns_drake.traffic import fcd_traffic
 from cns_drake.traffic.fcd_traffic import play_trace, read_fcd
 from cns_drake.traffic.lane_graph import LaneGraph, Piece
 from cns_drake.traffic.streets import EgoBox
@@ -275,6 +276,19 @@ def test_what_jumps_is_absent_meanwhile(tmp_path, tag, kind, fastest, dt):
         )
         # It stays the same kind of body.
         assert tag == "person" or plan.kinds[0] == plan.kinds[1]
+
+
+def test_a_trace_of_jumps_has_other_units(tmp_path, monkeypatch):
+    monkeypatch.setattr(fcd_traffic, "_MOST_JUMPS", 3)
+    for number in (4, 5):
+        xs = [1000.0 * k for k in range(number)]
+        path = write_moves(tmp_path / "a.xml", "vehicle", "", 1.0, xs)
+        if number == 4:
+            assert len(read_fcd(path).vehicles) == 4 + 1
+            continue
+        fault = r"4 jumps from .* in seconds"
+        with pytest.raises(InputError, match=fault):
+            read_fcd(path)
 
 
 def test_what_is_away_for_a_time_may_come_back_elsewhere(tmp_path):
