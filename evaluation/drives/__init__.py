@@ -11,6 +11,7 @@ from cns_drake.base.drives.drive import (
 )
 from cns_drake.base.errors import InputError
 from cns_drake.base.listing import listed
+from cns_drake.base.progress import doing
 
 __all__ = [
     "Drive",
@@ -49,6 +50,7 @@ def open_drive(
     path = Path(path)
     if not path.exists():
         raise InputError(f"{path}: no such file or folder")
+    doing(f"opening {path.name}")
     fitting = find_readers(path)
     from cns_drake.base.drives.mcap_drive import McapDrive
     from evaluation.drives.helipr import HeliprDrive

@@ -11,7 +11,7 @@ from cns_drake.base.jobs.cluster import Cluster
 from cns_drake.base.jobs.processes import nothing_left
 from cns_drake.base.jobs.running import Job, run_jobs
 from cns_drake.base.process import num_cores
-from cns_drake.base.terminal import note
+from cns_drake.base.progress import doing
 from evaluation.recognition.protocol import RetrievalProtocol
 from evaluation.results.table import (
     FRESH,
@@ -140,7 +140,7 @@ class Engine:
         make_folder(self.output)
         self._announce(cluster)
         run_jobs(self.jobs.values(), cluster)
-        note("writing the tables and the page")
+        doing("writing the tables and the page")
         return self.write_tables()
 
     def write_tables(self) -> tuple[Results, QueryRows]:

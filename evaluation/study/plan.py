@@ -6,13 +6,13 @@ from dataclasses import dataclass, field, replace
 from functools import cached_property
 from pathlib import Path
 
-from cns_drake.base import terminal
 from cns_drake.base.errors import InputError
 from cns_drake.base.files import make_folder
 from cns_drake.base.jobs.cluster import Cluster
 from cns_drake.base.jobs.processes import nothing_left
 from cns_drake.base.jobs.running import Job, run_jobs
 from cns_drake.base.jobs.step import Steps
+from cns_drake.base.progress import doing
 from cns_drake.base.version import __version__
 from evaluation.recognition.description import Role
 from evaluation.recognition.protocol import FAIR_PROTOCOL, RetrievalProtocol
@@ -163,7 +163,7 @@ class Study:
         Raises:
             InputError: a job has not been done, or a file cannot be written.
         """
-        terminal.note("writing the report")
+        doing("writing the report")
         folder = self._files.figures
         make_folder(folder)
         report = page.Report(pages=pages or {}, reference=self.reference)

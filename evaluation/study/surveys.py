@@ -19,7 +19,7 @@ from cns_drake.base.errors import InputError
 from cns_drake.base.jobs.file_digests import file_digests
 from cns_drake.base.jobs.step import Reporter, Step
 from cns_drake.base.points import xyz
-from cns_drake.base.progress import track
+from cns_drake.base.progress import doing, track
 from evaluation.drives import Drive, PlacedDrive, open_drive
 from evaluation.drives.drive_views import RecentScans
 from evaluation.drives.sampling import cropped, within_range
@@ -418,6 +418,7 @@ class Survey(Step):
         }
         for key, described in found.described.items():
             values[self.files.described(key)] = found.placed, described
+        doing("writing maps and descriptions")
         for part, made_of in missing.items():
             part.write(made_of, values[part])
 
