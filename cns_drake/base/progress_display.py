@@ -22,7 +22,7 @@ from cns_drake.base.progress import (
 )
 
 # What takes less time than this is not mentioned [s].
-PATIENCE = 0.8
+PATIENCE = 1.0
 # In a log, another activity gets a line at once, but not many lines a second
 # [s]. The same activity gets one again after a while, which grows with the time
 # since the start: a long run should not fill its log.

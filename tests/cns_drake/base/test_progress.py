@@ -95,7 +95,7 @@ def test_a_log_says_what_changes_and_then_less_and_less(clock, log):
     clock.now += 0.5
     log.refresh()
     assert log.text() == []  # It might be done at once.
-    clock.now += 0.31
+    clock.now += 0.51
     log.refresh()
     assert log.text() == ["loading, elapsed 0:01"]
     clock.now += 0.5
