@@ -26,7 +26,6 @@ from cns_drake.base.jobs.step import Reporter, Step
 from cns_drake.base.progress import doing
 from cns_drake.motion.trajectory import Trajectory
 from cns_drake.pictures.meshcat_drawing import height_rgb
-from cns_drake.recording.messages import rendered_intrinsics
 from cns_drake.scenarios.planning import plan_drive
 from cns_drake.scenarios.scenario import Scenario
 from cns_drake.scenarios.scenario_files import map_folder
@@ -287,8 +286,8 @@ def _draw_points(
     p_WQset: np.ndarray,
 ) -> None:
     """Draws the points that a camera sees, coloured by height."""
-    info = CameraInfo(camera.width, camera.height, camera.fov_y)
-    K = rendered_intrinsics(info)
+    # Drake renders with this K if pixel (0, 0) begins at the origin.
+    K = CameraInfo(camera.width, camera.height, camera.fov_y).intrinsic_matrix()
     x, y, z = K @ (X_WC.inverse() @ p_WQset.T)
     column, row = np.floor([x, y] / np.maximum(z, 0.1)).astype(int)
     seen = (z > 0.1) & (column >= 0) & (row >= 0)
