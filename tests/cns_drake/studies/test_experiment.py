@@ -275,10 +275,11 @@ def test_settings_of_methods_are_factors():
         (("place", "first"), ("ranges", "40")),
     ]
     assert [factors for *_, factors in solid] == [
-        {"methods.solid.ranges": 20},
-        {"methods.solid.ranges": 40},
+        {"methods.solid.place": "first", "methods.solid.ranges": ranges}
+        for ranges in (20, 40)
     ]
-    assert ring == ("ring++", (("crop", "3.5"),), {})
+    fixed = {"methods.ring++.crop": 3.5}
+    assert ring == ("ring++", (("crop", "3.5"),), fixed)
 
 
 def test_overrides_replace_single_fields(read):
