@@ -27,6 +27,7 @@ from cns_drake.base import poses
 from cns_drake.base.drives.drive import Drive
 from cns_drake.base.errors import InputError
 from cns_drake.base.files import completing, is_there, user_errors
+from cns_drake.base.listing import listed
 from cns_drake.base.points import encode_pcd, xyz
 from cns_drake.base.progress import track
 from evaluation.clouds.cloud_files import read_blocks, read_cloud, read_npy
@@ -236,7 +237,7 @@ def read_session(folder: Path) -> Session:
     X_WS = np.zeros((0, 4, 4))
     if is_there(file):
         X_WS = read_poses(file)
-        scans = len(list((folder / "Scans").glob("*.pcd")))
+        scans = len(listed(folder / "Scans", "*.pcd"))
         if scans != len(X_WS):
             raise InputError(f"{file}: {len(X_WS)} poses for {scans} scans")
     return _session(folder, points, X_WS)
