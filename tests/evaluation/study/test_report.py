@@ -140,7 +140,7 @@ def test_names_with_dates_and_numbers(tmp_path, names, stages):
     for name in names:
         drive(tmp_path / name, "01", "a", scenario=False)
     (city,) = find_cities(tmp_path)
-    ((first, second),) = city.recognition_pairs()
+    ((first, second),) = city.change_pairs()
     assert (first.name, second.name) == names
     if stages:
         assert list(city.stages) == stages
