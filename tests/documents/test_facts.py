@@ -221,7 +221,7 @@ def test_ci_installs_the_documented_packages():
         assert f" {package} " in image
     assert "npm ci" in script
     # It takes the line itself out of the page.
-    pattern = re.search(r"grep -m1 '([^']+)' CONTRIBUTING\.md", script)[1]
-    text = documents.read("CONTRIBUTING.md").text
+    pattern = re.search(r"grep -m1 '([^']+)' README\.md", script)[1]
+    text = documents.read("README.md").text
     line = re.search(pattern, text, re.MULTILINE)[0]
     assert "'.[test]'" in line
