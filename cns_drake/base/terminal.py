@@ -28,7 +28,6 @@ from cns_drake.base.errors import (
 )
 from cns_drake.base.process import look_seldom
 from cns_drake.base.progress import doing
-from cns_drake.base.progress_display import shown
 from cns_drake.base.version import __version__
 
 # All errors of usage are click's UsageError. New versions of Typer contain it
@@ -133,7 +132,11 @@ def example(*lines: str) -> str:
     return "\n  ".join(("\b\nExample:", *lines))
 
 
-def run(app: typer.Typer, program: str) -> NoReturn:
+def run(
+    app: typer.Typer,
+    program: str,
+    display: contextlib.AbstractContextManager[None],
+) -> NoReturn:
     """Runs the command line of a program, and ends the process.
 
     The exit status is 0 on success, 1 if jobs failed, and 130 after an
@@ -145,6 +148,8 @@ def run(app: typer.Typer, program: str) -> NoReturn:
     Args:
         app: the command line.
         program: name of the program, with which messages begin.
+        display: shows what the program does while it is open; it is closed
+            before the line that names a fault is written.
     """
     message: str | None = None
     look_seldom()
@@ -158,7 +163,7 @@ def run(app: typer.Typer, program: str) -> NoReturn:
         # This option may stand anywhere.
         words = [word for word in sys.argv[1:] if word != TRACEBACK_OPTION]
         try:
-            with shown():
+            with display:
                 doing("loading the program")
                 status = app(words, prog_name=program, standalone_mode=False)
         except Exception:

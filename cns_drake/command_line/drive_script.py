@@ -167,4 +167,4 @@ def run_script(name: str, description: str) -> None:
         epilog=epilog,
         context_settings=terminal.WIDE_HELP,
     )(script)
-    terminal.run(app, Path(sys.argv[0]).name)
+    terminal.run(app, Path(sys.argv[0]).name, progress_display.shown())

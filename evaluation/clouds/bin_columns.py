@@ -142,6 +142,9 @@ def _period(values: np.ndarray, places: np.ndarray) -> int | None:
     """
     # Beams without a return are stored as zeros or NaN, alike in all columns.
     is_value = np.isfinite(values) & (values != 0.0)
+    shown = _period_of_zeros(is_value, places)
+    if shown is not None:
+        return shown
     values, places = values[is_value], places[is_value]
     num_bins = min(_MOST_BINS, len(values) // _FILLED)
     candidates = [k for k in _CANDIDATES if k * _FILLED <= len(values)]
@@ -176,6 +179,30 @@ def _period(values: np.ndarray, places: np.ndarray) -> int | None:
         if told[half] >= _HALF * told[found] and (apart < _HALF).all():
             return half
     return found
+
+
+def _period_of_zeros(is_value: np.ndarray, places: np.ndarray) -> int | None:
+    """Returns the number of columns if some hold zeros alone, others none.
+
+    Args:
+        is_value: (N,) whether a value is neither zero nor NaN.
+        places: (N,) positions of the values.
+    """
+    for k in _CANDIDATES:
+        if k * _FILLED > len(places):
+            break
+        counts = np.bincount(places % k, minlength=k)
+        filled = np.bincount(places % k, weights=is_value, minlength=k)
+        zero = filled == 0
+        if not (zero.any() and (filled > 0).any()):
+            continue
+        if not np.array_equal(filled[~zero], counts[~zero]):
+            continue
+        # Every other beam may lack a return: these are two points.
+        one, other = zero[: k // 2], zero[k // 2 :]
+        is_two = k % 2 == 0 and k >= 2 * FEWEST_COLUMNS
+        return None if is_two and (one.all() or other.all()) else k
+    return None
 
 
 def _information(table: np.ndarray) -> float:

@@ -15,6 +15,7 @@ import typer
 
 from cns_drake.base import commands, terminal
 from cns_drake.base.commands import Command
+from cns_drake.base.progress_display import shown
 from cns_drake.base.terminal import example, number
 from evaluation.command_line import options
 from evaluation.command_line.localising import localise
@@ -488,7 +489,7 @@ app.command(
 
 def main() -> None:
     """Runs the command line and exits with its status."""
-    terminal.run(app, "cns-eval")
+    terminal.run(app, "cns-eval", shown())
 
 
 def _chosen_method(

@@ -48,6 +48,7 @@ BY_HAND = {
     "real_or_simulated.py",
     "real_scans.py",
     "scans_to_judge.py",
+    "silences.py",
     "source_rays.py",
 }
 SHARED = {"processes.py", "stages.py"}

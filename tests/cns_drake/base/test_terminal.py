@@ -1,5 +1,6 @@
 """Results, notes and faults of the command line."""
 
+import contextlib
 import errno
 import math
 import subprocess
@@ -43,7 +44,7 @@ def test_faults_are_one_line(monkeypatch, capsys, error, status, line):
     monkeypatch.setattr(terminal.interrupts, "ignore_interrupts", lambda: None)
     monkeypatch.setattr("sys.argv", ["program"])
     with pytest.raises(SystemExit) as raised:
-        terminal.run(app, "program")
+        terminal.run(app, "program", contextlib.nullcontext())
     assert raised.value.code == status
     assert capsys.readouterr().err == (line and f"program: {line}\n")
 
@@ -60,7 +61,7 @@ def test_a_renamed_command_names_the_new_one(capsys, rest):
     app.command("study")(study)
 
     def main():
-        terminal.run(app, "program")
+        terminal.run(app, "program", contextlib.nullcontext())
 
     status, out, err = run_program(capsys, "program", main, "years", *rest)
     assert (status, out) == (2, "")
@@ -104,7 +105,7 @@ def test_help_is_as_wide_as_the_terminal(monkeypatch, capsys, columns):
         """Make."""
 
     def main():
-        terminal.run(app, "program")
+        terminal.run(app, "program", contextlib.nullcontext())
 
     monkeypatch.setenv("COLUMNS", str(columns))
     _, out, _ = run_program(capsys, "program", main, "--help")

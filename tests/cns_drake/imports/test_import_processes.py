@@ -12,11 +12,25 @@ from typer.testing import CliRunner
 
 from cns_drake.command_line.cli import app
 
+# The program, which says at once what it does, however short it takes.
+PROGRAM = """
+import sys
+from cns_drake.base import terminal
+from cns_drake.base.progress import Listener, heard_by
+from cns_drake.command_line.cli import app
+
+class Printing(Listener):
+    def doing(self, activity, done=0, total=0, unit=""):
+        print(activity, file=sys.stderr, flush=True)
+
+terminal.run(app, "cns-drake", heard_by(Printing()))
+"""
+
 
 def start(source, output):
     return subprocess.Popen(
         [
-            *(sys.executable, "-m", "cns_drake", "import"),
+            *(sys.executable, "-c", PROGRAM, "import"),
             *(str(source), "--output", str(output)),
         ],
         stderr=subprocess.PIPE,

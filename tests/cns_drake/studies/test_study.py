@@ -605,7 +605,7 @@ class PlannedError(Exception):
 def test_maps_of_conditions_are_made_first(town, tmp_path, monkeypatch):
     runs = []
     monkeypatch.setattr(
-        redrawing, "run_jobs", lambda jobs, _: runs.append([*jobs])
+        redrawing, "run_jobs", lambda jobs, *_: runs.append([*jobs])
     )
 
     def stop(jobs, cluster):

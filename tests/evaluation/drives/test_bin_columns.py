@@ -153,3 +153,14 @@ def test_folders_of_scans(capsys, tmp_path):
     status, _, err = run(capsys, *arguments, "--columns", "7")
     assert status == 2
     assert "points of 7 float32" in err
+
+
+@pytest.mark.parametrize("columns", [3, 4, 5, 7])
+@pytest.mark.parametrize("filled", [1, 2])
+def test_columns_of_zeros_show_their_number(tmp_path, columns, filled):
+    """Such as scans of a line: its other coordinates are zero."""
+    points = np.zeros((600, columns), "<f4")
+    points[:, :filled] = 20.0 + np.arange(600)[:, None] / 600
+    path = tmp_path / "000000.bin"
+    points.tofile(path)
+    assert find_layout([path]).columns == columns

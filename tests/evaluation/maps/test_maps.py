@@ -1,4 +1,5 @@
 from helpers.drive_files import make_scan, write_recording, yaw_pose
+from helpers.listening import listening
 import numpy as np
 import pytest
 
@@ -196,14 +197,9 @@ def test_map_of_a_recording(tmp_path):
         p_S = np.stack([scan[name] for name in "xyz"], axis=1)
         p_B = p_S.astype(np.float64) + np.array([0.5, 0.0, 1.6])
         world.append(p_B @ X_WB[:3, :3].T + X_WB[:3, 3])
-    shown = []
-
-    def track(items, description, total):
-        shown.append((description, total))
-        return items
-
-    voxels = map_drive(open_drive(path), track=track)
-    assert shown == [("mapping s", 6)]
+    with listening() as heard:
+        voxels = map_drive(open_drive(path))
+    assert heard.counts("mapping s") == [(done, 6) for done in range(6)]
     assert_is(voxels, reference_map(np.concatenate(world), 5.0))
     again = map_drive(open_drive(path))
     assert again.centroids_W.tobytes() == voxels.centroids_W.tobytes()
