@@ -22,7 +22,8 @@ from cns_drake.city.facades.assembly import GROUND_OVERHANG_M, HEAD_ROOM_M, Site
 from cns_drake.city.facades.massing import FOUNDATION_M
 from cns_drake.city.geometry.structures import MeshShape
 
-pytestmark = pytest.mark.slow
+# By day, generated cities are compared with the committed ones byte by byte.
+pytestmark = [pytest.mark.slow, pytest.mark.night]
 
 NAMES = sorted(ARCHETYPES)
 ANY_OUTLINE = [name for name in NAMES if ARCHETYPES[name].any_outline]

@@ -104,6 +104,7 @@ def test_a_quick_study(reproduce, code, tmp_path):
     assert reproduce(quick=True) == surveys | DRAWN | COMPARED | maps
 
 
+@pytest.mark.night
 def test_recordings_pages_and_pictures(reproduce, code, tmp_path):
     everything = DRIVES | STUDY | PICTURES
     assert reproduce() == everything
