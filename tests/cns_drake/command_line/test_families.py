@@ -25,6 +25,7 @@ def run(*arguments):
     assert result.exit_code == 0, (result.output, result.exception)
 
 
+@pytest.mark.night
 def test_simulated_and_recorded_families_agree(tmp_path, monkeypatch):
     studies.run_here(monkeypatch, recording, engine)
     town = write_small_city(tmp_path / "town")

@@ -321,6 +321,7 @@ def boxes(places, yaw, size):
 
 
 @pytest.mark.slow
+@pytest.mark.night
 def test_nobody_meets_anybody(blocks):
     """Two minutes with the ego car on the southern street."""
     city, (graph, walkways, _) = blocks

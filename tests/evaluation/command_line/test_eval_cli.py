@@ -338,7 +338,9 @@ def test_the_module_is_the_program(towns):
         text=True,
     )
     assert done.returncode == 2
-    assert done.stderr == ("cns-eval: error: nowhere: no such file or folder\n")
+    # On a slow machine, what the program does stands before the fault.
+    *_, fault = done.stderr.splitlines()
+    assert fault == "cns-eval: error: nowhere: no such file or folder"
 
 
 def test_parameters_of_several_numbers(capsys, towns):
