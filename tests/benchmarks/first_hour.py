@@ -20,6 +20,7 @@ A row "again" is the same command with the caches of the row before. Linux only.
 from __future__ import annotations
 
 import argparse
+import contextlib
 import ctypes
 from dataclasses import dataclass
 import os
@@ -30,6 +31,8 @@ import sys
 import tempfile
 import threading
 import time
+
+import psutil
 
 ROOT = Path(__file__).parents[2]
 # Between two samples of memory [s].
@@ -189,29 +192,11 @@ def measure(words: list[str], folder: Path, environment: dict) -> Costs:
 def _sample(peaks: list[int], ended: threading.Event) -> None:
     """Appends the memory of all processes below this one until they end."""
     while not ended.wait(SAMPLING):
-        peaks.append(sum(map(_memory, _descendants(os.getpid()))))
-
-
-def _descendants(process: int) -> list[int]:
-    found = []
-    for tasks in Path(f"/proc/{process}/task").glob("*/children"):
-        try:
-            children = [int(word) for word in tasks.read_text().split()]
-        except OSError:  # It has ended.
-            continue
-        for child in children:
-            found += [child, *_descendants(child)]
-    return found
-
-
-def _memory(process: int) -> int:
-    """Returns a process's share of memory; 0 after its end [bytes]."""
-    try:
-        lines = Path(f"/proc/{process}/smaps_rollup").read_text().splitlines()
-    except OSError:
-        return 0
-    kilobytes = [line.split()[1] for line in lines if line.startswith("Pss:")]
-    return 1024 * sum(map(int, kilobytes))
+        total = 0
+        for process in psutil.Process().children(recursive=True):
+            with contextlib.suppress(psutil.Error):  # It has ended.
+                total += process.memory_full_info().pss
+        peaks.append(total)
 
 
 def install(prefix: Path) -> None:

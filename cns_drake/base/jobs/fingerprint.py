@@ -116,12 +116,10 @@ def _imported(module: _Module) -> Iterator[_Module]:
     versions count (`_LIBRARIES`), not their sources.
     """
     for home, name in _imports_of(module).names:
-        if _is_ours(home):
-            package = _Module(_ROOT, home)
-        elif _is_ours(module.name) and module.root == _ROOT:
+        own = _is_ours(home)
+        if not own and module.root == _ROOT and _is_ours(module.name):
             continue
-        else:
-            package = _Module(module.root, home)
+        package = _Module(_ROOT if own else module.root, home)
         yield package
         inner = package._replace(name=f"{home}.{name}")
         if name and _source(inner) is not None:
