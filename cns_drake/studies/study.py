@@ -65,7 +65,7 @@ from evaluation.study.collection import (
     find_recordings,
     group_cities,
 )
-from evaluation.study.engine import Comparison, Engine, made_tasks
+from evaluation.study.engine import Engine, MeasuredPair, made_tasks
 from evaluation.study.recorded import RecordedCondition, recorded_comparisons
 from evaluation.study.tasks.change import ChangeTask
 from evaluation.study.tasks.localise import LocaliseTask
@@ -361,7 +361,7 @@ class Study:
         )
         prints: dict[tuple[str, int], list[str]] = {}
         for some in drives:
-            found: list[Comparison] = []
+            found: list[MeasuredPair] = []
             if some.city is not None:
                 found += self._recorded(some.city)
             else:
@@ -381,7 +381,7 @@ class Study:
         return engine
 
     def _distractors(
-        self, some: _Drives, found: Iterable[Comparison]
+        self, some: _Drives, found: Iterable[MeasuredPair]
     ) -> list[NamedDrive]:
         """Returns the drives whose places are added to databases."""
         most = max((one.pair.distractors for one in found), default=0)
@@ -415,7 +415,7 @@ class Study:
 
     def _simulated(
         self, some: _Drives, *, made: bool = True
-    ) -> Iterator[tuple[Comparison, str]]:
+    ) -> Iterator[tuple[MeasuredPair, str]]:
         """Yields the pairs of a map in all conditions that it allows.
 
         Each item is a comparison and the fingerprint of its drives. If `made`
@@ -449,7 +449,7 @@ class Study:
                     if key not in known:
                         known.add(key)
                         yield (
-                            Comparison(
+                            MeasuredPair(
                                 some.map_name,
                                 (_base_name(database), query.name),
                                 {**some.factors, **condition.factors},
@@ -494,7 +494,7 @@ class Study:
             bool(compared.asked or compared.distractors),
         )
 
-    def _recorded(self, city: City) -> Iterator[Comparison]:
+    def _recorded(self, city: City) -> Iterator[MeasuredPair]:
         """Yields the pairs of recordings; only their stage can vary."""
         self._check_recordable(city)
         return recorded_comparisons(

@@ -32,7 +32,7 @@ _LONG = 3600.0
 
 
 @dataclass(frozen=True)
-class Comparison:
+class MeasuredPair:
     """Two drives that are compared under a condition of an experiment.
 
     Attributes:
@@ -94,12 +94,12 @@ class Engine:
     output: Path
     on_note: Callable[[str], None] = lambda text: None
     jobs: dict[str, Job] = field(default_factory=dict)
-    measured: list[Comparison] = field(default_factory=list)
+    measured: list[MeasuredPair] = field(default_factory=list)
     _notes: dict[str, None] = field(default_factory=dict)
 
     def add(
         self,
-        comparisons: Sequence[Comparison],
+        comparisons: Sequence[MeasuredPair],
         distractors: Sequence[NamedDrive] = (),
     ) -> None:
         """Adds the jobs of all comparisons on one map.
@@ -200,11 +200,11 @@ class Engine:
                     key = self._key(one, name, method, gate)
                     yield Answers(**key, columns=columns)
 
-    def _found(self, one: Comparison, task: str) -> Any:
+    def _found(self, one: MeasuredPair, task: str) -> Any:
         return self.tasks[task].found(one.parts[task], one.pair)
 
     def _key(
-        self, one: Comparison, task: str, method: str, gate: bool
+        self, one: MeasuredPair, task: str, method: str, gate: bool
     ) -> dict[str, Any]:
         factors = dict(one.factors)
         settings = self.tasks[task].changed_settings

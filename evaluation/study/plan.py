@@ -30,7 +30,7 @@ from evaluation.study.collection import (
     group_cities,
     nothing_to_compare,
 )
-from evaluation.study.engine import Comparison, Engine, made_tasks
+from evaluation.study.engine import Engine, MeasuredPair, made_tasks
 from evaluation.study.fault_evidence import explain_faults
 from evaluation.study.parts import MakePart, Part, StudyFiles
 from evaluation.study.recorded import RecordedCondition, recorded_comparisons
@@ -220,7 +220,7 @@ class Study:
         )
         return Results(results.factors, tuple(shown))
 
-    def _comparisons(self, city: City) -> list[Comparison]:
+    def _comparisons(self, city: City) -> list[MeasuredPair]:
         """Returns the comparisons of the experiment `stages`."""
         found = recorded_comparisons(
             city,
@@ -304,7 +304,7 @@ class Study:
         compared = {one.pair.name: one for one in self._comparisons(city)}
         return jobs + [self._tcr_job(one) for one in compared.values()]
 
-    def _tcr_job(self, one: Comparison) -> Job:
+    def _tcr_job(self, one: MeasuredPair) -> Job:
         """Returns the job that measures change, as in the table of results."""
         names = one.pair.database.name, one.pair.query.name
         step = MakePart(

@@ -7,7 +7,7 @@ from cns_drake.base.jobs.fingerprint import fingerprint
 from evaluation.recognition.protocol import RetrievalProtocol
 from evaluation.results.table import OWN
 from evaluation.study.collection import City
-from evaluation.study.engine import Comparison
+from evaluation.study.engine import MeasuredPair
 from evaluation.study.tasks.task import NamedDrive, Pair
 
 
@@ -35,7 +35,7 @@ def recorded_comparisons(
     on_note: Callable[[str], None],
     *,
     both_ways: bool = False,
-) -> Iterator[Comparison]:
+) -> Iterator[MeasuredPair]:
     """Yields the comparisons of a map's recordings in all conditions.
 
     Args:
@@ -62,7 +62,7 @@ def recorded_comparisons(
             )
             # Queries are scored once for all radii.
             asked = condition.protocol.to_json() | {"radius": None}
-            yield Comparison(
+            yield MeasuredPair(
                 city.name,
                 (pair[0].name, pair[1].name),
                 condition.factors,

@@ -32,9 +32,9 @@ from cns_drake.imports.foreign_city import (
 )
 from cns_drake.imports.openstreetmap import reading, streets
 from cns_drake.imports.openstreetmap.passages import (
-    Openings,
     Passage,
     Passages,
+    WayOpenings,
     note_walled_up,
     passages_of,
 )
@@ -309,7 +309,7 @@ def _count_unused(
 def _barriers(
     features: reading.OsmFeatures, local: Local
 ) -> Iterator[Imported]:
-    openings = Openings(features.ways, local)
+    openings = WayOpenings(features.ways, local)
     for way in features.ways:
         name, tags, line, _ = way
         kind = tags.get("barrier")

@@ -191,7 +191,7 @@ def note_walled_up(
             faults.add("street into a building without a passage", name)
 
 
-class Openings:
+class WayOpenings:
     """Finds where ways lead through walls, fences and hedges."""
 
     def __init__(self, ways: Iterable[OsmWay], local: Local):
