@@ -30,11 +30,14 @@ _TIME_TOLERANCE = 2e-3
 _OFF_ROAD = 5.0
 # A person this close to a vehicle's front is in the vehicle [m].
 _RIDING = 0.1
-# Two heights belong to different roads if they differ by more than the first
-# number [m]. They are those of the nearest points on lanes, at most so many,
-# within a radius [m]. The last number is the least cosine of the angle between
-# a vehicle and its lane.
-_LEVELS, _CANDIDATES, _REACH, _ALIKE = 1.5, 24, 6.0, 0.7
+# Heights that differ by more than this belong to different roads [m].
+_LEVEL_HEIGHT = 1.5
+# A height is found from at most this many points of lanes, the nearest ones.
+_MOST_POINTS = 24
+# These points are at most this far away [m].
+_REACH = 6.0
+# Least cosine of the angle between a vehicle and its lane.
+_LEAST_COSINE = 0.7
 # Part of the name of a type -> kind; the first one that matches applies.
 _KINDS_BY_WORD = (
     ("bicycle", "bicycle"),
@@ -416,20 +419,20 @@ class Heights:
             yaw: (M,) headings [rad]; None if the direction does not count.
         """
         found = self.at(xy)
-        count = min(_CANDIDATES, len(self._z))
+        count = min(_MOST_POINTS, len(self._z))
         distance, near = (
             np.reshape(values, (len(xy), -1))
             for values in self._tree.query(xy, k=count)
         )
         is_near = distance < _REACH
         levels = np.where(is_near, self._z[near], np.nan)
-        for k in np.flatnonzero(np.ptp(self._z[near], axis=1) > _LEVELS):
+        for k in np.flatnonzero(np.ptp(self._z[near], axis=1) > _LEVEL_HEIGHT):
             usable = np.flatnonzero(is_near[k])
-            if not len(usable) or np.ptp(levels[k][usable]) <= _LEVELS:
+            if not len(usable) or np.ptp(levels[k][usable]) <= _LEVEL_HEIGHT:
                 continue
             if yaw is not None:
                 turn = self._heading[near[k][usable]] - yaw[k]
-                alike = usable[np.abs(np.cos(turn)) > _ALIKE]
+                alike = usable[np.abs(np.cos(turn)) > _LEAST_COSINE]
                 usable = alike if len(alike) else usable
             moved = np.hypot(*(xy[k] - xy[k - 1])) if k else np.inf
             goal = levels[k][usable[0]]
@@ -438,7 +441,7 @@ class Heights:
             elif moved < _REACH:
                 goal = found[k - 1]
             off = np.abs(levels[k][usable] - goal)
-            usable = usable[off < off.min() + _LEVELS / 2][:4]
+            usable = usable[off < off.min() + _LEVEL_HEIGHT / 2][:4]
             (found[k],) = self._weighted(
                 distance[k][None, usable], near[k][None, usable]
             )

@@ -12,25 +12,42 @@ from shapely.geometry.base import BaseGeometry
 
 # Greatest distance between the points of a piece [m].
 SPACING = 0.5
-# Walkers' middles keep the first distance from objects, so that their boxes
-# clear them in any direction. Where this takes more than the second number, a
-# share of a walkway's width, they keep the third distance, as far as their
-# sides need [m].
-_AROUND, _NARROW, _BESIDE = 0.53, 0.5, 0.36
+# Walkers' middles keep this distance from objects, so that their boxes clear
+# them in any direction [m].
+_CLEARANCE = 0.53
+# Where objects with this clearance take more than this share of a walkway's
+# width, the walkway is narrow.
+_NARROW_SHARE = 0.5
+# On a narrow walkway, walkers keep this distance, as far as their sides need
+# [m].
+_SIDE_CLEARANCE = 0.36
 # Walkers begin a walkway at most this many points before its first one.
 _BEFORE = 4
-# Number of places across a walkway, and least number of points along it.
-_ACROSS, _ALONG = 21, 4
+# Number of places across a walkway.
+_ACROSS = 21
+# Least number of points along a walkway.
+_LEAST_POINTS = 4
 # Walkers move aside by at most this many places from one point to the next.
 _ASIDE = 2
-# A crossing without marks leads over at most this many lanes. It keeps these
-# distances: from the ends of lanes, so that the front of a vehicle on it is not
-# yet in another lane; from ways; and from the ends of walkways [m].
-_MOST_LANES, _FROM_ENDS, _FROM_WAYS, _FROM_NODES = 4, 15.0, 5.0, 4.0
-# Width of a crossing without marks; half the width of the walkers' path and of
-# a lane; greatest distance of a walkway from a lane; distance between the
-# places tried [m].
-_WIDTH, _HALF_WAY, _HALF_LANE, _REACH, _TRIED = 2.4, 0.5, 1.75, 20.0, 2.0
+# A crossing without marks leads over at most this many lanes.
+_MOST_LANES = 4
+# Least distance of such a crossing from the ends of lanes, so that the front of
+# a vehicle on it is not yet in another lane [m].
+_FROM_LANE_ENDS = 15.0
+# Its least distance from ways [m].
+_FROM_WAYS = 5.0
+# Its least distance from the ends of walkways [m].
+_FROM_WALKWAY_ENDS = 4.0
+# Its width [m].
+_CROSSING_WIDTH = 2.4
+# Half the width of the walkers' path on it [m].
+_CROSSING_HALF_PATH = 0.5
+# Half the width of a lane [m].
+_HALF_LANE = 1.75
+# Greatest distance of a walkway from a lane that a crossing leads over [m].
+_REACH = 20.0
+# Distance between the places of a lane where a crossing is tried [m].
+_TRIAL_STEP = 2.0
 
 
 @dataclass(frozen=True)
@@ -165,9 +182,9 @@ def kept_clear(
         places = points[:, None] + across[:, None] * right[:, None]
         seen = shapely.points(places).ravel()
         barred, around = np.zeros((2, *places.shape[:2]), int)
-        for each, reach in ((barred, _BESIDE), (around, _AROUND)):
+        for each, reach in ((barred, _SIDE_CLEARANCE), (around, _CLEARANCE)):
             each.flat[tree.query(seen, "dwithin", reach)[0]] = 1
-        narrow = around.mean(axis=1) > _NARROW
+        narrow = around.mean(axis=1) > _NARROW_SHARE
         barred[~narrow] = around[~narrow]
         # What blocks the whole width also stands in the way of walkers who
         # begin there.
@@ -204,7 +221,7 @@ def kept_clear(
             continue
         for before, after in pairwise([-1, *bars.tolist(), len(barred)]):
             rows, nodes = slice(before + 1, after), [way.start, way.end]
-            if after - before <= _ALONG:
+            if after - before <= _LEAST_POINTS:
                 continue
             for k, is_cut in enumerate((before >= 0, after < len(barred))):
                 if is_cut:
@@ -303,7 +320,7 @@ def with_unmarked_crossings(
         k = sides[near[int(np.argmin(apart))]]
         xy = walkways[k].points[:, :2]
         row = int(np.linalg.norm(xy - p, axis=1).argmin())
-        margin = int(_FROM_NODES / SPACING)
+        margin = int(_FROM_WALKWAY_ENDS / SPACING)
         is_inside = margin <= row < len(xy) - margin
         return (k, row) if is_inside and k not in cuts else None
 
@@ -323,14 +340,18 @@ def with_unmarked_crossings(
         if (
             len(over) > _MOST_LANES
             or any(graph.pieces[k].is_way for k in near)
-            or len(thing_tree.query(longer, "dwithin", _HALF_WAY + _AROUND))
+            or len(
+                thing_tree.query(
+                    longer, "dwithin", _CROSSING_HALF_PATH + _CLEARANCE
+                )
+            )
         ):
             return None
         places = []
         for k in over:
             place = line & lanes[k]
             s = lanes[k].project(place)
-            if not _FROM_ENDS < s < lanes[k].length - _FROM_ENDS:
+            if not _FROM_LANE_ENDS < s < lanes[k].length - _FROM_LANE_ENDS:
                 return None
             places.append(line.project(place))
         edges = min(places) - _HALF_LANE, max(places) + _HALF_LANE
@@ -338,8 +359,8 @@ def with_unmarked_crossings(
 
     for k in graph.lanes:
         points = graph.pieces[k].points
-        margin = int(_FROM_ENDS / SPACING)
-        middle, step = len(points) // 2, int(_TRIED / SPACING)
+        margin = int(_FROM_LANE_ENDS / SPACING)
+        middle, step = len(points) // 2, int(_TRIAL_STEP / SPACING)
         first = margin + (middle - margin) % step
         rows = range(first, len(points) - margin, step)
         for row in sorted(rows, key=lambda row: abs(row - middle)):
@@ -357,10 +378,16 @@ def with_unmarked_crossings(
             cuts |= {way: (at, node + i) for i, (way, at) in enumerate(ends)}
             found.append(
                 Walkway(
-                    resampled(line), _HALF_WAY, node, node + 1, len(crossings)
+                    resampled(line),
+                    _CROSSING_HALF_PATH,
+                    node,
+                    node + 1,
+                    len(crossings),
                 )
             )
-            crossings.append(make_crossing(line[[0, -1]], _WIDTH, marked=False))
+            crossings.append(
+                make_crossing(line[[0, -1]], _CROSSING_WIDTH, marked=False)
+            )
             node += 2
             break
     for k, way in enumerate(walkways):

@@ -30,20 +30,29 @@ from cns_drake.traffic.vehicles import (
     rear_on_way,
 )
 
-# Where there is no signal, a driver must stand for a while before the line: for
-# the first time [s], slower than the second number [m/s], and within the third
-# distance [m].
-_STOPS, _STANDS, _AT_LINE = 3.0, 0.5, 4.0
+# Where there is no signal, a driver stops before the line for this time [s].
+_STOP_TIME = 3.0
+# A driver who is at most this fast has stopped [m/s].
+_STANDSTILL_SPEED = 0.5
+# A driver within this distance of the line is at the line [m].
+_AT_LINE = 4.0
 # Traffic ahead of the ego car goes first and does not wait for signals if the
 # ego car comes within this time [s].
 _EGO_IS_NEAR = 80.0
 _GOES_FIRST = 1e6
-# Greatest expected wait on a way for vehicles, and for walkers [s]. After the
-# third time at a stop line, no later driver may enter a conflicting way [s].
-# Then the accelerations that are assumed for the driver and for others [m/s^2],
-# and the others' share of the allowed speed.
-_SLACK, _YIELDS, _LONG = 2.0, 6.0, 20.0
-_OWN, _OTHERS, _PACE = 2.0, 1.0, 0.8
+# Greatest expected wait on a way for vehicles [s].
+_WAIT_FOR_VEHICLES = 2.0
+# Greatest expected wait on a way for walkers [s].
+_WAIT_FOR_WALKERS = 6.0
+# After this time at a stop line, no later driver may enter a conflicting way
+# [s].
+_LONG_WAIT = 20.0
+# Acceleration that is assumed for the driver [m/s^2].
+_OWN_ACCELERATION = 2.0
+# Acceleration that is assumed for others [m/s^2].
+_OTHERS_ACCELERATION = 1.0
+# Share of the allowed speed that is assumed for others.
+_OTHERS_PACE = 0.8
 # If the ego car comes within this time, a vehicle enters its way only after all
 # others have left the conflicting ways [s].
 _EGO_COMES = 20.0
@@ -51,22 +60,28 @@ _EGO_COMES = 20.0
 _EGO_MARGIN = 3.0
 # Assumed wait at the end of a lane for a driver who goes first [s].
 _SHORT_WAIT = 5.0
-# Gap between standing vehicles [m], and greatest braking of the last vehicle
-# ahead [m/s^2].
-_ROOM, _LAST_BRAKES = 2.5, 4.0
-# Drivers request their way within this distance [m], or within this multiple of
-# their braking distance. At a signal they request it this much earlier [s],
-# since nobody brakes before a green signal.
-_ASKED_FROM, _ASKED_BRAKING, _ASKED_FOR = 10.0, 1.4, 3.0
+# Gap between standing vehicles [m].
+_STANDING_GAP = 2.5
+# Greatest braking of the last vehicle ahead [m/s^2].
+_LAST_BRAKES = 4.0
+# Drivers request their way within this distance of the line [m].
+_REQUEST_DISTANCE = 10.0
+# They also request it within this multiple of their braking distance.
+_REQUEST_BRAKING = 1.4
+# At a signal they request it this much earlier, since nobody brakes before a
+# green signal [s].
+_REQUEST_AT_SIGNAL = 3.0
 # After this time without room, a driver takes another way [s].
 _PATIENCE = 3.0
 # If the green of walkers is too short for them, they may begin to cross within
 # its first part of this length [s].
 _LATE = 2.0
-# Time in which a group of walkers starts [s], their assumed speed [m/s], and a
-# reserve [s].
+# Time in which a group of walkers starts [s].
 WALK_GROUP = 3.0
-_WALKING, _DAWDLING = 1.0, 3.0
+# Assumed speed of walkers [m/s].
+_WALKING_SPEED = 1.0
+# A group may take this much longer over a crossing [s].
+_WALKING_RESERVE = 3.0
 # Time that vehicles have after a group of walkers has left a crossing [s].
 _REST = 30.0
 # Where there are no marks, walkers begin to cross if no vehicle comes within
@@ -112,7 +127,7 @@ def grant_ways(traffic: Traffic, k: int) -> None:
                 first[other] = i
     for i in range(num_cars):
         lane = cars[i].path[CURRENT]
-        if lane < 0 or not cars[i].granted or cars[i].v > _STANDS:
+        if lane < 0 or not cars[i].granted or cars[i].v > _STANDSTILL_SPEED:
             continue
         if pieces[lane].is_way or first[lane] < 0:
             continue
@@ -135,17 +150,17 @@ def grant_ways(traffic: Traffic, k: int) -> None:
         if car.guided and car.path[CURRENT + 1] < 0:
             continue
         braking = car.v**2 / (2.0 * car.b)
-        asked_from = max(_ASKED_FROM, _ASKED_BRAKING * braking + 5.0)
+        asked_from = max(_REQUEST_DISTANCE, _REQUEST_BRAKING * braking + 5.0)
         left = pieces[lane].length - car.s
         phase = pieces[streets.after[pieces[lane].after_first]].phase
         if phase >= 0:
-            asked_from += _ASKED_FOR * car.v + 5.0
+            asked_from += _REQUEST_AT_SIGNAL * car.v + 5.0
         if left <= asked_from:
             if 0.0 < streets.until[k, lane] < _EGO_IS_NEAR:
                 since[first[lane]] = streets.until[k, lane] - _GOES_FIRST
             elif phase < 0 and car.since == np.inf:
                 # Every driver stops at the line where there is no signal.
-                if car.v > _STANDS or left > _AT_LINE:
+                if car.v > _STANDSTILL_SPEED or left > _AT_LINE:
                     continue
             else:
                 since[first[lane]] = car.since
@@ -183,7 +198,7 @@ def grant_ways(traffic: Traffic, k: int) -> None:
         if blocked[way] or not _is_ready(streets, car, k):
             continue
         if not _has_room(traffic, who, k):
-            if car.guided and t > since[who] + _LONG:
+            if car.guided and t > since[who] + _LONG_WAIT:
                 # It has no other way to take: the next room is for it.
                 for other in range(len(pieces)):
                     first_after = streets.after[pieces[other].after_first]
@@ -194,7 +209,7 @@ def grant_ways(traffic: Traffic, k: int) -> None:
         if taken[int(is_large), way] and (
             is_near or not _is_soon_free(traffic, who, way, t)
         ):
-            if is_near or t > since[who] + _LONG:
+            if is_near or t > since[who] + _LONG_WAIT:
                 # Later arrivals must not go first again and again.
                 clear = streets.clear[int(is_large), way]
                 blocked |= clear[: len(pieces)] > 0.0
@@ -219,15 +234,15 @@ def _is_soon_free(traffic: Traffic, i: int, way: int, t: float) -> bool:
     for c in range(len(crossings)):
         place = streets.begin[int(car.large), way, len(pieces) + c]
         if place < np.inf and is_walked(traffic, c, way, car.large):
-            lasts = crossings[c].length / _WALKING + _DAWDLING
+            lasts = crossings[c].length / _WALKING_SPEED + _WALKING_RESERVE
             if crossings[c].opened >= 0.0:
                 lasts += WALK_GROUP + crossings[c].opened - t
             elif crossings[c].is_open:
                 lasts += crossings[c].closed - t
             else:
                 lasts += WALK_GROUP
-            arrives = _duration(place - front, car.v, _OWN, pace)
-            if lasts > arrives + _YIELDS:
+            arrives = _duration(place - front, car.v, _OWN_ACCELERATION, pace)
+            if lasts > arrives + _WAIT_FOR_WALKERS:
                 return False
     for j in range(len(cars)):
         other = cars[j]
@@ -244,10 +259,10 @@ def _is_soon_free(traffic: Traffic, i: int, way: int, t: float) -> bool:
         if streets.joint[size, way, held] == MERGE:
             # Behind this place, it follows the other vehicle.
             last = min(last, streets.begin[size, held, way] + other.length)
-        arrives = _duration(place - front, car.v, _OWN, pace)
-        its_pace = _PACE * streets.speed[pieces[held].first]
-        leaves = _duration(last - rear, other.v, _OTHERS, its_pace)
-        if leaves > arrives + _SLACK:
+        arrives = _duration(place - front, car.v, _OWN_ACCELERATION, pace)
+        its_pace = _OTHERS_PACE * streets.speed[pieces[held].first]
+        leaves = _duration(last - rear, other.v, _OTHERS_ACCELERATION, its_pace)
+        if leaves > arrives + _WAIT_FOR_VEHICLES:
             return False
     return True
 
@@ -277,7 +292,7 @@ def _serve(traffic: Traffic, c: int, k: int, last: int) -> int:
     one, place, t = traffic.crossings[c], len(streets.pieces) + c, k * STEP
     if one.users > 0:
         return last
-    needed = one.length / _WALKING + WALK_GROUP + _DAWDLING
+    needed = one.length / _WALKING_SPEED + WALK_GROUP + _WALKING_RESERVE
     if one.order == 0:
         if t < one.closed + _REST:
             return last
@@ -370,7 +385,7 @@ def _is_ready(streets: Streets, car: Any, k: int) -> bool:
     if 0.0 < streets.until[k, car.path[CURRENT]] < _EGO_IS_NEAR:
         return True
     if row.phase < 0:
-        return t >= car.since + _STOPS
+        return t >= car.since + _STOP_TIME
     return _until_red(streets, way, t) > 0.0
 
 
@@ -411,8 +426,8 @@ def _has_room(traffic: Traffic, i: int, k: int) -> bool:
                 or (current == beyond and one.s < one.length)
             )
             if comes and j != i:
-                end -= one.length + _ROOM
-        has_room = end >= car.length + _ROOM
+                end -= one.length + _STANDING_GAP
+        has_room = end >= car.length + _STANDING_GAP
     if not has_room and not car.guided:
         car.refused += STEP
         if car.refused > _PATIENCE or is_ego_near:

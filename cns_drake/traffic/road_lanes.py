@@ -34,9 +34,10 @@ _LANES_WITHOUT_SIGNAL = 2
 _MARGIN = 0.45
 _CROSSING_HALF_WIDTH = 0.8
 _LEAST_HALF_WIDTH = 0.3
-# Distance from the kerb at which walkers wait, and least length of a walkway
-# from the walked strip to there [m].
-_BEFORE_KERB, _SHORTEST_SPUR = 1.4, 1.5
+# Distance from the kerb at which walkers wait [m].
+_BEFORE_KERB = 1.4
+# Least length of a walkway from the walked strip to that place [m].
+_SHORTEST_SPUR = 1.5
 # Distance of the walked strip from the kerb on a wide sidewalk. Furniture
 # stands at the kerb or at the houses [m]. Then the least length of a walkway
 # [m].

@@ -18,21 +18,31 @@ from cns_drake.roads.u_turn import outlines
 from cns_drake.traffic.lane_graph import LaneGraph, Piece, distances_along
 from cns_drake.traffic.vehicle_kinds import LARGEST, SMALL_SIZE
 
-# Least duration of a cycle, of red for all after each phase, and of a phase
-# [s].
-_CYCLE, _RED, _LEAST = 60.0, 4.0, 14.0
-# Greatest speed of a column of vehicles [m/s], and the shares of its green
-# after which vehicles leave a junction.
-_PACE, _LEAVE = 9.0, np.array([0.1, 0.25, 0.4, 0.6])
-# Distance between the offsets that are tried [s], and number of rounds.
-_OFFSET_STEP, _ROUNDS = 2.0, 3
+# Least duration of a cycle [s].
+_LEAST_CYCLE = 60.0
+# Red for all after each phase [s].
+_ALL_RED = 4.0
+# Least duration of a phase [s].
+_LEAST_PHASE = 14.0
+# Greatest speed of a column of vehicles [m/s].
+_COLUMN_SPEED = 9.0
+# Vehicles leave a junction after these shares of their green.
+_LEAVING_SHARES = np.array([0.1, 0.25, 0.4, 0.6])
+# Distance between the offsets that are tried [s].
+_OFFSET_STEP = 2.0
+# All offsets are improved this many times.
+_OFFSET_ROUNDS = 3
 # A crossing within this distance of the stop line lies before the line [m].
 _AT_LINE = 6.0
 # Number of steps of a vehicle that takes random ways.
 _WANDERS = 200
-# Number of drivers who go straight on, and who turn round, for each one who
-# turns; and the cosine of the least turn.
-_STRAIGHT, _ROUND, _TURN = 3.0, 0.02, 0.7
+# For each driver who turns, this many go straight on.
+_STRAIGHT_SHARE = 3.0
+# For each driver who turns, this many turn round.
+_TURN_ROUND_SHARE = 0.02
+# Cosine of the angle between straight on and a turn; its negative lies between
+# a turn and turning round.
+_TURN_COSINE = 0.7
 
 
 class Signals(NamedTuple):
@@ -67,7 +77,7 @@ def make_signals(graph: LaneGraph, begin: np.ndarray) -> Signals:
     origin = np.zeros(len(pieces), int)
     for k in graph.lanes:
         origin[list(pieces[k].after)] = k
-    cycle = max(_CYCLE, (phase.max() + 1) * (_RED + _LEAST))
+    cycle = max(_LEAST_CYCLE, (phase.max() + 1) * (_ALL_RED + _LEAST_PHASE))
     green_from, green_for = np.zeros(len(begin)), np.full(len(begin), cycle)
     place = begin[: len(pieces), len(pieces) :]
     # Walkers must not have green together with vehicles that start.
@@ -87,9 +97,9 @@ def make_signals(graph: LaneGraph, begin: np.ndarray) -> Signals:
         need = np.array(
             [np.bincount(origin[ways], flow[ways]).max() for ways in own]
         )
-        free = cycle - len(own) * (_RED + _LEAST)
-        green = _LEAST + free * need / need.sum()
-        starts = np.cumsum(green + _RED) - green - _RED
+        free = cycle - len(own) * (_ALL_RED + _LEAST_PHASE)
+        green = _LEAST_PHASE + free * need / need.sum()
+        starts = np.cumsum(green + _ALL_RED) - green - _ALL_RED
         for ways, start, lasts in zip(own, starts, green, strict=True):
             green_from[ways], green_for[ways] = start, lasts
         for column in np.flatnonzero(owner[len(pieces) :] == j):
@@ -123,7 +133,11 @@ def way_shares(graph: LaneGraph, lane: int) -> np.ndarray:
         a, b = steps / np.linalg.norm(steps, axis=1)[:, None]
         turn = a @ b
         likes.append(
-            _STRAIGHT if turn > _TURN else 1.0 if turn > -_TURN else _ROUND
+            _STRAIGHT_SHARE
+            if turn > _TURN_COSINE
+            else 1.0
+            if turn > -_TURN_COSINE
+            else _TURN_ROUND_SHARE
         )
     return np.array(likes) / sum(likes)
 
@@ -158,14 +172,16 @@ def _offsets(
     # Behind each way, a lane and its first way.
     lane = np.array([(*p.after, k)[0] for k, p in enumerate(graph.pieces)])
     after, number = lane[lane], len(lane)
-    time = np.array([p.length / min(p.limit, _PACE) for p in graph.pieces])
+    time = np.array(
+        [p.length / min(p.limit, _COLUMN_SPEED) for p in graph.pieces]
+    )
     way = np.flatnonzero(
         (owner[:number] >= 0)
         & (owner[after] >= 0)
         & (owner[after] != owner[:number])
     )
     leave = green_from[way] + time[way] + time[lane[way]]
-    leave = leave[:, None] + green_for[way, None] * _LEAVE
+    leave = leave[:, None] + green_for[way, None] * _LEAVING_SHARES
     weight, after = flow[way], after[way]
     last, begins = green_for[after, None], green_from[after, None]
     offsets = np.zeros(1 + max(0, owner.max()))
@@ -175,7 +191,7 @@ def _offsets(
         late = (leave - begins + shift[:, None]) % cycle
         return float(weight @ np.where(late < last, 0.0, cycle - late).sum(1))
 
-    for _ in range(_ROUNDS):
+    for _ in range(_OFFSET_ROUNDS):
         for j in np.unique(owner[way]):
             found = []
             for offset in np.arange(0.0, cycle, _OFFSET_STEP):
@@ -200,14 +216,17 @@ _CLEARANCE = 0.25
 # distance from the ego car [m].
 _HALF_LANE = 1.45
 # When the ego car enters a lane, the lane must be empty. Drivers assume that
-# they drive at this share of the speed limit, and wait for this time at the
-# lane's end [s].
-_SLOW_PART, WAIT = 0.6, 20.0
+# they drive at this share of the speed limit.
+_SLOW_PART = 0.6
+# They assume that they wait for this time at the lane's end [s].
+WAIT = 20.0
 
 # Time step of the plan [s].
 STEP = 0.1
-# Two ways share the lane before them (split), or the lane behind them (merge).
-SPLIT, MERGE = 1, 2
+# Two ways share the lane before them.
+SPLIT = 1
+# Two ways share the lane behind them.
+MERGE = 2
 
 # A piece of the lane graph as a record; see `Piece`.
 PIECE = np.dtype(

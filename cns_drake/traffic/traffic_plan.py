@@ -33,20 +33,31 @@ from cns_drake.traffic.walkers import WALKER_LENGTH, WALKER_WIDTH, Crowd
 
 # Distance between the places at which the ego car's lane is determined [m].
 _STEP = 1.0
-# The car's lane is at most this far away [m], and its direction within 45 deg
-# (cosine).
-_REACHES, _ALIGNED = 3.0, 0.7
-# Costs when lanes are fitted to the path: of a metre on no lane, as the square
-# of a lane's distance [m^2]; of a change of lanes; and of leaving all lanes or
-# coming back.
-_NO_LANE, _SIDEWAYS, _AWAY = 4.0, 8.0, 20.0
-# Before and after a change of lanes, the car counts in both lanes for the first
-# distance. It requests a way from a lane in which it is for the second distance
-# before the way [m].
-_CHANGES, _ASKS = 12.0, 25.0
-# Parameters of the Intelligent Driver Model, and the share of the drive's
-# greatest acceleration that it uses.
-_ACCELERATION, _DECELERATION, _HEADWAY, _PART_OF_BOUND = 1.5, 1.8, 1.3, 0.95
+# The car's lane is at most this far away [m].
+_LANE_REACH = 3.0
+# The car and its lane have the same direction within 45 deg (cosine).
+_ALIGNED = 0.7
+# Cost of a metre of the path on no lane; a metre on a lane costs the square of
+# the lane's distance [m^2].
+_COST_OF_NO_LANE = 4.0
+# Cost of a change of lanes [m^2].
+_COST_OF_CHANGE = 8.0
+# Cost of leaving all lanes, and of coming back [m^2].
+_COST_OF_LEAVING = 20.0
+# Before and after a change of lanes, the car counts in both lanes for this
+# distance [m].
+_IN_BOTH_LANES = 12.0
+# Before a change of lanes, the car is in its new lane this early, so that it
+# can request its way from there [m].
+_LANE_LEAD = 25.0
+# Acceleration of the Intelligent Driver Model [m/s^2].
+_ACCELERATION = 1.5
+# Comfortable deceleration of the model [m/s^2].
+_DECELERATION = 1.8
+# Time headway of the model [s].
+_HEADWAY = 1.3
+# The model uses at most this share of the drive's greatest acceleration.
+_PART_OF_BOUND = 0.95
 # The bounds of the speed are taken at least this far ahead [m].
 _AHEAD = 0.05
 
@@ -84,7 +95,7 @@ def find_runs(graph: LaneGraph, points: np.ndarray) -> list[_Run]:
     """
     lines = [shapely.LineString(piece.points[:, :2]) for piece in graph.pieces]
     tree = shapely.STRtree(lines)
-    rows, found = tree.query(shapely.points(points), "dwithin", _REACHES)
+    rows, found = tree.query(shapely.points(points), "dwithin", _LANE_REACH)
     near, columns = np.unique(found, return_inverse=True)
     here, on = shapely.points(points[rows]), np.array(lines)[found]
     places = shapely.line_locate_point(on, here)
@@ -101,18 +112,18 @@ def find_runs(graph: LaneGraph, points: np.ndarray) -> list[_Run]:
     fits = np.sum(along * ahead, axis=1) > _ALIGNED * size
     off = len(near)
     misfit = np.full((len(points), off + 1), np.inf)
-    misfit[:, off] = _NO_LANE
+    misfit[:, off] = _COST_OF_NO_LANE
     distance = shapely.distance(on, here)
     misfit[rows[fits], columns[fits]] = distance[fits] ** 2
     place = np.zeros(misfit.shape)
     place[rows, columns] = places
     change = np.full((off + 1, off + 1), np.inf)
-    change[off], change[:, off] = _AWAY, _AWAY
+    change[off], change[:, off] = _COST_OF_LEAVING, _COST_OF_LEAVING
     for row, number in enumerate(near):
         piece = graph.pieces[number]
         for others, cost in (
             (piece.after, 0.0),
-            ((piece.left, piece.right), _SIDEWAYS),
+            ((piece.left, piece.right), _COST_OF_CHANGE),
         ):
             change[row, :off][np.isin(near, others)] = cost
     np.fill_diagonal(change, 0.0)
@@ -141,7 +152,7 @@ def find_runs(graph: LaneGraph, points: np.ndarray) -> list[_Run]:
         last = runs[-1] if runs else run
         lane = graph.pieces[last.piece]
         if min(last.piece, piece) >= 0 and piece in (lane.left, lane.right):
-            earlier = min(run.first - run.last + _ASKS, run.s)
+            earlier = min(run.first - run.last + _LANE_LEAD, run.s)
             earlier = max(0.0, min(earlier, run.first - last.first - _STEP))
             first = run.first - earlier
             runs[-1] = last._replace(last=first)
@@ -149,7 +160,7 @@ def find_runs(graph: LaneGraph, points: np.ndarray) -> list[_Run]:
                 first=first,
                 s=run.s - earlier,
                 beside=last.piece,
-                parts=run.first + _CHANGES,
+                parts=run.first + _IN_BOTH_LANES,
             )
         runs.append(run)
     return runs
@@ -312,7 +323,7 @@ class Follower:
                 return
             way = after.piece
             if not streets.pieces[way]["is_way"]:
-                if run.last - front < _CHANGES:
+                if run.last - front < _IN_BOTH_LANES:
                     car["left_lane"] = way
                 return
             path[CURRENT + 1] = way
@@ -355,8 +366,10 @@ _FIRST = 200
 # others has arrived.
 _AFTER = 20
 # Share of vehicles and walkers that are planned in addition, because some will
-# be left out; and number of trials.
-_SPARE, _TRIES = 0.06, 4
+# be left out.
+_SPARE_SHARE = 0.06
+# Greatest number of plans that are tried.
+_TRIES = 4
 # After every so many steps, a trial is given up if it has to leave out too many
 # bodies.
 _PART = 200
@@ -730,7 +743,7 @@ def _smooth(values: np.ndarray) -> np.ndarray:
 
 
 def _with_spare(number: int) -> int:
-    return int(np.ceil(number * (1 + _SPARE)))
+    return int(np.ceil(number * (1 + _SPARE_SHARE)))
 
 
 def _at_half_steps(values: np.ndarray) -> np.ndarray:

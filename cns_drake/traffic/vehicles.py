@@ -34,8 +34,10 @@ EGO = -1
 # Greatest number of pieces that one vehicle is on.
 _MOST_ENTRIES = 8
 
-# Greatest braking, and greatest braking in an emergency [m/s^2].
-HARDEST_BRAKING, EMERGENCY_BRAKING = 3.2, 5.5
+# Greatest braking [m/s^2].
+HARDEST_BRAKING = 3.2
+# Greatest braking in an emergency [m/s^2].
+EMERGENCY_BRAKING = 5.5
 # Smaller gaps count as this gap [m].
 _NO_GAP = 0.05
 # Distance kept from the stop line [m].
@@ -51,13 +53,22 @@ _PASSED = (2.0, 3.5)
 
 # A driver considers a change of lanes once in this many steps.
 _THINKS = 10
-# MOBIL's politeness, least gain, and greatest braking of others [m/s^2].
-_POLITENESS, _GAIN, _OTHERS_BRAKE = 0.2, 0.25, 2.5
-# Duration of a change of lanes [s], its least length, and least length of the
-# lane that remains behind it [m].
-_DURATION, _LEAST_LENGTH, _BEYOND = 4.0, 20.0, 30.0
-# Least speed during a change of lanes [m/s], and least gap [m].
-_SLOWEST, _GAP = 3.0, 4.0
+# MOBIL's politeness: the weight of the other driver's loss.
+_POLITENESS = 0.2
+# MOBIL's threshold: the least gain of a change [m/s^2].
+_LEAST_GAIN = 0.25
+# MOBIL's safe braking: the hardest of the vehicle that will be behind [m/s^2].
+_SAFE_BRAKING = 2.5
+# Duration of a change of lanes [s].
+_CHANGE_DURATION = 4.0
+# Least length of a change of lanes [m].
+_LEAST_CHANGE = 20.0
+# Least length of the lane that remains behind the change [m].
+_LEFT_BEHIND_CHANGE = 30.0
+# Least speed during a change of lanes [m/s].
+_LEAST_CHANGE_SPEED = 3.0
+# Least gap to vehicles in the other lane [m].
+_CHANGE_GAP = 4.0
 
 # At the start, a vehicle needs this length of lane in addition to its own [m],
 # and drives at this share of the allowed speed.
@@ -635,13 +646,13 @@ def change_lanes(traffic: Traffic, k: int) -> None:
             or pieces[lane].is_way
             or car.granted
             or car.left_lane >= 0
-            or car.v < _SLOWEST
+            or car.v < _LEAST_CHANGE_SPEED
             or car.s < car.length + 2.0
         ):
             continue
-        length = max(_LEAST_LENGTH, _DURATION * car.v)
+        length = max(_LEAST_CHANGE, _CHANGE_DURATION * car.v)
         left = pieces[lane].length - car.s
-        if left < length + car.length + _BEYOND:
+        if left < length + car.length + _LEFT_BEHIND_CHANGE:
             continue
         for target in (pieces[lane].left, pieces[lane].right):
             if target >= 0 and _is_better(traffic, k, i, target):
@@ -680,10 +691,13 @@ def _is_better(traffic: Traffic, k: int, i: int, target: int) -> bool:
         gap = rear - other.front
         if other.who != i and other.rear <= rear and gap < behind:
             behind, who = gap, other.who
-        is_beside |= other.rear < there + _GAP and other.front > rear - _GAP
+        is_beside |= (
+            other.rear < there + _CHANGE_GAP
+            and other.front > rear - _CHANGE_GAP
+        )
         at = other.after
     gap, speed = find_ahead(traffic, target, there, i)
-    if gap < _GAP or behind < _GAP or who == EGO or is_beside:
+    if gap < _CHANGE_GAP or behind < _CHANGE_GAP or who == EGO or is_beside:
         return False
     free = free_acceleration(
         car, min(car.top, car.factor * speed_on(streets, lane, car.s))
@@ -700,10 +714,10 @@ def _is_better(traffic: Traffic, k: int, i: int, target: int) -> bool:
         gap, speed = find_ahead(traffic, target, rear - behind, who)
         now = max(free - interaction(it, gap, it.v - speed), -HARDEST_BRAKING)
         then = max(free - interaction(it, behind, it.v - v), -HARDEST_BRAKING)
-        if then < -_OTHERS_BRAKE:
+        if then < -_SAFE_BRAKING:
             return False
         cost = now - then
-    return new - old > _GAIN + _POLITENESS * cost
+    return new - old > _LEAST_GAIN + _POLITENESS * cost
 
 
 @compiled

@@ -18,48 +18,68 @@ from cns_drake.traffic.right_of_way import WALK_GROUP
 from cns_drake.traffic.streets import STEP
 from cns_drake.traffic.vehicles import uniform
 
-# Mean and spread of the model's wanted speed [m/s]; relaxation time [s];
-# strength [m/s^2] and range [m] of the repulsion by walkers, then by edges.
-_SPEED, _SPREAD = 1.34, 0.26
+# Mean of the model's wanted speed [m/s].
+_MEAN_SPEED = 1.34
+# Standard deviation of the wanted speed [m/s].
+_SPEED_SPREAD = 0.26
+# Relaxation time [s].
 _RELAXATION = 0.5
-_STRENGTH, _REACH = 7.0, 0.3
-_EDGE_STRENGTH, _EDGE_REACH = 10.0, 0.2
+# Repulsion by another walker whose box is touched [m/s^2].
+_REPULSION = 7.0
+# In this distance, the repulsion by a walker falls by the factor e [m].
+_REPULSION_RANGE = 0.3
+# Repulsion by an edge that is touched [m/s^2].
+_EDGE_REPULSION = 10.0
+# In this distance, the repulsion by an edge falls by the factor e [m].
+_EDGE_RANGE = 0.2
 # Greatest speed as a multiple of the wanted speed.
 _HURRY = 1.3
-# Least distance between two walkers' middles, and radius within which walkers
-# are neighbours [m].
+# Least distance between two walkers' middles [m].
 _APART = 0.95
+# Radius within which walkers are neighbours [m].
 _NEAR = 4.0
-# Length and width of a walker's box, which contains swinging limbs, and least
-# space between boxes [m].
-WALKER_LENGTH, WALKER_WIDTH, _GAP = 0.84, 0.6, 0.15
-# A walker steps aside for another one ahead with this acceleration [m/s^2],
-# unless that one is at least this far to the side [m]. The third number is a
-# small bias to the right.
-_ASIDE, _PASSING = 4.0, 0.85
+# Length of a walker's box, which contains swinging limbs [m].
+WALKER_LENGTH = 0.84
+# Width of the box [m].
+WALKER_WIDTH = 0.6
+# Least space between boxes [m].
+_BOX_GAP = 0.15
+# A walker steps aside for another one ahead with at most this acceleration
+# [m/s^2].
+_STEP_ASIDE = 4.0
+# A walker does not step aside for one that is at least this far to the side
+# [m].
+_PASSING_DISTANCE = 0.85
+# Part of the repulsion by walkers that turns to the right.
 _TO_THE_RIGHT = 0.3
 # A walker aims at a point of the walkway this many points ahead.
 _AHEAD = int(2.0 / SPACING)
-# A walker turns to its direction of motion at this rate [rad/s], if it is at
-# least this fast [m/s].
-_TURN_RATE, _GOING = 2.5, 0.2
+# A walker turns to its direction of motion at this rate [rad/s].
+_TURN_RATE = 2.5
+# A walker that is at most this fast stands [m/s].
+_STANDING_SPEED = 0.2
 # Distance of a waiting walker from the crossing [m].
 _AT_NODE = 1.0
 # Greatest acceleration, in any direction [m/s^2].
 _STRONGEST = 2.5
-# A walker that was blocked for this time turns back [s], and so does one that
-# waits within this distance of a blocked one [m].
-_PATIENCE, _BESIDE = 4.0, 1.5
-# Number of walkers that cross for each one that goes straight on, if both are
-# possible: at marked crossings, and elsewhere.
-_CROSSES, _CROSSES_ELSEWHERE = 0.25, 0.05
+# A walker that was blocked for this time turns back [s].
+_PATIENCE = 4.0
+# A waiting walker turns back within this distance of one that does so [m].
+_BLOCKING_DISTANCE = 1.5
+# For each walker that goes straight on, this many cross at a marked crossing,
+# if both are possible.
+_CROSSING_SHARE = 0.25
+# The same for a crossing without marks.
+_UNMARKED_SHARE = 0.05
 # After this time, a walker no longer waits for a gap [s].
 _GIVES_UP = 10.0
 # Length of sidewalk per walker [m].
 _WALKER_SPACE = 3.0
 # Share of walkers with a companion behind them, so that about a third walk in
-# groups; and the companion's distance in points of the walkway.
-_COMPANIONS, _BEHIND = 0.2, 3
+# groups.
+_COMPANIONS = 0.2
+# Distance of the companion behind the walker, in points of the walkway.
+_BEHIND = 3
 # Number of random places that are tried for a walker.
 _TRIES = 200
 
@@ -186,14 +206,14 @@ class Crowd:
         paths = self._paths.paths[walkers["path"]]
         # Others may push a walker back.
         along = self._paths.tangents[paths["first"] + walkers["at"]]
-        gets_on = x * along[:, 0] + y * along[:, 1] > _GOING
+        gets_on = x * along[:, 0] + y * along[:, 1] > _STANDING_SPEED
         is_stuck = ~gets_on & ~is_waiting
         walkers["stuck"] = np.where(is_stuck, walkers["stuck"] + STEP, 0.0)
         back = walkers["stuck"] > _PATIENCE
         # Also one that waits where another wants to leave a crossing.
         apart = walkers["xy"][back, None] - walkers["xy"][is_waiting]
         square = apart[..., 0] ** 2 + apart[..., 1] ** 2
-        back[is_waiting] |= (square < _BESIDE**2).any(axis=0)
+        back[is_waiting] |= (square < _BLOCKING_DISTANCE**2).any(axis=0)
         walkers["stuck"][back] = 0.0
         walkers["path"][back] ^= 1
         at = paths["num_points"] - 2 - walkers["at"]
@@ -286,7 +306,7 @@ class Crowd:
             over = int(self._paths.paths["crossing"][other])
             liking = 1.0
             if over >= 0:
-                liking = _CROSSES if marked[over] else _CROSSES_ELSEWHERE
+                liking = _CROSSING_SHARE if marked[over] else _UNMARKED_SHARE
             likings.append(0.0 if other // 2 == path // 2 else liking)
         who, draw = self.walkers[["group", "draws"]][i]
         pick = uniform(seed, who, draw) * sum(likings)
@@ -382,7 +402,9 @@ def _place_walkers(
     for name, values in zip(names, zip(*rows, strict=True), strict=False):
         walkers[name] = values
     number = len(rows)
-    walkers["speed"] = np.clip(rng.normal(_SPEED, _SPREAD, number), 0.6, 2.2)
+    walkers["speed"] = np.clip(
+        rng.normal(_MEAN_SPEED, _SPEED_SPREAD, number), 0.6, 2.2
+    )
     walkers["phase"] = rng.uniform(0.0, 2 * np.pi, number)
     walkers["aside"] = rng.uniform(0.1, 0.7, number)
     for name in ("speed", "aside"):
@@ -423,7 +445,9 @@ def _forces(
         )
         for side in (-1.0, 1.0):
             room = high - across if side > 0.0 else across - low
-            push = side * _EDGE_STRENGTH * np.exp(-max(room, 0.0) / _EDGE_REACH)
+            push = (
+                side * _EDGE_REPULSION * np.exp(-max(room, 0.0) / _EDGE_RANGE)
+            )
             force[i, 0] -= push * right[0]
             force[i, 1] -= push * right[1]
     for i in range(len(walkers)):
@@ -434,7 +458,9 @@ def _forces(
             if square >= _NEAR**2:
                 continue
             distance = max(np.sqrt(square), 1e-3)
-            push = _STRENGTH * np.exp(-max(distance - _APART, 0.0) / _REACH)
+            push = _REPULSION * np.exp(
+                -max(distance - _APART, 0.0) / _REPULSION_RANGE
+            )
             # Slightly to the right; otherwise two walkers who meet head-on
             # would stop.
             push_x = push * (x - _TO_THE_RIGHT * y) / distance
@@ -448,10 +474,10 @@ def _forces(
                 c, s = np.cos(walkers[k].yaw), np.sin(walkers[k].yaw)
                 ahead = sign * x * c + sign * y * s
                 aside = sign * y * c - sign * x * s
-                if ahead <= 0.0 or abs(aside) >= _PASSING:
+                if ahead <= 0.0 or abs(aside) >= _PASSING_DISTANCE:
                     continue
-                push = _ASIDE * (1.0 - distance / _NEAR)
-                push *= 1.0 - abs(aside) / _PASSING
+                push = _STEP_ASIDE * (1.0 - distance / _NEAR)
+                push *= 1.0 - abs(aside) / _PASSING_DISTANCE
                 # Away from the other one; to the right if that one is straight
                 # ahead.
                 side = -1.0 if aside >= -0.05 else 1.0
@@ -498,7 +524,7 @@ def _move(paths: Paths, walkers: np.ndarray, force: np.ndarray) -> None:
             yaw = one.yaw
             row = _nearest(paths, one, new_x, new_y)
             tx, ty = paths.tangents[row, 0], paths.tangents[row, 1]
-            if paths.narrow[row] or speed > _GOING:
+            if paths.narrow[row] or speed > _STANDING_SPEED:
                 turn = np.arctan2(new_vy, new_vx) - yaw
                 if paths.narrow[row]:
                     # Facing along the path, forwards or backwards.
@@ -576,7 +602,7 @@ def _is_free(
     The box would be at `place` with a heading and, if the walker braked, then
     at `stop`.
     """
-    half = (WALKER_LENGTH / 2 + _GAP / 2, WALKER_WIDTH / 2 + _GAP / 2)
+    half = (WALKER_LENGTH / 2 + _BOX_GAP / 2, WALKER_WIDTH / 2 + _BOX_GAP / 2)
     for j in range(len(walkers)):
         other = walkers[j]
         x, y = other.xy[0], other.xy[1]
