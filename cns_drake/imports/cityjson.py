@@ -184,10 +184,13 @@ _MEMBERS = {
     "type", "geometry", "attributes", "parents", "children", "children_roles",
     "geographicalExtent", "address", "bbox", "extent", "members",
 }  # fmt: skip
-# A city is mirrored if at most this share of its solids look outwards. At most
-# so many solids are looked at, and only those that enclose at least this much
-# [m^3, m^2].
-_MIRRORED, _MOST_VOTES, _LEAST_VOTE = 0.1, 1000, 1e-3
+# A city is mirrored if less than this share of its geometries look outwards.
+_MIRRORED_SHARE = 0.1
+# At most this many geometries are looked at.
+_MOST_VOTES = 1000
+# They count if six times the volume of a solid, or twice the area of surfaces,
+# is more than this [m^3, m^2].
+_LEAST_VOTE = 1e-3
 _BEYOND = "coordinates beyond the area of their reference system"
 # A geometry of a lower level of detail is left out if a higher one covers more
 # than this share of it.
@@ -525,7 +528,7 @@ def _check_order(city: CityFile) -> None:
         if city.system.is_north_first:
             kind = "order of axes that no face shows, taken as defined"
             city.faults.add(kind, city.system.name)
-    elif sum(votes) < _MIRRORED * len(votes):
+    elif sum(votes) < _MIRRORED_SHARE * len(votes):
         if city.order_is_open:
             _exchange_axes(city)
             if any(kind == _BEYOND for kind, _, _ in city.faults.rows()):

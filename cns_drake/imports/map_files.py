@@ -40,7 +40,8 @@ _DPI = 130
 _INCHES = 9.0
 _ROUTE_COLOURS = ("#d7191c", "#2c7bb6")
 _ROUTE_WIDTHS = (5.0, 2.0)  # [pt]
-_ROOM_COLOUR, _ROOM_ALPHA = "#ffd92f", 0.6
+_ROOM_COLOUR = "#ffd92f"
+_ROOM_ALPHA = 0.6
 
 
 def write_world(

@@ -133,13 +133,17 @@ def _laid_bare(
 _SPACING = 4.0
 # Height of the eyes above the ground [m].
 _EYES = 2.0
-# A wall is looked at from this many of the nearest places, and this many
-# others.
-_NEAREST, _OTHERS = 8, 24
+# A wall is looked at from this many of the nearest places.
+_NEAREST = 8
+# It is also looked at from about this many others.
+_OTHERS = 24
 # A wall is visible if one of its probes is. Probes are at these parts of its
-# length and height, this far in front of it, and a little below its top [m].
-_PARTS = np.array([(x, z) for x in (0.04, 0.5, 0.96) for z in (0.3, 1.0)])
-_BEFORE, _BELOW_TOP = 0.3, 0.3
+# length and height.
+_PROBES = np.array([(x, z) for x in (0.04, 0.5, 0.96) for z in (0.3, 1.0)])
+# Probes are this far in front of the wall [m].
+_BEFORE = 0.3
+# The highest probes are this far below its top [m].
+_BELOW_TOP = 0.3
 
 
 class DriveViews:
@@ -199,7 +203,7 @@ class DriveViews:
         probes = []
         for panel in panels:
             top = max(panel.height - _BELOW_TOP, panel.height / 2.0)
-            x, z = _PARTS.T * [[panel.length], [top]]
+            x, z = _PROBES.T * [[panel.length], [top]]
             probes.append(panel.place(x, z, _BEFORE))
         is_seen = self._is_seen(np.stack(probes)[number], self._eyes[place])
         found = np.full(len(panels), np.inf)
@@ -239,16 +243,22 @@ class DriveViews:
         return np.asarray((hits < 0).reshape(len(eyes), -1).any(axis=1))
 
 
-# Walls farther than this from all drives get no windows, and roofs no equipment
-# [m].
-_WALLS_WITHIN, _ROOFS_WITHIN = 60.0, 100.0
+# Walls farther than this from all drives get no windows [m].
+_WALLS_WITHIN = 60.0
+# Roofs farther than this from all drives get no equipment [m].
+_ROOFS_WITHIN = 100.0
 # About this many triangles are used for openings, first on the nearest walls.
 _MOST_TRIANGLES = 1_100_000
-_OF_OPENING, _OF_WALL = 30, 40
+# About this many triangles are needed per 9 m^2 of a wall, for its openings.
+_TRIANGLES_OF_OPENING = 30
+# About this many triangles are needed per wall in addition.
+_TRIANGLES_OF_WALL = 40
 # Shops are on walls at most this far from a street [m].
 _SHOPS_WITHIN = 16.0
-# From these levels of detail on, a model has its own roof, and its own windows.
-_OWN_ROOF, _OWN_WINDOWS = 2.2, 3.0
+# From this level of detail on, a model has its own roof.
+_LOD_WITH_ROOF = 2.2
+# From this level of detail on, a model has its own windows.
+_LOD_WITH_WINDOWS = 3.0
 _NO_TRIANGLES = np.zeros((0, 3, 3))
 
 
@@ -346,7 +356,7 @@ def _dressed(
         wall = f"wall {panel.length:.1f} {heading:.0f}"
         rng = random_generator(seed, wall, some.one.draw_name)
         counts += facade_pieces.add_facade(out, plan, rng)
-    has_own_roof = some.one.lod >= _OWN_ROOF or not len(some.roof)
+    has_own_roof = some.one.lod >= _LOD_WITH_ROOF or not len(some.roof)
     if not has_own_roof and shapely.dwithin(footprint, paths, _ROOFS_WITHIN):
         facade_pieces.add_roof_pieces(out, some.roof, style, some.is_flat)
     counts["roof equipment and chimneys"] = len(out.parts)
@@ -363,7 +373,7 @@ def _plans(
 ) -> dict[int, list[FacadePlan]]:
     """Returns number of a building -> plans of its walls to dress."""
     walls = [
-        some.walls if some.one.lod < _OWN_WINDOWS else np.zeros((0, 3, 3))
+        some.walls if some.one.lod < _LOD_WITH_WINDOWS else np.zeros((0, 3, 3))
         for some in bare
     ]
     panels, to_drive = _seen(walls, views)
@@ -429,7 +439,8 @@ def _seen(
     order = np.argsort(distances, kind="stable")
     order = order[distances[order] <= _WALLS_WITHIN]
     cost = [
-        _OF_WALL + _OF_OPENING * panel.length * panel.height / 9.0
+        _TRIANGLES_OF_WALL
+        + _TRIANGLES_OF_OPENING * panel.length * panel.height / 9.0
         for panel in (panels[k] for k in order)
     ]
     order = order[np.cumsum(cost) <= _MOST_TRIANGLES]

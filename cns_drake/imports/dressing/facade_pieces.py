@@ -34,24 +34,38 @@ from cns_drake.imports.foreign_city import to_mesh
 
 # Distance from the end of a wall to its first bay [m].
 _MARGIN = 0.5
-# Windows keep this distance from the foot and the top of their wall, and from
-# the ground [m].
-_FROM_FOOT, _FROM_TOP, _FROM_GROUND = 0.3, 0.12, 0.4
+# Windows keep this distance from the foot of their wall, and the probe of the
+# wall's top keeps it from the top [m].
+_FROM_FOOT = 0.3
+# Windows keep this distance from the top of their wall [m].
+_FROM_TOP = 0.12
+# Windows keep this distance from the ground [m].
+_FROM_GROUND = 0.4
 # Below a roof, a window may shrink to this share of its height.
 _LEAST_PART = 0.7
 # Probes are this far in front of a wall [m].
 _BEFORE = 0.4
-# The height of the paving is taken this far in front of a door's wall. The
-# walls beside a door are this wide [m].
-_STEP, _JAMB = 0.15, 0.3
+# The height of the paving is taken this far in front of a door's wall [m].
+_PAVING_BEFORE = 0.15
+# Width of the walls beside a door [m].
+_JAMB = 0.3
 # A front has one door for every such length [m].
 _DOOR_EVERY = 16.0
-_DOOR_HEIGHT, _LEAST_DOOR = 2.2, 1.8
-_DOOR_WIDTH, _GATE_WIDTH = 1.15, 2.5
-_THRESHOLD, _SHOP_HEIGHT, _SHOP_WIDTH = 0.04, 2.9, 2.2
-# How much deeper doors are than windows, and depths of shop windows and gates
-# [m].
-_DOOR_DEEPER, _SHOP_DEPTH, _GATE_DEPTH = 0.1, 0.35, 0.3
+_DOOR_HEIGHT = 2.2
+# Least height of a door or a shop window [m].
+_LEAST_DOOR = 1.8
+_DOOR_WIDTH = 1.15
+_GATE_WIDTH = 2.5
+# Height of a threshold above the paving [m].
+_THRESHOLD = 0.04
+# Greatest height of the top of a shop window above the ground [m].
+_SHOP_TOP = 2.9
+# Least width of a shop window [m].
+_LEAST_SHOP = 2.2
+# Doors are this much deeper than windows [m].
+_DOOR_DEEPER = 0.1
+_SHOP_DEPTH = 0.35
+_GATE_DEPTH = 0.3
 # A wall stands on the ground if it begins at most this high above the ground
 # [m].
 _ON_GROUND = 0.6
@@ -118,7 +132,7 @@ class FacadePlan:
         how far it protrudes from the wall [m].
         """
         is_low = z - self.ground < _TALLEST_CAR
-        return is_low and self.to_drive < reach + _BESIDE
+        return is_low and self.to_drive < reach + _HALF_PATH
 
     def probes(self) -> np.ndarray:
         """Returns a point in front of each opening and of the wall's top.
@@ -144,7 +158,7 @@ class FacadePlan:
         middle = (door.x0 + door.x1) / 2
         x, out = np.meshgrid(
             [door.x0 + _JAMB, middle, door.x1 - _JAMB],
-            [_STEP, -deep / 2, -deep],
+            [_PAVING_BEFORE, -deep / 2, -deep],
         )
         places = self.panel.place(x, np.zeros(x.shape), out).reshape(-1, 3)
         low = float(paving.heights(places[:, :2]).max()) - self.panel.origin[2]
@@ -212,10 +226,10 @@ def with_shops(plan: FacadePlan, paving: upper_sides.UpperSides) -> FacadePlan:
         paving: upper sides of the paving in front of the wall.
     """
     top = plan.floor + plan.style.storey - 0.75
-    top = min(top, plan.ground + _SHOP_HEIGHT)
+    top = min(top, plan.ground + _SHOP_TOP)
     street, openings = set(plan.on_street), []
     for o in plan.openings:
-        if o in street and o.x1 - o.x0 >= _SHOP_WIDTH:
+        if o in street and o.x1 - o.x0 >= _LEAST_SHOP:
             shop = o._replace(kind="shop", z1=top)
             low = plan.threshold(shop, paving)
             if top >= low + _LEAST_DOOR:
@@ -260,28 +274,46 @@ def with_doors(plan: FacadePlan, paving: upper_sides.UpperSides) -> FacadePlan:
     return replace(plan, openings=openings)
 
 
+# How far parts protrude from their wall [m].
 _PLINTH_REACH = 0.06
 _CORNICE_REACH = 0.28
-_GUTTER, _GUTTER_REACH = 0.15, 0.14
-_SIGN_REACH, _SIGN_HEIGHT = 0.15, 0.5
-_BALCONY_REACH, _BALCONY_WIDTH = 1.15, 3.0
-_AWNING_REACH, _AWNING_HEIGHT = 1.1, 0.55
+_GUTTER_REACH = 0.14
+_SIGN_REACH = 0.15
+_BALCONY_REACH = 1.15
+_AWNING_REACH = 1.1
 _SILL_REACH = 0.07
-# Windows farther from drives than this have no sills, no bars, or no recesses;
-# then they lie on their wall, and walls have no plinths [m].
-_SILLS_WITHIN, _BARS_WITHIN, _RECESSES_WITHIN = 12.0, 20.0, 25.0
-# Windows narrower than the first, or lower than the second, have no bars [m].
-_TWO_LEAVES, _TWO_PANES = 1.0, 1.5
-# Nothing below this height may extend over a car's path, within this distance
-# of the path's middle [m].
-_TALLEST_CAR, _BESIDE = 4.0, 2.5
+# Cornices lower than this are gutters [m].
+_HIGHEST_GUTTER = 0.15
+# Greatest height of a sign [m].
+_SIGN_HEIGHT = 0.5
+# Greatest width of a balcony [m].
+_BALCONY_WIDTH = 3.0
+_AWNING_HEIGHT = 0.55
+# Windows farther from drives than this have no sills [m].
+_SILLS_WITHIN = 12.0
+# Windows farther from drives than this have no bars [m].
+_BARS_WITHIN = 20.0
+# Openings farther from drives than this have no recesses, but lie on their
+# wall; such a wall has no plinth [m].
+_RECESSES_WITHIN = 25.0
+# Windows at most this wide have no vertical bar [m].
+_WIDEST_LEAF = 1.0
+# Windows at most this high have no horizontal bar [m].
+_HIGHEST_PANE = 1.5
+# Nothing below this height may extend over a car's path [m].
+_TALLEST_CAR = 4.0
+# A car's path extends this far to each side of its middle [m].
+_HALF_PATH = 2.5
 # Cornices of walls lower than this would collide with doors [m].
 _LEAST_WALL = 2.5
 # Material of the front of an opening -> its depth if it lies on the wall [m].
 _ON_WALL = {"glass": -0.02, "doors": -0.03, "frames": 0.0}
 # Distance of openings from the edge of a panel that is not a rectangle [m].
 _FROM_EDGE = 0.1
-_EXACT, _LEAST_AREA = 1e-3, 1e-4
+# Grid on which areas of walls are computed [m].
+_GRID = 1e-3
+# Smaller remainders of a wall are dropped [m^2].
+_LEAST_AREA = 1e-4
 
 
 def add_facade(
@@ -323,7 +355,7 @@ def add_facade(
         if plan.to_drive < _RECESSES_WITHIN:
             counts["plinths"] = _add_plinth(out, plan, reliefs)
         if style.cornice and panel.height > _LEAST_WALL:
-            is_gutter = style.cornice < _GUTTER
+            is_gutter = style.cornice < _HIGHEST_GUTTER
             reach = _GUTTER_REACH if is_gutter else _CORNICE_REACH
             low = panel.height - style.cornice
             limits = (-reach, panel.length + reach, low, panel.height, reach)
@@ -351,7 +383,7 @@ def _in_outline(
     area = (0.0, 0.0, panel.length, panel.height)
     outline = panel.outline
     if outline is not None:
-        outline = shapely.buffer(outline, _EXACT, join_style="mitre")
+        outline = shapely.buffer(outline, _GRID, join_style="mitre")
     while True:
         reliefs = [r for o in plan.openings for r in _reliefs(o, plan)]
         if outline is None or not reliefs:
@@ -388,8 +420,10 @@ def _reliefs(opening: Opening, plan: FacadePlan) -> list[tuple[Relief, str]]:
             0.0,
             height,
             style.depth,
-            mullions=int(has_bars and style.width > _TWO_LEAVES),
-            transom=0.7 * height if has_bars and height > _TWO_PANES else None,
+            mullions=int(has_bars and style.width > _WIDEST_LEAF),
+            transom=0.7 * height
+            if has_bars and height > _HIGHEST_PANE
+            else None,
             ledge=_SILL_REACH * has_sill,
             pier=0.15,
         )
@@ -442,7 +476,7 @@ def _add_wall(
     _put(out, "body", panel, wall.moved((x0, 0.0, z0)))
     if panel.outline is not None:
         rest = shapely.difference(
-            panel.outline, box(x0, z0, x1, z1), grid_size=_EXACT
+            panel.outline, box(x0, z0, x1, z1), grid_size=_GRID
         )
         for part in parts_of(rest):
             if part.area > _LEAST_AREA:
@@ -513,13 +547,18 @@ def _add_signs(
     return Counter({"shop windows": len(shops), "awnings": len(awnings)})
 
 
-# A roof is level if the z of its unit normal is at least the first number.
-# Level parts have the same height if they differ by less than the second [m].
-_LEVEL, _SAME_HEIGHT = 0.999, 0.1
+# A roof is level if the z of its unit normal is greater than this.
+_LEVEL_COSINE = 0.999
+# Level parts have the same height if they differ by less than this [m].
+_SAME_HEIGHT = 0.1
+# A roof is flat if at least this share of its area is level.
 _FLAT_PART = 0.6
-_LEAST_ROOF = 40.0  # [m^2]
-# Roof area per piece of equipment [m^2], and the greatest number of pieces.
-_ROOF_EACH, _MOST = 90.0, 6
+# Level parts smaller than this get no equipment [m^2].
+_LEAST_ROOF = 40.0
+# Roof area per piece of equipment [m^2].
+_AREA_OF_ITEM = 90.0
+# Greatest number of pieces of equipment on a roof.
+_MOST_ITEMS = 6
 _ITEMS = {
     "flats": "stair_house vents skylight tank vents dish",
     "office": "lift_house air_handler ac_unit ac_unit vents cooling_tower",
@@ -530,9 +569,10 @@ _ITEMS = {
 }
 _CHIMNEYS = ("house", "flats", "public")
 _BRICK = (0.45, 0.27, 0.22)
-# Depth of a chimney's foot below the ridge [m], and its scale relative to the
-# shared mesh.
-_BELOW_RIDGE, _CHIMNEY_SCALE = 0.35, 0.6
+# Depth of a chimney's foot below the ridge [m].
+_BELOW_RIDGE = 0.35
+# Scale of a chimney relative to the shared mesh.
+_CHIMNEY_SCALE = 0.6
 # Points of a ridge are at most this far below its highest one [m].
 _RIDGE = 0.15
 
@@ -543,7 +583,7 @@ def is_flat_roof(roof: np.ndarray) -> bool:
     `roof` contains the triangles (M, 3, 3) of the roof [m].
     """
     above = np.abs(upper_sides.long_normals(roof)[:, 2])
-    level = np.abs(upper_sides.unit_normals(roof)[:, 2]) > _LEVEL
+    level = np.abs(upper_sides.unit_normals(roof)[:, 2]) > _LEVEL_COSINE
     return bool(above[level].sum() >= _FLAT_PART * above.sum())
 
 
@@ -561,7 +601,7 @@ def add_roof_pieces(
     items = _ITEMS.get(style.use, "").split()
     if is_flat and items and (found := _largest_level(roof)) is not None:
         area, z = found
-        count = min(_MOST, len(items), int(area.area / _ROOF_EACH) + 1)
+        count = min(_MOST_ITEMS, len(items), int(area.area / _AREA_OF_ITEM) + 1)
         ring = np.array(area.exterior.coords)[:-1]
         equip_roof(out, ring, z, items[:count])
     if not is_flat and style.use in _CHIMNEYS:
@@ -570,7 +610,7 @@ def add_roof_pieces(
 
 def _largest_level(roof: np.ndarray) -> tuple[Polygon, float] | None:
     """Returns the largest level part of a roof, without holes, and its z."""
-    level = roof[upper_sides.unit_normals(roof)[:, 2] > _LEVEL]
+    level = roof[upper_sides.unit_normals(roof)[:, 2] > _LEVEL_COSINE]
     best: tuple[Polygon, float] | None = None
     if not len(level):
         return None

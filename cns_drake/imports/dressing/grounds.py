@@ -32,7 +32,9 @@ from cns_drake.imports.options import ImportFaults
 # Within this distance of drives, sidewalks get kerbs and missing ones are added
 # [m].
 _WITHIN = 80.0
-KERB_HEIGHT, _KERB_DEPTH = 0.12, 0.25
+KERB_HEIGHT = 0.12
+# The sides of a kerb reach this far down from its upper edges [m].
+_KERB_DEPTH = 0.25
 _KERB: Rgb = (0.60, 0.60, 0.58)
 _PAVED: Rgb = (0.57, 0.56, 0.53)
 _SIDEWALK = 2.0
@@ -199,12 +201,12 @@ def _cut(area: BaseGeometry, other: BaseGeometry) -> MultiPolygon:
     return _areas(shapely.difference(area, other, grid_size=_GRID))
 
 
-# Half the width of a street of unknown width, and the width of its sidewalks
-# [m].
+# Half the width of a street of unknown width [m].
 HALF_STREET = 3.9
-# A carriageway ends this far from walls, and narrower sidewalks are left out
-# [m].
-_FROM_WALL, _NARROWEST = 0.5, 0.6
+# A carriageway ends this far from walls [m].
+_FROM_WALL = 0.5
+# Sidewalks narrower than this are left out [m].
+_NARROWEST_SIDEWALK = 0.6
 # A carriageway is this far above the ground that it covers [m].
 _ABOVE = 0.02
 
@@ -230,7 +232,7 @@ def guessed_streets(
     street = _cut(paths.buffer(HALF_STREET, 4), walls.buffer(_FROM_WALL, 1))
     beside = _cut(paths.buffer(HALF_STREET + _SIDEWALK, 4), street)
     beside = _cut(beside, walls)
-    half = _NARROWEST / 2.0
+    half = _NARROWEST_SIDEWALK / 2.0
     wide = beside.buffer(-half, 2).buffer(half, 2)
     sidewalks = wide.intersection(beside)
     terrain = (one for one in structures if one.kind == "TINRelief")
@@ -275,11 +277,14 @@ def _laid(
     return np.concatenate(found)
 
 
-# Width of the widest gap, and area of the smallest one, that is paved [m, m^2].
-_WIDEST, _LEAST_AREA = 3.0, 0.05
-# Parts narrower than this stay open. A gap is at most this far from a sidewalk
-# [m].
-_NARROWEST_GAP, _BESIDE = 0.1, 0.1
+# Width of the widest gap that is paved [m].
+_WIDEST_GAP = 3.0
+# Area of the smallest gap that is paved [m^2].
+_SMALLEST_GAP = 0.05
+# Parts of a gap that are narrower than this stay open [m].
+_NARROWEST_GAP = 0.1
+# A gap is at most this far from a sidewalk [m].
+_GAP_WITHIN = 0.1
 # All gaps in a square of this size are one structure [m].
 _SQUARE = 50.0
 
@@ -303,9 +308,9 @@ def paved_gaps(
     walks_tree = STRtree(walks)
     houses = [one for one in near if one.structure.semantic_class == "building"]
     roofs = _upper_sides(houses)
-    beside = walks_tree.query(roofs, "dwithin", _WIDEST)[0]
+    beside = walks_tree.query(roofs, "dwithin", _WIDEST_GAP)[0]
     covered = shapely.union_all([*walks, *roads, *roofs[np.unique(beside)]])
-    half = _WIDEST / 2.0
+    half = _WIDEST_GAP / 2.0
     closed = covered.buffer(half, 2).buffer(-half, 2)
     gaps = shapely.difference(closed, covered, grid_size=_GRID)
     other = _upper_sides(
@@ -320,8 +325,8 @@ def paved_gaps(
     surfaces: dict[tuple[int, int], list[np.ndarray]] = {}
     for part in parts_of(gaps):
         if (
-            part.area < _LEAST_AREA
-            or not walks_tree.query(part, "dwithin", _BESIDE).size
+            part.area < _SMALLEST_GAP
+            or not walks_tree.query(part, "dwithin", _GAP_WITHIN).size
         ):
             continue
         taken = shapely.union_all(
@@ -364,13 +369,22 @@ def _flat_outline(one: Imported) -> BaseGeometry:
     return shapely.coverage_union_all(_upper_sides([one]))
 
 
-# Streets get marks if they are this close to drives and at least this wide [m].
-_MARKS_WITHIN, _LEAST_WIDTH = 80.0, 6.0
+# Streets get marks if they are this close to drives [m].
+_MARKS_WITHIN = 80.0
+# Streets get marks if they are at least this wide [m].
+_LEAST_MARKED = 6.0
 _CLASSES = ("primary", "secondary", "tertiary")
-# Length of a dash and of the gap after it, width of a dash, its height above
-# the street, and the length before a junction that stays free, in addition to
-# half the street's width [m].
-_DASH, _GAP, _WIDTH, _HEIGHT, _BEFORE = 3.0, 6.0, 0.12, 0.01, 4.0
+# Length of a dash [m].
+_DASH = 3.0
+# Length of the gap after a dash [m].
+_GAP = 6.0
+# Width of a dash [m].
+_DASH_WIDTH = 0.12
+# Height of a dash above the street [m].
+_DASH_HEIGHT = 0.01
+# Length before a junction that stays free, in addition to half the street's
+# width [m].
+_BEFORE_JUNCTION = 4.0
 _WHITE: Rgb = (0.86, 0.86, 0.84)
 
 
@@ -389,13 +403,13 @@ def lane_marks(
         if (
             street.forward
             and street.backward
-            and street.width >= _LEAST_WIDTH
+            and street.width >= _LEAST_MARKED
             and (street.tags.get("highway") in _CLASSES or lanes == "2")
             and line.distance(paths) < _MARKS_WITHIN
         ):
             middles = np.arange(_GAP, line.length - _DASH, _DASH + _GAP)
             places = shapely.line_interpolate_point(line, middles)
-            free = street.width / 2.0 + _BEFORE
+            free = street.width / 2.0 + _BEFORE_JUNCTION
             # Without any junction, the distance is NaN.
             kept = ~(shapely.distance(places, junctions) <= free)
             dashes = [_dash(line, s) for s in middles[kept].tolist()]
@@ -425,7 +439,7 @@ def _dash(line: LineString, s: float) -> np.ndarray:
     ends = [line.interpolate(s + k * _DASH / 2.0) for k in (-1.0, 1.0)]
     a, b = (np.array([end.x, end.y]) for end in ends)
     along = (b - a) / np.hypot(*(b - a))
-    left = np.array([-along[1], along[0]]) * _WIDTH / 2.0
+    left = np.array([-along[1], along[0]]) * _DASH_WIDTH / 2.0
     ring = np.array([a - left, b - left, b + left, a + left])
-    corners = np.column_stack([ring, np.full(4, _HEIGHT)])
+    corners = np.column_stack([ring, np.full(4, _DASH_HEIGHT)])
     return corners[[[0, 1, 2], [0, 2, 3]]]

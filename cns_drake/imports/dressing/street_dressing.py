@@ -94,10 +94,14 @@ def place_along(
     return (x, y), at.yaw
 
 
-# Number of sides of posts and balls, and of discs. Discs such as signs must not
-# look like octagons.
-_SIDES, _SIDES_OF_DISC = 8, 20
-_POST, _DISC, _BALL = "round_post", "round_disc", "round_ball"
+# Number of sides of posts and balls.
+_SIDES = 8
+# Number of sides of discs. Discs such as signs must not look like octagons.
+_SIDES_OF_DISC = 20
+# Names of the meshes.
+_POST = "round_post"
+_DISC = "round_disc"
+_BALL = "round_ball"
 
 
 def without_curves(model: Model) -> Model:
@@ -134,10 +138,15 @@ def _turned(radius: list[float], z: list[float], sides: int) -> Mesh:
 
 # Least distance of objects from the middle of a drive [m].
 _FROM_DRIVE = 1.7
-_FROM_WALL, _BETWEEN = 0.25, 0.2
-# Nothing stands where the ground below it falls by more than this, or on a
-# street that is this far above the guessed ground [m].
-_STEEPEST, _BRIDGE = 0.5, 1.0
+# Least distance of objects from walls [m].
+_FROM_WALL = 0.25
+# Least distance between two objects [m].
+_BETWEEN = 0.2
+# Nothing stands where the ground below it falls by more than this [m].
+_MOST_FALL = 0.5
+# A street this far above the guessed ground is a bridge or a roof, and no
+# object stands on it [m].
+_BRIDGE_HEIGHT = 1.0
 # Radius around the middle of a trunk that no other object takes [m].
 _TRUNK = 0.4
 # Classes of structures that nothing may touch.
@@ -270,12 +279,12 @@ class StreetRoom:
         feet = structure.p_WFs[:, :2]
         heights, guessed = self._laid.heights(feet), self._ground.height(feet)
         # A street far above the guessed ground is a bridge or a roof.
-        is_laid = np.isfinite(heights) & (heights < guessed + _BRIDGE)
+        is_laid = np.isfinite(heights) & (heights < guessed + _BRIDGE_HEIGHT)
         heights = np.where(is_laid, heights, guessed)
         z = round(float(heights.min()), 3)
         footprint = placed(model.footprint, xy, yaw)
         if (
-            np.ptp(heights) > _STEEPEST
+            np.ptp(heights) > _MOST_FALL
             or self.paths.distance(footprint) < _FROM_DRIVE
             or not self._taken.is_free(footprint, _BETWEEN)
             or self._is_built(footprint)
@@ -314,13 +323,22 @@ def _footing(footprint: BaseGeometry, z: float) -> np.ndarray:
 
 # Cars farther than this from all drives are left out [m].
 ROWS_WITHIN = 70.0
-# Parked cars: least and greatest distance in a row, share of the places that
-# are taken, distance of their middle from the kerb, and of rows from other
-# streets [m].
-_CAR_EVERY, _CARS, _FROM_KERB, _FROM_CROSSING = (5.8, 7.2), 0.6, 1.05, 5.0
-# Length of a place along a row; width and length of a bay across one; width of
-# the aisle between bays [m].
-_ROW_PITCH, _BAY, _AISLE = 6.2, (2.6, 5.0), 5.5
+# Least and greatest distance between cars that are parked along a street [m].
+_CAR_EVERY = (5.8, 7.2)
+# Share of the places that are taken.
+_TAKEN_SHARE = 0.6
+# Distance of the cars' middle from the kerb [m].
+_FROM_KERB = 1.05
+# Distance of the cars from other streets [m].
+_FROM_CROSSING = 5.0
+# Length of a place along the row of a car park that is too narrow for bays [m].
+_ROW_PITCH = 6.2
+# Width of a bay [m].
+_BAY_WIDTH = 2.6
+# Length of a bay, across the row [m].
+_BAY_LENGTH = 5.0
+# Width of the aisle between two rows of bays [m].
+_AISLE = 5.5
 
 
 def may_park_on(side: str, street: Street) -> bool:
@@ -375,7 +393,7 @@ def park_along(
         while s < line.length - 4.0:
             xy, yaw = place_along(line, s, side, row.half - _FROM_KERB)
             yaw += 0.0 if side > 0 else np.pi
-            is_taken = rng.random() < _CARS
+            is_taken = rng.random() < _TAKEN_SHARE
             yaw += float(rng.uniform(-0.02, 0.02))
             form = pick(_TABLES["vehicles"], rng)
             # Without other streets, the distance is NaN.
@@ -405,10 +423,10 @@ def fill_car_park(placing: StreetRoom, one: Imported, seed: int) -> None:
     along = sides[first] / length
     across = np.array([-along[1], along[0]])
     middle = box[:4].mean(axis=0)
-    is_row = width < _BAY[1]
-    pitch = _ROW_PITCH if is_row else _BAY[0]
-    offsets = [0.0] if is_row else [width / 2.0 - _BAY[1] / 2.0 - 0.2]
-    if width > 2.0 * _BAY[1] + _AISLE:
+    is_row = width < _BAY_LENGTH
+    pitch = _ROW_PITCH if is_row else _BAY_WIDTH
+    offsets = [0.0] if is_row else [width / 2.0 - _BAY_LENGTH / 2.0 - 0.2]
+    if width > 2.0 * _BAY_LENGTH + _AISLE:
         offsets.append(-offsets[0])
     heading = float(np.arctan2(along[1], along[0]))
     heading += 0.0 if is_row else np.pi / 2.0
@@ -422,7 +440,7 @@ def fill_car_park(placing: StreetRoom, one: Imported, seed: int) -> None:
             place = middle + x * along + offset * across
             yaw = heading + float(rng.uniform(-0.02, 0.02))
             form = pick(_TABLES["vehicles"], rng)
-            if rng.random() > _CARS or not area.contains(Point(place)):
+            if rng.random() > _TAKEN_SHARE or not area.contains(Point(place)):
                 continue
             xy = (float(place[0]), float(place[1]))
             if placing.place(f"car_{name}_{row}_{k}", form, xy, yaw, rng):

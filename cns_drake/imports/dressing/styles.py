@@ -22,13 +22,15 @@ _USE_KEYS = (
     "building:part",
 )
 _LOOKS = parse_yaml(Path(__file__).with_name("styles.yaml").read_bytes())
-# A house is old if it was built before the first year, and new if after the
-# second.
-_OLD, _NEW = 1930, 1965
+# A house is old if it was built before this year.
+_OLD_BEFORE = 1930
+# A house is new if it was built in this year or later.
+_NEW_FROM = 1965
 # Least and greatest storey height that a tag's number of levels may lead to
 # [m].
 _STOREYS = (2.3, 6.0)
-_LARGE_HOUSE, _HIGH_HOUSE = 260.0, 9.5  # [m^2], [m]
+_LARGE_HOUSE = 260.0  # [m^2]
+_HIGH_HOUSE = 9.5  # [m]
 _HIGH_BLOCK = 26.0  # [m]
 _SMALL = 45.0  # [m^2]
 
@@ -150,7 +152,7 @@ def make_style(
     tint = float(rng.uniform(0.92, 1.06))
     is_old = float(rng.random()) < 0.6
     if year is not None:
-        is_old = year < _OLD or (year < _NEW and is_old)
+        is_old = year < _OLD_BEFORE or (year < _NEW_FROM and is_old)
     chances = rng.random(4)
     is_block = use in ("flats", "office", "retail")
     levels = count(tags.get("building:levels")) if tags else None

@@ -27,9 +27,11 @@ _MM = 1000.0
 # A wall is a rectangle if at most this much of the rectangle's area is missing
 # [m^2].
 _NO_AREA = 0.01
-# Greatest deviation of a wall from its plane. The second is that of a piece of
-# a bent wall, which must leave no gap to the next piece [m].
-_BENT, _PIECE_BENT = 0.05, 0.01
+# Greatest deviation of a wall from its plane [m].
+_MOST_BENT = 0.05
+# The same for a piece of a bent wall, which must leave no gap to the next piece
+# [m].
+_MOST_PIECE_BENT = 0.01
 
 
 @dataclass(frozen=True)
@@ -161,7 +163,7 @@ def _plane_pieces(
     def of(members: Sequence[int]) -> Panel:
         here = np.isin(facets, members)
         one = triangles[here], normals[here], areas[here]
-        return _panel(wall.building, *one, _PIECE_BENT)
+        return _panel(wall.building, *one, _MOST_PIECE_BENT)
 
     found: list[Panel] = []
     members: list[int] = []
@@ -210,7 +212,7 @@ def _panel(
     triangles: np.ndarray,
     normals: np.ndarray,
     areas: np.ndarray,
-    bent: float = _BENT,
+    bent: float = _MOST_BENT,
 ) -> Panel:
     """Returns the panel of connected triangles (M, 3, 3) of a building [m].
 

@@ -424,8 +424,10 @@ _TURN = 12.0
 _SHARP_DEG_PER_M = 4.0
 # Tolerances of waypoints relative to the lanes, tried in turn [m].
 _TOLERANCES = (0.2, 0.4, 0.8, 1.2)
-# Lengths of the running means that smooth corners, and lateral offsets [m].
-_ROUND, _SMOOTH_ASIDE = 7, 15
+# Number of places in the running mean that smooths corners.
+_CORNER_WINDOW = 7
+# Number of places in the running mean that smooths lateral offsets.
+_OFFSET_WINDOW = 15
 
 
 @dataclass(frozen=True, eq=False)
@@ -644,7 +646,9 @@ class StreetGraph(WayGraph):
 
     def drive(self, way: Sequence[int]) -> WaypointDrive | Obstacle:
         rows = lane_path([self.lanes[k] for k in way], _LANE_SPACING)
-        middle = uniform_filter1d(rows[:, :2], _ROUND, axis=0, mode="nearest")
+        middle = uniform_filter1d(
+            rows[:, :2], _CORNER_WINDOW, axis=0, mode="nearest"
+        )
         along = np.gradient(middle, axis=0)
         along /= np.maximum(np.linalg.norm(along, axis=1), 1e-9)[:, None]
         heading = np.unwrap(np.arctan2(along[:, 1], along[:, 0]))
@@ -655,7 +659,7 @@ class StreetGraph(WayGraph):
         found: WaypointDrive | Obstacle = middle[len(middle) // 2]
         for tolerance, share in product(_TOLERANCES, _AT_TURNS):
             aside = rows[:, 2] * np.where(near, share, 1.0)
-            aside = uniform_filter1d(aside, _SMOOTH_ASIDE, mode="nearest")
+            aside = uniform_filter1d(aside, _OFFSET_WINDOW, mode="nearest")
             places = middle + aside[:, None] * right
             found = simplified_drive(places, self._space, (tolerance,))
             if isinstance(found, WaypointDrive):

@@ -33,12 +33,14 @@ _BEFORE = 1.0
 # The kerbs on both sides of a step have the same direction within this angle;
 # the step itself turns by more [rad].
 _ASTRAY = np.radians(45.0)
-# Length of a taper relative to the width of its step, and its greatest length
-# [m].
-_SLENDER, _LONGEST = 10.0, 6.0
-# Places where a taper may end are at most this far apart. Corners this close to
-# a straight edge are dropped [m].
-_SPACING, _SIMPLE = 0.25, 0.005
+# Greatest length of a taper relative to the width of its step.
+_TAPER_RATIO = 10.0
+# Greatest length of a taper [m].
+_LONGEST_TAPER = 6.0
+# Places where a taper may end are at most this far apart [m].
+_SPACING = 0.25
+# Corners this close to a straight edge are dropped [m].
+_CORNER_TOLERANCE = 0.005
 # Slits between lanes are closed up to twice this width [m].
 _SEAM = 0.05
 # Vertices closer to an outline than this are dropped [m].
@@ -67,7 +69,7 @@ def kerb_tapers(carriageway: BaseGeometry) -> list[Polygon]:
     for polygon in polygons_of(carriageway):
         polygon = shapely.orient_polygons(polygon)
         for ring in (polygon.exterior, *polygon.interiors):
-            simple = LinearRing(ring).simplify(_SIMPLE)
+            simple = LinearRing(ring).simplify(_CORNER_TOLERANCE)
             xy = shapely.get_coordinates(simple)[:-1]
             found += map(Polygon, _tapers(xy))
             # Reversed and mirrored, the ring has the carriageway on its left
@@ -104,7 +106,7 @@ def _tapers(xy: np.ndarray) -> Iterator[np.ndarray]:
         reach = np.hypot(*np.diff(straight, axis=0).T).sum()
         if reach < _BEFORE or len(chain) < 2:
             continue
-        within = min(_LONGEST, _SLENDER * aside)
+        within = min(_LONGEST_TAPER, _TAPER_RATIO * aside)
         dense = shapely.get_coordinates(
             shapely.segmentize(shapely.linestrings(chain), _SPACING)
         )

@@ -36,10 +36,14 @@ _SMOOTHING = (0, 1, 2, 3)
 # Speed limit where the file gives none [m/s].
 _LIMIT = 13.9
 _SIDEWALKS = frozenset({"sidewalk", "walking"})
-# Walkers' least distance from the edges of a sidewalk, and greatest distance
-# from its middle [m].
-_MARGIN, _MOST_HALF_WIDTH = 0.45, 1.05
-_LEAST_HALF_WIDTH, _SHORTEST = 0.3, 5.0
+# Least distance of walkers from the edges of a sidewalk [m].
+_FROM_EDGE = 0.45
+# Greatest distance of walkers from the middle of a sidewalk [m].
+_MOST_HALF_WIDTH = 1.05
+# There are no walkers where this distance would be smaller [m].
+_LEAST_HALF_WIDTH = 0.3
+# Least length of a sidewalk with walkers [m].
+_SHORTEST_WALKWAY = 5.0
 
 
 class BandGraph(search.WayGraph):
@@ -219,9 +223,9 @@ def _walkways(bands: Sequence[LaneBand], kerbs: KerbHeights) -> list[Walkway]:
     """Returns a walkway for each sidewalk, at whose ends walkers turn round."""
     found: list[Walkway] = []
     for band in bands:
-        half = min(float(band.width.min()) / 2 - _MARGIN, _MOST_HALF_WIDTH)
+        half = min(float(band.width.min()) / 2 - _FROM_EDGE, _MOST_HALF_WIDTH)
         steps = np.linalg.norm(np.diff(band.middle, axis=0), axis=1)
-        if half < _LEAST_HALF_WIDTH or steps.sum() < _SHORTEST:
+        if half < _LEAST_HALF_WIDTH or steps.sum() < _SHORTEST_WALKWAY:
             continue
         first = 2 * len(found)
         kerb = kerbs(band.middle[:, :2])

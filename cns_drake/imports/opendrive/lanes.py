@@ -34,15 +34,19 @@ _LEAST_KERB = 0.03
 _SPACING = 2.0
 _SAG = 0.002
 _MOST_STATIONS = 200_000
-# No lane is farther from the reference line than this, or higher [m].
-_FARTHEST, _HIGHEST = 50_000.0, 10_000.0
+# No lane is farther from the reference line than this along x or y [m].
+_FARTHEST = 50_000.0
+# No lane is farther above or below it than this [m].
+_HIGHEST = 10_000.0
 # Distances along the road that differ by less than this are the same [m].
 _INWARDS = 1e-6
 # A road at least this far above another one is a bridge [m].
 _HEADROOM = 3.0
-# Cell size for finding places above one another, and length of a bridge to both
-# sides of the road that it crosses [m].
-_NEAR, _BEYOND = 2.5, 8.0
+# Places are above one another if they are at most this far apart, as seen from
+# above [m].
+_ABOVE_WITHIN = 2.5
+# A bridge extends this far to both sides of the road that it crosses [m].
+_BRIDGE_REACH = 8.0
 _LEAST_WIDTH = 0.1
 # Number of nearby places whose planes are averaged.
 _NEIGHBOURS = 8
@@ -321,7 +325,9 @@ def split_levels(
         if above is None:
             ground.append(band)
             continue
-        low, high = np.searchsorted(above, [band.s - _BEYOND, band.s + _BEYOND])
+        low, high = np.searchsorted(
+            above, [band.s - _BRIDGE_REACH, band.s + _BRIDGE_REACH]
+        )
         is_bridge = high > low
         for run, carried in _runs(is_bridge):
             parts = {name: getattr(band, name)[run] for name in _ARRAYS}
@@ -349,7 +355,9 @@ def _raised_places(bands: Sequence[LaneBand]) -> dict[str, np.ndarray]:
     found: dict[str, list[float]] = {}
     high = np.flatnonzero(places[:, 2] > places[:, 2].min() + _HEADROOM)
     for k, near in zip(
-        high, tree.query_ball_point(places[high, :2], _NEAR), strict=True
+        high,
+        tree.query_ball_point(places[high, :2], _ABOVE_WITHIN),
+        strict=True,
     ):
         others = places[near]
         below = others[:, 2] < places[k, 2] - _HEADROOM

@@ -22,9 +22,10 @@ from cns_drake.imports.opendrive import road_model
 from cns_drake.imports.opendrive.things import read_things
 from cns_drake.imports.options import ImportFaults
 
-# Width of a painted line without a plausible width, and greatest plausible one
-# [m].
-_MARK_WIDTH, _WIDEST_MARK = 0.12, 1.0
+# Width of a painted line without a plausible width [m].
+_MARK_WIDTH = 0.12
+# Greatest plausible width of a painted line [m].
+_WIDEST_MARK = 1.0
 # Least distance between the starts of two dashes [m].
 _CLOSEST_DASHES = 0.1
 _ENDS = ("predecessor", "successor")

@@ -58,10 +58,13 @@ _INWARDS = 0.05
 # Lines are cut with one such square of the carriageway at a time [m].
 _SQUARE = 64.0
 _MM = 0.001
-# Default length of a dash and of its gap; distance of the lines of a double
-# line from its middle; height above the road [m].
-_DASH, _GAP = 3.0, 6.0
+# Default length of a dash [m].
+_DASH = 3.0
+# Default length of the gap between two dashes [m].
+_GAP = 6.0
+# Distance of the lines of a double line from its middle [m].
 _ASIDE = 0.12
+# Height of marks above the road [m].
 _ABOVE = 0.015
 _SHORTEST = 0.05
 _COLOURS: dict[str, Rgb] = {

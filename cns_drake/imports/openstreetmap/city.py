@@ -359,8 +359,10 @@ _INSIDE = 0.9
 _ALL_OF_IT = 0.9
 # Remainders of an outline that are narrower than this are dropped [m].
 _SLIVER = 0.25
-# Least height of a passage, and of the building above it [m].
-_LEAST_CLEAR, _LINTEL = 2.0, 0.4
+# Least height of a passage [m].
+_LEAST_CLEAR = 2.0
+# Least height of the building above a passage [m].
+_LINTEL = 0.4
 
 
 @dataclass(frozen=True)

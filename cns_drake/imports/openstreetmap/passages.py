@@ -31,14 +31,19 @@ from cns_drake.imports.openstreetmap.tags import (
 from cns_drake.imports.options import ImportFaults
 
 _RAILS = ("rail", "light_rail", "tram")
-# Usual clear heights of passages: of streets, paths and railways [m].
-_STREET, _PATH, _RAIL = 4.5, 2.8, 5.5
+# Usual clear height of a passage for a street [m].
+_STREET_HEIGHT = 4.5
+# Usual clear height of a passage for a path [m].
+_PATH_HEIGHT = 2.8
+# Usual clear height of a passage for a railway [m].
+_RAIL_HEIGHT = 5.5
 _TRACK = 3.5
 _TALLEST = 30.0
-# A passage reaches beyond the walls by the first length, because ways and
-# outlines meet only nearly; on each side, it is wider than its way by the
-# second one [m].
-_BEYOND, _ASIDE = 0.3, 0.25
+# A passage reaches this far beyond the walls, because ways and outlines meet
+# only nearly [m].
+_BEYOND_WALLS = 0.3
+# On each side, a passage is this much wider than its way [m].
+_BESIDE_WAY = 0.25
 # A way leads through a building if more than this is inside [m].
 _THROUGH = 0.5
 # Values of `maxheight` that are no heights, but usual.
@@ -101,9 +106,9 @@ def passages_of(
         width = width_of(tags)
         if not (is_passage and width and _on_the_ground(tags)):
             continue
-        usual = _STREET if street_width(tags) else _PATH
+        usual = _STREET_HEIGHT if street_width(tags) else _PATH_HEIGHT
         if tags.get("railway") in _RAILS:
-            usual = _RAIL
+            usual = _RAIL_HEIGHT
         clear = None
         if tags.get("maxheight") not in _NO_HEIGHTS:
             where = (name, faults)
@@ -114,9 +119,9 @@ def passages_of(
         area: BaseGeometry
         if has_tag(tags, "area") and course.is_closed and len(line) > 3:
             area = shapely.make_valid(Polygon(course))
-            area = area.buffer(_BEYOND, join_style="mitre")
+            area = area.buffer(_BEYOND_WALLS, join_style="mitre")
         else:
-            half = width / 2.0 + _ASIDE
+            half = width / 2.0 + _BESIDE_WAY
             area = _longer(course).buffer(half, cap_style="flat")
         found.append(Passage(name, course, area, clear or usual))
     return found
@@ -129,7 +134,7 @@ def _longer(course: LineString) -> LineString:
     for end, before in ((0, 1), (-1, -2)):
         out = places[end] - places[before]
         out /= max(float(np.hypot(*out)), 1e-9)
-        ends.append(places[end] + _BEYOND * out)
+        ends.append(places[end] + _BEYOND_WALLS * out)
     return LineString([ends[0], *places, ends[1]])
 
 
@@ -232,7 +237,7 @@ class WayOpenings:
             if edges & {frozenset(pair) for pair in pairwise(way.nodes)}:
                 continue  # It leads along the barrier.
             if on_it & {*way.nodes}:
-                half = (width_of(way.tags) or 0.0) / 2.0 + _ASIDE
+                half = (width_of(way.tags) or 0.0) / 2.0 + _BESIDE_WAY
                 areas.append(line.buffer(half, cap_style="square"))
             elif line.crosses(course):
                 faults.add("way across a barrier, without an opening", way.name)

@@ -211,11 +211,12 @@ _SEMI_MAJOR = 6378137.0
 _FLATTENING = 1.0 / 298.257223563
 # Smaller areas are points with rounding errors; it is about 0.01 m^2 [deg^2].
 _NO_AREA = 1e-12
-_FLAT, _OPEN = "without area", "whose outline does not close"
+_FLAT = "without area"
+_OPEN = "whose outline does not close"
 _LETTERS = {"Node": "n", "Way": "w", "Relation": "r"}
-_KIND_KEYS, _GONE, _LIFECYCLE = (
-    tuple(TABLES[key].split()) for key in ("kinds", "gone", "lifecycle")
-)
+_KIND_KEYS = tuple(TABLES["kinds"].split())
+_GONE = tuple(TABLES["gone"].split())
+_LIFECYCLE = tuple(TABLES["lifecycle"].split())
 
 
 class Local:

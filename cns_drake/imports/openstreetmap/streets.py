@@ -42,15 +42,19 @@ from cns_drake.imports.openstreetmap.tags import (
 )
 from cns_drake.imports.options import ImportFaults
 
-# Parapets: distance from the edge of the street, thickness, height [m].
-_FROM_EDGE, _THICK, _HIGH = 0.2, 0.25, 1.0
+# Distance of a parapet from the edge of the street [m].
+_PARAPET_FROM_EDGE = 0.2
+_PARAPET_THICKNESS = 0.25
+_PARAPET_HEIGHT = 1.0
 _BESIDE_BRIDGE = 2.0
 _SIDEWALK = 2.0
 _KERB = 0.12
 _WHITE = (0.86, 0.86, 0.84)
-# Width of the stripes of a zebra crossing and of the gaps between them; length
-# of a stripe; height above the street [m].
-_STRIPE, _STRIPE_LENGTH, _STRIPE_HEIGHT = 0.5, 3.0, 0.01
+# Width of the stripes of a zebra crossing, and of the gaps between them [m].
+_STRIPE_WIDTH = 0.5
+_STRIPE_LENGTH = 3.0
+# Height of the stripes above the street [m].
+_STRIPE_HEIGHT = 0.01
 
 
 @dataclass(frozen=True)
@@ -135,7 +139,7 @@ class Look(NamedTuple):
 
 _ROAD = Look("Road", "road", None, 0.0)
 _WALK = Look("Sidewalk", "sidewalk", None, _KERB)
-_PARAPET = Look("Parapet", "fence", (0.62, 0.60, 0.57), _HIGH)
+_PARAPET = Look("Parapet", "fence", (0.62, 0.60, 0.57), _PARAPET_HEIGHT)
 
 
 def laid(
@@ -209,9 +213,15 @@ def parapets(
         course = LineString(local(line))
         strips = []
         for side, walk in zip((1.0, -1.0), sidewalk_sides(tags), strict=True):
-            aside = width / 2.0 + _FROM_EDGE + (_BESIDE_BRIDGE if walk else 0.0)
+            aside = (
+                width / 2.0
+                + _PARAPET_FROM_EDGE
+                + (_BESIDE_BRIDGE if walk else 0.0)
+            )
             edge = course.offset_curve(side * aside)
-            strips.append(edge.buffer(_THICK / 2.0, cap_style="flat"))
+            strips.append(
+                edge.buffer(_PARAPET_THICKNESS / 2.0, cap_style="flat")
+            )
         source = (name, ImportFaults())
         yield from raised(f"parapet_{name}", _PARAPET, strips, source)
 
@@ -361,14 +371,14 @@ def _stripes(
 ) -> list[Polygon]:
     """Returns the stripes across a street, around a place."""
     left = np.array([-along[1], along[0]])
-    count = max(1, int((width - _STRIPE) / (2 * _STRIPE)))
-    middles = (np.arange(count) - (count - 1) / 2) * 2 * _STRIPE
+    count = max(1, int((width - _STRIPE_WIDTH) / (2 * _STRIPE_WIDTH)))
+    middles = (np.arange(count) - (count - 1) / 2) * 2 * _STRIPE_WIDTH
     corners = np.array([(-1, -1), (1, -1), (1, 1), (-1, 1)]) / 2
     return [
         Polygon(
             place
             + np.outer(corners[:, 0] * _STRIPE_LENGTH, along)
-            + np.outer(corners[:, 1] * _STRIPE + middle, left)
+            + np.outer(corners[:, 1] * _STRIPE_WIDTH + middle, left)
         )
         for middle in middles
     ]
@@ -393,9 +403,10 @@ _SPORTS_ON_GRASS = ("soccer", "rugby", "american_football", "cricket")
 _SURFACES = {"sand": _SAND, "gravel": _GRAVEL, "fine_gravel": _GRAVEL}
 # Car parks of these kinds are below the ground or in a building.
 _NO_GROUND = ("underground", "multi-storey", "rooftop")
-# A coastline that ends within the city is extended by this length. Probes
-# beside it, at this distance, find the side of the sea [m].
-_BEYOND, _BESIDE = 3000.0, 0.1
+# A coastline that ends within the city is extended by this length [m].
+_COAST_EXTENSION = 3000.0
+# Probes at this distance from a coastline find the side of the sea [m].
+_COAST_PROBE = 0.1
 
 
 def ground_areas(
@@ -502,7 +513,7 @@ def _prolonged(line: LineString, whole: BaseGeometry) -> LineString:
             way = points[end] - points[before]
             if not way.any():
                 continue
-            far = points[end] + _BEYOND * way / np.hypot(*way)
+            far = points[end] + _COAST_EXTENSION * way / np.hypot(*way)
             points = (
                 np.vstack([far, points])
                 if end == 0
@@ -522,7 +533,9 @@ def _is_sea(area: BaseGeometry, coasts: Sequence[LineString]) -> bool:
         used = length > 0.0
         middles = (points[:-1] + steps / 2.0)[used]
         steps, length = steps[used], length[used]
-        aside = _BESIDE * np.c_[steps[:, 1], -steps[:, 0]] / length[:, None]
+        aside = (
+            _COAST_PROBE * np.c_[steps[:, 1], -steps[:, 0]] / length[:, None]
+        )
         for side in (1.0, -1.0):
             places = shapely.points(middles + side * aside)
             right += side * float(length[shapely.contains(area, places)].sum())

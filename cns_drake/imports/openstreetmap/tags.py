@@ -37,9 +37,13 @@ _LOWEST = 0.1  # [m]
 _MOST_LEVELS = 170
 _WIDEST = 60.0  # [m]
 _LANES_OF_STREET = 16
-# Least width of a lane that carries vehicles, the width that drivers use, and
-# the width of street per lane if the file gives no number of lanes [m].
-_LEAST, _USED, _USUAL = 2.75, 3.25, 3.5
+# Least width of a lane that carries vehicles [m].
+_LEAST_LANE_WIDTH = 2.75
+# Greatest width that drivers use per lane if the file gives no number of lanes
+# [m].
+_USED_LANE_WIDTH = 3.25
+# Width of street per lane if the file gives no number of lanes [m].
+_USUAL_LANE_WIDTH = 3.5
 _MOST_LANES = 8
 _KM_H = 1.0 / 3.6
 _MILES_H = 0.44704
@@ -48,8 +52,10 @@ _WALKING_PACE = 7.0 * _KM_H
 # Speed limit of links, such as ramps [km/h].
 _LINKS = 50.0
 _SPEED = re.compile(r"(?:zone)?\s*(\d{1,3})(?:\s*(km/h|kmh|kph|mph))?")
-# Tags that give a limit by a rule, and countries whose rules are in miles.
-_SPEED_RULES, _IN_MILES = ("zone:maxspeed", "maxspeed:type"), ("gb", "uk", "us")
+# Tags that give a limit by a rule.
+_SPEED_RULES = ("zone:maxspeed", "maxspeed:type")
+# Countries whose rules are in miles per hour.
+_IN_MILES = ("gb", "uk", "us")
 
 
 def length(text: str | None) -> float | None:
@@ -374,7 +380,7 @@ def lane_layout(tags: Mapping[str, str], width: float) -> LaneLayout:
     """
     is_along, is_against = driven_ways(tags)
     directions = is_along + is_against
-    most = int(width / _LEAST)
+    most = int(width / _LEAST_LANE_WIDTH)
     if directions == 0 or most < directions:
         return LaneLayout(0, 0, 0.0, 0)
 
@@ -383,7 +389,9 @@ def lane_layout(tags: Mapping[str, str], width: float) -> LaneLayout:
         return None if value is None else int(value)
 
     tagged = number("lanes")
-    total = tagged or directions * int(max(1.0, width / directions / _USUAL))
+    total = tagged or directions * int(
+        max(1.0, width / directions / _USUAL_LANE_WIDTH)
+    )
     if directions == 1:
         forward = min(total, most) * is_along
         backward = min(total, most) * is_against
@@ -398,7 +406,7 @@ def lane_layout(tags: Mapping[str, str], width: float) -> LaneLayout:
             else:
                 backward -= 1
     total = max(forward + backward, min(tagged or 0, most))
-    most_used = width if tagged == total else _USED
+    most_used = width if tagged == total else _USED_LANE_WIDTH
     return LaneLayout(forward, backward, min(most_used, width / total), total)
 
 

@@ -31,14 +31,22 @@ from cns_drake.traffic.lane_file import lane_text
 from cns_drake.traffic.lane_graph import SPACING
 from cns_drake.traffic.lane_joining import DirectedLane, join_lanes
 
-# Distance from the kerb to the middle of a walked strip, half the strip's
-# width, and its least distance from the edges of a sidewalk [m].
-_FROM_KERB, _HALF_STRIP, _FROM_EDGE = 1.3, 0.3, 0.55
+# Distance from the kerb to the middle of a walked strip [m].
+_FROM_KERB = 1.3
+# Half the width of a walked strip [m].
+_HALF_STRIP = 0.3
+# Least distance of a walked strip from the edges of a sidewalk [m].
+_FROM_EDGE = 0.55
+# Least length of a walked strip [m].
 _LEAST_STRIP = 4.0
-# A crossing begins within the first distance of a strip, and another strip
-# within the second [m].
-_NEAR, _NEAR_END = 1.5, 4.0
-_CROSSING_WIDTH, _CROSSING_HALF_WIDTH = 2.4, 0.8
+# A crossing begins within this distance of a strip [m].
+_STRIP_WITHIN = 1.5
+# People walk from the end of a strip to the end of another within this distance
+# [m].
+_NEXT_END_WITHIN = 4.0
+_CROSSING_WIDTH = 2.4
+# Half the width of the walkers' path on a crossing [m].
+_CROSSING_HALF_PATH = 0.8
 
 
 # A place on a strip: the number of the strip, and the distance along it [m].
@@ -121,7 +129,7 @@ class StreetWalkways:
 
     def _on_strip(self, place: np.ndarray) -> _Place | None:
         point = shapely.Point(place)
-        near = self._tree.query_nearest(point, max_distance=_NEAR)
+        near = self._tree.query_nearest(point, max_distance=_STRIP_WITHIN)
         if not len(near):
             return None
         number = int(near[0])
@@ -141,7 +149,7 @@ class StreetWalkways:
         if not places:
             return
         tree = shapely.STRtree(places)
-        rows, columns = tree.query(places, "dwithin", _NEAR_END)
+        rows, columns = tree.query(places, "dwithin", _NEXT_END_WITHIN)
         for a, b in zip(rows.tolist(), columns.tolist(), strict=True):
             way = shapely.LineString([places[a], places[b]])
             if (
@@ -182,7 +190,7 @@ class StreetWalkways:
         height = np.full(len(line), _KERB)
         return lane_graph.Walkway(
             lane_graph.resampled(np.column_stack([line, height])),
-            _HALF_STRIP if crossing < 0 else _CROSSING_HALF_WIDTH,
+            _HALF_STRIP if crossing < 0 else _CROSSING_HALF_PATH,
             self._node(a),
             self._node(b),
             crossing,
@@ -211,14 +219,20 @@ def _sidewalk_lines(streets: Iterable[Street]) -> Iterator[BaseGeometry]:
 
 # A way through a junction is a turn if its heading changes by more than this.
 _STRAIGHT_DEG = 35.0
-# Lengths of the running means that round the corners of a street, and of a lane
-# on the inner side of a sharp bend [m]. There, the lane's points would be less
-# than this share of their distance apart, or fold over.
-_ROUND, _ROUND_LANE, _FOLDED = 7.0, 4.0, 0.2
-# Lanes end at this distance from the corner of two streets, and at least at the
-# second from a place where just one street continues. The third is the greatest
-# distance from either [m].
-_BEFORE_CORNER, _JOINT, _FARTHEST_STOP = 1.0, 3.0, 25.0
+# Length of the running mean that rounds the corners of a street [m].
+_ROUNDED_OVER = 7.0
+# Length of the running mean that rounds a lane on the inner side of a sharp
+# bend [m].
+_LANE_ROUNDED_OVER = 4.0
+# A bend is sharp if a lane's points would be less than this share of their
+# usual distance apart, or fold over.
+_SHARP_SHARE = 0.2
+# Lanes end at this distance from the corner of two streets [m].
+_BEFORE_CORNER = 1.0
+# They end at least this far from a place where just one street continues [m].
+_BEFORE_JOINT = 3.0
+# They end at most this far from either [m].
+_FARTHEST_STOP = 25.0
 # Least length of a lane between two junctions [m].
 _SHORTEST = 1.0
 # The direction of a street's end is that of its last piece of this length [m].
@@ -230,12 +244,15 @@ _Arm = tuple[int, int]
 _WITHIN = 300.0
 # Half the width that a vehicle needs around the middle of its lane [m].
 _HALF_WIDTH = 1.3
-# A signal belongs to a junction within the first distance, and to the
-# junction's ways that pass within the second [m].
-_SIGNAL_NEAR, _WAY_NEAR = 25.0, 6.0
+# A signal belongs to a junction within this distance [m].
+_JUNCTION_WITHIN = 25.0
+# It belongs to the junction's ways that pass within this distance [m].
+_WAY_WITHIN = 6.0
 _KERB = 0.12
-# Only objects between these two heights stop a vehicle [m].
-_ABOVE, _BELOW = 0.3, 3.5
+# What ends below this height does not stop a vehicle [m].
+_LOWEST_OBSTACLE = 0.3
+# What begins above this height does not stop a vehicle [m].
+_HIGHEST_OBSTACLE = 3.5
 
 
 @dataclass(frozen=True)
@@ -361,7 +378,7 @@ class StreetTraffic:
         stretch = self.stretches[arm[0]]
         arms = self._arms[stretch.nodes[arm[1]]]
         is_joint = len(arms) < 3
-        reach = _JOINT if is_joint else _BEFORE_CORNER
+        reach = _BEFORE_JOINT if is_joint else _BEFORE_CORNER
         half = stretch.street.width / 2.0
         for other in arms:
             if other == arm:
@@ -406,14 +423,14 @@ class StreetTraffic:
                     offset *= self._side * (1.0 if is_forward else -1.0)
                     points = middle + offset * right
                     ahead = (np.diff(points, axis=0) * tangent[1:]).sum(axis=1)
-                    if ahead.min() < _FOLDED * SPACING:
+                    if ahead.min() < _SHARP_SHARE * SPACING:
                         parts = shapely.get_parts(
                             shapely.LineString(middle).offset_curve(-offset)
                         )
                         if not len(parts):
                             continue
                         longest = parts[shapely.length(parts).argmax()]
-                        points = _rounded(longest, _ROUND_LANE)
+                        points = _rounded(longest, _LANE_ROUNDED_OVER)
                     yield _Lane(
                         k,
                         is_forward,
@@ -489,7 +506,10 @@ def _stretches(
         if shapely.LineString(line).length > SPACING:
             layout = tags.lane_layout(street.tags, street.width)
             yield Stretch(
-                street, _rounded(shapely.LineString(line), _ROUND), ends, layout
+                street,
+                _rounded(shapely.LineString(line), _ROUNDED_OVER),
+                ends,
+                layout,
             )
 
 
@@ -623,7 +643,9 @@ def _free(traffic: StreetTraffic, structures: Iterable[Imported]) -> np.ndarray:
         return free
     triangles = np.concatenate(solid)
     z = triangles[:, :, 2]
-    low = triangles[(z.max(axis=1) > _ABOVE) & (z.min(axis=1) < _BELOW)]
+    low = triangles[
+        (z.max(axis=1) > _LOWEST_OBSTACLE) & (z.min(axis=1) < _HIGHEST_OBSTACLE)
+    ]
     tree = shapely.STRtree(shapely.linearrings(low[:, [0, 1, 2, 0], :2]))
     strips = [_strip(lane.points) for lane in traffic.lanes]
     free[np.unique(tree.query(strips, "intersects")[0])] = False
@@ -663,7 +685,7 @@ def _signals(
     if not len(junctions):
         return []
     pairs = shapely.STRtree(junctions).query_nearest(
-        shapely.points(signals), max_distance=_SIGNAL_NEAR
+        shapely.points(signals), max_distance=_JUNCTION_WITHIN
     )
     return list(junctions[np.unique(pairs[1])])
 
@@ -680,7 +702,7 @@ def _with_signals(
     if not signals or not ways:
         return graph
     lines = [shapely.LineString(graph.pieces[k].points[:, :2]) for k in ways]
-    near = shapely.STRtree(signals).query(lines, "dwithin", _WAY_NEAR)
+    near = shapely.STRtree(signals).query(lines, "dwithin", _WAY_WITHIN)
     # Lanes that never cross have different junctions, which a common signal
     # joins.
     group = {piece.junction: piece.junction for piece in graph.pieces}
