@@ -28,8 +28,8 @@ from evaluation.recognition.protocol_options import with_protocol
 if TYPE_CHECKING:
     from evaluation.change.drive_change import ChangeReport
     from evaluation.methods.method import Method
-    from evaluation.recognition.metrics import Interval
-    from evaluation.recognition.place_recognition import PlaceRecognition
+    from evaluation.recognition.metrics import Interval, Mode
+    from evaluation.recognition.place_outcome import PlaceOutcome
 
 # Command of an earlier version -> the command that replaces it.
 RENAMED = {
@@ -182,7 +182,11 @@ def pr(
     from cns_drake.base import files
     from cns_drake.base.errors import InputError
     from evaluation.drives.drive_views import CountedDrive
-    from evaluation.recognition import overlap_truth, place_recognition
+    from evaluation.recognition import (
+        overlap_truth,
+        place_recognition,
+        retrieval,
+    )
 
     if turn_queries is not None:
         protocol = replace(protocol, turn_queries=turn_queries)
@@ -225,14 +229,16 @@ def pr(
     if exact_overlaps is not None:
         frames = overlap_truth.compared_frames(places, query_drive, protocol)
         exact = overlap_truth.read_overlaps(exact_overlaps, *frames)
-    result = place_recognition.run(
+    found = retrieval.retrieve(
         places,
         query_drive,
         chosen,
-        mode,
         protocol,
         across_maps=across_maps,
         overlaps=exact,
+    )
+    outcome = place_recognition.judge_retrieval(
+        chosen, places.name, query_drive, found, protocol
     )
     for note in dict.fromkeys(
         chosen.assumption(one.lidar_field) for one in (places, query_drive)
@@ -243,7 +249,6 @@ def pr(
         if one.num_ignored:
             terminal.note(f"{one.name}: {one.num_ignored} {_NOT_FINITE}")
     if overlaps is not None:
-        found = result.retrieval
         assert found.overlaps is not None
         overlap_truth.write_overlaps(
             overlaps, found.query_frames, found.database_frames, found.overlaps
@@ -261,8 +266,9 @@ def pr(
         from evaluation.study.one_pair import pair_tables
 
         results, queries = pair_tables(
-            result,
+            outcome,
             query_drive,
+            protocol,
             dict(map(parse_setting, parameter or [])),
             None
             if sensor_height == MethodConfig().sensor_height
@@ -271,7 +277,9 @@ def pr(
         results.write_csv(output / RESULTS)
         queries.write_csv(output / QUERIES)
         terminal.note(f"wrote {output / RESULTS} and {QUERIES}")
-    options.show(result.to_json(), _recognition_rows(result), json=json)
+    values = outcome.to_json(mode)
+    values["parameters"] = chosen.config.model_dump(mode="json")
+    options.show(values, _recognition_rows(outcome, mode), json=json)
 
 
 @app.command(
@@ -529,17 +537,20 @@ def _change_rows(report: ChangeReport) -> Iterator[tuple[str, str]]:
         yield "TCR_sym of the routes alone", f"{value}  ({names})"
 
 
-def _recognition_rows(result: PlaceRecognition) -> Iterator[tuple[str, str]]:
+def _recognition_rows(
+    outcome: PlaceOutcome, mode: Mode
+) -> Iterator[tuple[str, str]]:
     """Yields names and values of the results of `pr`."""
     from evaluation.recognition.pose_errors import (
         SUCCESS_ROTATION_DEG,
         SUCCESS_TRANSLATION,
     )
 
-    metrics, outcomes, pose = result.metrics, result.outcomes, result.pose
+    metrics, pose = outcome.by_mode[mode], outcome.pose
+    outcomes = outcome.outcomes
     with_match = metrics.num_with_match
-    yield "method", result.method
-    yield "database -> query", f"{result.database} -> {result.query}"
+    yield "method", outcome.method
+    yield "database -> query", f"{outcome.database} -> {outcome.query}"
     yield "mode", metrics.mode
     yield "queries, with a match (N)", f"{metrics.num_queries}, {with_match}"
     yield (
@@ -570,7 +581,7 @@ def _recognition_rows(result: PlaceRecognition) -> Iterator[tuple[str, str]]:
         "AUC by radius",
         ", ".join(
             f"{radius:g} m {number(auc)}"
-            for radius, auc in result.auc_over_radius().items()
+            for radius, auc in outcome.auc_over_radius().items()
         ),
     )
     if not isnan(pose.success):
@@ -587,7 +598,7 @@ def _recognition_rows(result: PlaceRecognition) -> Iterator[tuple[str, str]]:
         )
         limits = f"{SUCCESS_TRANSLATION:g} m and {SUCCESS_ROTATION_DEG:g} deg"
         yield f"within {limits}", f"{number(pose.success)}  (of N)"
-    yield "protocol", result.protocol.to_text()
+    yield "protocol", outcome.protocol.to_text()
 
 
 def _known_interval(interval: Interval) -> str:

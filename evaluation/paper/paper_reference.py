@@ -18,7 +18,7 @@ import numpy as np
 
 from evaluation.change.drive_change import ChangeResult, symmetric_changes
 from evaluation.recognition.metrics import Mode
-from evaluation.recognition.place_recognition import PlaceRecognition
+from evaluation.recognition.place_outcome import PlaceOutcome
 from evaluation.recognition.protocol import PAPER_PROTOCOL
 from evaluation.report.reference import (
     NO_REFERENCE,
@@ -119,7 +119,7 @@ def _rows(name: str) -> list[dict[str, str]]:
 
 
 def _judge(
-    results: Sequence[PlaceRecognition], changes: Sequence[ChangeResult]
+    results: Sequence[PlaceOutcome], changes: Sequence[ChangeResult]
 ) -> list[Judgement]:
     found = (
         (f"What {_TITLE} claims", findings(results, changes)),
@@ -156,7 +156,7 @@ class Trend:
 
 
 def findings(
-    results: Sequence[PlaceRecognition], changes: Sequence[ChangeResult]
+    results: Sequence[PlaceOutcome], changes: Sequence[ChangeResult]
 ) -> list[Finding]:
     """Returns a verdict on each of the paper's findings that can be tested.
 
@@ -228,7 +228,7 @@ def paper_trend(method: str) -> Trend:
 
 
 def _trends(
-    results: Sequence[PlaceRecognition],
+    results: Sequence[PlaceOutcome],
     tcr: Mapping[tuple[str, str, str], float],
     methods: Sequence[str],
 ) -> dict[str, Trend]:
@@ -275,7 +275,7 @@ def _larger_than_real(changes: Sequence[ChangeResult]) -> Finding:
 
 
 def _ring_is_best(
-    results: Sequence[PlaceRecognition], shown: Sequence[PlaceRecognition]
+    results: Sequence[PlaceOutcome], shown: Sequence[PlaceOutcome]
 ) -> Finding:
     best = _best_methods(results)
     evidence = (
@@ -297,7 +297,7 @@ def _ring_is_best(
 
 
 def _counted_alike(
-    results: Sequence[PlaceRecognition],
+    results: Sequence[PlaceOutcome],
     words: str = "If all queries count for every method",
 ) -> str:
     """Returns a sentence on which methods are best if all queries count.
@@ -313,7 +313,7 @@ def _counted_alike(
 
 
 def _best_methods(
-    results: Sequence[PlaceRecognition], mode: Mode | None = None
+    results: Sequence[PlaceOutcome], mode: Mode | None = None
 ) -> list[list[str]]:
     """Returns the methods with the greatest AUC on each pair.
 
@@ -403,7 +403,7 @@ def _part(number: int, total: int) -> str:
 
 
 def aims(
-    results: Sequence[PlaceRecognition], changes: Sequence[ChangeResult]
+    results: Sequence[PlaceOutcome], changes: Sequence[ChangeResult]
 ) -> list[Finding]:
     """Returns, for each target of the shipped cities, whether it is met.
 
@@ -471,7 +471,7 @@ def aims(
 
 
 def _differences(
-    results: Sequence[PlaceRecognition],
+    results: Sequence[PlaceOutcome],
 ) -> dict[tuple[str, str, str, str], float]:
     """Returns (map, database, query, method) -> our AUC minus the paper's."""
     found = {}

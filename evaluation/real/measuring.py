@@ -290,12 +290,12 @@ class Measuring:
             for gate, found in zip((False, True), both, strict=True):
                 now = PlaceOutcome.of(
                     method.name,
-                    gate,
+                    method,
+                    replace(_REAL, gate=gate),
                     found,
-                    (asked.stamps_ns, asked.p_WSs),
+                    (one.name, asked.stamps_ns, asked.p_WSs),
                     worlds,
                     overlaps,
-                    _REAL.radius,
                 )
                 self._add(
                     one,

@@ -8,11 +8,10 @@ import numpy as np
 from evaluation.recognition.place_outcome import (
     ELSEWHERE,
     FAULTS,
-    faults,
+    PlaceOutcome,
     mean_visible_change,
     visible_change_added,
 )
-from evaluation.recognition.place_recognition import PlaceRecognition
 
 # The kinds of the reason `elsewhere`, which evidence from scans tells apart, in
 # order of precedence: a wrong answer gets the first that fits.
@@ -90,7 +89,7 @@ class PairEvidence:
         return visible_change_added(self.overlaps, self.unchanged)
 
 
-def fault_kinds(result: PlaceRecognition, evidence: PairEvidence) -> list[str]:
+def fault_kinds(result: PlaceOutcome, evidence: PairEvidence) -> list[str]:
     """Returns, for each query, why its best place is wrong.
 
     The best place is the one that the method ranks first. The right place is
@@ -109,13 +108,7 @@ def fault_kinds(result: PlaceRecognition, evidence: PairEvidence) -> list[str]:
         - `twin`: the best place fits the query as well as the right place does.
         - `unexplained`: no other kind applies.
     """
-    retrieval = result.retrieval
-    reasons = faults(
-        result.outcomes,
-        retrieval.best_frames,
-        retrieval.best_distances,
-        result.protocol.radius,
-    )
+    reasons = result.columns["why"]
     little = evidence.overlaps < _ENOUGH
     unseen = 1.0 - evidence.overlaps
     conditions = [

@@ -3,15 +3,22 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass, replace
+from functools import cached_property
 import math
 from typing import NamedTuple
 
 import numpy as np
 
+from cns_drake.base.json_text import json_values
+from evaluation.methods.method import Method
 from evaluation.recognition.metrics import (
+    MODES,
     UNKNOWN,
     Interval,
+    Mode,
+    PlaceRecognitionMetrics,
+    evaluate,
     own_samples,
     paired_samples,
     percentile_interval,
@@ -19,11 +26,15 @@ from evaluation.recognition.metrics import (
 )
 from evaluation.recognition.pose_errors import (
     PoseErrors,
+    PoseMetrics,
     is_accepted,
+    pose_metrics,
     pose_success,
 )
+from evaluation.recognition.protocol import RetrievalProtocol
 from evaluation.recognition.query_outcomes import QueryOutcomes, judge
 from evaluation.recognition.retrieval import Retrieval
+from evaluation.recognition.scoring import ranked_places
 
 # The reason for a wrong best place to which no other one applies.
 ELSEWHERE = "elsewhere"
@@ -32,78 +43,113 @@ FAULTS = ("no_place", "no_candidate", "other_city", "too_far", ELSEWHERE)
 # Up to this multiple of the radius, a wrong place is `too_far`; beyond it,
 # `elsewhere`.
 NEARLY = 2.0
+# Further radii of a match for which AUC is computed [m].
+RADII = (2.5, 5.0, 7.5, 10.0, 15.0, 20.0, 25.0)
+# Number of best places that are kept for each query.
+NUM_BEST = 5
 _HALF = 0.5
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class PlaceOutcome:
     """The answers of a method to the queries of a drive, and their truth.
 
+    All numbers, tables and pages of place recognition are made from it. It
+    holds the best places of each query instead of the scores of all places.
+
     Attributes:
-        method: name of the method.
-        is_gated: whether the gate was used, which rejects places that lie too
-            far away by the method's own pose estimate.
+        method: name of the method; if it has settings, with them.
+        database: name of the drive of the places.
+        query: name of the drive of the queries.
+        protocol: protocol with the method's own choices. Its gate and radius
+            are those of the outcome.
+        protocol_name: name of the protocol in tables, see
+            `RetrievalProtocol.name_with`.
         outcomes: outcomes of Q queries.
         columns: name of a column of `queries.csv` -> (Q,) values. An unknown
             value is -1 for a frame, infinite for a rank, and NaN for other
             numbers.
-        pose_errors: errors of the poses at the best places.
-        radius: radius of a match [m].
+        place_frames: (D,) frame of each place in its drive.
+        best_places: (Q, K) int32, the best places of each query, best first; -1
+            where there are fewer candidates.
+        best_scores: (Q, K) their scores; NaN where there are fewer.
+        matches: (M, 2) int32, each pair of a query and a place that is a true
+            match.
+        nearest: (Q,) distance of each query to the nearest place that is
+            allowed as an answer [m]; infinite if there is none.
+        pair: names of the map and of the stages of database and query, if the
+            outcome is for a report.
     """
 
     method: str
-    is_gated: bool
+    database: str
+    query: str
+    protocol: RetrievalProtocol
+    protocol_name: str
     outcomes: QueryOutcomes
     columns: Mapping[str, np.ndarray]
-    pose_errors: PoseErrors
-    radius: float
+    place_frames: np.ndarray
+    best_places: np.ndarray
+    best_scores: np.ndarray
+    matches: np.ndarray
+    nearest: np.ndarray
+    pair: tuple[str, str, str] = ("", "", "")
 
     @classmethod
     def of(
         cls,
-        method: str,
-        is_gated: bool,
+        name: str,
+        method: Method,
+        protocol: RetrievalProtocol,
         retrieval: Retrieval,
-        query: tuple[np.ndarray, np.ndarray],
+        query: tuple[str, np.ndarray, np.ndarray],
         drives: Sequence[str],
-        overlaps: np.ndarray,
-        radius: float,
+        overlaps: np.ndarray | None = None,
     ) -> PlaceOutcome:
         """Returns the outcomes of a method's queries in a retrieval.
 
         Args:
-            method: name of the method.
-            is_gated: whether the gate has changed the scores.
+            name: name of the method, with its settings.
+            method: the method.
+            protocol: protocol of the retrieval, with the gate that has changed
+                the scores, and the radius of a match.
             retrieval: scores and truth of Q queries and D places.
-            query: time stamps (Q,) [ns] and positions (Q, 3) [m] of the
-                queries.
+            query: name of the drive of the queries, and time stamps (Q,) [ns]
+                and positions (Q, 3) [m] of the queries.
             drives: name of each place's drive (D names). The first name is
                 that of the drive through the query's own city; distances to
                 places of all other drives are unknown.
             overlaps: (Q,) how much of the query's scan the best of its matches
                 shows, see `evaluation.recognition.overlap_truth`; NaN without a
-                match.
-            radius: radius of a match [m].
+                match. None if it is unknown.
         """
+        scores = retrieval.scores
+        order = ranked_places(scores)[:, :NUM_BEST].astype(np.int32)
+        best_scores = np.take_along_axis(scores, order, axis=1)
+        best_places = np.where(np.isnan(best_scores), -1, order)
         best = retrieval.best_places.tolist()
         names = np.array([drives[k] if k >= 0 else "" for k in best])
-        outcomes = judge(
-            retrieval.scores, retrieval.matches, retrieval.query_blocks
-        )
+        outcomes = judge(scores, retrieval.matches, retrieval.query_blocks)
         distances = retrieval.best_distances
         distances[names != drives[0]] = math.nan
+        if overlaps is None:
+            overlaps = np.full(len(outcomes), math.nan)
+        query_name, stamps_ns, positions = query
+        why = faults(
+            outcomes, retrieval.best_frames, distances, protocol.radius
+        )
         columns = {
             "query_frame": retrieval.query_frames,
-            "query_stamp_ns": query[0],
-            "query_x": query[1][:, 0],
-            "query_y": query[1][:, 1],
-            "query_z": query[1][:, 2],
+            "query_stamp_ns": stamps_ns,
+            "query_x": positions[:, 0],
+            "query_y": positions[:, 1],
+            "query_z": positions[:, 2],
             "block": outcomes.own_blocks,
             "correct": outcomes.is_right,
             "has_match": outcomes.has_match,
             "score": outcomes.best_scores,
             "first_right_rank": outcomes.first_right_ranks,
-            "why": faults(outcomes, retrieval.best_frames, distances, radius),
+            "why": why,
             "match_drive": names,
             "match_frame": retrieval.best_frames,
             "distance": distances,
@@ -112,8 +158,116 @@ class PlaceOutcome:
             "overlap": overlaps,
             "visible_change": 1.0 - overlaps,
         }
-        errors = retrieval.pose_errors
-        return cls(method, is_gated, outcomes, columns, errors, radius)
+        allowed = np.where(retrieval.is_known, retrieval.distances, math.inf)
+        return cls(
+            method=name,
+            database=drives[0],
+            query=query_name,
+            protocol=protocol.of(method),
+            protocol_name=protocol.name_with(method),
+            outcomes=outcomes,
+            columns=columns,
+            place_frames=retrieval.database_frames,
+            best_places=best_places,
+            best_scores=best_scores,
+            matches=np.argwhere(retrieval.matches).astype(np.int32),
+            nearest=allowed.min(axis=1, initial=math.inf),
+        )
+
+    @property
+    def is_gated(self) -> bool:
+        """Whether the gate was used.
+
+        It rejects places that lie too far away by the method's own pose
+        estimate.
+        """
+        return self.protocol.gate
+
+    @property
+    def radius(self) -> float:
+        """Greatest distance between a query and its match [m]."""
+        return self.protocol.radius
+
+    @property
+    def pose_errors(self) -> PoseErrors:
+        """Errors of the poses at the best places."""
+        return PoseErrors(
+            self.columns["translation_error"],
+            self.columns["rotation_error_deg"],
+        )
+
+    @cached_property
+    def by_mode(self) -> Mapping[Mode, PlaceRecognitionMetrics]:
+        """Mode -> metrics, of all queries or of those with a match."""
+        return {mode: evaluate(self.outcomes, mode) for mode in MODES}
+
+    @cached_property
+    def pose(self) -> PoseMetrics:
+        """Errors of the estimated poses."""
+        return pose_metrics(self.pose_errors, self.outcomes)
+
+    def auc_over_radius(self) -> dict[float, float]:
+        """Returns the AUC for several radii of a match: radius [m] -> AUC.
+
+        All queries count. The AUC is NaN if no query has a match within the
+        radius.
+        """
+        found = {}
+        for radius in RADII:
+            has_match = self.nearest <= radius
+            outcomes = replace(
+                self.outcomes,
+                is_right=self.columns["distance"] <= radius,
+                has_match=has_match,
+            )
+            found[radius] = math.nan
+            if has_match.any():
+                found[radius] = pr_curve(outcomes).auc
+        return found
+
+    def to_json(self, mode: Mode = "all") -> dict:
+        """Returns all numbers as a dictionary for JSON; NaN becomes None.
+
+        Args:
+            mode: which queries count: `all`, or only those with a match
+                (`filtered`).
+        """
+        metrics = self.by_mode[mode]
+        true_positives = counted = 0
+        if metrics.f1_max_index is not None:
+            true_positives = metrics.curve.true_positives[metrics.f1_max_index]
+            counted = metrics.curve.counted[metrics.f1_max_index]
+        values = {
+            "method": self.method,
+            "mode": metrics.mode,
+            "database": self.database,
+            "query": self.query,
+            "auc": metrics.auc,
+            "auc_strict": metrics.auc_strict,
+            "auc_interval_95": metrics.auc_interval.to_json(),
+            "recall_at_1": metrics.recall_at_1,
+            "r1": metrics.recall_at_1,  # Its name in tables of results.
+            "recall_at_1_interval_95": metrics.recall_at_1_interval.to_json(),
+            "recall_at_n": metrics.recall_at_n.tolist(),
+            "recall_at_1_percent": metrics.recall_at_1_percent,
+            "f1_max": metrics.f1_max,
+            "f1_max_true_positives": int(true_positives),
+            "f1_max_counted": int(counted),
+            "queries": metrics.num_queries,
+            "queries_with_match": metrics.num_with_match,
+            "true_positives": metrics.num_right,
+            "places": self.outcomes.num_places,
+            "recall_at_full_precision": metrics.curve.recall_at_full_precision,
+            "mean_reciprocal_rank": self.outcomes.mean_reciprocal_rank,
+            "match_auroc": self.outcomes.match_auroc,
+            "auc_over_radius": {
+                f"{radius:g}": auc
+                for radius, auc in self.auc_over_radius().items()
+            },
+            "pose": asdict(self.pose),
+            "protocol": self.protocol.to_json(),
+        }
+        return json_values(values)
 
     def number(
         self,

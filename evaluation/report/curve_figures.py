@@ -10,14 +10,14 @@ import numpy as np
 from evaluation.localisation.localise import RIGHT_TRANSLATION
 from evaluation.localisation.tracking import LOST
 from evaluation.recognition.metrics import MODES, PlaceRecognitionMetrics
-from evaluation.recognition.place_recognition import PlaceRecognition
+from evaluation.recognition.place_outcome import PlaceOutcome
 from evaluation.results.charts import styles
 from evaluation.results.drawing import INK, PALE, plain, save
 from evaluation.results.table_forms import by_pair, in_table_order, title
 
 
 def draw_pr_curves(
-    map_name: str, results: Sequence[PlaceRecognition], stem: Path
+    map_name: str, results: Sequence[PlaceOutcome], stem: Path
 ) -> None:
     """Draws precision-recall curves of all methods and saves the figure.
 

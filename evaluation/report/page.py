@@ -27,7 +27,7 @@ from evaluation.change.drive_change import ChangeResult, symmetric_changes
 from evaluation.recognition.costs import Cost
 from evaluation.recognition.fault_kinds import FAULT_KINDS, PairEvidence
 from evaluation.recognition.metrics import MODES, Mode
-from evaluation.recognition.place_recognition import PlaceRecognition
+from evaluation.recognition.place_outcome import PlaceOutcome
 from evaluation.report import result_tables, rows
 from evaluation.report.figures import ROUTE_COLOURS
 from evaluation.report.page_data import (
@@ -110,7 +110,7 @@ class Report:
     results: Results = field(default_factory=lambda: Results((), ()))
     changes: list[ChangeResult] = field(default_factory=list)
     pairs: list[rows.Controlled] = field(default_factory=list)
-    recognitions: list[PlaceRecognition] = field(default_factory=list)
+    recognitions: list[PlaceOutcome] = field(default_factory=list)
     differences: Sequence[result_tables.MethodDifference] = ()
     evidence: dict[tuple[str, str], PairEvidence] = field(default_factory=dict)
     tracks: dict[str, result_tables.DriveTrack] = field(default_factory=dict)
@@ -121,7 +121,7 @@ class Report:
     made_by: Sequence[str] = ()
     pages: Mapping[str, str] = field(default_factory=dict)
     reference: Reference = NO_REFERENCE
-    repeated: list[PlaceRecognition] = field(default_factory=list)
+    repeated: list[PlaceOutcome] = field(default_factory=list)
 
     @functools.cached_property
     def survivals(self) -> list[rows.Survival]:
@@ -138,7 +138,7 @@ class Report:
         return rows.survivals(self.results.rows, stages)
 
     @property
-    def compared(self) -> list[PlaceRecognition]:
+    def compared(self) -> list[PlaceOutcome]:
         """Results for which there are published numbers to compare."""
         known = filter(self.reference.covers, self.recognitions)
         return [*known, *self.repeated]
@@ -322,7 +322,7 @@ def _shown_tables(report: Report) -> dict[str, list[Table]]:
     """Returns name of a file -> its tables for print."""
     results = report.recognitions
     # The last one is counted as the reference did.
-    counted: list[tuple[Sequence[PlaceRecognition], Mode | None, Reference]] = [
+    counted: list[tuple[Sequence[PlaceOutcome], Mode | None, Reference]] = [
         (results, mode, NO_REFERENCE) for mode in MODES
     ]
     if report.compared:

@@ -18,8 +18,7 @@ from evaluation.drives.sampling import sample_frames
 from evaluation.maps.thumbnails import CELL, HEIGHT_STEP, MAX_POINTS
 from evaluation.recognition.fault_kinds import PairEvidence, fault_kinds
 from evaluation.recognition.metrics import MODES
-from evaluation.recognition.place_recognition import PlaceRecognition
-from evaluation.recognition.scoring import ranked_places
+from evaluation.recognition.place_outcome import PlaceOutcome
 from evaluation.report.figures import Picture
 from evaluation.results.drawing import Legend
 from evaluation.results.table_forms import by_pair, in_table_order, title
@@ -29,8 +28,6 @@ from evaluation.results.table_forms import by_pair, in_table_order, title
 _POINTS_OF_A_PAGE = 5_000_000
 # The same for images of cameras [bytes], and pixels of their longer side.
 _IMAGES_OF_A_PAGE, _IMAGE_SIDE = 6_000_000, 320
-# Number of best places that are kept for each query.
-_NUM_BEST = 5
 # Between the points of a drawn route [m].
 _ROUTE_STEP = 2.0
 _WEBP_QUALITY = 75
@@ -196,7 +193,7 @@ def _nearest(times_ns: np.ndarray, wanted_ns: np.ndarray) -> np.ndarray:
 
 
 def browser_data(
-    recognitions: Sequence[PlaceRecognition],
+    recognitions: Sequence[PlaceOutcome],
     drives: Mapping[str, PageDrive],
     changes: Mapping[tuple[str, str, str], float],
     pages: Mapping[str, str],
@@ -270,15 +267,15 @@ def _drive_data(drive: PageDrive, num_points: int) -> dict:
 
 def _pair_data(
     pair: tuple[str, str, str],
-    results: Sequence[PlaceRecognition],
+    results: Sequence[PlaceOutcome],
     drives: Mapping[str, PageDrive],
     change: float | None,
     evidence: Mapping[tuple[str, str], PairEvidence],
 ) -> dict:
     by_method = {result.method: result for result in results}
     first = results[0]
-    retrieval = first.retrieval
     database, query = drives[first.database], drives[first.query]
+    rows, places = first.matches.T
     if change is not None:
         change = None if np.isnan(change) else round(change, 4)
     return {
@@ -287,13 +284,13 @@ def _pair_data(
         "database": first.database,
         "query": first.query,
         "change": change,
-        "places": np.searchsorted(
-            database.frames, retrieval.database_frames
-        ).tolist(),
+        "places": np.searchsorted(database.frames, first.place_frames).tolist(),
         "queries": np.searchsorted(
-            query.frames, retrieval.query_frames
+            query.frames, first.columns["query_frame"]
         ).tolist(),
-        "matches": [np.flatnonzero(row).tolist() for row in retrieval.matches],
+        "matches": [
+            places[rows == row].tolist() for row in range(len(first.outcomes))
+        ],
         "methods": [
             _method_data(
                 by_method[method], evidence.get((first.database, first.query))
@@ -303,17 +300,14 @@ def _pair_data(
     }
 
 
-def _method_data(
-    result: PlaceRecognition, evidence: PairEvidence | None
-) -> dict:
-    scores = result.retrieval.scores
+def _method_data(result: PlaceOutcome, evidence: PairEvidence | None) -> dict:
     best, values = [], []
-    for row, places in zip(
-        scores, ranked_places(scores)[:, :_NUM_BEST], strict=True
+    for places, scores in zip(
+        result.best_places, result.best_scores, strict=True
     ):
-        places = places[~np.isnan(row[places])]
-        best.append(places.tolist())
-        values.append(np.round(row[places], 4).tolist())
+        is_candidate = places >= 0
+        best.append(places[is_candidate].tolist())
+        values.append(np.round(scores[is_candidate], 4).tolist())
     metrics = {
         mode: {
             "auc": round(result.by_mode[mode].auc, 4),

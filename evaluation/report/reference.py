@@ -6,7 +6,7 @@ from typing import Any
 
 from evaluation.change.drive_change import ChangeResult
 from evaluation.recognition.metrics import Mode
-from evaluation.recognition.place_recognition import PlaceRecognition
+from evaluation.recognition.place_outcome import PlaceOutcome
 from evaluation.recognition.protocol import RetrievalProtocol
 from evaluation.results.table import Results, Row
 
@@ -93,7 +93,7 @@ class Reference:
     )
     protocols: Mapping[str, RetrievalProtocol] = field(default_factory=dict)
     judge: Callable[
-        [Sequence[PlaceRecognition], Sequence[ChangeResult]], list[Judgement]
+        [Sequence[PlaceOutcome], Sequence[ChangeResult]], list[Judgement]
     ] = lambda results, changes: []
 
     @property
@@ -126,7 +126,7 @@ class Reference:
             return None
         return self.protocols[method]
 
-    def covers(self, result: PlaceRecognition) -> bool:
+    def covers(self, result: PlaceOutcome) -> bool:
         """Returns whether a result can be compared with published results.
 
         The publication must have results on the same map, and of the same
@@ -143,7 +143,7 @@ class Reference:
         modes = (key[4] for key in self.recognitions if key[3] == method)
         return next(modes, "all")
 
-    def values(self, result: PlaceRecognition, mode: Mode) -> Published | None:
+    def values(self, result: PlaceOutcome, mode: Mode) -> Published | None:
         """Returns the published numbers of a method on a pair of drives.
 
         Args:
@@ -186,7 +186,7 @@ class Reference:
                 rows.append(Row(**where, **whole))
         return Results.of(rows)
 
-    def _ran(self, result: PlaceRecognition) -> bool:
+    def _ran(self, result: PlaceOutcome) -> bool:
         """Returns whether the source ran the method by the same protocol."""
         protocol = replace(result.protocol, exclude_recent=None)
         return protocol == self.protocols.get(result.method)

@@ -31,8 +31,12 @@ from evaluation.recognition.metrics import (
     PlaceRecognitionMetrics,
     compared_by_auc,
 )
-from evaluation.recognition.place_outcome import ELSEWHERE, kept_share
-from evaluation.recognition.place_recognition import RADII, PlaceRecognition
+from evaluation.recognition.place_outcome import (
+    ELSEWHERE,
+    RADII,
+    PlaceOutcome,
+    kept_share,
+)
 from evaluation.recognition.protocol import PROTOCOL_COLUMNS, check_one_protocol
 from evaluation.report.reference import NO_REFERENCE, Published, Reference
 from evaluation.results.table_forms import (
@@ -61,18 +65,18 @@ _MOMENT = ("frame", "stamp_ns", "x", "y", "z", "qx", "qy", "qz", "qw")
 Evidence = Mapping[tuple[str, str], PairEvidence]
 
 
-def _inner(columns: Columns[PlaceRecognition]) -> Columns[Any]:
+def _inner(columns: Columns[PlaceOutcome]) -> Columns[Any]:
     """Returns columns of results, applied to the field `result` of items."""
     return keyed(columns, lambda item, value: value(item.result))
 
 
 # The first columns, for print and in files, and the last ones in files.
-_SHOWN: Columns[PlaceRecognition] = {
+_SHOWN: Columns[PlaceOutcome] = {
     "map": lambda r: r.pair[0],
     "DB → query": lambda r: " → ".join(r.pair[1:]),
     "method": lambda r: title(r.method),
 }
-_KEYS: Columns[PlaceRecognition] = {
+_KEYS: Columns[PlaceOutcome] = {
     "map": lambda r: r.pair[0],
     "db": lambda r: r.pair[1],
     "query": lambda r: r.pair[2],
@@ -152,13 +156,13 @@ def _visible_change(
 class _Counted(NamedTuple):
     """A result in one mode, with the published numbers if there are any."""
 
-    result: PlaceRecognition
+    result: PlaceOutcome
     metrics: PlaceRecognitionMetrics
     printed: Published | None
 
     @classmethod
     def of(
-        cls, result: PlaceRecognition, mode: Mode, reference: Reference
+        cls, result: PlaceOutcome, mode: Mode, reference: Reference
     ) -> _Counted:
         printed = reference.values(result, mode)
         return cls(result, result.by_mode[mode], printed)
@@ -175,7 +179,7 @@ class _Counted(NamedTuple):
 
 
 def recognition_table(
-    results: Sequence[PlaceRecognition],
+    results: Sequence[PlaceOutcome],
     changes: Sequence[ChangeResult],
     mode: Mode | None = None,
     reference: Reference = NO_REFERENCE,
@@ -252,7 +256,7 @@ def recognition_table(
     )
 
 
-def _merging_text(results: Sequence[PlaceRecognition]) -> str:
+def _merging_text(results: Sequence[PlaceOutcome]) -> str:
     """Returns a sentence on which of several merged scans is the place.
 
     It is empty if no scans are merged.
@@ -274,7 +278,7 @@ def _merging_text(results: Sequence[PlaceRecognition]) -> str:
 
 
 def audit_table(
-    results: Sequence[PlaceRecognition], reference: Reference = NO_REFERENCE
+    results: Sequence[PlaceOutcome], reference: Reference = NO_REFERENCE
 ) -> Table:
     """Returns a table of all metrics with the counts from which they follow.
 
@@ -318,7 +322,7 @@ def audit_table(
     )
 
 
-def metric_numbers(results: Sequence[PlaceRecognition]) -> Table:
+def metric_numbers(results: Sequence[PlaceOutcome]) -> Table:
     """Returns the metrics that other publications use, for `metrics.csv`."""
     return Table.of(
         by_pair_and_method(results),
@@ -355,14 +359,14 @@ class MethodDifference(NamedTuple):
             differences on this pair of drives; NaN if unknown.
     """
 
-    result: PlaceRecognition
-    other: PlaceRecognition
+    result: PlaceOutcome
+    other: PlaceOutcome
     difference: Difference
     p_value: float
 
 
 def method_differences(
-    results: Sequence[PlaceRecognition],
+    results: Sequence[PlaceOutcome],
 ) -> list[MethodDifference]:
     """Returns the AUC difference of any two methods on each pair of drives.
 
@@ -417,7 +421,7 @@ def difference_table(differences: Sequence[MethodDifference]) -> Table:
 
 
 # Name in files -> value.
-_POSE_ERRORS: Columns[PlaceRecognition] = {
+_POSE_ERRORS: Columns[PlaceOutcome] = {
     "translation_median": lambda r: r.pose.translation_median,
     "translation_90": lambda r: r.pose.translation_90,
     "rotation_median_deg": lambda r: r.pose.rotation_median_deg,
@@ -429,7 +433,7 @@ _POSE_ERRORS: Columns[PlaceRecognition] = {
 }
 
 
-def pose_table(results: Sequence[PlaceRecognition]) -> Table:
+def pose_table(results: Sequence[PlaceOutcome]) -> Table:
     """Returns a table of the errors of estimated poses, for print."""
     names: list[str | tuple[str, str]] = [
         *(("translation [m]", part) for part in ("median", "90 %")),
@@ -444,7 +448,7 @@ def pose_table(results: Sequence[PlaceRecognition]) -> Table:
     )
 
 
-def pose_numbers(results: Sequence[PlaceRecognition]) -> Table:
+def pose_numbers(results: Sequence[PlaceOutcome]) -> Table:
     """Returns a table of the errors of estimated poses, for `poses.csv`."""
     return Table.of(
         results,
@@ -460,7 +464,7 @@ def pose_numbers(results: Sequence[PlaceRecognition]) -> Table:
 class _Faults(NamedTuple):
     """Why best places of a result are wrong: reasons, and changed classes."""
 
-    result: PlaceRecognition
+    result: PlaceOutcome
     kinds: Counter[str]
     changed: Counter[str]
 
@@ -475,9 +479,7 @@ class _Faults(NamedTuple):
         return sum(self.kinds[kind] for kind in ELSEWHERE_KINDS)
 
 
-def fault_table(
-    results: Sequence[PlaceRecognition], evidence: Evidence
-) -> Table:
+def fault_table(results: Sequence[PlaceOutcome], evidence: Evidence) -> Table:
     """Returns a table, for print, of the reasons why best places are wrong."""
 
     def share(one: _Faults, kind: str) -> str | None:
@@ -501,9 +503,7 @@ def fault_table(
     )
 
 
-def fault_numbers(
-    results: Sequence[PlaceRecognition], evidence: Evidence
-) -> Table:
+def fault_numbers(results: Sequence[PlaceOutcome], evidence: Evidence) -> Table:
     """Returns the table `why.csv`: why best places were wrong.
 
     For each method on each pair of drives, it counts the queries with a wrong
@@ -530,7 +530,7 @@ def fault_numbers(
 
 
 def _count_faults(
-    results: Sequence[PlaceRecognition], evidence: Evidence
+    results: Sequence[PlaceOutcome], evidence: Evidence
 ) -> Iterator[_Faults]:
     for result in by_pair_and_method(results):
         known = evidence.get((result.database, result.query))
@@ -608,7 +608,7 @@ class DriveTrack:
 class _Queries(NamedTuple):
     """The queries of a result and their best places: frame, time and pose."""
 
-    result: PlaceRecognition
+    result: PlaceOutcome
     query: list[np.ndarray]
     match: list[np.ndarray]
     evidence: PairEvidence | None
@@ -633,9 +633,9 @@ _QUERY_COLUMNS: Columns[_Queries] = {
     **_moment_columns("query"),
     "match_drive": lambda q: q.result.database,
     **_moment_columns("match"),
-    "distance": lambda q: q.result.retrieval.best_distances,
-    "translation_error": lambda q: q.result.retrieval.pose_errors.translation,
-    "rotation_error_deg": lambda q: q.result.retrieval.pose_errors.rotation_deg,
+    "distance": lambda q: q.result.columns["distance"],
+    "translation_error": lambda q: q.result.pose_errors.translation,
+    "rotation_error_deg": lambda q: q.result.pose_errors.rotation_deg,
     **keyed(
         {name: name for name in PROTOCOL_COLUMNS},
         lambda q, name: getattr(q.result.protocol, name),
@@ -653,7 +653,7 @@ _QUERY_COLUMNS: Columns[_Queries] = {
 
 
 def query_table(
-    results: Iterable[PlaceRecognition],
+    results: Iterable[PlaceOutcome],
     tracks: Mapping[str, DriveTrack],
     evidence: Evidence,
 ) -> Table:
@@ -669,11 +669,11 @@ def query_table(
             without evidence.
     """
 
-    def queries(one: PlaceRecognition) -> _Queries:
+    def queries(one: PlaceOutcome) -> _Queries:
         return _Queries(
             one,
-            tracks[one.query].moments(one.retrieval.query_frames),
-            tracks[one.database].moments(one.retrieval.best_frames),
+            tracks[one.query].moments(one.columns["query_frame"]),
+            tracks[one.database].moments(one.columns["match_frame"]),
             evidence.get((one.database, one.query)),
         )
 

@@ -12,7 +12,7 @@ from collections.abc import Callable, Iterable, Mapping, Sequence
 import math
 from typing import NamedTuple
 
-from evaluation.recognition.place_recognition import PlaceRecognition
+from evaluation.recognition.place_outcome import PlaceOutcome
 from evaluation.report.result_tables import MethodDifference
 from evaluation.results import table_forms as tables
 from evaluation.results.headlines import listed, told_apart
@@ -28,7 +28,7 @@ EXPERIMENT = "stages"
 _SEED = 1
 NO_CONTROL = "no control"
 # A result, and that of its control, if there is one.
-Controlled = tuple[PlaceRecognition, PlaceRecognition | None]
+Controlled = tuple[PlaceOutcome, PlaceOutcome | None]
 
 
 def ranked_methods(

@@ -22,8 +22,7 @@ from evaluation.methods import MethodConfig
 from evaluation.methods.layered_overlap import LayeredOverlap, LayeredScan
 from evaluation.recognition.fault_kinds import PairEvidence
 from evaluation.recognition.overlap_truth import sampled
-from evaluation.recognition.place_outcome import NEARLY
-from evaluation.recognition.place_recognition import PlaceRecognition
+from evaluation.recognition.place_outcome import NEARLY, PlaceOutcome
 from evaluation.recognition.protocol import RetrievalProtocol
 from evaluation.recognition.seen_surfaces import SeenSurfaces
 from evaluation.study.chosen_methods import MethodChoice
@@ -55,16 +54,18 @@ def explain_faults(
         drives: files with the scans (`KeptDrive`) of the database and of the
             query.
         methods: methods of the results.
-        results: file with each method's `MethodResult` on the pair.
+        results: file with each method's outcomes on the pair.
         overlaps: file with how much of each query's scan its best match shows.
         protocol: protocol of the results.
     """
     found = []
     for choice, part in zip(methods, results, strict=True):
-        # The method registers the type of its descriptions.
-        choice.make()
-        found.append(part.read().recognition)
-    if None in found or not found:
+        found += [
+            replace(one, method=choice.name)
+            for one in part.read()
+            if one.is_gated == protocol.gate
+        ]
+    if not any(one.outcomes.has_match.any() for one in found):
         return None
     database, query = (part.read() for part in drives)
     evidence = find_evidence(database, query, found, protocol)
@@ -75,7 +76,7 @@ def explain_faults(
 def find_evidence(
     database: Drive | KeptDrive,
     query: Drive | KeptDrive,
-    results: Sequence[PlaceRecognition],
+    results: Sequence[PlaceOutcome],
     protocol: RetrievalProtocol,
 ) -> PairEvidence:
     """Returns evidence on why the best places of queries are wrong.
@@ -92,9 +93,11 @@ def find_evidence(
     Raises:
         InputError: a scan cannot be read.
     """
-    first = results[0].retrieval
+    first = results[0]
     wrong = {one.method: _wrong_places(one) for one in results}
-    is_needed = np.asarray(first.matches.any(axis=0))
+    rows, matched = first.matches.T
+    is_needed = np.zeros(len(first.place_frames), dtype=bool)
+    is_needed[matched] = True
     for places in wrong.values():
         is_needed[places[places >= 0]] = True
     shown = {}
@@ -104,14 +107,15 @@ def find_evidence(
         int(is_needed.sum()),
         "places",
     ):
-        frame = int(first.database_frames[place])
+        frame = int(first.place_frames[place])
         shown[place] = _Shown.of(database, frame, protocol.max_range)
     classes = {
         number: str(one.get("class", "unknown"))
         for drive in (database, query)
         for number, one in (drive.instances or {}).items()
     }
-    number = len(first.query_frames)
+    query_frames = first.columns["query_frame"]
+    number = len(query_frames)
     overlaps, hidden_shares, changed, right_fits = np.full(
         (4, number), math.nan
     )
@@ -120,9 +124,9 @@ def find_evidence(
     for row in track(
         range(number), f"why: comparing {query.name}", number, "queries"
     ):
-        frame = int(first.query_frames[row])
+        frame = int(query_frames[row])
         query_scan = _Shown.of(query, frame, protocol.max_range)
-        matches = np.flatnonzero(first.matches[row]).tolist()
+        matches = matched[rows == row].tolist()
         right = None
         if matches and len(query_scan.points):
             seen = [
@@ -151,15 +155,15 @@ def find_evidence(
     )
 
 
-def _wrong_places(result: PlaceRecognition) -> np.ndarray:
+def _wrong_places(result: PlaceOutcome) -> np.ndarray:
     """Returns the wrong best place of each query, (Q,).
 
     It is -1 if the best place is right or less than two radii away.
     """
-    found, outcomes = result.retrieval, result.outcomes
-    is_far = found.best_distances > NEARLY * result.protocol.radius
+    outcomes = result.outcomes
+    is_far = result.columns["distance"] > NEARLY * result.radius
     is_wrong = outcomes.has_match & ~outcomes.is_right
-    return np.where(is_wrong & is_far, found.best_places, -1)
+    return np.where(is_wrong & is_far, result.best_places[:, 0], -1)
 
 
 @dataclass(frozen=True, eq=False)

@@ -1,7 +1,7 @@
 """Measures methods on one recording or on two."""
 
 from collections.abc import Callable
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from typing import TypeAlias
 
 import numpy as np
@@ -21,10 +21,6 @@ from evaluation.recognition.description import (
 )
 from evaluation.recognition.overlap_truth import best_overlaps
 from evaluation.recognition.place_outcome import PlaceOutcome
-from evaluation.recognition.place_recognition import (
-    PlaceRecognition,
-    judge_retrieval,
-)
 from evaluation.recognition.protocol import RetrievalProtocol
 from evaluation.recognition.retrieval import (
     compare_with_gates,
@@ -52,37 +48,20 @@ _MANY = 5000
 _NUM_TRIALS = 12
 
 
-@dataclass(frozen=True)
-class MethodResult:
-    """The result of a method on two drives of one world.
-
-    Attributes:
-        outcomes: outcomes for the tables, without and with the gate; empty if
-            they were not asked for.
-        recognition: the result by the protocol's own gate; None if no query has
-            a match.
-    """
-
-    outcomes: list[PlaceOutcome]
-    recognition: PlaceRecognition | None
-
-
 def recognise_places(
     reporter: Reporter,
-    names: tuple[str, str, str],
     described: tuple[Part, Part],
     overlaps: Part | None,
     choice: MethodChoice,
     protocol: RetrievalProtocol,
-) -> MethodResult:
-    """Returns the result of a method on two drives of one world.
+) -> list[PlaceOutcome]:
+    """Returns a method's outcomes on two drives, without and with the gate.
 
     Args:
         reporter: reports notes.
-        names: names of the map, and of the stages of database and query.
         described: files with the descriptions of the database and of the query.
-        overlaps: file with the result of `shown_overlaps`; None if no outcomes
-            are asked for.
+        overlaps: file with the result of `shown_overlaps`; None if overlaps
+            are not asked for.
         choice: the method.
         protocol: protocol of the comparison.
     """
@@ -94,40 +73,32 @@ def recognise_places(
     both = compare_with_gates(
         method, database, query, protocol, [None, protocol.radius]
     )
-    outcomes = []
-    if overlaps is not None:
-        shown = overlaps.read()
-        outcomes = [
-            PlaceOutcome.of(
-                choice.key,
-                is_gated,
-                one,
-                (query.queries.stamps_ns, query.queries.p_WSs),
-                [database.name] * len(one.database_frames),
-                shown,
-                protocol.radius,
-            )
-            for is_gated, one in zip((False, True), both, strict=True)
-        ]
     if not both[0].matches.any():
         # Routes need not meet, nor close a loop.
         reporter.note(
             f"{query.name}: no query lies within {protocol.radius:g} m of a"
             f" place of {database.name}"
         )
-        return MethodResult(outcomes, None)
-    own = both[protocol.gate]
-    result = judge_retrieval(
-        method, database.name, query.name, own, protocol, pair=names
-    )
-    return MethodResult(outcomes, result)
+    shown = None if overlaps is None else overlaps.read()
+    return [
+        PlaceOutcome.of(
+            choice.key,
+            method,
+            replace(protocol, gate=is_gated),
+            one,
+            (query.name, query.queries.stamps_ns, query.queries.p_WSs),
+            [database.name] * len(one.database_frames),
+            shown,
+        )
+        for is_gated, one in zip((False, True), both, strict=True)
+    ]
 
 
 def outcomes_of(
     reporter: Reporter, results: tuple[Part, ...]
 ) -> list[PlaceOutcome]:
-    """Returns the outcomes in files with a `MethodResult` each."""
-    return [one for part in results for one in part.read().outcomes]
+    """Returns the outcomes in several files."""
+    return [one for part in results for one in part.read()]
 
 
 def shown_overlaps(
@@ -292,12 +263,16 @@ def measure_places(
             outcomes += [
                 PlaceOutcome.of(
                     choice.key,
-                    is_gated,
+                    method,
+                    replace(protocol, gate=is_gated, radius=radius),
                     replace(found, matches=matches),
-                    (asked.queries.stamps_ns, asked.queries.p_WSs),
+                    (
+                        asked.name,
+                        asked.queries.stamps_ns,
+                        asked.queries.p_WSs,
+                    ),
                     drives,
                     overlaps[radius],
-                    radius,
                 )
                 for is_gated, found in ((False, plain), (True, one))
             ]

@@ -4,8 +4,6 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
-import numpy as np
-
 from cns_drake.base.drives.drive import Drive
 from cns_drake.base.errors import one_line
 from evaluation.recognition.place_outcome import (
@@ -13,7 +11,7 @@ from evaluation.recognition.place_outcome import (
     place_numbers,
     pose_numbers,
 )
-from evaluation.recognition.place_recognition import PlaceRecognition
+from evaluation.recognition.protocol import RetrievalProtocol
 from evaluation.results.table import (
     SETTINGS,
     Answers,
@@ -28,44 +26,35 @@ _EXPERIMENT = "pr"
 
 
 def pair_tables(
-    result: PlaceRecognition,
+    outcome: PlaceOutcome,
     query: Drive,
+    protocol: RetrievalProtocol,
     settings: Mapping[str, Any],
     sensor_height: float | None = None,
 ) -> tuple[Results, QueryRows]:
-    """Returns a result as tables, in the same form as those of studies.
+    """Returns an outcome as tables, in the same form as those of studies.
 
     Args:
-        result: the result.
+        outcome: the outcome.
         query: the drive of the queries.
+        protocol: the protocol that was asked for.
         settings: name -> value of the settings of the method that were given.
         sensor_height: height of the LiDAR [m]; None for the methods' default.
     """
-    found = result.retrieval
-    frames = found.query_frames
-    outcome = PlaceOutcome.of(
-        result.method,
-        result.protocol.gate,
-        found,
-        (query.stamps_ns[frames], query.X_WS[frames, :3, 3]),
-        [result.database] * len(found.database_frames),
-        np.full(len(frames), np.nan),
-        result.protocol.radius,
-    )
     height = {} if sensor_height is None else {"sensor_height": sensor_height}
     key: dict[str, Any] = {
         "experiment": _EXPERIMENT,
         "map": _map_of(query),
-        "database": result.database,
-        "query": result.query,
-        "seed": result.asked.seed,
+        "database": outcome.database,
+        "query": outcome.query,
+        "seed": protocol.seed,
         "factors": {
-            f"{SETTINGS}{result.method}.{name}": value
+            f"{SETTINGS}{outcome.method}.{name}": value
             for name, value in settings.items()
         },
-        "method": result.method,
-        "gate": result.protocol.gate,
-        **made_by(result.asked, height),
+        "method": outcome.method,
+        "gate": outcome.is_gated,
+        **made_by(protocol, height),
     }
     rows = [
         Row.of(number, **key, task=task)

@@ -15,6 +15,7 @@ from cns_drake.base.jobs.step import Steps
 from cns_drake.base.progress import doing
 from cns_drake.base.version import __version__
 from evaluation.recognition.description import Role
+from evaluation.recognition.place_outcome import PlaceOutcome
 from evaluation.recognition.protocol import FAIR_PROTOCOL, RetrievalProtocol
 from evaluation.report import page, result_tables
 from evaluation.report.curve_figures import draw_pr_curves
@@ -26,6 +27,7 @@ from evaluation.study.collection import (
     City,
     Pair,
     RecordingInfo,
+    Run,
     find_recordings,
     group_cities,
     nothing_to_compare,
@@ -248,6 +250,16 @@ class Study:
         names = (one.name for one in pair)
         return self._files.part("recognition", *names, key)
 
+    def _outcome(
+        self, city: City, pair: Pair, measured: Pair, run: Run
+    ) -> PlaceOutcome:
+        """Returns the outcome of a run, with the names that the page shows."""
+        wanted = run.protocol.gate
+        outcomes = self._result(measured, run.queries).read()
+        (found,) = (one for one in outcomes if one.is_gated == wanted)
+        stages = (one.stage for one in pair)
+        return replace(found, method=run.method.name, pair=(city.name, *stages))
+
     def _evidence(self, pair: Pair) -> Part:
         """Returns the file with evidence on why best places are wrong."""
         return self._files.part("why", *(one.name for one in pair))
@@ -389,7 +401,6 @@ class Study:
         repeats runs by the protocol of published numbers.
         """
         database, query = pair
-        names = city.name, database.stage, query.stage
         surveys = [self._files.survey(one.name) for one in pair]
         scans = surveys[0].scans, surveys[1].scans
 
@@ -409,7 +420,6 @@ class Study:
         for run in runs:
             if explains or not run.repeats:
                 arguments = (
-                    names,
                     (
                         surveys[0].described(run.places),
                         surveys[1].described(run.queries),
@@ -469,8 +479,8 @@ class Study:
         for pair in self._pairs(city):
             control = city.unchanged_pair(*pair)
             for run in city.runs(pair, self.methods, self.protocol):
-                found = self._result(pair, run.queries).read().recognition
-                if found is None:
+                found = self._outcome(city, pair, pair, run)
+                if not found.outcomes.has_match.any():
                     continue
                 if run.repeats:
                     report.repeated.append(found)
@@ -479,8 +489,9 @@ class Study:
                 if pair[0] is not pair[1]:
                     before = None
                     if control is not None:
-                        beside = self._result(control, run.queries).read()
-                        before = beside.recognition
+                        before = self._outcome(city, pair, control, run)
+                        if not before.outcomes.has_match.any():
+                            before = None
                     report.pairs.append((found, before))
             evidence = self._evidence(pair).read()
             if evidence is not None and control is not None:

@@ -1,5 +1,6 @@
 """A small report for tests of pages: two drives, two methods."""
 
+from dataclasses import replace
 from types import MappingProxyType
 
 import numpy as np
@@ -13,7 +14,6 @@ from evaluation.recognition.place_outcome import (
     place_numbers,
     pose_numbers,
 )
-from evaluation.recognition.place_recognition import judge_retrieval
 from evaluation.recognition.pose_errors import PoseErrors
 from evaluation.recognition.protocol import PAPER_PROTOCOL
 from evaluation.recognition.retrieval import Retrieval
@@ -115,7 +115,7 @@ def make_results(pairs, evidence=MappingProxyType({})):
                 "query": changed.query,
                 "seed": 1,
                 "factors": {STAGE: stage},
-                **made_by(changed.asked),
+                **made_by(PAPER_PROTOCOL),
             }
             rows += [
                 Row.of(number, **key, task=task)
@@ -131,19 +131,10 @@ def make_results(pairs, evidence=MappingProxyType({})):
 def _outcome(result, overlaps):
     if result is None:
         return None
-    found = result.retrieval
-    number = len(found.query_frames)
     if overlaps is None:
-        overlaps = np.full(number, np.nan)
-    return PlaceOutcome.of(
-        result.method,
-        result.protocol.gate,
-        found,
-        (np.arange(number), np.zeros((number, 3))),
-        [result.database] * len(found.database_frames),
-        overlaps,
-        result.protocol.radius,
-    )
+        return result
+    shown = {"overlap": overlaps, "visible_change": 1.0 - overlaps}
+    return replace(result, columns={**result.columns, **shown})
 
 
 def _poses(xs, y, yaw):
@@ -186,11 +177,14 @@ def make_result(method, best, back=False):
         np.ones(distances.shape, dtype=bool),
     )
     stages = ("04", "01") if back else ("01", "04")
-    names = [f"{MAP}_{stage}" for stage in stages]
-    return judge_retrieval(
+    database, query = (f"{MAP}_{stage}" for stage in stages)
+    number = len(queries)
+    outcome = PlaceOutcome.of(
+        method,
         make_method(method, {}),
-        *names,
-        retrieval,
         PAPER_PROTOCOL,
-        pair=(MAP, *stages),
+        retrieval,
+        (query, np.arange(number), np.zeros((number, 3))),
+        [database] * len(places),
     )
+    return replace(outcome, pair=(MAP, *stages))

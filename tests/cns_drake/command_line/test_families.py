@@ -85,11 +85,11 @@ def test_simulated_and_recorded_families_agree(tmp_path, monkeypatch):
                 protocol=FAIR_PROTOCOL,
             )
             for metric, value in (
-                ("auc", alone.metrics.auc),
-                ("r1", alone.metrics.recall_at_1),
+                ("auc", alone.by_mode["all"].auc),
+                ("r1", alone.by_mode["all"].recall_at_1),
                 ("places", alone.outcomes.num_places),
             ):
                 (found,) = here.where(method=method, metric=metric).rows
                 assert found.value == pytest.approx(value, abs=1e-9)
-    assert found.n == alone.metrics.num_queries
+    assert found.n == alone.by_mode["all"].num_queries
     assert not list(simulated.glob("**/*.mcap"))

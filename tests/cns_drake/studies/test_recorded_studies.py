@@ -74,8 +74,8 @@ def test_the_numbers_are_those_of_the_single_commands(folder, tmp_path):
             open_drive(query),
             make_method("solid", {}),
             protocol=FAIR_PROTOCOL,
-        )
-        assert found[stage]["auc"] == pytest.approx(alone.metrics.auc, abs=1e-9)
+        ).by_mode["all"]
+        assert found[stage]["auc"] == pytest.approx(alone.auc, abs=1e-9)
         change = compare_maps(survey(folder / name), survey(query)).change
         assert values(results, **here, task="change")["tcr_sym"] == (
             pytest.approx(change.symmetric, abs=1e-9)
@@ -119,10 +119,10 @@ def test_protocols_may_vary(folder, tmp_path):
             open_drive(folder / "metropolis_04"),
             make_method("solid", {}),
             protocol=RetrievalProtocol(radius=radius),
-        )
+        ).by_mode["all"]
         found = values(results, **{"protocol.radius": radius}, gate=False)
-        assert found["auc"] == pytest.approx(alone.metrics.auc, abs=1e-9)
-        assert found["with_match"] == alone.outcomes.has_match.sum()
+        assert found["auc"] == pytest.approx(alone.auc, abs=1e-9)
+        assert found["with_match"] == alone.num_with_match
 
 
 def test_the_last_stage_alone(folder, tmp_path):

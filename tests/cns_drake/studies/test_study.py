@@ -153,13 +153,11 @@ def test_the_numbers_are_those_of_the_single_commands(
                 drives["query"],
                 make_method("solid", {"ranges": str(ranges)}),
                 protocol=protocol,
-            )
+            ).by_mode["all"]
             with_it = {**there, "methods__solid__ranges": ranges}
             found = values(results, **with_it, task="place")
-            assert found["auc"] == pytest.approx(alone.metrics.auc, abs=1e-9)
-            assert found["r1"] == pytest.approx(
-                alone.metrics.recall_at_1, abs=1e-9
-            )
+            assert found["auc"] == pytest.approx(alone.auc, abs=1e-9)
+            assert found["r1"] == pytest.approx(alone.recall_at_1, abs=1e-9)
             before = values(
                 results,
                 **{**with_it, "database__stage": "last"},
@@ -283,7 +281,7 @@ def test_protocols_are_factors(town, tmp_path, jobs_done):
             query,
             make_method("solid", {}),
             protocol=RetrievalProtocol(radius=radius),
-        )
+        ).by_mode["all"]
         own, last = (
             values(
                 results,
@@ -293,8 +291,8 @@ def test_protocols_are_factors(town, tmp_path, jobs_done):
             )
             for stage in ("own", "last")
         )
-        assert own["auc"] == pytest.approx(alone.metrics.auc, abs=1e-9)
-        assert own["with_match"] == alone.outcomes.has_match.sum()
+        assert own["auc"] == pytest.approx(alone.auc, abs=1e-9)
+        assert own["with_match"] == alone.num_with_match
         assert last["kept"] == 1.0
         assert own["kept"] == pytest.approx(own["auc"] / last["auc"], abs=1e-6)
 

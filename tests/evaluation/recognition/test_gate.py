@@ -13,6 +13,7 @@ from evaluation.drives import open_drive
 from evaluation.methods import Method, MethodConfig, make_method
 from evaluation.recognition.place_recognition import run
 from evaluation.recognition.protocol import RetrievalProtocol
+from evaluation.recognition.retrieval import retrieve
 from evaluation.recognition.scoring import (
     NUM_GATED,
     SOFTNESS,
@@ -162,27 +163,23 @@ def test_a_pair_of_drives(tmp_path):
     database = record(tmp_path / "a", np.arange(0.0, 61.0, 5.0))
     query = record(tmp_path / "b", np.arange(1.0, 42.0, 10.0))
     free = run(database, query, Line())
-    assert free.metrics.recall_at_1 == 0.0
+    assert free.by_mode["all"].recall_at_1 == 0.0
     shut = run(database, query, Line(), protocol=RetrievalProtocol(gate=True))
-    assert shut.metrics.recall_at_1 == 1.0
+    assert shut.by_mode["all"].recall_at_1 == 1.0
     # The best place of each query is the farthest one that counts: 4 m ahead;
     # one 9 m ahead is rejected.
-    np.testing.assert_allclose(_offsets(shut), 4.0)
-    assert not np.isnan(free.retrieval.scores).any()
-    far = shut.retrieval.distances >= 7.5 * (1.0 + SOFTNESS)
-    assert np.isnan(shut.retrieval.scores[far]).all()
+    np.testing.assert_allclose(shut.columns["distance"], 4.0)
+    plain, gated = (
+        retrieve(database, query, Line(), RetrievalProtocol(gate=gate))
+        for gate in (False, True)
+    )
+    assert not np.isnan(plain.scores).any()
+    far = gated.distances >= 7.5 * (1.0 + SOFTNESS)
+    assert np.isnan(gated.scores[far]).all()
     # A wider radius accepts places 9 m ahead.
     wide = RetrievalProtocol(gate=True, radius=10.5)
-    np.testing.assert_allclose(
-        _offsets(run(database, query, Line(), protocol=wide)), 9.0
-    )
-
-
-def _offsets(outcome):
-    """Returns the distance of each query's best place."""
-    found = outcome.retrieval
-    rows = np.arange(len(found.query_frames))
-    return found.distances[rows, found.best_places]
+    outcome = run(database, query, Line(), wide)
+    np.testing.assert_allclose(outcome.columns["distance"], 9.0)
 
 
 @pytest.mark.slow
@@ -221,4 +218,4 @@ def test_shipped_methods_take_part(name, towns):
     drive = open_drive(towns / "town_01")
     method = make_method(name, {})
     shut = run(drive, drive, method, protocol=RetrievalProtocol(gate=True))
-    assert shut.metrics.recall_at_1 == 1.0
+    assert shut.by_mode["all"].recall_at_1 == 1.0

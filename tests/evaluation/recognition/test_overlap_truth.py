@@ -15,6 +15,7 @@ from evaluation.methods import make_method
 from evaluation.recognition.overlap_truth import overlap_matrix
 from evaluation.recognition.place_recognition import run
 from evaluation.recognition.protocol import RetrievalProtocol
+from evaluation.recognition.retrieval import retrieve
 from evaluation.recognition.seen_surfaces import TOLERANCE, SeenSurfaces
 
 # Beams are a degree apart and miss the borders of cells.
@@ -149,17 +150,17 @@ def test_a_match_is_what_shows_the_same(rooms, capsys, tmp_path):
     database, query = map(open_drive, rooms)
     method = make_method("solid", {})
     protocol = RetrievalProtocol(overlap=0.5, query_spacing=5.0)
-    result = run(database, query, method, protocol=protocol)
+    result = retrieve(database, query, method, protocol)
     expected = [[True, True, False], [True, True, False], [False, False, True]]
-    assert result.retrieval.matches.tolist() == expected
-    assert "a match shows 50% of" in result.protocol.to_text()
+    assert result.matches.tolist() == expected
+    assert "a match shows 50% of" in protocol.to_text()
     # The limit is itself enough.
-    overlaps = result.retrieval.overlaps
+    overlaps = result.overlaps
     protocol = RetrievalProtocol(
         overlap=float(overlaps[2, 2]), query_spacing=5.0
     )
-    limit = run(database, query, method, protocol=protocol, overlaps=overlaps)
-    assert limit.retrieval.matches[2, 2]
+    limit = run(database, query, method, protocol, overlaps=overlaps)
+    assert [2, 2] in limit.matches.tolist()
     with pytest.raises(InputError, match="no place of a shows 100% of"):
         run(
             database,
@@ -178,7 +179,7 @@ def test_a_match_is_what_shows_the_same(rooms, capsys, tmp_path):
         rows = list(csv.DictReader(stream))
     np.testing.assert_allclose(
         [float(row["overlap"]) for row in rows],
-        result.retrieval.overlaps.ravel(),
+        result.overlaps.ravel(),
         atol=1e-6,
     )
     for truth in ("overlap", "overlap:0", "overlap:1.01", "overlap:x", "near"):

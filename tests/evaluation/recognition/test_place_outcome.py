@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 from scipy.stats import binom
 
+from evaluation.methods import make_method
 from evaluation.recognition.metrics import UNKNOWN
 from evaluation.recognition.place_outcome import (
     FAULTS,
@@ -13,6 +14,7 @@ from evaluation.recognition.place_outcome import (
     pose_numbers,
 )
 from evaluation.recognition.pose_errors import PoseErrors
+from evaluation.recognition.protocol import RetrievalProtocol
 from evaluation.recognition.query_outcomes import QueryOutcomes
 from evaluation.recognition.retrieval import Retrieval
 
@@ -33,8 +35,30 @@ def answered(is_right, scores=None, blocks=None):
         "why": faults(outcomes, np.arange(number), np.ones(number), 7.5),
         "overlap": np.linspace(0.2, 0.8, number),
     }
-    errors = PoseErrors.unknown(number)
-    return PlaceOutcome("solid", False, outcomes, columns, errors, 7.5)
+    return outcome_of("solid", outcomes, columns, PoseErrors.unknown(number))
+
+
+def outcome_of(method, outcomes, columns, errors):
+    """An outcome whose best places are not known."""
+    number = len(outcomes)
+    poses = {
+        "translation_error": errors.translation,
+        "rotation_error_deg": errors.rotation_deg,
+    }
+    return PlaceOutcome(
+        method=method,
+        database="a",
+        query="b",
+        protocol=RetrievalProtocol(),
+        protocol_name="recorded",
+        outcomes=outcomes,
+        columns={**columns, **poses},
+        place_frames=np.arange(9),
+        best_places=np.full((number, 5), -1),
+        best_scores=np.full((number, 5), np.nan),
+        matches=np.empty((0, 2), int),
+        nearest=np.full(number, np.inf),
+    )
 
 
 def part(number, kept):
@@ -120,9 +144,7 @@ def test_median_errors_are_those_of_right_answers():
     )
     far = np.where(right, 0.1, 50.0)
     far[0] = np.nan
-    now = PlaceOutcome(
-        "btc", False, outcomes, {}, PoseErrors(far, 2.0 * far), 7.5
-    )
+    now = outcome_of("btc", outcomes, {}, PoseErrors(far, 2.0 * far))
     assert {n.metric: (n.value, n.n) for n in pose_numbers(now, None)} == {
         "pose_success": (9 / 11, 11),
         "translation_median": (0.1, 9),
@@ -217,13 +239,13 @@ def test_columns_hold_all_that_numbers_follow_from(blocks):
         query_blocks=blocks,
     )
     one = PlaceOutcome.of(
-        "solid",
-        False,
+        "solid rings=8",
+        make_method("solid", {}),
+        RetrievalProtocol(gate=True),
         retrieval,
-        (np.arange(8) * 50, np.arange(24.0).reshape(8, 3)),
+        ("town_03", np.arange(8) * 50, np.arange(24.0).reshape(8, 3)),
         ["town_01"] * 6 + ["town_02"] * 3,
         np.linspace(0.2, 0.8, 8),
-        7.5,
     )
     found = one.columns
     assert {len(column) for column in found.values()} == {8}
@@ -237,4 +259,13 @@ def test_columns_hold_all_that_numbers_follow_from(blocks):
         found["block"], np.arange(8) if blocks is None else blocks
     )
     np.testing.assert_allclose(found["overlap"] + found["visible_change"], 1.0)
+    assert (one.method, one.database) == ("solid rings=8", "town_01")
+    assert (one.query, one.is_gated, one.radius) == ("town_03", True, 7.5)
+    assert one.protocol.scans_per_place == 1
+    # Each query has one candidate.
+    assert one.best_places.tolist() == [[k, -1, -1, -1, -1] for k in range(8)]
+    np.testing.assert_array_equal(one.best_scores[:, 0], np.diag(scores))
+    assert np.isnan(one.best_scores[:, 1:]).all()
+    assert one.matches.tolist() == [[k, k] for k in range(5)]
+    assert one.nearest.tolist() == [1.0] * 8
     assert [bool(why) for why in found["why"]] == [*~right]

@@ -112,8 +112,8 @@ def test_a_drive_against_itself(tmp_path):
     np.testing.assert_array_equal(found.matches, near & (age >= 0.5 - 1e-9))
     outcome = run(drive, drive, Means(), protocol=protocol)
     # These are all queries of the way back except those just after the turn.
-    assert outcome.metrics.num_with_match in (3, 4)
-    assert outcome.metrics.recall_at_1 == 1.0
+    assert outcome.by_mode["all"].num_with_match in (3, 4)
+    assert outcome.by_mode["all"].recall_at_1 == 1.0
     with pytest.raises(InputError, match=r"loop: never within 7.5 m of where"):
         run(drive, drive, Means(), protocol=RetrievalProtocol(exclude_recent=9))
 

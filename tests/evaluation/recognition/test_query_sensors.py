@@ -75,14 +75,14 @@ def test_poses_are_judged_against_the_turned_sensor(drives):
     )
     for found in (plain, turned):
         assert found.pose.success == 1.0
-        assert found.retrieval.pose_errors.translation.max() < 1e-4
-        assert found.retrieval.pose_errors.rotation_deg.max() < 1e-4
-    np.testing.assert_allclose(
-        turned.retrieval.scores, plain.retrieval.scores, atol=1e-9
+        assert found.pose_errors.translation.max() < 1e-4
+        assert found.pose_errors.rotation_deg.max() < 1e-4
+    plain, turned = (
+        retrieve(*drives, Corresponding(), protocol)
+        for protocol in (RetrievalProtocol(), TURNED)
     )
-    np.testing.assert_array_equal(
-        turned.retrieval.matches, plain.retrieval.matches
-    )
+    np.testing.assert_allclose(turned.scores, plain.scores, atol=1e-9)
+    np.testing.assert_array_equal(turned.matches, plain.matches)
 
 
 @pytest.mark.parametrize("number", [1, 3])

@@ -226,12 +226,7 @@ def test_metrics_of_a_pair(tmp_path):
     assert values["recall_at_1"] == pytest.approx(3 / 4)
     assert values["places"] == 7
     assert (values["database"], values["query"]) == ("a", "b")
-    assert values["parameters"] == {
-        "sensor_height": 1.6,
-        "place": None,
-        "sequence": 0.0,
-    }
-    filtered = replace(result, mode="filtered").to_json()
+    filtered = result.to_json("filtered")
     assert filtered["mode"] == "filtered"
     assert filtered["f1_max"] == pytest.approx(2 * 0.75 / 1.75)
     assert len(values["recall_at_n"]) == 25
@@ -243,11 +238,11 @@ def test_auc_over_the_radius(tmp_path):
     result = run(database, query, OddOneOut())
     found = result.auc_over_radius()
     assert [*found] == [2.5, 5.0, 7.5, 10.0, 15.0, 20.0, 25.0]
-    assert found[7.5] == result.metrics.auc
+    assert found[7.5] == result.by_mode["all"].auc
     for radius, auc in found.items():
         protocol = RetrievalProtocol(radius=radius)
         other = run(database, query, OddOneOut(), protocol=protocol)
-        assert auc == other.metrics.auc
+        assert auc == other.by_mode["all"].auc
     assert len(set(found.values())) > 2
 
 

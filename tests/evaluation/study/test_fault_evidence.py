@@ -1,6 +1,7 @@
 """Why best places are wrong: walls that hide, come, go and repeat."""
 
 import csv
+from dataclasses import replace
 
 from helpers.drive_files import make_scan, write_recording, yaw_pose
 import numpy as np
@@ -13,10 +14,7 @@ from evaluation.recognition.fault_kinds import (
     PairEvidence,
     fault_kinds,
 )
-from evaluation.recognition.place_outcome import faults
-from evaluation.recognition.place_recognition import (
-    judge_retrieval,
-)
+from evaluation.recognition.place_outcome import PlaceOutcome
 from evaluation.recognition.pose_errors import PoseErrors
 from evaluation.recognition.protocol import RetrievalProtocol
 from evaluation.recognition.retrieval import Retrieval
@@ -97,14 +95,15 @@ def result_of(best, distances, protocol, method="solid"):
         PoseErrors.unknown(rows),
         np.ones(distances.shape, dtype=bool),
     )
-    return judge_retrieval(
+    outcome = PlaceOutcome.of(
+        method,
         make_method(method, {}),
-        "a",
-        "b",
-        retrieval,
         protocol,
-        pair=("town", "a", "b"),
+        retrieval,
+        ("b", np.arange(rows), np.zeros((rows, 3))),
+        ["a"] * places,
     )
+    return replace(outcome, pair=("town", "a", "b"))
 
 
 def test_what_scans_say(tmp_path):
@@ -227,10 +226,7 @@ def test_reasons_are_counted(judged):
     assert [row[kind] for kind in FAULT_KINDS] == ["1"] * 7 + ["2"]
     assert row["changed_by"] == "car:1"
     # The same number as in the table of results.
-    retrieval = result.retrieval
-    reasons = faults(
-        result.outcomes, retrieval.best_frames, retrieval.best_distances, 7.5
-    )
+    reasons = result.columns["why"]
     assert int(row["elsewhere"]) == np.sum(reasons == "elsewhere") == 6
     table = fault_table([result], known)
     (shown,) = table.rows

@@ -340,7 +340,7 @@ def test_each_protocol_is_that_of_the_single_command(recordings, report):
     for name in ("btc", "solid"):
         for protocol in (FAIR_PROTOCOL, PAPER_PROTOCOL):
             alone = run(*drives, make_method(name, {}), protocol=protocol)
-            assert found[name, protocol.name] == alone.metrics.auc
+            assert found[name, protocol.name] == alone.by_mode["all"].auc
     assert ("layered-overlap", "paper") not in found
     for name in ("survival", "differences", "query_details_unchanged"):
         rows = forward(report / f"{name}.csv")

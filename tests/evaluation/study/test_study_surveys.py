@@ -236,8 +236,7 @@ def test_drives_of_two_worlds_are_not_compared(tmp_path, recorded):
     survey(other, (solid,), surveys[1])
     part = Part(tmp_path / "results" / "solid.data")
     described = tuple(one.described(solid.name) for one in surveys)
-    names = ("metropolis", "01", "04")
-    arguments = names, described, None, solid, PAPER_PROTOCOL
+    arguments = described, None, solid, PAPER_PROTOCOL
     step = MakePart(part, recognise_places, arguments)
     with pytest.raises(InputError, match="poses in frame 'utm'"):
         step.run(Reporter())
