@@ -43,9 +43,10 @@ _MAX_SEED = 2**63
 # Half the width of the car with its mirrors, and some room [m].
 _HALF_CAR = 1.3
 _SPACING = 0.5
-# In each past year, a tree was lower by the first number, but never below the
-# second [m].
-_GROWTH, _LEAST_TREE = 0.4, 2.0
+# In each past year, a tree was lower by this height [m].
+_GROWTH = 0.4
+# Trees were never lower than this [m].
+_LEAST_TREE = 2.0
 
 
 @dataclass(frozen=True)

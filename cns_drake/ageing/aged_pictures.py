@@ -12,10 +12,14 @@ from cns_drake.base.progress import doing
 from cns_drake.pictures.stage_scene import StageScene, View
 
 PICTURES = "pictures"
-_WIDTH, _HEIGHT = 480, 270
+# Size of a picture in pixels.
+_WIDTH = 480
+_HEIGHT = 270
 _STREETS = 3
-# Height of the camera above the street, and distance to its target [m].
-_EYE, _AHEAD = 2.4, 30.0
+# Height of the camera above the street [m].
+_EYE_HEIGHT = 2.4
+# Distance from the camera to its target [m].
+_TARGET_AHEAD = 30.0
 # Possible views along the drive are this far apart, and chosen ones three times
 # as far [m].
 _SPACING = 25.0
@@ -51,9 +55,11 @@ def street_views(aged: AgedMap) -> dict[str, View]:
     views = {}
     for n, k in enumerate(sorted(chosen), start=1):
         x, y, z = p_WBs[k]
-        u, v, w = p_WBs[k] + _AHEAD * ahead[k]
+        u, v, w = p_WBs[k] + _TARGET_AHEAD * ahead[k]
         views[f"street_{n}"] = View(
-            position=(x, y, z + _EYE), target=(u, v, w + _EYE + 1.0), fov_y=60
+            position=(x, y, z + _EYE_HEIGHT),
+            target=(u, v, w + _EYE_HEIGHT + 1.0),
+            fov_y=60,
         )
     return views
 

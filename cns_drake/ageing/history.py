@@ -41,13 +41,17 @@ from cns_drake.transient import world_structures
 _REPLACED = 0.85
 # Share of the sites that take two years; all others take one year.
 _TWO_YEARS = 0.7
-# Shares of the renewed fronts: with a scaffold in front in the year of the
-# renewal, with new insulation, and with balconies.
+# Share of the renewed fronts with a scaffold in front, in the year of the
+# renewal.
 _SCAFFOLDED = 0.4
-_INSULATED, _WITH_BALCONIES = 0.5, 0.35
-# Greatest height of buildings that get another storey, and least height of
-# those that get balconies [m].
-_HIGHEST_RAISED, _LEAST_BALCONIES = 40.0, 8.0
+# Share of the free-standing renewed buildings with new insulation.
+_INSULATED = 0.5
+# Share of the renewed fronts with balconies, if they had none.
+_WITH_BALCONIES = 0.35
+# Greatest height of buildings that get another storey [m].
+_HIGHEST_RAISED = 40.0
+# Least height of buildings that get balconies [m].
+_LEAST_WITH_BALCONIES = 8.0
 # Listed buildings, which never change.
 _LISTED = re.compile(
     "church|chapel|museum|town_hall|observation_tower|station|mill"
@@ -61,13 +65,18 @@ _YOUNG_YEARS = 10
 _LEAST_TREE = 3.0
 # A crown keeps this share of its reach away from walls.
 _CROWN_PART = 0.8
-# Street furniture that moves does so by at least this distance, and turns by at
-# most this angle [m, rad].
-_NEAREST, _TURN = 0.2, 0.1
+# Street furniture that moves does so by at least this distance [m].
+_LEAST_MOVE = 0.2
+# It turns by at most this angle [rad].
+_MOST_TURN = 0.1
 _TRIES = 6
 _KERB = 0.1
-# Sizes of new plots along streets: widths, depth, range of setbacks [m].
-_PLOT_WIDTHS, _PLOT_DEPTH, _SETBACKS = (22.0, 16.0, 11.0), 14.0, (3.0, 22.0)
+# Widths of new plots along streets, tried in turn [m].
+_PLOT_WIDTHS = (22.0, 16.0, 11.0)
+# Greatest depth of new plots [m].
+_PLOT_DEPTH = 14.0
+# Distances of new plots from the street that are tried [m].
+_SETBACKS = (3.0, 22.0)
 _STEEPEST = 0.6
 # No building on a small plot is higher than this [m].
 _HIGHEST_NEW = 20.0
@@ -77,8 +86,10 @@ _GROUND = ("road", "parking", "sidewalk", "other-ground", "terrain")
 _PASSING = ("car", "truck", "bus", "bicycle", "other-vehicle")
 
 
-# Events that put up or remove structures as a consequence of another event.
-PUT_UP, TAKEN_DOWN = "put_up", "taken_down"
+# A structure is put up as a consequence of another event.
+PUT_UP = "put_up"
+# A structure is removed as a consequence of another event.
+TAKEN_DOWN = "taken_down"
 
 
 @dataclass(frozen=True)
@@ -624,7 +635,11 @@ class City:
         )
         words = ["colour", *(["insulation"] if insulated else [])]
         has = any("_balconies_" in part for part in lot.parts)
-        has = has or not _DWELLING.search(name) or lot.height < _LEAST_BALCONIES
+        has = (
+            has
+            or not _DWELLING.search(name)
+            or lot.height < _LEAST_WITH_BALCONIES
+        )
         added = ""
         if rng.uniform() < _WITH_BALCONIES and not has:
             one = plots.balconies_on(
@@ -689,7 +704,7 @@ class City:
         farthest = self._rates[MOVED]
         for _ in range(_TRIES if farthest else 0):
             angle = rng.uniform(-np.pi, np.pi)
-            by = float(rng.uniform(min(_NEAREST, farthest), farthest))
+            by = float(rng.uniform(min(_LEAST_MOVE, farthest), farthest))
             step = by * np.array([math.cos(angle), math.sin(angle)])
             up = ground.rise(middle, middle + step)
             area = affinity.translate(foot, *step)
@@ -699,7 +714,7 @@ class City:
                 and not area.intersects(ground.carriageway)
                 and not area.intersects(self._kept_free)
             ):
-                turn = float(rng.uniform(-_TURN, _TURN))
+                turn = float(rng.uniform(-_MOST_TURN, _MOST_TURN))
                 offset, rise = step, up
                 break
         whole = self._structure(old)

@@ -63,8 +63,10 @@ PARTY_WALL = 3.1
 # A frame is at least this high, about one storey [m].
 _LEAST_FRAME = 4.0
 _STOREY = 3.0
-# Greatest length and height of a scaffold [m].
-_LONGEST, _HIGHEST = 25.0, 16.0
+# Greatest length of a scaffold [m].
+_LONGEST_SCAFFOLD = 25.0
+# Greatest height of a scaffold [m].
+_HIGHEST_SCAFFOLD = 16.0
 _COLOURS: tuple[Rgb, ...] = (
     (0.93, 0.91, 0.86),
     (0.86, 0.79, 0.66),
@@ -283,10 +285,10 @@ def scaffold_before(
         rng: random generator for the scaffold.
     """
     x0, y0, x1, _ = plot.inside(plot.area).bounds
-    length = min(x1 - x0, _LONGEST)
+    length = min(x1 - x0, _LONGEST_SCAFFOLD)
     xy = plot.place((x0 + x1) / 2, y0)
     moved = Plot(plot.area, xy, round(plot.yaw + math.pi, 5), plot.z)
-    model = scaffold(length, min(height, _HIGHEST), rng)
+    model = scaffold(length, min(height, _HIGHEST_SCAFFOLD), rng)
     return moved.thing(name, "other-structure", model)
 
 

@@ -11,9 +11,10 @@ from scipy.stats import poisson
 from cns_drake.base.errors import InputError
 from cns_drake.base.yaml_files import parse_yaml, read_yaml
 
-# Not a rate: the greatest distance that street furniture moves, and its upper
-# limit [m].
-MOVED, _FARTHEST = "moved", 20.0
+# Not a rate, but the greatest distance that street furniture moves.
+MOVED = "moved"
+# Upper limit of this distance [m].
+_FARTHEST = 20.0
 # Events that are drawn at random -> their rate per year, see rates.yaml.
 DEFAULT_RATES: Mapping[str, float] = {
     event: values["metres" if event == MOVED else "rate"]

@@ -59,7 +59,8 @@ _TRAFFIC_INTERVAL = 5
 # Greatest number of samples in a plot; more would not be visible.
 _MAX_SAMPLES = 400
 # Size of a plot in units of its own, which the page stretches.
-_PLOT_WIDTH, _PLOT_HEIGHT = 400.0, 20.0
+_PLOT_WIDTH = 400.0
+_PLOT_HEIGHT = 20.0
 # Unit -> least range of a plot. A smaller one would magnify noise.
 _LEAST_RANGE = {"km/h": 10.0, "m/s²": 2.0, "deg/s": 10.0}
 # Possible distances of the times on the scale [s].
@@ -67,8 +68,10 @@ _TIME_STEPS = (1, 2, 5, 10, 15, 30, 60, 120, 300, 600, 900, 1800)
 # These limits keep the page of any drive below 25 MB.
 _MAX_SCANS = 160
 _MAX_POINTS_PER_SCAN = 3000
-# Greatest number of images per camera, and their longer side in pixels.
-_MAX_IMAGES, _IMAGE_SIDE = 200, 400
+# Greatest number of images per camera.
+_MAX_IMAGES = 200
+# Longer side of an image [pixels].
+_IMAGE_SIDE = 400
 # One point is kept per cube of this size [m]. Otherwise nearly all points would
 # lie on the rings of ground around the vehicle.
 _THINNING_SIZE = 0.5

@@ -19,9 +19,10 @@ from cns_drake.scenarios.scenario import Scenario
 from cns_drake.scenarios.scenario_files import world_file
 from cns_drake.sensors.lidar.presets import make_beam_pattern
 
-# Size of a panel in pixels: width and height of a view, and side of a picture
-# from above.
-_WIDTH, _HEIGHT = 704, 396
+# Size of a camera's view [pixels].
+_WIDTH = 704
+_HEIGHT = 396
+# Side of a picture from above [pixels].
 _SIDE = 600
 # Height of the LiDAR, which stands below the camera [m].
 _SENSOR_HEIGHT = 1.6

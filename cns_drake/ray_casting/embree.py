@@ -17,11 +17,22 @@ from numba import types
 # With this import, numba accepts functions as arguments of compiled functions.
 from numba.extending import typeof_impl
 
-TRIANGLE, CONE, ROUND_SEGMENT, SPHERE, DISC, INSTANCE = (
-    0, 15, 16, 50, 52, 121,
-)  # fmt: skip
-INDEX_BUFFER, VERTEX_BUFFER, NORMAL_BUFFER = 0, 1, 3
-UINT, UINT3, FLOAT3, FLOAT4 = 0x5001, 0x5003, 0x9003, 0x9004
+# Types of geometries (`RTC_GEOMETRY_TYPE_...`).
+TRIANGLE = 0
+CONE = 15
+ROUND_SEGMENT = 16
+SPHERE = 50
+DISC = 52
+INSTANCE = 121
+# Types of buffers (`RTC_BUFFER_TYPE_...`).
+INDEX_BUFFER = 0
+VERTEX_BUFFER = 1
+NORMAL_BUFFER = 3
+# Formats of buffers (`RTC_FORMAT_...`).
+UINT = 0x5001
+UINT3 = 0x5003
+FLOAT3 = 0x9003
+FLOAT4 = 0x9004
 FLOAT3X4_ROW_MAJOR = 0x9134
 ROBUST_SCENE = 1 << 2
 COHERENT_RAYS = 1 << 16

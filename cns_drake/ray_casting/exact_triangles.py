@@ -18,15 +18,19 @@ from cns_drake.ray_casting.ray_groups import RayGroup
 from cns_drake.ray_casting.rays import Hits
 from cns_drake.scene.surfaces import TriangleSurface, merge_triangles
 
-# Number of triangles in a leaf, and how much boxes are wider than those [m].
-_LEAF, _MARGIN = 4, 1e-6
+# Greatest number of triangles in a leaf.
+_LEAF_SIZE = 4
+# Boxes are this much wider than the triangles on each side [m].
+_BOX_MARGIN = 1e-6
 # Number of planes, plus one, at which dividing a node is considered.
 _BINS = 16
 # Depth of nodes from which on they are halved, so that stacks suffice.
 _DEEPEST = 100
-# Tolerance of a hit beside an edge, as a share of the triangle's size, and for
-# rounding. No ray passes between two triangles that share an edge.
-_BESIDE, _ROUNDING = 1e-9, 1e-14
+# Tolerance of a hit beside an edge, as a share of the triangle's size. With it,
+# no ray passes between two triangles that share an edge.
+_EDGE_TOLERANCE = 1e-9
+# Additional tolerance for rounding, relative to the numbers that are rounded.
+_ROUNDING_TOLERANCE = 1e-14
 # Greatest error of a hit by rounding, as a share of the triangle's size.
 _PARALLEL = 1e-3
 
@@ -109,7 +113,10 @@ class ExactTriangles:
 def _sort(surface: TriangleSurface, owners: np.ndarray) -> _Tree:
     """Sorts triangles by the surface area heuristic (Wald 2007, with bins)."""
     corners = surface.p_GVset[surface.triangles].astype(float)
-    low, high = corners.min(axis=1) - _MARGIN, corners.max(axis=1) + _MARGIN
+    low, high = (
+        corners.min(axis=1) - _BOX_MARGIN,
+        corners.max(axis=1) + _BOX_MARGIN,
+    )
     order = np.arange(len(corners))
     boxes = np.empty((2 * len(corners), 2, 3))
     begins = np.empty(2 * len(corners), np.int64)
@@ -183,7 +190,7 @@ def _divide(
                 side[0, i] = min(side[0, i], middle)
                 side[1, i] = max(side[1, i], middle)
         begins[node], counts[node] = begin, end - begin
-        if end - begin <= _LEAF:
+        if end - begin <= _LEAF_SIZE:
             continue
         axis = 0
         for i in range(1, 3):
@@ -324,7 +331,7 @@ def _cast(
                 for i in range(3):
                     longest += abs(a[i]) + abs(b[i])
                 far = abs(s[0]) + abs(s[1]) + abs(s[2])
-                rounding = _ROUNDING * longest * far
+                rounding = _ROUNDING_TOLERANCE * longest * far
                 # In the plane of the triangle, as far as numbers tell: the ray
                 # meets the edge of a neighbour instead.
                 if rounding >= _PARALLEL * abs(det):
@@ -338,7 +345,7 @@ def _cast(
                     across = s[j] * d[m] - s[m] * d[j]
                     u += b[i] * across
                     v -= a[i] * across
-                slack = _BESIDE * abs(det) + rounding
+                slack = _EDGE_TOLERANCE * abs(det) + rounding
                 if det < 0.0:
                     u, v = -u, -v
                 if u >= -slack and v >= -slack and u + v <= abs(det) + slack:

@@ -22,10 +22,11 @@ MOST_COPIED_TRIANGLES = 2**18
 _LARGEST_STEP_RAD = 2.0
 # Greatest number of time steps that Embree supports.
 _MOST_STEPS = 129
-# Space is divided into cubes, each with an origin O. Sides of the cubes [m]:
-# for scenes with merged geometry, and for other scenes, which are quick to
-# rebuild.
-_CUBE, _MOVING_CUBE = 2000.0, 256.0
+# Space is divided into cubes, each with an origin O. Side of the cubes for
+# scenes with merged geometry [m].
+_MERGED_CUBE = 2000.0
+# Side of the cubes for other scenes, which are quick to rebuild [m].
+_MOVING_CUBE = 256.0
 # A member of a scene: index of a geometry, its pose, its surface.
 Member = tuple[int, RigidTransform, surfaces.Surface]
 
@@ -206,7 +207,7 @@ def group_geometries(
         places = np.array([X_WG.translation() for _, X_WG, _ in world])
         p_WO = np.round((places.min(axis=0) + places.max(axis=0)) / 2.0)
     if p_WS is not None:
-        cube = _CUBE if world else _MOVING_CUBE
+        cube = _MERGED_CUBE if world else _MOVING_CUBE
         p_WO += cube * np.round((p_WS - p_WO) / cube)
 
     groups, alone = [], []
@@ -261,7 +262,7 @@ def serves(
         p_WS: (3,) position of the sensor in the world [m].
     """
     has_world = any(group.is_merged_world for group in groups)
-    cube = _CUBE if has_world else _MOVING_CUBE
+    cube = _MERGED_CUBE if has_world else _MOVING_CUBE
     return bool((np.abs(p_WS - p_WO) <= cube / 2.0).all())
 
 

@@ -20,16 +20,19 @@ from cns_drake.roads.u_turn import FRONT, HALF_WIDTH, REAR, directions, outlines
 
 # Distance between the points of the path that `depart` needs [m].
 FINE_SPACING = 0.5
-# Least and greatest length of an episode in another lane [m].
-SHORTEST_EPISODE, LONGEST_EPISODE = 15.0, 270.0
+# Least length of an episode in another lane [m].
+SHORTEST_EPISODE = 15.0
+# Greatest length of an episode in another lane [m].
+LONGEST_EPISODE = 270.0
 # Length of a change from one lane to the other [m].
 _RAMP = 80.0
 # Greatest offset of the car from its line; in a lane of 3.5 m, as much room is
 # left [m].
 _FARTHEST = 0.8
-# Least distance of the car from kerbs and other obstacles, and by how much the
-# smoothed path may fall short of it [m].
-_CLEARANCE, _SLACK = 0.3, 0.1
+# Least distance of the car from kerbs and other obstacles [m].
+_CLEARANCE = 0.3
+# The smoothed path may fall short of this distance by so much [m].
+_SMOOTHING_SLACK = 0.1
 # Offsets that are tried [m], at one of so many points of the path.
 _OFFSETS = np.linspace(-_FARTHEST, _FARTHEST, 33)
 _CHECKED = 4
@@ -112,7 +115,7 @@ def _is_free(
     middle = points[:, None, :2] + offsets[:, None] * left
     corners = outlines(middle, along, REAR, FRONT, HALF_WIDTH)
     cars = np.asarray(shapely.polygons(corners)).ravel()
-    hit, _ = obstacles.query(cars, "dwithin", _CLEARANCE + _SLACK)
+    hit, _ = obstacles.query(cars, "dwithin", _CLEARANCE + _SMOOTHING_SLACK)
     free = np.ones(len(cars), dtype=bool)
     free[hit] = False
     return free.reshape(middle.shape[:2])

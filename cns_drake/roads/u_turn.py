@@ -19,9 +19,12 @@ from cns_drake.roads.centreline import Centreline, sample_stations
 _WHEELBASE = 2.8
 _HALF_TRACK = 0.79
 _STEERING_LIMIT = 0.7
-# Length of the car behind the rear axle and ahead of it, and half its width
-# with mirrors [m].
-REAR, FRONT, HALF_WIDTH = 1.0, 3.72, 1.03
+# Length of the car behind the rear axle [m].
+REAR = 1.0
+# Length of the car ahead of the rear axle [m].
+FRONT = 3.72
+# Half the width of the car with mirrors [m].
+HALF_WIDTH = 1.03
 
 # Tightest radius on which the middle of the rear axle can drive [m].
 TIGHTEST_RADIUS = float(_WHEELBASE / math.tan(_STEERING_LIMIT) + _HALF_TRACK)

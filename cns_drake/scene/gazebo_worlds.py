@@ -180,7 +180,8 @@ _SHAPES = (
     "drake:capsule", "drake:ellipsoid",
 )  # fmt: skip
 # Gazebo's own models, for which no file is needed.
-_SUN, _GROUND_PLANE = "model://sun", "model://ground_plane"
+_SUN = "model://sun"
+_GROUND_PLANE = "model://ground_plane"
 _GROUND = """<model name="ground_plane"><link name="link"><visual name="visual">
 <geometry><plane><normal>0 0 1</normal></plane></geometry></visual></link>
 </model>"""

@@ -40,8 +40,10 @@ from cns_drake.transient.world_structures import GROUND_CLASSES, read_structures
 # Size of the car in worlds/vehicle.sdf, with mirrors and wheels [m].
 EGO_BOX = EgoBox(rear=-1.05, front=3.75, half_width=1.05)
 # A car that follows others takes at most this multiple of the time that it
-# would need alone, plus this time [s].
-_SLOWEST, _WAITS = 6.0, 600.0
+# would need alone, plus a wait.
+_SLOWEST_RATIO = 6.0
+# This wait [s].
+_LONGEST_WAIT = 600.0
 # Distance from the car's middle line to its sides, with a margin [m].
 _HALF_WIDTH = 1.3
 
@@ -276,7 +278,7 @@ def plan_scenario_traffic(
         walkers=wanted.walkers,
         seed=wanted.seed,
         # Traffic is planned for the whole drive, not only for its frames.
-        duration=_SLOWEST * trajectory.duration + _WAITS
+        duration=_SLOWEST_RATIO * trajectory.duration + _LONGEST_WAIT
         if follows
         else trajectory.duration + FRAME_PERIOD,
         ego=(lambda t: ego(0.0 * t)) if follows else ego,

@@ -272,11 +272,17 @@ _BARE = frozenset(
 )
 # Longest side of triangles at the edge of a cleared road [m].
 _FINE = 0.7
-# A bank of snow along a kerb: distances from the kerb of its edge on the road,
-# of its crest, and of its edge beyond the kerb [m]; its greatest height as a
-# multiple of the depth of snow, and above the snow [m].
-_INSIDE, _CREST, _OUTSIDE = 0.3, 0.3, 1.1
-_HIGHEST, _MOST_HEIGHT = 2.5, 0.9
+# A bank of snow along a kerb: distance from the kerb of its edge on the road
+# [m].
+_BANK_ON_ROAD = 0.3
+# Distance from the kerb of its crest, beyond the kerb [m].
+_BANK_CREST = 0.3
+# Distance from the kerb of its edge beyond the kerb [m].
+_BANK_BEYOND = 1.1
+# Its greatest height as a multiple of the depth of snow.
+_BANK_RATIO = 2.5
+# Its greatest height above the snow [m].
+_BANK_ABOVE_SNOW = 0.9
 _SPACING = 1.5
 # Wavelengths of the bank's height along the street [m].
 _WAVES = (9.0, 3.7)
@@ -420,28 +426,30 @@ def _lay_banks(
     around: Surroundings, ground: GroundSurface, depth: float
 ) -> None:
     phases = draws(around.seed, _SNOW, "banks").uniform(0, 2 * np.pi, 4)
-    way = around.drive.buffer(1.4 + _INSIDE)
+    way = around.drive.buffer(1.4 + _BANK_ON_ROAD)
     shapely.prepare(way)
     meshes = []
     for kerb in ground.kerbs(_SPACING):
         xy, out = kerb.points, kerb.outwards
         road = ground.heights(xy - 0.1 * out, of_road=True)
-        beside = ground.heights(xy + _OUTSIDE * out, of_road=False)
+        beside = ground.heights(xy + _BANK_BEYOND * out, of_road=False)
         beside = np.where(np.isfinite(beside), beside, road)
         waves = (
             sin(2 * np.pi * (xy / _WAVES[0]) + phases[:2]).sum(axis=1)
             + sin(2 * np.pi * (xy / _WAVES[1]) + phases[2:]).sum(axis=1)
         ) / 4
-        most = min(_HIGHEST * depth, _MOST_HEIGHT + depth)
+        most = min(_BANK_RATIO * depth, _BANK_ABOVE_SNOW + depth)
         crest = beside + depth + (most - depth) * (0.6 + 0.4 * waves)
         # The profile of the bank: on the road, on the crest, on the snow beside
         # it.
         profile = np.stack(
             [
-                np.column_stack([xy - _INSIDE * out, road]),
+                np.column_stack([xy - _BANK_ON_ROAD * out, road]),
                 np.column_stack([xy, (road + crest) / 2]),
-                np.column_stack([xy + _CREST * out, crest]),
-                np.column_stack([xy + _OUTSIDE * out, beside + depth - 0.01]),
+                np.column_stack([xy + _BANK_CREST * out, crest]),
+                np.column_stack(
+                    [xy + _BANK_BEYOND * out, beside + depth - 0.01]
+                ),
             ],
             axis=1,
         )
@@ -462,8 +470,10 @@ def _lay_banks(
 
 
 _FURNITURE = frozenset({"pole", "traffic-sign"})
-# Least and greatest distance by which furniture moves [m].
-_NEAREST, _FARTHEST = 0.3, 2.0
+# Least distance by which furniture moves [m].
+_LEAST_SHIFT = 0.3
+# Greatest distance by which furniture moves [m].
+_MOST_SHIFT = 2.0
 _TURN = 0.15  # [rad]
 # If the height of the ground differs by more than this, there is a kerb in
 # between [m].
@@ -542,7 +552,7 @@ def _move_furniture(around: Surroundings, share: float) -> None:
         middle = np.array(foot.centroid.coords[0])
         for _ in range(_TRIES):
             angle, turn = rng.uniform(-1, 1, 2) * (np.pi, _TURN)
-            by = rng.uniform(_NEAREST, _FARTHEST)
+            by = rng.uniform(_LEAST_SHIFT, _MOST_SHIFT)
             offset = by * np.array([math.cos(angle), math.sin(angle)])
             rise = around.ground.rise(middle, middle + offset)
             if abs(rise) < _KERB and obstacles.is_free(

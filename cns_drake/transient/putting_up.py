@@ -32,13 +32,22 @@ from cns_drake.transient.world_structures import (
 
 # Greatest distance between a front and the drive [m].
 _FARTHEST = 30.0
-# Distance of a scaffold's inner and outer uprights from the front [m].
-_ROW_INNER, _ROW_OUTER = 0.25, 1.15
-# Scaffolds: height of a lift, length of a bay, and greatest length and height
-# [m].
-_LIFT, _BAY = 2.0, 2.5
-_LONGEST, _HIGHEST = 25.0, 16.0
-_LEAST_LENGTH, _LEAST_HEIGHT = 4.0, 3.5
+# Distance of a scaffold's inner uprights from the front [m].
+_ROW_INNER = 0.25
+# Distance of its outer uprights from the front [m].
+_ROW_OUTER = 1.15
+# Height of a lift of a scaffold [m].
+_LIFT = 2.0
+# Length of a bay of a scaffold, about [m].
+_BAY = 2.5
+# Greatest length of a scaffold [m].
+_LONGEST_SCAFFOLD = 25.0
+# Greatest height of a scaffold [m].
+_HIGHEST_SCAFFOLD = 16.0
+# Least length of a scaffold [m].
+_SHORTEST_SCAFFOLD = 4.0
+# Least height of a scaffold [m].
+_LOWEST_SCAFFOLD = 3.5
 # Share of the scaffolds that have a net.
 _NETTED = 0.4
 _STEEL = (0.6, 0.61, 0.62)
@@ -69,7 +78,7 @@ def put_up_scaffolds(around: Surroundings, share: float) -> None:
     obstacles = around.obstacles(classes=_NOT_THROUGH)
     for building, rng in around.chosen("scaffolds", fronts, share):
         X_WF, length = _front(building, around.drive)
-        length = min(length, _LONGEST)
+        length = min(length, _LONGEST_SCAFFOLD)
         corners = [
             X_WF @ [x, y, 0.0]
             for x, y in (
@@ -80,10 +89,12 @@ def put_up_scaffolds(around: Surroundings, share: float) -> None:
         area = shapely.Polygon([corner[:2] for corner in corners])
         # A quay beside the front does not count as the foot of the building.
         foot = max(around.ground.lowest(area, building.bottom), building.bottom)
-        height = min(float(building.p_WPs[:, 2].max()) - foot, _HIGHEST)
+        height = min(
+            float(building.p_WPs[:, 2].max()) - foot, _HIGHEST_SCAFFOLD
+        )
         if (
-            length >= _LEAST_LENGTH
-            and height >= _LEAST_HEIGHT
+            length >= _SHORTEST_SCAFFOLD
+            and height >= _LOWEST_SCAFFOLD
             and obstacles.is_free(area, (building.name,))
         ):
             around.editing.add(
@@ -311,8 +322,10 @@ _TRIES = 6
 # Sites extend from the first distance from the kerb to one of the others [m].
 _SITE_INNER = 0.4
 _WIDTHS = (4.6, 2.7)
-# Width and height of new kerb stones, which narrow the carriageway [m].
-_KERB_WIDTH, _KERB_HEIGHT = 0.3, 0.13
+# Width of new kerb stones, which narrow the carriageway [m].
+_KERB_WIDTH = 0.3
+# Height of new kerb stones above the carriageway [m].
+_KERB_HEIGHT = 0.13
 _KERB_RGB = (0.8, 0.8, 0.78)
 # Objects on wide and on narrow sites -> weight in the random choice.
 _WIDE = {"excavator": 3, "skip": 2, "soil_heap": 1, "brick_pallets": 1}
@@ -412,9 +425,10 @@ class _Site:
                 taken.append(area)
 
 
-# Cell size of the grid, in W, of kerb stretches, and least length of a stretch
-# [m].
-_CELL, _SHORTEST = 6.5, 3.0
+# Cell size of the grid, in W, of kerb stretches [m].
+_STRETCH_CELL = 6.5
+# Least length of a stretch [m].
+_SHORTEST_STRETCH = 3.0
 # Distance between the places that are tried, away from the kerb [m].
 _STEP = 0.4
 
@@ -452,7 +466,9 @@ def fill_roadsides(around: Surroundings, share: float) -> None:
         around: surroundings of the drive, to which the objects are added.
         share: share of the free places that get an object, from 0 to 1.
     """
-    stretches = _stretches(around, "roadsides", _CELL, _SHORTEST)
+    stretches = _stretches(
+        around, "roadsides", _STRETCH_CELL, _SHORTEST_STRETCH
+    )
     standing = around.obstacles(ignored=GROUND_CLASSES)
     areas = [around.ground.carriageway]
     shapely.prepare(areas[0])

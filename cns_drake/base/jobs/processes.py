@@ -37,7 +37,8 @@ from cns_drake.base.progress import heard_by
 # How long a process may take to close its files after SIGTERM [s].
 PATIENCE = 30.0
 # File descriptors. Whatever a job prints goes to stderr.
-_STDOUT, _STDERR = 1, 2
+_STDOUT = 1
+_STDERR = 2
 # How often a parent checks whether its job was cancelled [s].
 _LOOK_INTERVAL = 0.2
 # How long a killed process may take to disappear [s].

@@ -36,8 +36,12 @@ from cns_drake.sensors.camera.camera_scene import RENDERER, CameraScene
 from cns_drake.sensors.camera.config import CameraSection
 from cns_drake.sensors.camera.looks import HORIZON_RGB, sky
 
-# Clipping distances, near and far, and the greatest measured depth [m].
-_NEAREST, _FARTHEST, _DEEPEST = 0.05, 2000.0, 250.0
+# Near clipping distance [m].
+_NEAR = 0.05
+# Far clipping distance [m].
+_FAR = 2000.0
+# Greatest measured depth [m].
+_DEEPEST = 250.0
 # Drake reserves labels from here on, for pixels without a label.
 _RESERVED = 2**15 - 4
 # The optical frame looks along z, with x to the right.
@@ -80,7 +84,7 @@ def add_cameras(
     logging.getLogger("drake").addFilter(_is_told)
     for name, config in cameras.items():
         info = CameraInfo(config.width, config.height, config.fov_y)
-        clipping = ClippingRange(_NEAREST, _FARTHEST)
+        clipping = ClippingRange(_NEAR, _FAR)
         core = RenderCameraCore(RENDERER, info, clipping, RigidTransform())
         X_BC = optical_pose(config)
         eyes = {}
@@ -92,7 +96,7 @@ def add_cameras(
                     scene.frames[base],
                     X_BC,
                     ColorRenderCamera(core),
-                    DepthRenderCamera(core, DepthRange(2 * _NEAREST, _DEEPEST)),
+                    DepthRenderCamera(core, DepthRange(2 * _NEAR, _DEEPEST)),
                 ),
             )
             builder.Connect(

@@ -91,8 +91,12 @@ _LIGHTS = [
         )
     ),
 ]
-# Constants of glTF 2.0: float, unsigned int; uses of buffers.
-_FLOAT, _UINT, _VERTICES, _CORNERS = 5126, 5125, 34962, 34963
+# Component types of glTF 2.0.
+_FLOAT = 5126
+_UINT = 5125
+# Targets of buffer views in glTF 2.0.
+_VERTICES = 34962
+_CORNERS = 34963
 # Pose, colour and surface of a geometry.
 _Member = tuple[RigidTransform, tuple[float, float, float], TriangleSurface]
 

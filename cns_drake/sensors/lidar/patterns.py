@@ -38,8 +38,10 @@ POINT_DTYPE = np.dtype(
 
 # Height of the elevation bands in which beams of irregular patterns are cast.
 _BAND_RAD = 0.03
-# What the fields `ring` and `t` of a point can hold.
-_MOST_RING, _LATEST_NS = 2**16 - 1, 2**32 - 1
+# Greatest value of the field `ring` of a point.
+_MOST_RING = 2**16 - 1
+# Greatest value of the field `t` of a point [ns].
+_LATEST_NS = 2**32 - 1
 # Turns per second of the two wedge prisms of the Mid series: 7294 and -4664 per
 # minute, the defaults of HELIOS++ for such optics. Together they repeat after
 # 30 s.
@@ -504,12 +506,17 @@ def make_flash_pattern(
     )
 
 
-# Width of a cell in elevation and in azimuth [deg], and numbers of cells.
+# Width of a cell in elevation and in azimuth [deg].
 _CELL_DEG = 0.25
-_ROWS, _COLUMNS = round(180 / _CELL_DEG), round(360 / _CELL_DEG)
-# In cells: how far a beam covers its surroundings (1.5 deg), and half of the
-# widest gap between beams that still counts as field of view (12 deg).
-_NEAR_CELLS, _GAP_CELLS = 6, 48
+# Number of cells in elevation.
+_ROWS = round(180 / _CELL_DEG)
+# Number of cells in azimuth.
+_COLUMNS = round(360 / _CELL_DEG)
+# How far a beam covers its surroundings: 1.5 deg, in cells.
+_NEAR_CELLS = 6
+# Half of the widest gap between beams that still counts as field of view: 12
+# deg, in cells.
+_GAP_CELLS = 48
 
 
 class BeamCoverage:

@@ -19,8 +19,10 @@ from cns_drake.sensors.returns.random_numbers import uniform
 # Numbers of a beam's random draws for the rays at its sides, two per ray.
 _SIDE_DRAW = 0
 # Two surfaces are apart if a range differs from the range at the neighbour's
-# plane by more than this distance [m] plus this fraction of the range.
-_JUMP, _JUMP_PART = 0.1, 0.01
+# plane by more than this distance [m] plus a part of the range.
+_JUMP = 0.1
+# This part, as a fraction of the range.
+_JUMP_PART = 0.01
 # Beams are neighbours if the angle between them is at most this many
 # divergences. If beams are farther apart, an edge between them is hardly ever
 # within either beam.

@@ -174,15 +174,26 @@ def reflected(
     )
 
 
-# Edges of the cells of equal albedo [m]: areas, as of repairs, patches, grains.
-_AREA, _PATCH, _GRAIN = 5.0, 0.35, 0.06
-# How much the brightness of areas varies, and how much darker the darkest stain
-# is.
-_AREAS, _DEEPEST = 0.15, 1.15
-# Height of a wall's courses [m]; width and height of objects that hang on the
-# wall [m], and the fraction of the wall that they cover; greatest sideways
-# distance at which rough ground ends a beam [m].
-_COURSE, _WIDE, _HIGH, _COVERED = 0.3, 0.25, 1.2, 0.16
+# Edge of the large cells of equal albedo: areas, as of repairs [m].
+_AREA_SIZE = 5.0
+# Edge of the middle-sized cells: patches [m].
+_PATCH_SIZE = 0.35
+# Edge of the small cells: grains [m].
+_GRAIN_SIZE = 0.06
+# How much the brightness of areas varies.
+_AREA_CONTRAST = 0.15
+# How much darker the darkest stain is.
+_DARKEST_STAIN = 1.15
+# Height of a wall's courses [m].
+_COURSE_HEIGHT = 0.3
+# Width of objects that hang on a wall [m].
+_FITTING_WIDTH = 0.25
+# Height of objects that hang on a wall [m].
+_FITTING_HEIGHT = 1.2
+# Fraction of the wall that these objects cover.
+_FITTING_SHARE = 0.16
+# Greatest distance along a beam by which rough ground ends it early or late
+# [m].
 _FARTHEST = 1.0
 # Height error of the mean of a spot on rough ground, as a fraction of the
 # distance.
@@ -245,16 +256,16 @@ def texture(
         a = 0.7071 * x + 0.5417 * y + 0.4545 * z
         b = -0.6124 * x + 0.7899 * y + 0.0113 * z
         c = -0.3529 * x - 0.2863 * y + 0.8908 * z
-        grain = cell_number(a / _GRAIN, b / _GRAIN, c / _GRAIN)
-        patch = cell_number(a / _PATCH, b / _PATCH, c / _PATCH)
-        area = cell_number(a / _AREA, b / _AREA, c / _AREA)
+        grain = cell_number(a / _GRAIN_SIZE, b / _GRAIN_SIZE, c / _GRAIN_SIZE)
+        patch = cell_number(a / _PATCH_SIZE, b / _PATCH_SIZE, c / _PATCH_SIZE)
+        area = cell_number(a / _AREA_SIZE, b / _AREA_SIZE, c / _AREA_SIZE)
         # Most patches are a little brighter than the mean, few much darker.
         dull = 0.4 - 0.085 * (1.0 - patch) ** 4
-        share = part * (dull + grain * grain * grain) + _AREAS * area
+        share = part * (dull + grain * grain * grain) + _AREA_CONTRAST * area
         # Stains lie in dark areas, most of all; the square has a mean of 4 / 3.
         stain = 1.5 * stains[geometry[k]] * (1.0 - area) ** 2
         if patch + 1.0 < stain:
-            share -= _DEEPEST * (1.0 - (patch + 1.0) / stain)
+            share -= _DARKEST_STAIN * (1.0 - (patch + 1.0) / stain)
         share = min(max(share, _DARKEST), -_DARKEST)
         energy[k] *= (1.0 + share) / (1.0 - share)
         distance[k] -= relief[geometry[k]] * grain
@@ -269,9 +280,13 @@ def texture(
             distance[k] -= max(min(height / down, _FARTHEST), -_FARTHEST)
         out = fittings[geometry[k]]
         if out > 0.0:
-            distance[k] -= 0.04 * out * cell_number(0.0, 0.0, z / _COURSE)
-            thing = cell_number(a / _WIDE, b / _WIDE, z / _HIGH)
-            if thing > 1.0 - 2.0 * _COVERED:
+            distance[k] -= (
+                0.04 * out * cell_number(0.0, 0.0, z / _COURSE_HEIGHT)
+            )
+            thing = cell_number(
+                a / _FITTING_WIDTH, b / _FITTING_WIDTH, z / _FITTING_HEIGHT
+            )
+            if thing > 1.0 - 2.0 * _FITTING_SHARE:
                 distance[k] -= out * (0.5 + 0.5 * patch)
     return Light(light.beam, distance, energy, light.geometry)
 

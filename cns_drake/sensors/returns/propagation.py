@@ -47,8 +47,12 @@ _FAINT_SNR = 3.0
 # the sum of this angle and the beam's divergence, a pane mirrors light back to
 # the unit.
 _FLATNESS = 2e-3
-# Cell sizes of clumps and of twigs [m], and the fraction of clumps.
-_CLUMP, _TWIG, _CLUMPS = 0.5, 0.1, 0.6
+# Cell size of clumps of leaves [m].
+_CLUMP_SIZE = 0.5
+# Cell size of twigs [m].
+_TWIG_SIZE = 0.1
+# Fraction of the space that clumps take.
+_CLUMP_SHARE = 0.6
 
 
 class Ways(NamedTuple):
@@ -154,10 +158,10 @@ def _leaf_areas(p_Wset: np.ndarray) -> np.ndarray:
     """
     result = np.empty(len(p_Wset))
     for k, (x, y, z) in enumerate(p_Wset):
-        size = _CLUMP
+        size = _CLUMP_SIZE
         # A second number from -1 to 1, independent of `share` below.
-        if cell_number(z / size, x / size, y / size) > 2 * _CLUMPS - 1:
-            size = _TWIG
+        if cell_number(z / size, x / size, y / size) > 2 * _CLUMP_SHARE - 1:
+            size = _TWIG_SIZE
         share = cell_number(x / size, y / size, z / size)
         result[k] = -np.log(0.5 - 0.5 * share)
     return result
