@@ -38,7 +38,10 @@ _MOST_SCREENS = 60
 _SCREEN = 850
 _PICTURES = (".png", ".jpg", ".webp")
 _THUMBNAIL = (520, 390)
-_LABEL, _GAP = 18, 10
+# Height of the label above a picture [pixels].
+_LABEL = 18
+# Distance between pictures [pixels].
+_GAP = 10
 _SOFTWARE = ("--use-angle=swiftshader", "--enable-unsafe-swiftshader")
 _OPEN = 'document.querySelectorAll("details").forEach((one) => one.open = true)'
 _IS_DRIVE = 'Boolean(document.getElementById("loading"))'

@@ -21,7 +21,10 @@ _UPRIGHT = 0.5
 # Greatest distance of a pair in each stage [m], and the number of points used:
 # more points add time, not accuracy.
 _STAGES = ((10.0, 1500), (5.0, 1500), (2.0, 4000), (1.0, 4000), (0.5, 4000))
-_LIMIT, _NUM_SAMPLES = 1.0, 4000
+# Greatest distance of the pairs by which a fit is judged [m].
+_JUDGED_DISTANCE = 1.0
+# Number of the points by which a fit is judged.
+_NUM_SAMPLES = 4000
 _MAX_ITERATIONS = 15
 # A stage ends when a step is shorter than this [m, rad].
 _STILL = (0.005, 2e-4)
@@ -165,7 +168,7 @@ def _pair(
         source.normals[sample] @ X_TS[:3, :3].T,
         target.normals[nearest],
     )
-    is_paired = (np.asarray(squares) < _LIMIT**2) & (
+    is_paired = (np.asarray(squares) < _JUDGED_DISTANCE**2) & (
         np.abs(cosines) > _PARALLEL
     )
     return sample, is_paired, p_T, nearest

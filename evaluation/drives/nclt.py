@@ -37,7 +37,10 @@ _POINT = np.dtype(
         ("ring", "<u2"),
     ]
 )
-_STEP, _LEAST = 0.005, -100.0
+# Unit of stored coordinates [m].
+_UNIT = 0.005
+# Coordinate that is stored as 0 [m].
+_LEAST_COORDINATE = -100.0
 _NUM_LASERS = 32
 _LONGEST_GAP_NS = 1_000_000_000
 # W has its axes east, north and up.
@@ -110,7 +113,9 @@ def read_scan(path: Path) -> np.ndarray:
     for axis, origin, sign in zip(
         "xyz", _X_BS[:3, 3], _X_BS.diagonal(), strict=False
     ):
-        points[axis] = sign * (stored[axis] * _STEP + _LEAST - origin)
+        points[axis] = sign * (
+            stored[axis] * _UNIT + _LEAST_COORDINATE - origin
+        )
     points["intensity"] = stored["intensity"]
     down = stored["laser"] // 2 + _NUM_LASERS // 2 * (stored["laser"] % 2)
     points["ring"] = _NUM_LASERS - 1 - down

@@ -35,34 +35,47 @@ from evaluation.recognition.seen_surfaces import SeenSurfaces
 
 # Threshold of the baseline `distance` [m].
 _APART = 0.5
-# M3C2: radius of the normal's neighbourhood, radius of the cylinder, greatest
-# distance, and least distance that counts as a change [m].
-_NORMAL, _CYLINDER, _FARTHEST, _LEAST = 1.0, 0.5, 3.0, 0.1
+# M3C2: radius of the neighbourhood to which a normal is fitted [m].
+_NORMAL_RADIUS = 1.0
+# M3C2: radius of the cylinder [m].
+_CYLINDER_RADIUS = 0.5
+# M3C2: greatest distance [m].
+_MOST_DISTANCE = 3.0
+# M3C2: least distance that counts as a change [m].
+_LEAST_CHANGE = 0.1
 # Number of points per step of progress.
 _CHUNK = 50_000
 
 
-# Settings of `free-space`, fitted on two pairs of drives: Metropolis 01 and 04,
-# whose paths hardly meet, and Suburbia after five years. First the side of a
-# cell, and the distance of a point of the other map at which a cell is kept
-# [m].
-_CELL, _NEAR = 0.2, 0.2
-# A scan sees past a cell if the surface lies at least the first distance behind
-# it, and shows the cell if the surface is within the second [m].
-_BEHIND, _ON = 0.5, 0.2
+# The settings of `free-space` below were fitted on two pairs of drives:
+# Metropolis 01 and 04, whose paths hardly meet, and Suburbia after five years.
+
+# Side of a cell [m].
+_CELL = 0.2
+# A cell is kept if a point of the other map is within this distance [m].
+_KEPT_WITHIN = 0.2
+# A scan sees past a cell if the surface lies at least this far behind it [m].
+_PAST = 0.5
+# A scan shows a cell if the surface is within this distance [m].
+_SHOWN_WITHIN = 0.2
 # Distance driven between two scans [m].
 _SPACING = 2.0
 # Number of the lowest, highest and farthest returns that do not count for the
 # field of view, since a few may come from a bird or a reflection. A ring of
 # beams has many more returns.
 _STRAYS = 10
-# Number of scans that must show a kept cell: this share of the scans from which
-# the cell is hidden, but at most this number.
-_SHOWN, _ENOUGH = 0.05, 2
-# Side of a cube in which changes are counted [m]; the share of changed points
-# above which the whole cube counts as changed; and the distance of a point of
-# the other map within which a point of such a cube is still kept [m].
-_BLOCK, _PART, _AT = 1.0, 0.2, 0.12
+# A kept cell must be shown by at least this number of scans, as a share of the
+# scans from which it is hidden.
+_SHOWN_SHARE = 0.05
+# This number of scans is always enough.
+_ENOUGH = 2
+# Side of a cube in which changes are counted [m].
+_CUBE = 1.0
+# Share of changed points above which the whole cube counts as changed.
+_CHANGED_SHARE = 0.2
+# A point of such a cube is still kept if a point of the other map is within
+# this distance [m].
+_STILL_KEPT_WITHIN = 0.12
 
 
 def run_baseline(name: str, pair: Pair) -> Labels:
@@ -114,7 +127,7 @@ def by_free_space(mine: Session, theirs: Session) -> np.ndarray:
     unobserved, kept, changed = SIDES[mine.side]
     _check_scans(theirs)
     labels = np.full(len(mine.points), kept, np.uint8)
-    distances = nearest(mine.points, theirs.points, _NEAR)
+    distances = nearest(mine.points, theirs.points, _KEPT_WITHIN)
     far = np.isinf(distances)
     points = mine.points[far]
     cells = np.floor(points / _CELL).astype(np.int64)
@@ -122,7 +135,7 @@ def by_free_space(mine: Session, theirs: Session) -> np.ndarray:
         cells, axis=0, return_index=True, return_inverse=True
     )
     past, shown, hidden = _count_views(points[first], theirs)
-    needed = np.minimum(_SHOWN * hidden, _ENOUGH)
+    needed = np.minimum(_SHOWN_SHARE * hidden, _ENOUGH)
     is_shown = (shown > 0) & (shown >= needed)
     found = np.where(is_shown, kept, unobserved)
     found = np.where(past > 0, changed, found)
@@ -130,14 +143,16 @@ def by_free_space(mine: Session, theirs: Session) -> np.ndarray:
     # A new object may pass near to one that is gone.
     is_changed = labels == changed
     known = is_changed | (labels == kept)
-    blocks = np.floor(mine.points[known] / _BLOCK).astype(np.int64)
+    blocks = np.floor(mine.points[known] / _CUBE).astype(np.int64)
     blocks -= blocks.min(axis=0, initial=0)
     sizes = blocks.max(axis=0, initial=0) + 1
     _, block_of = np.unique(
         np.ravel_multi_index(tuple(blocks.T), tuple(sizes)), return_inverse=True
     )
     part = np.bincount(block_of, is_changed[known]) / np.bincount(block_of)
-    is_beside = (part[block_of] > _PART) & (distances[known] > _AT)
+    is_beside = (part[block_of] > _CHANGED_SHARE) & (
+        distances[known] > _STILL_KEPT_WITHIN
+    )
     labels[np.flatnonzero(known)[is_beside]] = changed
     return labels
 
@@ -176,9 +191,9 @@ def _count_views(points: np.ndarray, other: Session) -> np.ndarray:
         rows, p_S = rows[inside], p_S[inside]
         found = SeenSurfaces.of(other.scan(number)).clearances(p_S)
         return [
-            rows[found > _BEHIND],
-            rows[np.abs(found) <= _ON],
-            rows[found < -_ON],
+            rows[found > _PAST],
+            rows[np.abs(found) <= _SHOWN_WITHIN],
+            rows[found < -_SHOWN_WITHIN],
         ]
 
     with ThreadPoolExecutor(num_cores()) as threads:
@@ -214,15 +229,15 @@ def by_m3c2(mine: Session, theirs: Session) -> np.ndarray:
         py4dgeo.M3C2(
             epochs=tuple(epochs),
             corepoints=chunk,
-            normal_radii=[_NORMAL],
-            cyl_radius=_CYLINDER,
-            max_distance=_FARTHEST,
+            normal_radii=[_NORMAL_RADIUS],
+            cyl_radius=_CYLINDER_RADIUS,
+            max_distance=_MOST_DISTANCE,
         ).run()
         for chunk in track(chunks, f"m3c2 of {mine.side}", len(chunks), "parts")
     ]
     distances = np.concatenate([each[0] for each in found])
     detectable = np.concatenate([each[1]["lodetection"] for each in found])
-    least = np.maximum(np.nan_to_num(detectable), _LEAST)
+    least = np.maximum(np.nan_to_num(detectable), _LEAST_CHANGE)
     labels = np.where(np.abs(distances) > least, changed, kept)
     labels[np.isnan(distances)] = unobserved
     return labels.astype(np.uint8)

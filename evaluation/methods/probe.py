@@ -36,9 +36,10 @@ from evaluation.methods.sparse_convolution import PACKED
 _EPSILON = 1e-6
 # A cell counts if the two scans' probabilities add up to more than this.
 _SEEN = 1e-3
-# Least blur along a ring [cells], and least fraction of a ring that counts as
-# occupied.
-_LEAST_BLUR, _LEAST_DENSITY = 0.1, 0.01
+# Least blur along a ring [cells].
+_LEAST_BLUR = 0.1
+# Least fraction of a ring that counts as occupied.
+_LEAST_DENSITY = 0.01
 
 
 class ProbeConfig(MethodConfig):

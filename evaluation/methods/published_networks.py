@@ -40,13 +40,24 @@ Weights = Mapping[str, np.ndarray]
 NUM_POINTS = 4096
 # Side of a cell of the networks, in clouds from -1 to 1.
 _CELL = 0.01
-# Points this near to the greatest plane count as ground [m]; number of trials
-# for this plane, and number of points that vote.
-_GROUND, _TRIALS, _VOTERS = 0.5, 200, 2000
-# Side of the voxels for thinning, and step by which it grows [m].
-_FINEST, _STEP, _SIZES = 0.001, 0.025, 400
-# DPA-Net's attention: numbers of points, of heads, and of samples per head.
-_CENTRES, _HEADS, _SAMPLES = 1024, 8, 8
+# Points this near to the greatest plane count as ground [m].
+_GROUND_WITHIN = 0.5
+# Number of planes that are tried.
+_TRIALS = 200
+# Number of points that vote for a plane.
+_VOTERS = 2000
+# Least side of the voxels for thinning [m].
+_LEAST_VOXEL = 0.001
+# Difference between the sides that are tried [m].
+_VOXEL_STEP = 0.025
+# Number of sides that are tried.
+_NUM_VOXELS = 400
+# DPA-Net's attention: number of points.
+_CENTRES = 1024
+# Number of heads.
+_HEADS = 8
+# Number of samples per head.
+_SAMPLES = 8
 # Least mean distance of points from their centre [m].
 _LEAST_EXTENT = 1e-3
 _TINY = 1e-6
@@ -67,11 +78,13 @@ def prepare(points: np.ndarray) -> np.ndarray:
     if len(points) == 0:
         return np.zeros((0, 3), np.float32)
     size = bisect.bisect_left(
-        range(_SIZES),
+        range(_NUM_VOXELS),
         True,
-        key=lambda k: len(thin(points, _FINEST + _STEP * k)) <= NUM_POINTS,
+        key=lambda k: (
+            len(thin(points, _LEAST_VOXEL + _VOXEL_STEP * k)) <= NUM_POINTS
+        ),
     )
-    chosen = thin(points, _FINEST + _STEP * size)
+    chosen = thin(points, _LEAST_VOXEL + _VOXEL_STEP * size)
     chosen = np.concatenate([chosen, _drawn(points, chosen, rng)])
     centre = chosen.mean(axis=0)
     extent = np.linalg.norm(chosen - centre, axis=1).mean()
@@ -101,9 +114,11 @@ def _without_ground(points: np.ndarray, rng: np.random.Generator) -> np.ndarray:
     normals /= np.linalg.norm(normals, axis=1, keepdims=True) + _TINY
     offsets = (normals * a).sum(axis=1)
     voters = points[rng.integers(len(points), size=_VOTERS)]
-    votes = np.abs(voters @ normals.T - offsets) < _GROUND
+    votes = np.abs(voters @ normals.T - offsets) < _GROUND_WITHIN
     best = votes.sum(axis=0).argmax()
-    return points[np.abs(points @ normals[best] - offsets[best]) >= _GROUND]
+    return points[
+        np.abs(points @ normals[best] - offsets[best]) >= _GROUND_WITHIN
+    ]
 
 
 def _drawn(

@@ -29,9 +29,14 @@ _NEAR_DEG = 0.75
 # If one return around a direction is this many times as far as another, they
 # are on two surfaces.
 _FARTHEST = 3.0
-# Numbers of cells in elevation and in azimuth; a cell has a width of 1 deg.
-_UP, _SIDE = 2, 1
-_ROWS, _COLUMNS = 180, 360
+# Returns are looked for in this many cells below and above a direction.
+_REACH_UP = 2
+# They are looked for in this many cells to each side.
+_REACH_ASIDE = 1
+# Number of cells in elevation, each 1 deg wide.
+_ROWS = 180
+# Number of cells in azimuth, each 1 deg wide.
+_COLUMNS = 360
 # Factor by which squares may exceed a limit because of rounding.
 _MARGIN = 1.0 + 1e-9
 _UNKNOWN, _SHOWN, _BEHIND = range(3)
@@ -173,8 +178,10 @@ def _find_corners(
     shrink = math.sin(math.radians(elevation))
     row = min(int(elevation), _ROWS - 1)
     column = int(azimuth)
-    for r in range(max(row - _UP, 0), min(row + _UP, _ROWS - 1) + 1):
-        for c in range(column - _SIDE, column + _SIDE + 1):
+    for r in range(
+        max(row - _REACH_UP, 0), min(row + _REACH_UP, _ROWS - 1) + 1
+    ):
+        for c in range(column - _REACH_ASIDE, column + _REACH_ASIDE + 1):
             cell = r * _COLUMNS + c % _COLUMNS
             for k in range(starts[cell], starts[cell + 1]):
                 up = angles[k, 0] - elevation

@@ -26,8 +26,10 @@ from evaluation.results.table_forms import by_pair, in_table_order, title
 # Points in all scans of a page. At some 3 bytes each they leave room for the
 # figures within 25 MB.
 _POINTS_OF_A_PAGE = 5_000_000
-# The same for images of cameras [bytes], and pixels of their longer side.
-_IMAGES_OF_A_PAGE, _IMAGE_SIDE = 6_000_000, 320
+# Images of cameras in a page [bytes].
+_IMAGES_OF_A_PAGE = 6_000_000
+# Longer side of an image [pixels].
+_IMAGE_SIDE = 320
 # Between the points of a drawn route [m].
 _ROUTE_STEP = 2.0
 _WEBP_QUALITY = 75

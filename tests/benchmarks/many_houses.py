@@ -25,7 +25,8 @@ import time
 SPACING = 24.0
 BLOCK = 5
 # Where the first house stands [deg].
-LATITUDE, LONGITUDE = 52.0, 13.0
+LATITUDE = 52.0
+LONGITUDE = 13.0
 METRES_PER_DEG = 111_195.0
 
 

@@ -30,8 +30,10 @@ from cns_drake.simulation.loaded_drive import load_drive
 from cns_drake.simulation.station import make_station
 
 DRIVES = ("riverside_02", "metropolis_04", "suburbia_02")
-# Turns of the unit [s], and steps of the poses during one.
-_PERIOD, _STEPS = 0.1, 10
+# Duration of a turn of the unit [s].
+_PERIOD = 0.1
+# Number of steps of the poses during a turn.
+_STEPS = 10
 # As of the road of KITTI's first place.
 _CROSSFALL = 0.03
 

@@ -18,7 +18,8 @@ import shutil
 import subprocess
 
 # Numbers of the pipes that Chromium reads from and writes to.
-_IN, _OUT = 3, 4
+_IN = 3
+_OUT = 4
 # Longest wait for an answer; only a broken page or browser takes so long [s].
 _PATIENCE = 600.0
 _KEYS = {"ArrowLeft": 37, "ArrowRight": 39, "Escape": 27, "Tab": 9, " ": 32}

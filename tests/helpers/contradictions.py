@@ -16,12 +16,9 @@ import numpy as np
 
 from helpers.drive_files import TYPES
 
-_LIDAR, _ODOMETRY, _IMU, _MOUNTS = (
-    "/lidar/points",
-    "/odometry",
-    "/imu/data",
-    "/tf_static",
-)
+_LIDAR = "/lidar/points"
+_ODOMETRY = "/odometry"
+_MOUNTS = "/tf_static"
 
 
 @dataclass(frozen=True)

@@ -2,7 +2,9 @@
 
 import math
 
-LAT, LON = 52.0, 13.0
+# Origin of the maps [deg].
+LAT = 52.0
+LON = 13.0
 
 
 class OsmWriter:

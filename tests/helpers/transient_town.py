@@ -39,8 +39,10 @@ LANES = shapely.Polygon(
     ]
 )
 COLUMNS = 20
-# The lawn of a sloping town rises along y, from a line.
-SLOPE, SLOPE_FROM = 0.08, 4.5
+# The lawn of a sloping town rises along y by this much per metre.
+SLOPE = 0.08
+# It rises from this y on [m].
+SLOPE_FROM = 4.5
 
 
 def _numbers(values):

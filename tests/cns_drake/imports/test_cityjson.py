@@ -509,7 +509,9 @@ def test_a_projection_that_stretches_a_city_is_refused(
     assert float(factor) == pytest.approx(1 / np.cos(phi), rel=8e-3)
 
 
-TOKYO, RIGA, MADRID = "EPSG:6677", "EPSG:3059", "EPSG:25830"
+TOKYO = "EPSG:6677"
+RIGA = "EPSG:3059"
+MADRID = "EPSG:25830"
 
 
 @pytest.mark.parametrize(

@@ -160,7 +160,12 @@ WALL = (
     ' length="{length}" distance="0" tStart="{t0}" tEnd="{t1}"'
     ' heightStart="1.2" heightEnd="{high}"/></object>'
 )
-RADIUS, START, LENGTH = 25.0, 5.0, 60.0
+# Radius of the road [m].
+RADIUS = 25.0
+# Where on the road the wall begins [m].
+START = 5.0
+# Length of the wall along the road [m].
+LENGTH = 60.0
 
 
 def bent_road(path, curve, objects, elevation=""):

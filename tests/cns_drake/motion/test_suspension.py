@@ -35,7 +35,9 @@ CAR = CarMasses(
     wheels=np.array([40.0, 40.0, 40.0, 40.0]),
     p_BWset=np.array([[2.6, 0.8], [2.6, -0.8], [0.0, 0.8], [0.0, -0.8]]),
 )
-SPRING, DAMPER, TYRE = 20e3, 1500.0, 180e3
+SPRING = 20e3  # [N/m]
+DAMPER = 1500.0  # [N s/m]
+TYRE = 180e3  # [N/m]
 SERIES = SPRING * TYRE / (SPRING + TYRE)
 
 

@@ -7,7 +7,8 @@ from cns_drake.scene.surfaces import TriangleSurface
 from cns_drake.scene.world import load_world
 
 # Levels of a house: a square prism has these, and eight triangles between two.
-LOW, HIGH = (0.0, 4.0), (0.0, 4.0, 9.0)
+LOW = (0.0, 4.0)
+HIGH = (0.0, 4.0, 9.0)
 
 
 def house(*levels, x=0.0):

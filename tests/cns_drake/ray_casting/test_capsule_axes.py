@@ -12,7 +12,8 @@ from cns_drake.ray_casting.ray_groups import Motion
 from cns_drake.scene.perception_geometry import PerceptionGeometry
 from cns_drake.scene.surfaces import CapsuleSurface, EllipsoidSurface
 
-WORLD, MOVING = FrameId.get_new_id(), FrameId.get_new_id()
+WORLD = FrameId.get_new_id()
+MOVING = FrameId.get_new_id()
 X_WC = RigidTransform(RollPitchYaw(0.3, 0.5, 0.7), [101.0, -52.0, 3.0])
 X_WF = RigidTransform(RollPitchYaw(-0.2, 0.9, 2.0), [90.0, -40.0, 1.0])
 CREEPING = Motion(np.zeros(3), np.array([1e-3, 0.0, 0.0]), 0.1)

@@ -13,7 +13,9 @@ from cns_drake.scene.mesh_files import MeshFiles
 from cns_drake.scene.perception_geometry import PerceptionGeometry
 from cns_drake.scene.surfaces import EllipsoidSurface, TriangleSurface
 
-WORLD, CAR, CART = (FrameId.get_new_id() for _ in range(3))
+WORLD = FrameId.get_new_id()
+CAR = FrameId.get_new_id()
+CART = FrameId.get_new_id()
 POSES = {
     WORLD: RigidTransform(),
     CAR: RigidTransform(RollPitchYaw(0.1, 0.2, -2.0), [-7.0, 1.0, 0.5]),

@@ -14,7 +14,8 @@ from cns_drake.ray_casting import embree
 from cns_drake.ray_casting.ray_casting_scene import RayCastingScene
 from cns_drake.scene.surfaces import EllipsoidSurface, TriangleSurface
 
-WORLD, CAR = FrameId.get_new_id(), FrameId.get_new_id()
+WORLD = FrameId.get_new_id()
+CAR = FrameId.get_new_id()
 # From rtcore_device.h: RTC_DEVICE_PROPERTY_NATIVE_RAY<n>_SUPPORTED.
 NATIVE = {4: 32, 8: 33, 16: 34}
 

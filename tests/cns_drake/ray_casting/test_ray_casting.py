@@ -15,7 +15,8 @@ from cns_drake.scene.surfaces import (
     TriangleSurface,
 )
 
-WORLD, CAR = FrameId.get_new_id(), FrameId.get_new_id()
+WORLD = FrameId.get_new_id()
+CAR = FrameId.get_new_id()
 X_WG = RigidTransform(RollPitchYaw(0.3, -0.5, 1.1), [4.0, -3.0, 2.0])
 SHAPES = {
     "box": (None, lambda p, d: box(p, d, (2.0, 3.0, 1.0))),

@@ -172,7 +172,11 @@ def stl(*facets):
     return f"solid a\n{''.join(facet(*one) for one in facets)}endsolid a\n"
 
 
-A, B, C, D = (0, 0, 0), (1, 0, 0), (1, 1, 0), (0, 1, 0)
+# The corners of a square.
+A = (0, 0, 0)
+B = (1, 0, 0)
+C = (1, 1, 0)
+D = (0, 1, 0)
 BY_INDEX = FACES.format("vertex_index")
 VERTICES = "".join(f"v {row}\n" for row in SQUARE.splitlines())
 

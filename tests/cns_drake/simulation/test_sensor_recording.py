@@ -34,7 +34,12 @@ from cns_drake.sensors.odometry.odometry import add_odometry
 from cns_drake.simulation.sensor_recording import add_mcap_recorder
 from evaluation.drives import open_drive
 
-RATE, PERIOD, RADIUS = 0.7, 0.1, 2.0
+# Angular velocity of the arm [rad/s].
+RATE = 0.7
+# Time between frames [s].
+PERIOD = 0.1
+# Distance of the seat from the arm's axis [m].
+RADIUS = 2.0
 X_PL = RigidTransform(RollPitchYaw(0.1, -0.2, 0.3), [0.2, 0.1, 0.5])
 PATTERN = make_beam_pattern("vlp-16", PERIOD, num_columns=90)
 

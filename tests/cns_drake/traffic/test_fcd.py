@@ -14,7 +14,12 @@ from cns_drake.traffic.streets import EgoBox
 from cns_drake.traffic.traffic_motion import make_traffic
 from cns_drake.traffic.walkers import gait_rate
 
-DT, RADIUS, RATE = 0.1, 30.0, 0.2
+# Time step of the trace [s].
+DT = 0.1
+# Radius of the circle on which a vehicle drives [m].
+RADIUS = 30.0
+# Angular velocity of this vehicle [rad/s].
+RATE = 0.2
 TURN = np.linspace(0.0, 2 * np.pi, 400)
 SLOPE = 0.05
 GRAPH = LaneGraph(

@@ -19,9 +19,17 @@ from cns_drake.traffic.vehicles import (
     uniform,
 )
 
-A, B, T, V0, V = 1.5, 2.0, 1.3, 15.0, 10.0
-# The model's wanted gap at one speed, and the free acceleration [m, m/s^2].
-WANTED, FREE = STANDSTILL_GAP + V * T, A * (1 - (V / V0) ** 4)
+# Acceleration, deceleration and headway of the drivers [m/s^2, m/s^2, s].
+A = 1.5
+B = 2.0
+T = 1.3
+# Allowed speed, and speed of the vehicles [m/s].
+V0 = 15.0
+V = 10.0
+# The model's wanted gap at equal speeds [m].
+WANTED = STANDSTILL_GAP + V * T
+# The model's free acceleration [m/s^2].
+FREE = A * (1 - (V / V0) ** 4)
 
 
 def two_lanes(length=400.0):

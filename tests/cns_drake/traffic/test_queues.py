@@ -12,7 +12,10 @@ from cns_drake.traffic.streets import EgoBox
 from cns_drake.traffic.traffic_plan import plan_queues, plan_traffic
 
 BOX = EgoBox(-1.0, 3.0, 1.0)
-ANGLE, SLOPE = 2.5, 0.06
+# Direction of the road [rad].
+ANGLE = 2.5
+# Its rise per metre.
+SLOPE = 0.06
 AHEAD = np.array([np.cos(ANGLE), np.sin(ANGLE)])
 ORIGIN = np.array([7.0, -3.0])
 

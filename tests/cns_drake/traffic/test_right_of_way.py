@@ -20,7 +20,8 @@ from cns_drake.traffic.vehicles import (
     make_crossings,
 )
 
-C, S = np.cos(0.4), np.sin(0.4)
+C = np.cos(0.4)
+S = np.sin(0.4)
 R = np.array([[C, -S, 0.0], [S, C, 0.0], [0.0, 0.0, 1.0]])
 
 

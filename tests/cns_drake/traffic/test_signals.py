@@ -11,7 +11,8 @@ from cns_drake.traffic.lane_graph import LaneGraph, Piece
 from cns_drake.traffic.road_lanes import make_lane_graph
 from cns_drake.traffic.streets import find_conflicts, make_signals, way_shares
 
-AHEAD, ASIDE = np.array([0.8, 0.6, 0.0]), np.array([-0.6, 0.8, 0.0])
+AHEAD = np.array([0.8, 0.6, 0.0])
+ASIDE = np.array([-0.6, 0.8, 0.0])
 
 
 def piece(

@@ -30,7 +30,8 @@ from cns_drake.traffic.vehicles import (
 
 BOX = EgoBox(-1.05, 3.75, 1.03)
 TURN = 0.4
-C, S = np.cos(TURN), np.sin(TURN)
+C = np.cos(TURN)
+S = np.sin(TURN)
 R = np.array([[C, -S, 0.0], [S, C, 0.0], [0.0, 0.0, 1.0]])
 
 

@@ -14,7 +14,11 @@ from cns_drake.traffic.vehicles import (
     vehicle_poses,
 )
 
-V0, T, A, B = 13.9, 1.5, 1.5, 2.0
+# Wanted speed [m/s], headway [s], acceleration and deceleration [m/s^2].
+V0 = 13.9
+T = 1.5
+A = 1.5
+B = 2.0
 
 
 def straight_lanes(lengths, start, along):

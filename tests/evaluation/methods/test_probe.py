@@ -10,7 +10,8 @@ from cns_drake.base.errors import InputError
 from evaluation.methods import make_method
 from evaluation.methods.probe import Probe
 
-RINGS, SECTORS = 5, 8
+RINGS = 5
+SECTORS = 8
 SETTINGS = {"rings": RINGS, "sectors": SECTORS, "max_range": 10.0}
 
 

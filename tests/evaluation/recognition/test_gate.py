@@ -22,7 +22,10 @@ from evaluation.recognition.scoring import (
 )
 
 RADIUS = 8.0
-FULL, NONE = (1.0 - SOFTNESS) * RADIUS, (1.0 + SOFTNESS) * RADIUS
+# Up to this distance, a place has the full weight [m].
+FULL = (1.0 - SOFTNESS) * RADIUS
+# From this distance on, it has none [m].
+NONE = (1.0 + SOFTNESS) * RADIUS
 
 
 class Far(Method):

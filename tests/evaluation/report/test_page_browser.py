@@ -18,7 +18,9 @@ pytestmark = [
     pytest.mark.skipif(not has_chromium(), reason="no chromium"),
 ]
 
-PHONE, DESKTOP = (390, 844), (1440, 900)
+# Sizes of a window [pixels].
+PHONE = (390, 844)
+DESKTOP = (1440, 900)
 
 
 @pytest.fixture(scope="module")

@@ -8,7 +8,8 @@ from evaluation.report.figures import (
     shade_by_height,
 )
 
-RED, GREEN = (200, 0, 0), (0, 200, 0)
+RED = (200, 0, 0)
+GREEN = (0, 200, 0)
 
 
 def test_axes_of_the_camera():

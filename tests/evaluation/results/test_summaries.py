@@ -11,7 +11,8 @@ from evaluation.recognition.metrics import Interval
 from evaluation.results import summaries
 from evaluation.results.table import Answers, QueryRows, Results, Row
 
-YEARS, SNOW = "database.years", "query.transient.snow"
+YEARS = "database.years"
+SNOW = "query.transient.snow"
 BLOCKS = np.repeat(np.arange(5), 4)
 
 
