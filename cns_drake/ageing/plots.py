@@ -14,7 +14,7 @@ from shapely.geometry import Polygon, box
 from shapely.geometry.base import BaseGeometry
 
 from cns_drake.city.buildings import ARCHETYPES, sample
-from cns_drake.city.facades.assembly import Rgb
+from cns_drake.city.dice import Rgb
 from cns_drake.city.geometry import (
     MeshShape,
     Model,

@@ -1,8 +1,9 @@
 """Buildings of every archetype, drawn at random or fixed (landmarks).
 
-An archetype is a kind of building. `archetypes.yaml` describes the sizes,
-colours and parameters of each archetype, and a class with the archetype's name
-builds it. `sample` draws the parameters at random and then builds:
+An archetype is a kind of building. `archetypes.yaml` contains the limits of
+size and the colours of each archetype, and a subclass of `Building` draws and
+builds it. To add an archetype, write both, and add the class to `BUILDERS`.
+`sample` returns one building:
 
     footprint = shapely.box(-12, -9, 12, 9)     # front: the edge of least y
     model = sample("brick_block", footprint, 24.0, rng, name="block_003")
@@ -10,13 +11,12 @@ builds it. `sample` draws the parameters at random and then builds:
 
 from collections.abc import Collection
 from pathlib import Path
-import re
 
 import numpy as np
 from shapely.geometry import Polygon
 
 from cns_drake.base.yaml_files import parse_yaml
-from cns_drake.city.buildings import (  # noqa: F401
+from cns_drake.city.buildings import (
     family_houses,
     flats,
     halls,
@@ -43,12 +43,43 @@ ARCHETYPES = {
     ).items()
     if name != "shared"
 }
-# Name of an archetype -> its class, such as `brick_block` -> `BrickBlock`.
+# Name of an archetype -> its class.
 BUILDERS: dict[str, type[Building]] = {
-    re.sub("(?<!^)(?=[A-Z])", "_", one.__name__).lower(): one
-    for one in Building.__subclasses__()
-    if one is not Landmark
-} | dict.fromkeys(LANDMARKS, Landmark)
+    "art_deco_tower": towers.ArtDecoTower,
+    "balcony_flats": slabs.BalconyFlats,
+    "banded_tower": office_towers.BandedTower,
+    "barn": halls.Barn,
+    "brick_block": street_blocks.BrickBlock,
+    "bungalow": family_houses.Bungalow,
+    "chapel": public_buildings.Chapel,
+    "corner_building": street_blocks.CornerBuilding,
+    "corner_store": street_blocks.CornerStore,
+    "court_block": flats.CourtBlock,
+    "detached_house": family_houses.DetachedHouse,
+    "gallery_flats": slabs.GalleryFlats,
+    "garden_flats": flats.GardenFlats,
+    "gas_station": open_roofs.GasStation,
+    "glass_skyscraper": towers.GlassSkyscraper,
+    "grid_tower": office_towers.GridTower,
+    "hotel": towers.Hotel,
+    "kiosk_row": markets.KioskRow,
+    "office": street_blocks.Office,
+    "park_pavilion": open_roofs.ParkPavilion,
+    "podium_tower": towers.PodiumTower,
+    "row_house": row_houses.RowHouse,
+    "school": public_buildings.School,
+    "semi_detached": family_houses.SemiDetached,
+    "shop_house": row_houses.ShopHouse,
+    "shop_strip": markets.ShopStrip,
+    "slab_tower": slabs.SlabTower,
+    "sports_hall": halls.SportsHall,
+    "supermarket": markets.Supermarket,
+    "terrace": row_houses.Terrace,
+    "unfinished_tower": office_towers.UnfinishedTower,
+    "walk_up": flats.WalkUp,
+    "waterfront_hall": halls.WaterfrontHall,
+    **dict.fromkeys(LANDMARKS, Landmark),
+}
 
 
 def sample(

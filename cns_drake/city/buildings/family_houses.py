@@ -1,5 +1,7 @@
 """Houses for one or two families, with gables or hips, porches and garages."""
 
+from collections.abc import Sequence
+
 import numpy as np
 
 from cns_drake.city.facades import (
@@ -60,7 +62,25 @@ def wall_top_for(
     return min(wanted, height - ROOF_M - 0.08 * span)
 
 
-def _window_rows(p: Building, wing: Wing, storeys: int) -> Openings:
+class _FamilyHouse(Building):
+    """The base class of family houses.
+
+    Attributes:
+        boxes: the wings, which hide parts of each other's walls.
+        floor: height of the ground floor [m].
+        window_pitch: distance between the windows of front and back [m].
+        window_width: width of a window [m].
+        casing: style of the frames around the windows in front.
+    """
+
+    boxes: Sequence[Wing]
+    floor: float
+    window_pitch: float
+    window_width: float
+    casing: str
+
+
+def _window_rows(p: _FamilyHouse, wing: Wing, storeys: int) -> Openings:
     """Returns the windows of a wing; those of its sides are further apart."""
     openings, width = Openings(p, wing, p.boxes), p.window_width
     for edges, step in (((0, 2), p.window_pitch), ((1, 3), _SIDE_PITCH_M)):
@@ -68,7 +88,7 @@ def _window_rows(p: Building, wing: Wing, storeys: int) -> Openings:
     return openings
 
 
-def _close_box(p: Building, wing: Wing, openings: Openings) -> None:
+def _close_box(p: _FamilyHouse, wing: Wing, openings: Openings) -> None:
     """Adds the walls of a wing around its openings, and its roof."""
     openings.add_casings((0,), p.casing)
     bands = (Band(0.0, p.floor, -0.04),) if p.floor > 0 else ()
@@ -92,7 +112,7 @@ def _garage_wing(
     return Wing.at((x0, y0, x1, min(y1, y0 + 6.5)), wall_top, top, shape)
 
 
-def _add_garage(p: Building, garage: Wing) -> None:
+def _add_garage(p: _FamilyHouse, garage: Wing) -> None:
     """Adds a garage whose door is in front."""
     openings = Openings(p, garage, p.boxes)
     length = garage.x1 - garage.x0
@@ -111,7 +131,7 @@ _WING_ENDS = {
 }
 
 
-class DetachedHouse(Building):
+class DetachedHouse(_FamilyHouse):
     """The detached house: wings under gables or hips, a porch, a garage.
 
     The parameter `plan` is `box` (one main wing), `ell` (with a second wing in
@@ -119,6 +139,28 @@ class DetachedHouse(Building):
     garage is on the right and the front wing on the left; if `mirrored`, they
     change sides.
     """
+
+    def draw(self) -> None:
+        """Draws sizes and style."""
+        self.plan = self.pick(("box", "ell", "tee", "cross", "ell"))
+        self.mirrored = self.chance(0.5)
+        self.roof = self.pick(("gable", "gable", "hip", "gambrel"))
+        self.pitch_deg = self.uniform(28.0, 45.0)
+        self.wing_width = self.uniform(0.36, 0.46)
+        self.low_wing = self.chance(0.35)
+        self.floor = self.uniform(0.2, 0.6, 2)
+        self.window_pitch = self.uniform(2.6, 3.4)
+        self.window_width = self.uniform(0.95, 1.3, 2)
+        self.casing = self.pick(("frame", "sill", "sill", "shutters"))
+        self.porch = self.pick(("shed", "gable", "full", "flat"))
+        self.porch_reach = self.uniform(1.5, 2.2, 2)
+        self.garage = self.pick(("flat", "gable", "shed", "none"))
+        self.garage_width = self.uniform(3.2, 5.8, 1)
+        self.chimney = self.pick(("ridge", "breast", "ridge", "none"))
+        self.chimney_at = self.uniform(0.2, 0.8)
+        self.dormers = self.whole(0, 3)
+        self.dormer = self.pick(("gable", "shed"))
+        self.bay_window = self.chance(0.4)
 
     def build(self) -> None:
         """Adds all parts of the detached house, with the porch in front.
@@ -254,8 +296,30 @@ def _add_chimney(p: DetachedHouse) -> None:
 _BUNGALOW_MARGIN = 0.75
 
 
-class Bungalow(Building):
+class Bungalow(_FamilyHouse):
     """The bungalow: one long low storey, a carport or a garage."""
+
+    def draw(self) -> None:
+        """Draws sizes and style."""
+        # `long`, `ell` (a wing to the front) or `court` (two of them).
+        self.plan = self.pick(("long", "ell", "ell", "court"))
+        # `garage` in the front wing, `carport` beside the house or `none`.
+        self.parking = self.pick(("garage", "carport", "none"))
+        # Whether the front wing stands on the right.
+        self.mirrored = self.chance(0.5)
+        self.roof = self.pick(("gable", "hip", "hip"))
+        # Width of a front wing, as a part of the house's.
+        self.wing_width = self.uniform(0.3, 0.4)
+        # How far the front wings stand out.
+        self.reach = self.uniform(2.0, 4.0, 2)
+        self.floor = self.uniform(0.1, 0.35, 2)
+        self.window_pitch = self.uniform(2.6, 3.6)
+        self.window_width = self.uniform(1.2, 1.7, 2)
+        # Width of the large window beside the door.
+        self.picture = self.uniform(2.2, 3.4, 2)
+        self.casing = self.pick(("frame", "sill", "shutters"))
+        self.veranda = self.chance(0.5)
+        self.chimney_at = self.uniform(0.25, 0.75)
 
     def build(self) -> None:
         """Adds all parts of the bungalow, which lies along the front.
@@ -359,8 +423,29 @@ def _add_carport(p: Bungalow, area: massing.Area) -> None:
     p.add_to("walls", massing.standing(*shed, bottom=True))
 
 
-class SemiDetached(Building):
+class SemiDetached(_FamilyHouse):
     """The pair of semi-detached houses: mirrored halves under one roof."""
+
+    def draw(self) -> None:
+        """Draws sizes and style."""
+        self.roof = self.pick(("gable", "hip"))
+        # Wanted slope of the roof.
+        self.pitch_deg = self.uniform(30.0, 45.0)
+        self.floor = self.uniform(0.15, 0.45, 2)
+        self.window_pitch = self.uniform(2.4, 3.2)
+        self.window_width = self.uniform(1.0, 1.4, 2)
+        self.casing = self.pick(("frame", "sill", "sill", "shutters"))
+        # `gabled` (through all storeys, under a gable of its own), `canted`
+        # or `none`.
+        self.bay = self.pick(("gabled", "canted", "gabled", "none"))
+        self.bay_width = self.uniform(2.6, 3.2, 2)
+        self.bay_reach = self.uniform(0.6, 1.0, 2)
+        self.doors_inside = self.chance(0.5)
+        self.porch_reach = self.uniform(1.1, 1.5, 2)
+        # Shape of their roofs, one on either side, or `none`.
+        self.garages = self.pick(("none", "flat", "shed", "hip"))
+        self.garage_width = self.uniform(2.9, 3.4, 2)
+        self.chimneys = self.pick(("middle", "ends"))
 
     def build(self) -> None:
         """Adds all parts of the two semi-detached houses.

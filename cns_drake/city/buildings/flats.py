@@ -30,6 +30,28 @@ from cns_drake.city.geometry import Mesh, MeshShape, merge_meshes
 class CourtBlock(Building):
     """The court block: wings around a court, a mansard roof with dormers."""
 
+    def draw(self) -> None:
+        """Draws sizes and style."""
+        site = self.site
+        range_depth = self.uniform(10.0, 12.5)
+        run = 1.3 * site.open_length
+        self.shape = "U" if site.width > 30.0 and self.chance(0.7) else "L"
+        self.mirrored = self.chance(0.5)
+        self.wing = round(min(range_depth, 0.34 * site.width), 1)
+        self.back = round(min(range_depth + 0.8, 0.5 * site.depth), 1)
+        self.ground_height = self.uniform(3.8, 4.4, 2)
+        self.storey_height = self.uniform(3.0, 3.4)
+        self.pitch = max(self.uniform(2.4, 3.2), run / 52)
+        self.window_width = self.uniform(0.95, 1.25, 2)
+        self.recess = self.uniform(0.15, 0.28, 2)
+        self.oriel_every = self.whole(2, 5)
+        self.oriel_reach = self.uniform(0.7, 1.0, 2)
+        self.mansard_height = self.uniform(3.6, 4.8, 1)
+        self.mansard_inset = self.uniform(1.6, 2.2, 2)
+        self.dormer_pitch = max(self.uniform(4.5, 6.5), run / 26)
+        self.chimneys = self.whole(3, 7)
+        self.gate_height = self.uniform(3.2, 3.6, 2)
+
     def build(self) -> None:
         """Adds all parts of the court block, whose court is open to the back.
 
@@ -149,6 +171,33 @@ _FRONT_M, _BACK_M = 1.5, 0.5
 
 class WalkUp(Building):
     """The walk-up: brick flats around a stair, behind a raised entrance."""
+
+    def draw(self) -> None:
+        """Draws sizes and style."""
+        site = self.site
+        depth = site.depth - _FRONT_M - _BACK_M
+        is_free = not {1, 3} & site.blind_edges
+        # Rise of a hipped roof; 0 for a flat one.
+        self.rise = 0.0
+        if is_free and depth < 16.0 and self.chance(0.4):
+            rise = 0.3 * min(depth, site.width)
+            self.rise = round(rise, 2) if self.height - rise >= 7.0 else 0.0
+        self.roof = "hip" if self.rise > 0 else "flat"
+        self.floor = self.uniform(0.5, 1.1, 2)
+        self.storey = self.uniform(2.8, 3.1)
+        # Wanted length of front for each stair.
+        self.section = self.uniform(11.0, 15.0)
+        # How far the bays of the front stand out; 0 for none.
+        self.bay_reach = self.pick((0.0, 0.4, 0.6))
+        self.pitch = max(self.uniform(2.1, 2.8), (site.width + depth) / 17)
+        self.window_width = self.uniform(1.0, 1.5, 2)
+        self.recess = self.uniform(0.14, 0.26, 2)
+        # Whether the windows of the ground floor are arched.
+        self.arched = self.chance(0.3)
+        self.ledge = self.pick((0.0, 0.08))
+        self.hood = self.pick((0.0, 0.08))
+        self.cornice = self.uniform(0.15, 0.45, 2)
+        self.roof_items = self.some_of("stair_house vents tank skylight", 1, 5)
 
     def build(self) -> None:
         """Adds all parts of the walk-up flats.
@@ -295,6 +344,26 @@ _FLOOR = 0.3
 
 class GardenFlats(Building):
     """Flats in a garden: staggered houses under gables, stacks of verandas."""
+
+    def draw(self) -> None:
+        """Draws sizes and style."""
+        site = self.site
+        self.roof = self.pick(("gable", "gable", "hip"))
+        # Wanted slope of the roofs.
+        self.pitch_deg = self.uniform(22.0, 34.0)
+        # Wanted length of front for each house of the group.
+        self.section = self.uniform(11.0, 15.0)
+        # Distance by which every other house stands back.
+        self.stagger = round(self.uniform(0.0, 0.16) * site.depth, 2)
+        # Whether every other house turns its gable to the front.
+        self.crossed = self.chance(0.5)
+        self.window_pitch = max(self.uniform(2.6, 3.4), site.width / 12)
+        self.window_width = self.uniform(1.1, 1.6, 2)
+        self.veranda_width = self.uniform(2.8, 4.0, 2)
+        self.veranda_reach = self.uniform(1.4, 1.9, 2)
+        self.casing = "sill"
+        if site.width < 20.0:
+            self.casing = self.pick(("frame", "sill"))
 
     def build(self) -> None:
         """Adds all parts of the houses, side by side along the front.

@@ -27,6 +27,25 @@ _RECESS = 0.15
 class Barn(Building):
     """The barn or boat house: timber boards, wide doors, a lean-to."""
 
+    def draw(self) -> None:
+        """Draws sizes and style."""
+        site = self.site
+        width = min(site.width, site.depth)
+        aisle = round(self.uniform(0.2, 0.28) * width, 2)
+        self.roof = self.pick(("gambrel", "gable", "gable", "barrel"))
+        # Height of the walls, as a part of the ridge's.
+        self.wall = self.uniform(0.42, 0.58)
+        # Room in front, a jetty of a boat house; 0 for a barn.
+        self.deck = self.pick((0.0, 0.0, 2.0)) if site.depth > 10.0 else 0.0
+        self.door_width = self.uniform(2.6, 4.4, 2)
+        self.door_height = self.uniform(2.4, 3.4, 2)
+        # Width of the lean-to on one side; 0 for none.
+        self.aisle = aisle if self.chance(0.6) and width > 9.0 else 0.0
+        self.aisle_left = self.chance(0.5)
+        # Distance between battens.
+        self.batten = self.uniform(1.0, 1.6)
+        self.ventilators = self.whole(0, 3)
+
     def build(self) -> None:
         """Adds all parts of the barn, which lies along the site's longer sides.
 
@@ -174,6 +193,27 @@ _RIM = 0.6
 class SportsHall(Building):
     """The sports hall: a wide roof on frames, a low front, high windows."""
 
+    def draw(self) -> None:
+        """Draws sizes and style."""
+        site = self.site
+        # A `butterfly` is two sheds that fall to the middle.
+        self.roof = self.pick(("barrel", "gable", "shed", "butterfly"))
+        # Height of the walls, as a part of the ridge's.
+        self.wall = self.uniform(0.58, 0.7)
+        # Distance between the frames.
+        self.bay = max(self.uniform(5.0, 7.5), (site.width + site.depth) / 18)
+        self.frame_reach = self.uniform(0.35, 0.6, 2)
+        # Depth of the low front; 0 for none.
+        self.annex = 0.0
+        if self.chance(0.8):
+            self.annex = round(min(self.uniform(5.0, 8.0), 0.3 * site.depth), 2)
+        self.annex_height = round(
+            min(self.uniform(3.4, 4.2), 0.5 * self.height), 2
+        )
+        # Whether the gables are glazed.
+        self.glazed = self.chance(0.6)
+        self.roof_items = self.some_of("air_handler vents ac_unit", 1, 4)
+
     def build(self) -> None:
         """Adds all parts of the sports hall, with the entrance in front.
 
@@ -287,6 +327,22 @@ class WaterfrontHall(Building):
 
     `roof` is `gable`, `barrel` or `sawtooth`; the ridge is at `height`.
     """
+
+    def draw(self) -> None:
+        """Draws sizes and style."""
+        site = self.site
+        self.roof = self.pick(("gable", "barrel", "sawtooth"))
+        self.dock_depth = self.uniform(2.5, 4.0, 1)
+        depth = site.depth - self.dock_depth
+        self.eaves = round(self.height * self.uniform(0.6, 0.7), 1)
+        self.spans = max(1, round(depth / self.uniform(16.0, 22.0)))
+        self.pitch = max(self.uniform(4.5, 6.0), (site.width + depth) / 15)
+        self.pier_width = self.uniform(0.6, 0.9, 2)
+        self.pier_reach = self.uniform(0.2, 0.34, 2)
+        self.window_depth = self.uniform(0.2, 0.35, 2)
+        self.door_every = self.whole(2, 4)
+        self.dock_height = self.uniform(0.9, 1.2, 2)
+        self.ventilators = self.whole(3, 7)
 
     def build(self) -> None:
         """Adds all parts of the waterfront hall, with its dock in front.

@@ -25,7 +25,8 @@ import numpy as np
 from pydantic import BaseModel
 
 from cns_drake.base.yaml_files import parse_yaml
-from cns_drake.city.facades.assembly import Building, Rgb
+from cns_drake.city.dice import Rgb
+from cns_drake.city.facades.assembly import Building
 from cns_drake.city.geometry import Mesh, MeshShape, read_mesh, triple
 
 _MODELS = Path(__file__).parent / "landmark_models"
@@ -62,15 +63,18 @@ LANDMARKS = _folders()
 class Landmark(Building):
     """A landmark: a fixed model from a file, stretched to fit its site."""
 
+    def draw(self) -> None:
+        """Draws one of the landmark's models."""
+        self.folder = self.pick(LANDMARKS[self.kind.name])
+
     def build(self) -> None:
-        """Adds the parts of one of the landmark's models, drawn at random.
+        """Adds the parts of the landmark's model.
 
         The model is stretched to the size of the building's site, which must be
         a rectangle, and to the building's height.
         """
         x0, y0, x1, y1 = self.site.bounds
-        folder = self.pick(LANDMARKS[self.kind.name])
-        model = _read(folder)
+        model = _read(self.folder)
         lot, size = np.array((x1 - x0, y1 - y0)), np.array(model.size)
         # On a lot wider than the model, overhanging parts keep their reach.
         reach = np.where(lot > size, 2 * np.array(model.overhang), 0.0)
@@ -81,7 +85,7 @@ class Landmark(Building):
         for part in model.parts:
             quarters = round(part.yaw / (np.pi / 2))
             along = stretch[[1, 0, 2]] if quarters % 2 else stretch
-            path = folder / f"{part.mesh}.obj"
+            path = self.folder / f"{part.mesh}.obj"
             if path.exists():
                 name = f"{self.site.name}_{part.mesh}"
                 if name not in self.meshes:

@@ -24,6 +24,20 @@ _FRONT_M, _BACK_M = 0.4, 0.1
 class ShopStrip(Building):
     """The strip of shops: low flat-roofed units side by side, all different."""
 
+    def draw(self) -> None:
+        """Draws sizes and style."""
+        # Height of the shops without their parapets.
+        self.ground = round(min(self.uniform(3.6, 4.2), self.height - 0.5), 2)
+        self.unit_width = self.uniform(5.5, 9.0)
+        # Part of the units with an upper floor, where height allows.
+        self.upper = self.uniform(0.2, 0.7)
+        # Whether one canopy runs along all shops, else awnings.
+        self.canopy = self.chance(0.45)
+        self.canopy_reach = self.uniform(0.9, 1.3, 2)
+        # Difference between parapets.
+        self.steps = self.uniform(0.3, 0.6, 2)
+        self.roof_items = self.some_of("ac_unit ac_unit vents skylight", 1, 5)
+
     def build(self) -> None:
         """Adds all parts of the shops, side by side along the front.
 
@@ -108,6 +122,23 @@ _COUNTER = 1.05
 
 class KioskRow(Building):
     """The row of kiosks: small stalls with counters behind a common arcade."""
+
+    def draw(self) -> None:
+        """Draws sizes and style."""
+        site = self.site
+        reach = self.uniform(1.6, 2.4, 2)
+        # Wanted width of a stall.
+        self.stall = self.uniform(2.8, 4.2)
+        self.depth = round(min(self.uniform(2.8, 4.2), site.depth - 3.0), 2)
+        # Distance between groups of stalls.
+        self.gap = self.uniform(0.8, 1.8, 2)
+        # Stalls built wall to wall.
+        self.group = self.whole(1, 4)
+        self.roof = self.pick(("hip", "gable", "barrel", "shed"))
+        # Reach of a roof on posts in front; 0 for awnings.
+        self.arcade = reach if self.chance(0.5) else 0.0
+        # Whether one stall carries a lantern.
+        self.tower = self.height > 4.6 and self.chance(0.6)
 
     def build(self) -> None:
         """Adds all parts of the kiosks, side by side along the front.
@@ -204,6 +235,34 @@ _RECESS = 0.25
 
 class Supermarket(Building):
     """The supermarket: a low hall, a glazed front under a canopy, a dock."""
+
+    def draw(self) -> None:
+        """Draws sizes and style."""
+        site = self.site
+        # Width of the entrance.
+        self.entrance_width = round(
+            min(self.uniform(7.0, 11.0), 0.4 * site.width), 1
+        )
+        self.eaves = round(min(self.uniform(5.0, 6.5), 0.75 * self.height), 2)
+        # `tower` (a box), `gable` or `vault` above the doors.
+        self.entrance = self.pick(("tower", "gable", "vault"))
+        # Its place along the front, a part of it.
+        self.entrance_at = self.uniform(0.25, 0.75)
+        # Reach of the canopy along the front.
+        self.canopy = self.uniform(2.2, 3.2, 2)
+        # Distance between the pilasters.
+        self.pitch = max(self.uniform(5.0, 7.0), site.width / 9)
+        self.dock_left = self.chance(0.5)
+        # Depth of the dock beside the hall; 0 for none.
+        self.dock_depth = 4.5 if site.width > 32.0 and self.chance(0.8) else 0.0
+        # Roofs for trolleys, in front.
+        self.shelters = self.whole(0, 3)
+        self.roof_items = self.some_of(
+            "air_handler air_handler cooling_tower skylight skylight skylight "
+            "ac_unit vents",
+            4,
+            9,
+        )
 
     def build(self) -> None:
         """Adds all parts of the supermarket, with the entrance in front.

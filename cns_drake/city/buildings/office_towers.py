@@ -25,6 +25,30 @@ from cns_drake.city.geometry import Mesh, MeshShape, merge_meshes
 class BandedTower(Building):
     """The banded office tower: round corners, ribbon windows, garden floors."""
 
+    def draw(self) -> None:
+        """Draws sizes and style."""
+        site = self.site
+        side = min(site.width, site.depth)
+        self.radius = round(self.uniform(0.18, 0.42) * side, 2)
+        # Which corners of the rectangle are round.
+        self.corners = self.pick(((0, 1, 2, 3), (0, 2), (0, 1), (1,)))
+        # Number of stacks of storeys, with an open floor between two.
+        self.stacks = min(max(round(self.height / self.uniform(24, 40)), 1), 3)
+        # Distance by which every other stack is smaller.
+        self.taper = self.uniform(0.03, 0.08) * side
+        self.lobby = self.uniform(5.0, 7.5, 2)
+        self.storey = self.uniform(3.5, 4.0)
+        # Height of the bands between the glass.
+        self.spandrel = self.uniform(0.9, 1.3, 2)
+        # How far a sunshade above the glass sticks out.
+        self.ledge = self.pick((0.15, 0.5, 0.8))
+        self.recess = self.uniform(0.2, 0.4, 2)
+        # Distance between upright fins; 0 for none.
+        self.fins = self.pick((0.0, 5.0, 7.0))
+        self.roof_items = self.some_of(
+            "lift_house cooling_tower air_handler ac_unit mast", 2, 6
+        )
+
     def build(self) -> None:
         """Adds all parts of the banded office tower.
 
@@ -164,6 +188,33 @@ class GridTower(Building):
         """Width of the plain wall between a corner and the first window [m]."""
         return self.recess + 0.15
 
+    def draw(self) -> None:
+        """Draws sizes and style."""
+        site = self.site
+        # `box`, `offset` (two slabs that slide past each other) or `notched`.
+        self.plan = self.pick(("box", "offset", "notched"))
+        # How far slabs slide, or size of notches, as a part of the depth.
+        self.shift = self.uniform(0.1, 0.18)
+        self.lobby = self.uniform(5.5, 8.0, 2)
+        self.storey = self.uniform(3.5, 4.0)
+        self.pitch = max(self.uniform(3.4, 5.0), site.open_length / 28)
+        # pier, beam: what the frames leave of wall beside and below windows.
+        self.pier = self.uniform(0.5, 0.9, 2)
+        self.beam = self.uniform(0.5, 0.9, 2)
+        self.recess = self.uniform(0.4, 0.8, 2)
+        # Whether each frame spans two storeys.
+        self.double = self.chance(0.4)
+        # Where a plant floor interrupts the grid, as a part of the height; 0
+        # for none.
+        self.waist = self.uniform(0.45, 0.65) if self.height > 55.0 else 0.0
+        # Height of the screen around the roof.
+        self.crown = self.uniform(2.4, 4.5, 2)
+        self.roof_items = self.some_of(
+            "lift_house cooling_tower air_handler cooling_tower mast ac_unit",
+            3,
+            7,
+        )
+
     def build(self) -> None:
         """Adds all parts of the gridded office tower.
 
@@ -260,6 +311,33 @@ _LIFT_M = 2.0
 
 class UnfinishedTower(Building):
     """The tower under construction: core, frame, scaffolds, cladding."""
+
+    def draw(self) -> None:
+        """Draws sizes and style."""
+        rise = self.height - self.uniform(3.5, 5.5)
+        wanted = max(3, round(rise / self.uniform(3.4, 4.0)))
+        # Storeys that are placed as one.
+        self.group = -(-wanted // 8)
+        # Slabs above the ground.
+        self.storeys = self.group * max(2, round(wanted / self.group))
+        self.storey = round(rise / self.storeys, 3)
+        self.pitch = self.uniform(6.0, 8.0)
+        # Extent of the core, as parts of the plan.
+        self.core = (self.uniform(0.28, 0.4), self.uniform(0.28, 0.4))
+        # Storeys whose walls are finished.
+        self.clad = self.group * self.whole(
+            0, max(1, self.storeys // self.group // 2)
+        )
+        # Edges with a scaffold.
+        self.scaffolds = self.pick(((0,), (0, 1), (0, 3), (1, 3)))
+        # Storeys it covers.
+        self.scaffold_top = min(self.whole(self.storeys // 2, self.storeys), 8)
+        # Part of the scaffold's bays behind a net.
+        self.nets = self.uniform(0.2, 0.7)
+        # Whether the top slab is still propped.
+        self.props = self.chance(0.7)
+        # Whether a hoist climbs the back.
+        self.hoist = self.chance(0.6)
 
     def build(self) -> None:
         """Adds all parts of the tower under construction.

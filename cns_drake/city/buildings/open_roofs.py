@@ -28,6 +28,27 @@ _RECESS = 0.18
 class GasStation(Building):
     """The gas station: pumps under a canopy, shop, car wash and price sign."""
 
+    def draw(self) -> None:
+        """Draws sizes and style."""
+        site = self.site
+        self.canopy_top = round(min(self.height, self.uniform(5.0, 5.8)), 2)
+        # Height of the canopy's edge.
+        self.fascia = self.uniform(0.6, 1.0, 2)
+        # Whether the canopy is a pair of raised wings.
+        self.sloped = self.chance(0.35)
+        # Rows of pumps, and pumps in each row.
+        self.lanes = 2 if site.depth > 24.0 else 1
+        self.pumps = int(min(max((site.width - 8.0) / 6.5, 1), 4))
+        self.shop_depth = round(
+            min(self.uniform(6.0, 9.0), 0.36 * site.depth), 2
+        )
+        self.shop_height = self.uniform(3.6, 4.3, 2)
+        # Whether a car wash stands beside the shop.
+        self.wash = site.width > 26.0 and self.chance(0.7)
+        # Whether the car wash and the sign are on the left.
+        self.mirrored = self.chance(0.5)
+        self.roof_items = self.some_of("ac_unit vents ac_unit", 1, 4)
+
     def build(self) -> None:
         """Adds all parts of the gas station: a shop behind a canopy with pumps.
 
@@ -157,6 +178,25 @@ _EAVES_M = 0.6
 
 class ParkPavilion(Building):
     """The park pavilion: a bandstand, a shelter with tables, or a tea house."""
+
+    def draw(self) -> None:
+        """Draws sizes and style."""
+        site = self.site
+        long = not 0.67 < site.width / site.depth < 1.5
+        self.floor = self.uniform(0.3, 0.9, 2)
+        # `bandstand` (open, round), `tea_house` (glazed, round) or `shelter`
+        # (open, long).
+        self.form = "shelter"
+        if not long:
+            self.form = self.pick(
+                ("bandstand", "bandstand", "tea_house", "shelter")
+            )
+        self.sides = self.pick((6, 8, 8))
+        # Height of the posts above the deck.
+        self.eaves = round(max(2.2, 0.5 * (self.height - self.floor)), 2)
+        self.lantern = self.height > 5.0 and self.chance(0.5)
+        # Whether the roof is bent like a bell.
+        self.bell = self.chance(0.5)
 
     def build(self) -> None:
         """Adds all parts of the pavilion.

@@ -26,6 +26,38 @@ _RECESS = 0.16
 class School(Building):
     """The school: classroom wings, a glazed entrance, a gymnasium."""
 
+    def draw(self) -> None:
+        """Draws sizes and style."""
+        site = self.site
+        deep = min(self.uniform(9.0, 12.0), site.depth - 4.5)
+        self.rise = round(self.uniform(0.26, 0.36) * deep, 2)
+        self.roof = self.pick(("hip", "flat", "flat"))
+        # Height of the walls below the roof.
+        body = self.height - (self.rise if self.roof == "hip" else 2.4)
+        if body < 3.6:
+            self.roof, body = "flat", self.height - 1.0
+        # Width of the gymnasium; 0 for none.
+        self.gym = 0.0
+        if site.width > 34.0 and site.depth > 16.0:
+            gym = round(self.uniform(0.3, 0.38) * site.width, 1)
+            self.gym = min(gym, 28.0)
+        self.storeys = min(max(round(body / 3.5), 1), 4)
+        # Depth of the classroom wing.
+        self.depth = round(deep, 1)
+        # Whether there is a wing behind.
+        self.wing = site.depth > 22.0 and self.chance(0.8)
+        # Whether gymnasium and wing stand on the left.
+        self.mirrored = self.chance(0.5)
+        self.gym_roof = self.pick(("barrel", "shed", "flat"))
+        # Width of a classroom's window group.
+        self.pitch = max(self.uniform(3.2, 4.4), site.width / 15)
+        self.mullions = self.whole(1, 3)
+        # Width of the glazed hall.
+        self.entrance = self.uniform(4.5, 6.5, 1)
+        self.roof_items = self.some_of(
+            "air_handler vents skylight skylight vents", 2, 6
+        )
+
     def build(self) -> None:
         """Adds all parts of the school, with the entrance in front.
 
@@ -157,6 +189,30 @@ _THICK = 0.2
 
 class Chapel(Building):
     """The chapel: a nave with a steep roof, a tower or bell cote, a porch."""
+
+    def draw(self) -> None:
+        """Draws sizes and style."""
+        site = self.site
+        wide = min(site.width, site.depth, 18.0)
+        # `front` (a tower in the middle of the front), `side` (a tower beside
+        # the nave) or `cote` (a bell gable on the roof).
+        self.belfry = "cote"
+        if self.height >= 13.0:
+            self.belfry = self.pick(("front", "side", "front"))
+        self.spire = self.pick(("needle", "broach", "cap"))
+        # Side of the tower.
+        self.tower = round(self.uniform(0.24, 0.3) * wide + 0.6, 2)
+        # Width of the nave, as a part of the site's.
+        self.nave = self.uniform(0.62, 0.72)
+        self.pitch_deg = self.uniform(44.0, 54.0)
+        # Distance between the side windows.
+        self.bay = self.uniform(2.8, 3.8)
+        self.buttresses = self.chance(0.5)
+        # Whether the door has a porch, with a cote or a side tower.
+        self.porch = self.chance(0.7)
+        # Whether a vestry stands beside the choir.
+        self.annex = self.chance(0.6)
+        self.mirrored = self.chance(0.5)
 
     def build(self) -> None:
         """Adds all parts of the chapel, parallel to the site's longer sides.

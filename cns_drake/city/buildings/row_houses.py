@@ -1,8 +1,8 @@
 """Row houses: single ones, terraces, and houses above a shop."""
 
+from collections.abc import Sequence
 import copy
 import math
-from typing import Any
 
 import numpy as np
 
@@ -29,8 +29,60 @@ _ROOF_M = 0.2
 _FIREWALL_M = 0.25
 
 
+# Roofs of a house: `gable` and `gambrel` along the street, `flat` with a
+# cornice. Narrow houses may also have a gable to the street: `front`, or
+# `stepped` with steps on it.
+_ROOFS = ("gable", "gambrel", "flat", "front", "stepped")
+_ROOFS_ABOVE_SHOPS = ("flat", "gable", "gambrel", "front", "stepped")
+
+
+class _HouseInARow(Building):
+    """The base class of houses that stand wall to wall.
+
+    Attributes:
+        stoop: room in front of the wall for steps [m].
+        floor: height of the ground floor above the street [m].
+    """
+
+    stoop: float
+    floor: float
+
+    def draw_house(
+        self,
+        width: float,
+        roofs: Sequence[str],
+        casings: Sequence[str] = ("frame", "sill", "sill", "shutters"),
+    ) -> None:
+        """Draws sizes and style of a house.
+
+        Args:
+            width: width of the house [m].
+            roofs: the roofs that it may have, as in `_ROOFS`.
+            casings: styles of the frames around the windows.
+        """
+        self.roof = self.pick(roofs)
+        # Rise of the roof, as a part of half its span.
+        self.rise = self.uniform(0.75, 1.15)
+        self.storey = self.uniform(2.75, 3.1)
+        self.plinth = self.pick((0.2, 0.5, 0.8, 1.0))
+        self.door_left = self.chance(0.5)
+        self.window_pitch = self.uniform(1.9, 2.5)
+        self.window_width = self.uniform(0.9, 1.2, 2)
+        self.casing = self.pick(casings)
+        # `none`, `canted`, `box` (on the ground) or `oriel` (above it).
+        self.bay = self.pick(("none", "canted", "box", "oriel"))
+        self.bay_storeys = self.whole(1, 4)
+        # Dormers, at most.
+        self.dormers = self.whole(0, max(2, round(width / 2.2)))
+        self.dormer = self.pick(("gable", "shed"))
+        # Whether there is a hood above the door.
+        self.canopy = self.chance(0.4)
+        self.chimney = self.chance(0.75)
+        self.brick = self.pick(self.kind.choices["bricks"])
+
+
 def _add_unit(
-    p: Building,
+    p: _HouseInARow,
     area: massing.Area,
     blind: frozenset[int],
     part: str = "",
@@ -67,7 +119,7 @@ def _add_unit(
 
 
 def _unit_box(
-    p: Building, area: massing.Area, blind: frozenset[int]
+    p: _HouseInARow, area: massing.Area, blind: frozenset[int]
 ) -> tuple[Wing, int]:
     """Returns the wing of a house, and its storeys above `p.floor`."""
     x0, y0, x1, y1 = area
@@ -95,7 +147,7 @@ def _unit_box(
 
 
 def _add_entrance(
-    p: Building, wing: Wing, openings: Openings, material: str
+    p: _HouseInARow, wing: Wing, openings: Openings, material: str
 ) -> float:
     """Adds the door on its landing; returns its place along the wall [m]."""
     wall = wing.wall(0)
@@ -117,7 +169,7 @@ def _add_entrance(
 
 
 def _add_bay(
-    p: Building,
+    p: _HouseInARow,
     wing: Wing,
     openings: Openings,
     storeys: int,
@@ -143,7 +195,7 @@ def _add_bay(
     )  # fmt: skip
 
 
-def _add_roof(p: Building, wing: Wing) -> None:
+def _add_roof(p: _HouseInARow, wing: Wing) -> None:
     """Adds a roof with its dormers, firewalls or stepped gables."""
     low = wing.wall_top + 0.45
     attic = wings.attic_window(0.8, low, low + 1.1, wings.GLASS_M)
@@ -190,7 +242,7 @@ def _add_gable_windows(out: Assembly, wing: Wing) -> None:
             out.add_to("glass", wall.place(glass))
 
 
-def _add_stack(p: Building, wing: Wing, name: str) -> None:
+def _add_stack(p: _HouseInARow, wing: Wing, name: str) -> None:
     """Adds a chimney to the roof of a house."""
     yaw = math.pi / 2
     if p.roof in ("front", "stepped"):
@@ -206,7 +258,7 @@ def _add_stack(p: Building, wing: Wing, name: str) -> None:
     add_chimney(p, name, spot, p.brick, item=row, yaw=yaw, scale=scale)
 
 
-def _front_site(p: Building) -> tuple[float, float, frozenset[int]]:
+def _front_site(p: _HouseInARow) -> tuple[float, float, frozenset[int]]:
     """Returns the x of a house's left and right wall, and its blind edges.
 
     Eaves and cornices stay on the lot, except towards the neighbours.
@@ -221,8 +273,19 @@ def _front_site(p: Building) -> tuple[float, float, frozenset[int]]:
 _MOST_DEPTH = 10.5
 
 
-class RowHouse(Building):
+class RowHouse(_HouseInARow):
     """The row house: one narrow house between its neighbours, with a stoop."""
+
+    def draw(self) -> None:
+        """Draws sizes and style."""
+        width = self.site.width
+        self.draw_house(width, _ROOFS[:5] if width < 9.5 else _ROOFS[:3])
+        self.stoop = 1.3
+        self.floor = self.plinth
+        # Of the lower wing behind the house.
+        self.annex_height = self.uniform(2.8, 3.6, 2)
+        self.annex_width = self.uniform(0.45, 0.65)
+        self.annex_left = self.chance(0.5)
 
     def build(self) -> None:
         """Adds all parts of the row house.
@@ -257,8 +320,35 @@ def _add_annex(p: RowHouse, main: Wing, back: float) -> None:
 _DOORS = ("accent", "trim", "roof")
 
 
-class Terrace(Building):
+class Terrace(_HouseInARow):
     """The terrace: a row of narrow houses, similar but not the same."""
+
+    def draw(self) -> None:
+        """Draws sizes and style."""
+        # Wanted width of a house.
+        self.unit_width = self.uniform(5.0, 6.6)
+        self.draw_house(
+            self.unit_width,
+            ("gable", "gable", "gambrel"),
+            ("sill", "sill", "sill", "shutters"),
+        )
+        self.rise *= 0.8
+        self.stoop = 1.6
+        self.floor = min(self.plinth, 0.5)
+        # Bay of the houses that have one.
+        self.house_bay = self.bay
+        if self.bay == "none":
+            self.house_bay, self.bay_storeys = "canted", 1
+        # Height by which every other pair of houses is lower.
+        self.step = self.pick((0.0, 0.4, 0.8))
+        # Distance by which every other pair stands back.
+        self.setback = self.pick((0.0, 0.0, 0.8))
+        # Part of the houses with their gable to the street.
+        self.crossed = self.uniform(0.0, 0.35)
+        # Whether doors lie side by side in pairs.
+        self.paired = self.chance(0.6)
+        # Part of the houses with a bay window.
+        self.bays = self.uniform(0.2, 0.9)
 
     def build(self) -> None:
         """Adds all parts of the houses, side by side along the front.
@@ -282,12 +372,12 @@ class Terrace(Building):
                 f"house_{k:02d}_", self.pick(_DOORS),
             )  # fmt: skip
 
-    def _varied(self, k: int) -> Building:
+    def _varied(self, k: int) -> _HouseInARow:
         """Returns the k-th house, which differs from its neighbours in details.
 
         Its parts and meshes are collected in those of the terrace.
         """
-        house: Any = copy.copy(self)
+        house = copy.copy(self)
         if self.chance(self.crossed) and k > 0:
             house.roof = "front"
         house.bay = self.house_bay if self.chance(self.bays) else "none"
@@ -299,8 +389,31 @@ class Terrace(Building):
         return house
 
 
-class ShopHouse(Building):
+class ShopHouse(_HouseInARow):
     """The shop house: shops on the ground floor, flats above them."""
+
+    def draw(self) -> None:
+        """Draws sizes and style."""
+        width, depth = self.site.width, self.site.depth
+        roofs = _ROOFS_ABOVE_SHOPS[: 5 if width < min(10.0, depth) else 3]
+        self.draw_house(width, roofs if depth <= 14.0 else ("flat",))
+        self.window_pitch = max(self.window_pitch, (width + depth) / 22)
+        self.stoop = 0.35
+        # Height of the shops; they take a low house alone.
+        self.floor = self.uniform(3.5, 4.2, 2)
+        if self.height - self.floor < 3.2:
+            self.roof = "flat"
+            self.floor = round(min(3.4, self.height - 1.6), 2)
+        self.shop_width = self.uniform(4.5, 7.5)
+        # Part of the shops with an awning.
+        self.awnings = self.uniform(0.2, 0.9)
+        # Bay windows above the shops, at most.
+        self.oriels = self.whole(0, 3)
+        # How far the band above the shops sticks out.
+        self.course = self.uniform(0.08, 0.2, 2)
+        self.roof_items = self.some_of(
+            "stair_house vents ac_unit skylight", 1, 5
+        )
 
     def build(self) -> None:
         """Adds all parts of the shop house.

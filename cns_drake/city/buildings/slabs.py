@@ -29,6 +29,21 @@ _ROOF_ITEMS = ("tank", "tank", "mast", "vents", "stair_house", "dish")
 class SlabTower(Building):
     """The concrete slab block: loggias, a stair tower, pillars, a pavilion."""
 
+    def draw(self) -> None:
+        """Draws sizes and style."""
+        site = self.site
+        self.ground_height = self.uniform(4.2, 5.2, 2)
+        self.storey_height = self.uniform(2.9, 3.2)
+        self.depth = round(min(site.depth, self.uniform(13.0, 17.0)), 1)
+        self.at_back = self.chance(0.5)
+        self.stair_width = self.uniform(4.0, 6.0, 1)
+        self.stair_left = self.chance(0.5)
+        self.pitch = max(self.uniform(3.4, 5.0), site.width / 11)
+        self.loggia_depth = self.uniform(1.2, 1.7, 2)
+        self.rail = self.uniform(0.9, 1.1, 2)
+        self.window_recess = self.uniform(0.15, 0.3, 2)
+        self.pavilion_height = self.uniform(4.0, 5.5, 1)
+
     def build(self) -> None:
         """Adds all parts of the slab block, whose longer sides lie along x.
 
@@ -123,6 +138,33 @@ _FRONT_M = 1.7
 
 class BalconyFlats(Building):
     """The white slab block: stacks of balconies, staggered sections."""
+
+    def draw(self) -> None:
+        """Draws sizes and style."""
+        site = self.site
+        room = site.depth - 2.0
+        # Distance by which every other section stands back.
+        self.stagger = self.pick((0.0, 0.0, 1.5, 2.4)) if room > 12.0 else 0.0
+        # Parts of the slab, each with its own stair.
+        self.sections = min(max(round(site.width / 18.0), 1), 3)
+        # Storeys by which every other section is lower.
+        self.step = self.whole(0, 2)
+        self.depth = round(
+            min(room - self.stagger, self.uniform(11.0, 14.0)), 1
+        )
+        self.storey = self.uniform(2.8, 3.1)
+        self.pitch = max(self.uniform(2.8, 3.6), site.width / 16)
+        self.window_width = self.uniform(1.3, 2.0, 2)
+        self.recess = self.uniform(0.12, 0.22, 2)
+        self.balcony_width = self.uniform(2.8, 3.8, 2)
+        self.balcony_reach = self.uniform(1.1, 1.5, 2)
+        # `stacks` (one above the other), `ribbons` (all along the front) or
+        # `checks` (every other one left out).
+        self.balconies = self.pick(("stacks", "ribbons", "checks"))
+        self.rail = self.uniform(0.9, 1.1, 2)
+        # `slit` (a strip of glass) or `tower` (stands out in front).
+        self.stair = self.pick(("slit", "tower"))
+        self.roof_items = self.some_of("stair_house tank mast vents dish", 1, 6)
 
     def build(self) -> None:
         """Adds all parts of the slab block, which lies along the front.
@@ -318,6 +360,28 @@ def _runs(
 
 class GalleryFlats(Building):
     """The gallery block: walkways along the doors, loggias at the back."""
+
+    def draw(self) -> None:
+        """Draws sizes and style."""
+        site = self.site
+        self.gallery = self.uniform(1.4, 1.8, 2)
+        room = site.depth - self.gallery
+        # Whether the galleries look to the street, else the loggias do.
+        self.gallery_front = self.chance(0.5)
+        # Depth of the bar between galleries and loggias.
+        self.depth = round(min(room, self.uniform(10.0, 13.0)), 2)
+        self.storey = self.uniform(2.8, 3.0)
+        # Width of a flat.
+        self.pitch = max(self.uniform(4.8, 6.4), site.width / 12)
+        self.loggia = self.uniform(1.1, 1.5, 2)
+        self.rail = self.uniform(0.95, 1.1, 2)
+        self.recess = self.uniform(0.12, 0.2, 2)
+        self.stair_left = self.chance(0.5)
+        self.stair_width = self.uniform(3.2, 4.2, 2)
+        # Part of the galleries' bays with a screen.
+        self.panels = self.uniform(0.15, 0.5)
+        self.ground = self.uniform(3.0, 3.6, 2)
+        self.roof_items = self.some_of("vents tank mast dish", 2, 5)
 
     def build(self) -> None:
         """Adds all parts of the gallery block, whose longer sides lie along x.

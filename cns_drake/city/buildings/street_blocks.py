@@ -24,6 +24,41 @@ _MOST_FLIGHTS = 8
 class BrickBlock(Building):
     """The old brick block: punched windows, fire stairs, a water tower."""
 
+    def draw(self) -> None:
+        """Draws sizes and style."""
+        site = self.site
+        self.storey_height = self.uniform(3.1, 3.7)
+        free = [
+            k for k in range(1, len(site.outline)) if k not in site.blind_edges
+        ]
+        on_top = ["water_tower"] if self.chance(0.6) else []
+        # 0 mullions, 1 transoms, 2 ledges, 3 hoods.
+        style = self.whole(0, 4)
+        self.ground_height = self.uniform(4.0, 4.8, 2)
+        self.pitch = max(self.uniform(2.3, 3.4), site.open_length / 46)
+        self.window_width = self.uniform(1.0, 1.6, 2)
+        self.sill = self.uniform(0.75, 0.95, 2)
+        self.head = self.uniform(2.4, 2.7, 2)
+        self.recess = self.uniform(0.18, 0.35, 2)
+        self.corbels = self.chance(0.4)
+        self.pilasters = self.chance(0.5)
+        self.cornice_reach = self.uniform(0.5, 1.0, 2)
+        self.parapet = self.uniform(0.7, 1.3, 2)
+        self.stairs_edge = self.pick(free) if free else None
+        self.stairs_at = self.uniform(0.3, 0.7)
+        self.mullions = 1 if style == 0 else 0
+        self.transom = 1.65 if style == 1 else None
+        self.ledge = 0.12 if style == 2 else 0.0
+        self.hood = 0.12 if style == 3 else 0.0
+        self.sill_course = 0.1 if style < 2 else 0.0
+        self.roof_items = [
+            *on_top,
+            "stair_house",
+            "vents",
+            "ac_unit",
+            "skylight",
+        ]
+
     def build(self) -> None:
         """Adds all parts of the brick block on a site of any outline."""
         outline, blind = self.site.outline, self.site.blind_edges
@@ -110,6 +145,25 @@ class CornerBuilding(Building):
     `corner` is the rounded corner of the rectangle (0: front left,
     1: front right) and `radius` its radius.
     """
+
+    def draw(self) -> None:
+        """Draws sizes and style."""
+        site = self.site
+        side = min(site.width, site.depth, 24.0)
+        self.corner = self.pick(site.free_corners or [0, 1])
+        self.radius = round(self.uniform(0.3, 0.42) * side, 1)
+        self.ground_height = self.uniform(4.6, 5.4, 2)
+        self.first_height = self.uniform(4.2, 4.8, 2)
+        self.storey_height = self.uniform(3.3, 3.8)
+        self.pitch = max(self.uniform(2.5, 3.2), site.open_length / 36)
+        self.window_width = self.uniform(1.1, 1.5, 2)
+        self.recess = self.uniform(0.22, 0.4, 2)
+        self.hood = 0.1 if self.chance(0.4) else 0.0
+        self.pilasters = self.chance(0.6)
+        self.balcony = self.chance(0.7)
+        self.dome = self.pick(("dome", "cone", "lantern"))
+        self.dome_height = round(self.uniform(0.17, 0.24) * self.height, 1)
+        self.cornice_reach = self.uniform(0.5, 0.9, 2)
 
     def build(self) -> None:
         """Adds all parts of the corner house.
@@ -252,14 +306,43 @@ class Office(Building):
     `grooves` (piers from the first floor to the top).
     """
 
+    def draw(self) -> None:
+        """Draws sizes and style."""
+        site = self.site
+        self.ground_height = self.uniform(4.4, 5.4, 2)
+        self.storey_height = self.uniform(3.4, 3.9)
+        self.style = self.pick(("ribbon", "frame", "grooves"))
+        self.pitch = max(self.uniform(3.0, 4.4), site.open_length / 42)
+        self.recess = self.uniform(0.25, 0.5, 2)
+        self.sill = self.uniform(0.75, 1.05, 2)
+        self.pier_reach = self.uniform(0.15, 0.32, 2)
+        # Low offices have no penthouse.
+        penthouse = self.uniform(3.4, 4.4, 1)
+        self.penthouse_height = penthouse if self.height > 18.0 else 0.0
+        self.penthouse_inset = self.uniform(2.2, 4.0, 1)
+        self.parapet = self.uniform(0.6, 1.2, 2)
+        self.awnings = self.uniform(0.0, 0.7)
+        self.roof_items = self.some_of(
+            "air_handler lift_house ac_unit ac_unit vents dish", 3, 7
+        )
+
     def build(self) -> None:
         """Adds all parts of the office; its site can have any outline."""
         outline, blind = self.site.outline, self.site.blind_edges
         top = _add_ground(self)
         goal = self.height - self.penthouse_height - self.parapet - 0.5
         if self.style == "grooves":
+            grooves = tiers.Grooves(
+                storey_height=self.storey_height,
+                spandrel=self.sill,
+                recess=self.recess,
+                pitch=self.pitch,
+                pier=0.5,
+                pier_reach=self.pier_reach,
+                solid_corner=0.8,
+            )
             top = tiers.add_grooved(
-                self, outline, top, goal, "storey", 0.2, 8, blind
+                self, outline, grooves, top, goal, "storey", 0.2, 8, blind
             )
         else:
             top = _add_windows(self, top, goal)
@@ -326,6 +409,28 @@ def _add_penthouse(p: Office, outline: np.ndarray, roof: float) -> float:
 
 class CornerStore(Building):
     """The corner store: a door across the corner, flats above the shop."""
+
+    def draw(self) -> None:
+        """Draws sizes and style."""
+        site = self.site
+        # Rise of the parapet above the corner.
+        self.raised = self.uniform(0.3, 0.9, 2)
+        self.ground = round(
+            min(self.uniform(3.5, 4.1), self.height - self.raised - 0.7), 2
+        )
+        # 0 front left, 1 front right.
+        self.corner = self.pick(site.free_corners or [0, 1])
+        # Length taken off each edge at the corner.
+        self.cut = round(min(self.uniform(2.0, 3.0), 0.3 * site.depth), 2)
+        self.storey = self.uniform(2.9, 3.3)
+        self.pitch = max(self.uniform(2.2, 3.0), (site.width + site.depth) / 20)
+        self.window_width = self.uniform(1.0, 1.5, 2)
+        self.recess = self.uniform(0.12, 0.25, 2)
+        self.ledge = self.pick((0.0, 0.1))
+        self.cornice = self.uniform(0.15, 0.4, 2)
+        # Part of the shop windows with an awning.
+        self.awnings = self.uniform(0.2, 0.9)
+        self.roof_items = self.some_of("stair_house ac_unit vents", 1, 4)
 
     def build(self) -> None:
         """Adds all parts of the corner store.

@@ -19,6 +19,39 @@ from cns_drake.city.geometry.mesh import Mesh, merge_meshes
 class ArtDecoTower(Building):
     """The art-deco tower: symmetric setbacks, tall piers, a stepped crown."""
 
+    def draw(self) -> None:
+        """Draws sizes and style."""
+        site = self.site
+        # Where each tier above the base starts, as a part of the height.
+        starts = self.pick(((0.5,), (0.3, 0.62)))
+        share = 0.24 if len(starts) == 2 else 0.4
+        # For each of these tiers, where it starts, how far it steps back across
+        # the front and along the sides, and by how much it starts higher.
+        self.steps = [
+            (
+                start,
+                share * self.uniform(0.3, 0.9) * site.depth / 2,
+                share * self.uniform(0.6, 1.2) * site.width / 2,
+                self.uniform(-0.04, 0.04),
+            )
+            for start in starts
+        ]
+        self.ground_height = self.uniform(6.5, 8.5, 2)
+        self.grooves = tiers.Grooves(
+            storey_height=self.uniform(3.4, 3.8),
+            spandrel=self.uniform(1.1, 1.6, 2),
+            recess=self.uniform(0.2, 0.4, 2),
+            pitch=max(self.uniform(2.6, 3.6), site.open_length / 34),
+            pier=self.uniform(0.8, 1.4, 2),
+            pier_reach=self.uniform(0.2, 0.34, 2),
+            solid_corner=self.uniform(1.4, 2.4, 2),
+        )
+        self.portal_width = self.uniform(4.0, 5.5, 1)
+        self.crown_steps = self.whole(2, 5)
+        # Height of the spire, as a part of the crown's.
+        self.spire = self.uniform(0.35, 0.6)
+        self.notch = self.pick((0.0, 1.2, 2.0))
+
     def build(self) -> None:
         """Adds all parts of the art-deco tower.
 
@@ -31,7 +64,10 @@ class ArtDecoTower(Building):
         across = along = 0.0
         for k, (start, a, b, jitter) in enumerate(self.steps):
             goal = round(self.height * (start + jitter), 1)
-            top = tiers.add_grooved(self, plan, top, goal, f"tier_{k}", 1.7)
+            part = f"tier_{k}"
+            top = tiers.add_grooved(
+                self, plan, self.grooves, top, goal, part, 1.7
+            )
             edges = (Band(0.0, 0.3, -0.12), Band(1.0, 1.3, -0.1))
             parapet, part = Facade(1.3, edges), f"terrace_{k}"
             tiers.add_crown(self, plan, parapet, top, 1.1, part=part)
@@ -40,7 +76,7 @@ class ArtDecoTower(Building):
             plan = massing.inset(base, step)
             plan = massing.notched(plan, self.notch) if self.notch else plan
         goal, part = round(self.height - crown_height, 1), f"tier_{k + 1}"
-        top = tiers.add_grooved(self, plan, top, goal, part, 1.7)
+        top = tiers.add_grooved(self, plan, self.grooves, top, goal, part, 1.7)
         _add_crown(self, plan, top)
 
 
@@ -48,7 +84,7 @@ def _add_ground(p: ArtDecoTower, plan: np.ndarray) -> float:
     h = p.ground_height
     portal = bays.entrance(p.portal_width, h - 1.6, 1.4, surround=0.3)
     arch = bays.arched(3.4, 0.5, 3.2, 0.5)
-    arches = bays.rhythm(1.7 * p.pitch, [arch], margin=1.4)
+    arches = bays.rhythm(1.7 * p.grooves.pitch, [arch], margin=1.4)
     bands = (Band(h - 0.7, h - 0.4, -0.15), Band(h - 0.4, h, -0.3))
     layout = bays.with_door(arches, portal, p.portal_width + 2.0)
     roof = details.front_canopy(plan, 2.4, 1.4, 3.6)
@@ -75,6 +111,46 @@ _ROOF_ITEMS = ("lift_house", "mast", *2 * ("cooling_tower",), "air_handler")
 class GlassSkyscraper(Building):
     """The glass skyscraper: curtain walls with fins, setbacks, a crown."""
 
+    def draw(self) -> None:
+        """Draws sizes and style."""
+        site = self.site
+        edges = len(site.outline)
+        starts = self.pick(((0.62,), (0.45, 0.78)))
+        # 0 ribbons, 1 a grid, above that fins.
+        style = self.whole(0, 4)
+        # For each tier above the first, where it starts, as a part of the
+        # height, how far edges step back, as a part of the most, and by how
+        # much it starts higher.
+        self.setbacks = [
+            (start, self._share(edges), self.uniform(-0.06, 0.06))
+            for start in starts
+        ]
+        walls, glass = (self.kind.choices[part] for part in ("walls", "glass"))
+        tint = self.whole(0, len(walls))
+        self.rgb, self.glass_rgb = walls[tint], glass[tint]
+        wanted = self.pick(("plain", "chamfered", "notched", "rounded"))
+        self.corners = wanted if edges == 4 else "plain"
+        self.lobby_height = self.uniform(6.0, 9.0, 2)
+        self.grooves = tiers.Grooves(
+            storey_height=self.uniform(3.7, 4.2),
+            spandrel=self.uniform(0.6, 1.2, 2),
+            ledge=self.uniform(0.3, 0.6, 2) * (style < 2),
+            recess=self.uniform(0.2, 0.4, 2),
+            pitch=max(self.uniform(2.2, 3.6), site.open_length / 38),
+            pier=self.uniform(0.12, 0.3, 2) * (style > 0),
+            pier_reach=self.uniform(0.2, 0.55, 2),
+        )
+        # Size of cut corners, as a part of the shorter side.
+        self.corner_size = self.uniform(0.08, 0.16)
+        self.crown = self.pick(("screen", "wedge", "stepped"))
+        self.crown_height = self.uniform(5.0, 9.0, 1)
+
+    def _share(self, edges: int) -> float | np.ndarray:
+        """Returns how far a tier steps back: its edges, or all alike."""
+        if edges == 4:
+            return self.rng.uniform(0.06, 0.13, 4) * (self.rng.random(4) < 0.6)
+        return self.uniform(0.5, 1.0)
+
     def build(self) -> None:
         """Adds all parts of the skyscraper; its site can have any outline."""
         base = self.site.outline
@@ -85,14 +161,18 @@ class GlassSkyscraper(Building):
             reach = min(0.08 * reach, 0.5 * massing.inset_limit(base))
         for k, (start, share, jitter) in enumerate(self.setbacks):
             goal = round((start + jitter) * self.height, 1)
-            top = tiers.add_grooved(self, plan, top, goal, f"tier_{k}", 1.1)
+            part = f"tier_{k}"
+            top = tiers.add_grooved(
+                self, plan, self.grooves, top, goal, part, 1.1
+            )
             terrace = Facade(1.1, (Band(0.8, 1.1, -0.1),))
             tiers.add_crown(self, plan, terrace, top, 1.0, part=f"terrace_{k}")
             total = total + np.round(share * reach, 1)
             plan = _shaped(self, massing.inset(base, total))
         rise = self.crown_height if self.crown == "screen" else 0.0
         goal = self.height - self.crown_height
-        top = tiers.add_grooved(self, plan, top, goal, "tier_top", rise)
+        part = "tier_top"
+        top = tiers.add_grooved(self, plan, self.grooves, top, goal, part, rise)
         _add_glass_skyscraper_crown(self, plan, top)
 
 
@@ -113,7 +193,7 @@ def _add_lobby(p: GlassSkyscraper, plan: np.ndarray) -> float:
     height, length = p.lobby_height, details.WallFrame(plan, 0).length
     door = bays.entrance(min(5.0, length / 3), 3.6, 1.6)
     bar = bays.bar(0.12, 0.0, height - 0.8, 0.4)
-    mullions = bays.rhythm(2 * p.pitch, [bar], margin=1.0)
+    mullions = bays.rhythm(2 * p.grooves.pitch, [bar], margin=1.0)
     bands = (
         Band(0.0, height - 0.8, 0.7),
         Band(0.0, 0.3, 0.45),
@@ -158,6 +238,24 @@ _HOTEL_ROOF_ITEMS = ("cooling_tower", "air_handler", "mast", "vents", "ac_unit")
 
 class Hotel(Building):
     """The hotel: balconies along rounded walls, a forecourt, a roof-top bar."""
+
+    def draw(self) -> None:
+        """Draws sizes and style."""
+        site = self.site
+        depth = site.depth - _FORECOURT_M
+        self.pitch = max(self.uniform(3.6, 4.6), site.width / 11)
+        self.ground_height = self.uniform(5.0, 6.2, 2)
+        self.storey_height = self.uniform(3.1, 3.4)
+        self.round_ends = self.chance(0.5) and site.width > 1.5 * depth
+        self.corner = round(self.uniform(0.2, 0.35) * min(depth, site.width), 1)
+        self.side_pitch = max(2.7, (site.width + 2 * depth) / 34)
+        self.recess = self.uniform(0.2, 0.35, 2)
+        self.balcony_reach = self.uniform(1.1, 1.45, 2)
+        self.balcony_width = round(self.uniform(0.6, 0.95) * self.pitch, 2)
+        self.rail = self.uniform(0.95, 1.1, 2)
+        self.bar_height = self.uniform(4.0, 5.0, 1)
+        self.bar_inset = self.uniform(1.8, 3.0, 1)
+        self.sign_left = self.chance(0.5)
 
     def build(self) -> None:
         """Adds all parts of the hotel, which stands behind a forecourt.
@@ -240,8 +338,43 @@ def _add_sign(p: Hotel, plan: np.ndarray) -> None:
     p.add("sign", blade, *arms, rgb=(0.55, 0.16, 0.14))
 
 
+_PODIUM_TOWER_ROOF_ITEMS = (
+    "lift_house",
+    "cooling_tower",
+    "air_handler",
+    "mast",
+)
+
+
 class PodiumTower(Building):
     """The podium tower: a block of shops with a tower set back on its roof."""
+
+    def draw(self) -> None:
+        """Draws sizes and style."""
+        site = self.site
+        podium, tower = (
+            self.kind.choices[part] for part in ("podium", "tower")
+        )
+        cladding = self.whole(0, len(podium))
+        self.rgb, self.tower_rgb = podium[cladding], tower[cladding]
+        # Share of the podium that the tower covers along x and y.
+        self.tower = self.rng.uniform(0.5, 0.68, 2).tolist()
+        run = 2 * (self.tower[0] * site.width + self.tower[1] * site.depth)
+        self.podium_storeys = self.whole(2, 4)
+        self.ground_height = self.uniform(4.8, 5.6, 2)
+        self.storey_height = self.uniform(3.2, 3.7)
+        self.shop_pitch = self.uniform(5.5, 7.5) * min(
+            1.3, max(1.0, (site.width + site.depth) / 70)
+        )
+        # Where the tower stands, as a part of the room that is left.
+        self.at = self.rng.choice([0.15, 0.5, 0.85], 2).tolist()
+        self.chamfer = self.pick((0.0, 2.0, 3.5))
+        self.pitch = max(self.uniform(3.0, 4.2), run / 19)
+        self.recess = self.uniform(0.35, 0.5, 2)
+        self.frame = self.uniform(0.5, 0.9, 2)
+        self.mullions = int(run < 70.0)
+        self.balconies = self.chance(0.5)
+        self.awnings = self.uniform(0.3, 0.9)
 
     def build(self) -> None:
         """Adds all parts of the podium and of the tower on it.
@@ -313,7 +446,8 @@ def _add_tower(p: PodiumTower, plan: np.ndarray, z0: float) -> None:
     crown = round(p.height - top, 3)
     louvres = tuple(Band(z, z + 0.35, 0.15) for z in (0.5, 1.2, 1.9))
     screen = Facade(crown, (*louvres, Band(2.6, crown, -0.15)))
-    tiers.add_crown(p, plan, screen, top, 2.2, items=p.roof_items)
+    items = _PODIUM_TOWER_ROOF_ITEMS
+    tiers.add_crown(p, plan, screen, top, 2.2, items=items)
 
 
 def _add_garden(p: PodiumTower, tower: np.ndarray, z: float) -> None:

@@ -3,9 +3,8 @@
 from __future__ import annotations
 
 import abc
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING, Any, TypeVar
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -13,8 +12,8 @@ from pydantic import BaseModel
 from shapely.geometry import Polygon
 from shapely.geometry.base import BaseGeometry
 
+from cns_drake.city.dice import Dice, Rgb
 from cns_drake.city.facades import massing
-from cns_drake.city.formulas import FUNCTIONS, value_of
 from cns_drake.city.geometry import (
     Mesh,
     MeshShape,
@@ -24,14 +23,6 @@ from cns_drake.city.geometry import (
     merge_meshes,
     object_mesh,
 )
-
-Rgb = tuple[float, float, float]
-T = TypeVar("T")
-
-
-def pick(rng: np.random.Generator, choices: Sequence[T]) -> T:
-    """Returns one of the choices, all equally likely."""
-    return choices[int(rng.integers(len(choices)))]
 
 
 @dataclass(frozen=True)
@@ -180,8 +171,6 @@ class Archetype(BaseModel, frozen=True, extra="forbid"):
             of a building draw.
         materials: names of the parts that are made of many pieces, such as
             `trim`; each is a key of `colours`, or `glass`.
-        parameters: name -> value or formula of each parameter, in the order in
-            which they are computed (see `cns_drake.city.formulas.value_of`).
     """
 
     name: str
@@ -193,7 +182,6 @@ class Archetype(BaseModel, frozen=True, extra="forbid"):
     colours: dict[str, tuple[Rgb, ...] | str] = {}
     choices: dict[str, tuple[Rgb, ...]] = {}
     materials: tuple[str, ...] = ()
-    parameters: dict[str, Any] = {}
 
 
 # Plinths and pilasters may stand this far outside the footprint [m]. Above
@@ -203,8 +191,8 @@ HEAD_ROOM_M = 2.3
 
 
 @dataclass
-class Assembly:
-    """Collects the parts and meshes of one building.
+class Assembly(Dice):
+    """Collects the parts and meshes of one building, and draws for it.
 
     `add` makes one part from the given meshes. `add_to` collects meshes by
     material, and `paint` sets the materials' colours: each material becomes one
@@ -220,28 +208,6 @@ class Assembly:
     meshes: dict[str, Mesh] = field(default_factory=dict)
     _colours: dict[str, Rgb] = field(default_factory=dict)
     _pieces: dict[str, list[Mesh]] = field(default_factory=dict)
-
-    def uniform(
-        self, low: float, high: float, digits: int | None = None
-    ) -> float:
-        """Returns a random number, uniform from `low` to below `high`.
-
-        If `digits` is given, the number is rounded to that many decimals.
-        """
-        value = float(self.rng.uniform(low, high))
-        return value if digits is None else round(value, digits)
-
-    def whole(self, low: int, high: int) -> int:
-        """Returns a random integer from `low` to below `high`."""
-        return int(self.rng.integers(low, high))
-
-    def chance(self, share: float) -> bool:
-        """Returns True with the probability `share`, and otherwise False."""
-        return bool(self.rng.random() < share)
-
-    def pick(self, choices: Sequence[T]) -> T:
-        """Returns one of the choices at random, all equally likely."""
-        return pick(self.rng, choices)
 
     def some_of(self, words: str, low: int, high: int) -> list[str]:
         """Returns the first words of a text; how many of them is random.
@@ -377,9 +343,10 @@ class Assembly:
 class Building(Assembly, abc.ABC):
     """The base class of buildings; each archetype has a subclass.
 
-    The constructor draws the parameters of the archetype at random. They become
-    attributes, from which `build` makes the parts of the building. Only roof
-    equipment and chimneys may rise above its `height` [m].
+    The constructor calls `draw`, which draws the sizes and the style of the
+    building at random, and then draws its colours. From these attributes,
+    `build` makes the parts of the building. Only roof equipment and chimneys
+    may rise above its `height` [m].
     """
 
     def __init__(
@@ -389,34 +356,29 @@ class Building(Assembly, abc.ABC):
         height: float,
         rng: np.random.Generator,
     ) -> None:
-        """Draws the parameters and then the colours of the building."""
+        """Draws sizes and style, and then the colours of the building."""
         super().__init__(site, rng)
         self.kind, self.height = kind, height
-        draws = (self.uniform, self.whole, self.chance, self.pick, self.some_of)
-        names = {
-            **FUNCTIONS,
-            **{"kind": kind, "site": site, "height": height, "rng": rng},
-            **{draw.__name__: draw for draw in draws},
-        }
-        for name, formula in kind.parameters.items():
-            names[name] = value_of(formula, names)
-            setattr(self, name, names[name])
+        self.draw()
         self.colours: dict[str, Rgb] = {}
         for part, rgbs in kind.colours.items():
             if isinstance(rgbs, str):
                 self.colours[part] = self.colours[rgbs]
             else:
-                drawn = pick(rng, rgbs) if len(rgbs) > 1 else rgbs[0]
+                drawn = self.pick(rgbs) if len(rgbs) > 1 else rgbs[0]
                 self.colours[part] = drawn
         if self.rgb is None and self.colours:
             self.rgb = next(iter(self.colours.values()))
         self.glass_rgb = self.colours.setdefault("glass", self.glass_rgb)
         self.paint(**{part: self.colours[part] for part in kind.materials})
 
-    if TYPE_CHECKING:
+    @abc.abstractmethod
+    def draw(self) -> None:
+        """Sets the attributes that differ between buildings of one archetype.
 
-        def __getattr__(self, name: str) -> Any:
-            """The parameters are those of the archetype's description."""
+        Lengths are in metres. The order of the draws is part of each city: it
+        decides which numbers a building gets.
+        """
 
     @abc.abstractmethod
     def build(self) -> None:

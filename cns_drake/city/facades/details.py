@@ -10,8 +10,9 @@ import math
 import numpy as np
 from numpy.typing import ArrayLike
 
+from cns_drake.city.dice import Rgb
 from cns_drake.city.facades import bays, massing, roofs, walls
-from cns_drake.city.facades.assembly import Assembly, Rgb
+from cns_drake.city.facades.assembly import Assembly
 from cns_drake.city.geometry.mesh import Mesh, box_mesh, merge_meshes
 
 # Height of the shared mesh of fire stairs, which is scaled to the storey [m].

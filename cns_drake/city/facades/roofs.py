@@ -13,8 +13,9 @@ import numpy as np
 from numpy.typing import ArrayLike
 from shapely.geometry import Point, Polygon
 
+from cns_drake.city.dice import Rgb
 from cns_drake.city.facades import bays, massing
-from cns_drake.city.facades.assembly import Assembly, Rgb
+from cns_drake.city.facades.assembly import Assembly
 from cns_drake.city.facades.walls import Patch
 from cns_drake.city.geometry.mesh import Mesh, merge_meshes
 

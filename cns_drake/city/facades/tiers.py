@@ -1,13 +1,14 @@
 """Adds the ground floor, the storeys, the top walls and the roof."""
 
 from collections.abc import Sequence
+from dataclasses import dataclass
 import math
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from cns_drake.city.facades import bays, details, massing
-from cns_drake.city.facades.assembly import Assembly, Building, pick
+from cns_drake.city.facades.assembly import Assembly, Building
 from cns_drake.city.facades.bays import Bay
 from cns_drake.city.facades.roofs import equip_roof
 from cns_drake.city.facades.walls import Band, Facade, facade_mesh, glass_mesh
@@ -25,7 +26,7 @@ def add_awnings(p: Building, pieces: Sequence[Mesh]) -> None:
     is added.
     """
     if pieces:
-        rgb = pick(p.rng, p.kind.choices["awnings"])
+        rgb = p.pick(p.kind.choices["awnings"])
         p.add("awnings", *pieces, rgb=rgb)
 
 
@@ -128,9 +129,35 @@ def _pane(outline: ArrayLike, facade: Facade, z0: float, z1: float) -> Mesh:
     return Mesh(pane.vertices, faces)
 
 
+@dataclass(frozen=True)
+class Grooves:
+    """Windows between upright piers; all lengths are in metres.
+
+    Attributes:
+        storey_height: wanted height of a storey.
+        spandrel: height of the wall under the windows.
+        recess: depth of the windows.
+        pitch: distance between piers.
+        pier: width of a pier; 0 for none.
+        pier_reach: how far a pier protrudes.
+        solid_corner: width of solid corners; 0 for glass around the corner.
+        ledge: how far a lip on the spandrel protrudes; 0 for none.
+    """
+
+    storey_height: float
+    spandrel: float
+    recess: float
+    pitch: float
+    pier: float
+    pier_reach: float
+    solid_corner: float = 0.0
+    ledge: float = 0.0
+
+
 def add_grooved(
-    p: Building,
+    out: Assembly,
     outline: ArrayLike,
+    grooves: Grooves,
     z0: float,
     goal: float,
     part: str,
@@ -143,14 +170,9 @@ def add_grooved(
     Returns the height of the top [m], which is a few millimetres below `goal`.
 
     Args:
-        p: the building. Of its parameters, these lengths are used [m]:
-            `storey_height`; `spandrel`, the height of the wall under the
-            windows; `ledge`, how far a lip on the spandrel protrudes; `recess`,
-            the depth of the windows; `pitch`, the distance between piers;
-            `pier`, the width of a pier (may be 0); `pier_reach`, how far a pier
-            protrudes; `solid_corner`, the width of solid corners (0 for glass
-            around the corner).
+        out: the building under assembly, which gets the parts.
         outline: (N, 2) corners of the walls, counter-clockwise [m].
+        grooves: sizes of the windows and piers.
         z0: height of the bottom [m].
         goal: wanted height of the top [m].
         part: beginning of the names of the parts.
@@ -158,28 +180,34 @@ def add_grooved(
         most: greatest number of parts, one above another.
         plain: numbers of the edges whose walls are plain.
     """
-    groups, per_group, storey = divided(goal - z0, p.storey_height, most)
-    depth = p.recess
-    bands = [Band(0.0, p.spandrel, 0.0), Band(p.spandrel, storey, depth)]
-    if p.ledge > 0:
-        bands.append(Band(0.0, 0.2, -p.ledge))
+    groups, per_group, storey = divided(goal - z0, grooves.storey_height, most)
+    depth = grooves.recess
+    bands = [
+        Band(0.0, grooves.spandrel, 0.0),
+        Band(grooves.spandrel, storey, depth),
+    ]
+    if grooves.ledge > 0:
+        bands.append(Band(0.0, 0.2, -grooves.ledge))
     facade = Facade(storey, tuple(bands), glass=(depth,), plain=plain)
-    top = add_storeys(p, outline, facade, z0, groups, per_group, part=part)
+    top = add_storeys(out, outline, facade, z0, groups, per_group, part=part)
     pieces, into = [], depth + 0.05
-    if p.solid_corner > 0:
-        size = (p.solid_corner, p.pier_reach, into)
+    if grooves.solid_corner > 0:
+        size = (grooves.solid_corner, grooves.pier_reach, into)
         pieces.append(
             details.corner_piers(outline, *size, z0, top + rise, plain)
         )
-    if p.pier > 0:
-        margin = max(p.solid_corner + p.pitch - p.pier, into + p.pier)
+    if grooves.pier > 0:
+        margin = max(
+            grooves.solid_corner + grooves.pitch - grooves.pier,
+            into + grooves.pier,
+        )
         piers = details.piers(
-            outline, p.pitch, p.pier, p.pier_reach, z0, top + rise,
-            depth=into, margin=margin, skip=plain,
+            outline, grooves.pitch, grooves.pier, grooves.pier_reach, z0,
+            top + rise, depth=into, margin=margin, skip=plain,
         )  # fmt: skip
         pieces.append(piers)
     if pieces:
-        p.add(f"{part}_piers", *pieces)
+        out.add(f"{part}_piers", *pieces)
     return top
 
 

@@ -7,7 +7,7 @@ from pathlib import Path
 import numpy as np
 
 from cns_drake.base.yaml_files import parse_yaml
-from cns_drake.city.facades.assembly import Rgb, pick
+from cns_drake.city.dice import Dice, Rgb
 from cns_drake.city.geometry import structures
 
 _LONGEST = 8
@@ -66,7 +66,7 @@ def run(
         raise ValueError(
             f"{name}: length {length}, height {height}: not positive"
         )
-    red, green, blue = pick(rng, kind.colours)
+    red, green, blue = Dice(rng).pick(kind.colours)
     rgb = (red, green, blue)
     tall = round(height / kind.height, 4)
     total = max(1, round(length / kind.panel))

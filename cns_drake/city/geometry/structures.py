@@ -2,7 +2,9 @@
 
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
+import inspect
 import math
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -160,14 +162,27 @@ _ROUND_SIDES = 12
 class Builder:
     """A kind of object, and the function that makes objects of this kind.
 
-    `build(rng, **parameters)` returns a `Model`. Every parameter has a default;
+    `make(rng, **parameters)` returns a `Model`. Every parameter has a default;
     most defaults are drawn at random from `rng`. The same state of `rng` gives
     the same model. `semantic_class` is a key of
     `cns_drake.scene.semantics.CLASS_IDS`.
     """
 
     semantic_class: str
-    build: Callable[..., Model]
+    make: Callable[..., Model]
+
+    def build(self, rng: np.random.Generator, **parameters: Any) -> Model:
+        """Returns an object; what is not given is drawn at random from `rng`.
+
+        Raises:
+            TypeError: there is no such parameter, or its type is wrong.
+            ValueError: there is no object with such a parameter.
+        """
+        known = inspect.signature(self.make).parameters
+        for name in parameters:
+            if name not in known:
+                raise TypeError(f"there is no parameter {name}")
+        return self.make(rng, **parameters)
 
 
 def post(
@@ -249,6 +264,65 @@ def block(
         rpy=(0.0, 0.0, float(yaw)),
         rgb=rgb,
     )
+
+
+def pillar(
+    name: str,
+    x: float,
+    y: float,
+    height: float,
+    xy: tuple[float, float] = (0.0, 0.0),
+    yaw: float = 0.0,
+    rgb: tuple[float, float, float] | None = None,
+) -> Part:
+    """Returns an upright box that stands on the ground.
+
+    It begins slightly below the ground.
+
+    Args:
+        name: name of the part.
+        x: length along the box's own x [m].
+        y: length along the box's own y [m].
+        height: height of its top above the ground [m].
+        xy: position of its middle in the structure's frame [m].
+        yaw: heading of the box in the structure's frame [rad].
+        rgb: colour; by default that of the structure's semantic class.
+    """
+    center = (*xy, (height - ROOT_DEPTH) / 2)
+    return block(name, (x, y, height + ROOT_DEPTH), center, yaw, rgb)
+
+
+def mesh_part(
+    name: str,
+    mesh: str,
+    at: Iterable[float] = (0.0, 0.0, 0.0),
+    yaw: float = 0.0,
+    rgb: tuple[float, float, float] | None = None,
+    scale: tuple[float, float, float] = (1.0, 1.0, 1.0),
+) -> Part:
+    """Returns an upright mesh of the folder `object_meshes` as a part.
+
+    Args:
+        name: name of the part.
+        mesh: name of its file without `.obj`.
+        at: (3,) position of the mesh's origin in the structure's frame [m].
+        yaw: heading of the mesh in the structure's frame [rad].
+        rgb: colour; by default that of the structure's semantic class.
+        scale: factors along the mesh's own x, y and z.
+    """
+    rpy = (0.0, 0.0, float(yaw))
+    return Part(name, MeshShape(mesh, scale), triple(at), rpy, rgb)
+
+
+def in_a_row(k: int, distance: float, count: int) -> float:
+    """Returns the place of one of `count` things in a row centred on 0 [m].
+
+    Args:
+        k: number of the thing, from 0.
+        distance: distance from one thing to the next [m].
+        count: number of things in the row.
+    """
+    return distance * (k - (count - 1) / 2)
 
 
 def triple(values: Iterable[float]) -> tuple[float, float, float]:

@@ -4,9 +4,15 @@ from collections.abc import Mapping
 
 import numpy as np
 
-from cns_drake.city.furniture.described_objects import DESCRIBED
 from cns_drake.city.furniture.fences import FENCES
+from cns_drake.city.furniture.object_data import ONE_MESH
 from cns_drake.city.furniture.parked_cars import PARKED_CARS
+from cns_drake.city.furniture.planters import PLANTERS
+from cns_drake.city.furniture.site_equipment import SITE_EQUIPMENT
+from cns_drake.city.furniture.squares import SQUARES
+from cns_drake.city.furniture.street_furniture import STREET_FURNITURE
+from cns_drake.city.furniture.street_lights import STREET_LIGHTS
+from cns_drake.city.furniture.traffic_signals import TRAFFIC_SIGNALS
 from cns_drake.city.geometry.structures import Builder
 from cns_drake.city.plants.vegetation import TREES
 
@@ -18,6 +24,15 @@ def pick(weights: Mapping[str, float], rng: np.random.Generator) -> str:
     return names[int(rng.choice(len(names), p=p / p.sum()))]
 
 
-OBJECTS: dict[str, Builder] = {**TREES, **FENCES, **PARKED_CARS}
-for _objects in DESCRIBED.values():
-    OBJECTS |= _objects
+OBJECTS: dict[str, Builder] = {
+    **TREES,
+    **FENCES,
+    **PARKED_CARS,
+    **ONE_MESH,
+    **STREET_FURNITURE,
+    **STREET_LIGHTS,
+    **TRAFFIC_SIGNALS,
+    **SQUARES,
+    **SITE_EQUIPMENT,
+    **PLANTERS,
+}

@@ -9,7 +9,7 @@ from matplotlib.colors import to_rgb
 import numpy as np
 
 from cns_drake.base.yaml_files import parse_yaml
-from cns_drake.city.facades.assembly import Rgb, pick
+from cns_drake.city.dice import Dice, Rgb
 from cns_drake.imports.openstreetmap.tags import count
 
 _USE_KEYS = (
@@ -210,7 +210,6 @@ def _tinted(rgb: Rgb, factor: float) -> Rgb:
 
 def _colour(rng: np.random.Generator, *palettes: str) -> Rgb:
     """Returns a random colour of some palettes."""
-    red, green, blue = pick(
-        rng, [rgb for name in palettes for rgb in _LOOKS["palettes"][name]]
-    )
+    colours = [rgb for name in palettes for rgb in _LOOKS["palettes"][name]]
+    red, green, blue = Dice(rng).pick(colours)
     return red, green, blue

@@ -15,6 +15,9 @@ from cns_drake.city.geometry.structures import (
     bar,
     block,
     ground_footprint,
+    in_a_row,
+    part_mesh,
+    pillar,
     post,
     rotation,
 )
@@ -81,9 +84,24 @@ def test_footprint_holds_round_shapes_and_scaled_turned_meshes():
     assert not footprint.contains(Point(2.2, 0.2))
 
 
-def test_an_unknown_parameter_of_an_object_is_refused():
+@pytest.mark.parametrize("name", ["obelisk", "bench", "hedge", "palm", "van"])
+def test_an_unknown_parameter_of_an_object_is_refused(name):
     with pytest.raises(TypeError, match="no parameter colour"):
-        OBJECTS["obelisk"].build(np.random.default_rng(0), colour=1)
+        OBJECTS[name].build(np.random.default_rng(0), colour=1)
+
+
+def test_a_pillar_stands_on_the_ground_and_reaches_below_it():
+    part = pillar("case", 0.4, 0.6, 1.5, (2.0, 3.0), yaw=np.pi / 2)
+    corners = part_mesh(part, {}).vertices
+    np.testing.assert_allclose(corners.min(axis=0), (1.7, 2.8, -ROOT_DEPTH))
+    np.testing.assert_allclose(corners.max(axis=0), (2.3, 3.2, 1.5))
+
+
+@pytest.mark.parametrize("count", [1, 2, 5])
+def test_things_in_a_row_are_equally_far_apart_about_0(count):
+    places = [in_a_row(k, 1.5, count) for k in range(count)]
+    np.testing.assert_allclose(np.diff(places), 1.5)
+    assert sum(places) == pytest.approx(0.0)
 
 
 def test_a_given_parameter_leaves_the_other_draws_alone():

@@ -2,15 +2,14 @@ from helpers.mesh_checks import is_closed, solids, surface_points
 import numpy as np
 import pytest
 
-from cns_drake.city.furniture.described_objects import DESCRIBED
+from cns_drake.city.furniture.object_data import ONE_MESH
+from cns_drake.city.furniture.street_furniture import STREET_FURNITURE
 from cns_drake.city.geometry.structures import MeshShape
 from cns_drake.city.placement.objects import OBJECTS
 
 SOLID = [
-    *DESCRIBED["street_furniture"],
-    "kiosk",
-    "advertising_pillar",
-    "phone_box",
+    *STREET_FURNITURE,
+    *ONE_MESH,
     "bus_shelter",
     "market_stall",
     "cafe_table",
@@ -22,13 +21,10 @@ SOLID = [
     "sign_triangular",
     "lantern",
     "lamp_post_curved",
-    "container",
     "site_cabin",
     "excavator",
     "soil_heap",
     "tower_crane",
-    "slide",
-    "swing",
     "flag_poles",
 ]
 

@@ -1,0 +1,105 @@
+"""Shrubs, flower beds and planters."""
+
+from functools import partial
+import math
+
+import numpy as np
+
+from cns_drake.city.dice import Dice, Rgb
+from cns_drake.city.furniture.object_data import CHOICES, COLOURS
+from cns_drake.city.geometry import Builder, Model, assemble, mesh_part
+
+# There are four meshes of shrubs.
+_LETTERS = "abcd"
+
+
+def _leaves(dice: Dice) -> Rgb:
+    return dice.tinted(COLOURS["grass"], 0.85, 1.15)
+
+
+def shrub(rng: np.random.Generator, *, height: float | None = None) -> Model:
+    """Returns a shrub.
+
+    Args:
+        rng: random generator.
+        height: height of the shrub [m].
+    """
+    dice = Dice(rng)
+    drawn = dice.uniform(0.8, 1.6)
+    height = drawn if height is None else height
+    mesh = f"shrub_{dice.pick(_LETTERS)}"
+    # Tall shrubs are also wider, but less than in proportion.
+    wide = height**0.8 * dice.uniform(0.85, 1.2)
+    deep = height**0.8 * dice.uniform(0.85, 1.2)
+    scale = (round(wide, 3), round(deep, 3), round(height, 3))
+    rgb = _leaves(dice)
+    yaw = dice.uniform(-math.pi, math.pi, 3)
+    return assemble(mesh_part("leaves", mesh, yaw=yaw, rgb=rgb, scale=scale))
+
+
+def flower_bed(
+    rng: np.random.Generator, *, length: float = 4.0, width: float = 1.5
+) -> Model:
+    """Returns a bed of flowers with an edge of stone.
+
+    Args:
+        rng: random generator for the colour of the flowers.
+        length: length along x [m].
+        width: length along y [m].
+    """
+    scale = (round(length / 4, 4), round(width / 1.5, 4), 1.0)
+    stone, rgb = COLOURS["stone"], Dice(rng).pick(CHOICES["flowers"])
+    return assemble(
+        mesh_part("edge", "flower_bed_edge", rgb=stone, scale=scale),
+        mesh_part("plants", "flower_bed_plants", rgb=rgb, scale=scale),
+    )
+
+
+def round_planter(rng: np.random.Generator) -> Model:
+    """Returns a shrub in a round pot."""
+    dice = Dice(rng)
+    size = dice.uniform(0.9, 1.2, 3)
+    mesh = f"shrub_{dice.pick(_LETTERS)}"
+    tall = dice.uniform(0.7, 1.1, 3)
+    rgb = _leaves(dice)
+    yaw = dice.uniform(-math.pi, math.pi, 3)
+    pot, wide = (size, size, size), round(0.75 * size, 3)
+    at, scale = (0, 0, round(0.5 * size, 3)), (wide, wide, tall)
+    return assemble(
+        mesh_part("pot", "round_pot", rgb=COLOURS["stone"], scale=pot),
+        mesh_part("leaves", mesh, at, yaw, rgb, scale),
+    )
+
+
+def box_planter(
+    rng: np.random.Generator, *, length: float | None = None
+) -> Model:
+    """Returns shrubs in a row along x, in a box.
+
+    Args:
+        rng: random generator.
+        length: length of the box [m].
+    """
+    dice = Dice(rng)
+    drawn = dice.uniform(1.6, 3.0)
+    length = drawn if length is None else length
+    scale, rgb = (round(length / 2, 4), 1.0, 1.0), COLOURS["planter"]
+    parts = [mesh_part("box", "planter_box", rgb=rgb, scale=scale)]
+    count = max(1, round(length / 0.8))
+    for k in range(count):
+        mesh = f"shrub_{dice.pick(_LETTERS)}"
+        size = (0.6, 0.55, dice.uniform(0.6, 1.0, 3))
+        rgb = _leaves(dice)
+        at = ((k + 0.5) * length / count - length / 2, 0, 0.45)
+        yaw = dice.uniform(-math.pi, math.pi, 3)
+        parts.append(mesh_part(f"leaves_{k}", mesh, at, yaw, rgb, size))
+    return assemble(*parts)
+
+
+PLANTERS = {
+    "box_planter": Builder("vegetation", box_planter),
+    "flower_bed": Builder("vegetation", flower_bed),
+    "low_shrub": Builder("vegetation", partial(shrub, height=0.6)),
+    "round_planter": Builder("vegetation", round_planter),
+    "shrub": Builder("vegetation", shrub),
+}

@@ -1,0 +1,190 @@
+"""Things on construction sites and at roadworks."""
+
+import math
+
+import numpy as np
+
+from cns_drake.city.dice import Dice
+from cns_drake.city.furniture.object_data import CHOICES, COLOURS
+from cns_drake.city.geometry import (
+    Builder,
+    Model,
+    assemble,
+    bar,
+    block,
+    in_a_row,
+    mesh_part,
+)
+
+
+def site_cabin(rng: np.random.Generator, *, storeys: int = 1) -> Model:
+    """Returns site offices along x, one on top of the other.
+
+    Args:
+        rng: random generator for the colour.
+        storeys: number of cabins.
+    """
+    paint = Dice(rng).pick(CHOICES["site_cabin"])
+    return assemble(
+        *(
+            mesh_part(
+                f"cabin_{k}",
+                "site_cabin",
+                (0, 0, round(2.75 * k, 3)),
+                rgb=paint,
+            )
+            for k in range(storeys)
+        )
+    )
+
+
+def skip(rng: np.random.Generator) -> Model:
+    """Returns a skip half full of rubble."""
+    dice = Dice(rng)
+    at, yaw = (0, 0, dice.uniform(0.7, 0.95, 3)), dice.uniform(0.0, 0.2, 3)
+    earth, scale = COLOURS["earth"], (0.3, 0.2, 0.25)
+    return assemble(
+        mesh_part("shell", "skip_shell", rgb=COLOURS["machine"]),
+        mesh_part("load", "heap", at, yaw, earth, scale),
+    )
+
+
+def soil_heap(rng: np.random.Generator) -> Model:
+    """Returns a heap of earth or sand, 4 to 8 m across."""
+    dice = Dice(rng)
+    a = dice.uniform(0.55, 1.1)
+    b = dice.uniform(0.55, 1.1)
+    scale = (round(a, 3), round(b, 3), round((a + b) / 2, 3))
+    yaw = dice.uniform(-3.0, 3.0, 3)
+    rgb = dice.pick(CHOICES["heap"])
+    return assemble(mesh_part("heap", "heap", yaw=yaw, rgb=rgb, scale=scale))
+
+
+def brick_pallets(rng: np.random.Generator) -> Model:
+    """Returns two to five pallets of bricks in a loose row along y.
+
+    Every other pallet is half empty.
+    """
+    dice = Dice(rng)
+    count = dice.whole(2, 6)
+    parts = []
+    for k in range(count):
+        at = (dice.uniform(-0.2, 0.2, 3), in_a_row(k, 1.5, count), 0)
+        yaw = dice.uniform(-0.15, 0.15, 3)
+        scale = (1.0, 1.0, 0.6 if k % 2 == 0 else 1.0)
+        name, brick = f"pallet_{k}", COLOURS["brick"]
+        parts.append(mesh_part(name, "brick_pallet", at, yaw, brick, scale))
+    return assemble(*parts)
+
+
+def excavator(rng: np.random.Generator) -> Model:
+    """Returns an excavator whose arm is stretched out, roughly along +x."""
+    yaw, rgb = Dice(rng).uniform(-0.6, 0.6, 3), COLOURS["machine"]
+    return assemble(
+        mesh_part("tracks", "excavator_tracks", rgb=COLOURS["rubber"]),
+        mesh_part("upper", "excavator_upper", yaw=yaw, rgb=rgb),
+    )
+
+
+def traffic_cones(rng: np.random.Generator, *, count: int = 5) -> Model:
+    """Returns traffic cones in a loose row along x.
+
+    Args:
+        rng: random generator for their places.
+        count: number of cones.
+    """
+    dice = Dice(rng)
+    return assemble(
+        *(
+            mesh_part(
+                f"cone_{k}",
+                "traffic_cone",
+                (in_a_row(k, 1.5, count), dice.uniform(-0.15, 0.15, 3), 0),
+                rgb=COLOURS["cone"],
+            )
+            for k in range(count)
+        )
+    )
+
+
+# Length of a section of a crane's mast or jib [m].
+_SECTION_M = 4
+
+
+def tower_crane(
+    rng: np.random.Generator,
+    *,
+    height: float | None = None,
+    reach: float | None = None,
+) -> Model:
+    """Returns a tower crane; its mast and jib are made of whole sections.
+
+    Args:
+        rng: random generator for sizes and heading.
+        height: height of the mast [m].
+        reach: length of the jib in front of the mast [m].
+    """
+    dice = Dice(rng)
+    drawn_height = dice.uniform(36.0, 56.0)
+    drawn_reach = dice.uniform(28.0, 44.0)
+    height = drawn_height if height is None else height
+    reach = drawn_reach if reach is None else reach
+    yaw = dice.uniform(-math.pi, math.pi, 3)
+    c, s = math.cos(yaw), math.sin(yaw)
+    storeys = max(3, round(height / _SECTION_M))
+    bays = max(3, round(reach / _SECTION_M))
+    top = _SECTION_M * storeys
+    peak = (0, 0, top + 7.5)
+    hook = top - 0.45 * top
+    crane, concrete = COLOURS["crane"], COLOURS["concrete"]
+
+    def along(distance: float, z: float) -> tuple[float, float, float]:
+        """Returns a point along the jib, at the height z."""
+        return (distance * c, distance * s, z)
+
+    return assemble(
+        block("base", (5, 5, 1), (0, 0, 0.2), rgb=concrete),
+        *(
+            mesh_part(
+                f"mast_{k:02d}", "crane_mast", (0, 0, _SECTION_M * k), rgb=crane
+            )
+            for k in range(storeys)
+        ),
+        # Three sections carry the counterweight behind the mast.
+        *(
+            mesh_part(
+                f"jib_{k:02d}",
+                "crane_jib",
+                along(_SECTION_M * (k - 3), top + 0.6),
+                yaw,
+                crane,
+            )
+            for k in range(bays + 3)
+        ),
+        mesh_part("cab", "crane_cab", (0, 0, top), yaw, crane),
+        bar("peak", (0, 0, top), peak, 0.25, crane),
+        bar("stay", peak, along(2.8 * bays, top + 1.8), 0.06),
+        bar("back_stay", peak, along(-11.2, top + 1.8), 0.06),
+        block(
+            "counterweight",
+            (2.2, 1.6, 2.4),
+            along(-10.4, top + 0.2),
+            yaw,
+            concrete,
+        ),
+        bar(
+            "rope", along(2.4 * bays, hook), along(2.4 * bays, top + 0.6), 0.04
+        ),
+        block("hook", (0.4, 0.5, 0.9), along(2.4 * bays, hook), yaw, crane),
+    )
+
+
+SITE_EQUIPMENT = {
+    "brick_pallets": Builder("other-object", brick_pallets),
+    "excavator": Builder("other-vehicle", excavator),
+    "site_cabin": Builder("other-structure", site_cabin),
+    "skip": Builder("other-object", skip),
+    "soil_heap": Builder("terrain", soil_heap),
+    "tower_crane": Builder("other-structure", tower_crane),
+    "traffic_cones": Builder("other-object", traffic_cones),
+}

@@ -1,0 +1,163 @@
+"""Things of squares, parks and yards: monuments, shelters, stalls."""
+
+import math
+
+import numpy as np
+
+from cns_drake.city.dice import Dice
+from cns_drake.city.furniture.object_data import CHOICES, COLOURS
+from cns_drake.city.geometry import (
+    Builder,
+    Model,
+    assemble,
+    block,
+    in_a_row,
+    mesh_part,
+    post,
+)
+
+
+def statue(rng: np.random.Generator) -> Model:
+    """Returns a bronze figure, arm raised, on a stepped pedestal."""
+    dice = Dice(rng)
+    size = dice.uniform(0.9, 1.2, 3)
+    yaw = dice.uniform(-0.4, 0.4, 3)
+    marble, bronze = COLOURS["marble"], COLOURS["bronze"]
+    scale, top = (size, size, size), (0, 0, round(2.9 * size, 3))
+    return assemble(
+        mesh_part("pedestal", "statue_pedestal", rgb=marble, scale=scale),
+        mesh_part("figure", "statue_figure", top, yaw, bronze, scale),
+    )
+
+
+def obelisk(rng: np.random.Generator, *, height: float | None = None) -> Model:
+    """Returns a stepped obelisk.
+
+    Args:
+        rng: random generator for the height.
+        height: height of the tip [m].
+    """
+    drawn = Dice(rng).uniform(9.0, 14.0)
+    tall = round((drawn if height is None else height) / 10, 3)
+    wide = round(tall**0.5, 3)
+    scale, marble = (wide, wide, tall), COLOURS["marble"]
+    return assemble(mesh_part("body", "obelisk", rgb=marble, scale=scale))
+
+
+def fountain(rng: np.random.Generator, *, radius: float | None = None) -> Model:
+    """Returns a round fountain.
+
+    Args:
+        rng: random generator for the radius.
+        radius: radius of the basin [m].
+    """
+    drawn = Dice(rng).uniform(2.5, 3.6)
+    wide = round((drawn if radius is None else radius) / 3, 3)
+    scale = (wide, wide, round(wide**0.5, 3))
+    marble, water = COLOURS["marble"], COLOURS["water"]
+    return assemble(
+        mesh_part("stone", "fountain_stone", rgb=marble, scale=scale),
+        mesh_part("water", "fountain_water", rgb=water, scale=scale),
+    )
+
+
+def flag_poles(
+    rng: np.random.Generator, *, count: int = 3, spacing: float = 2.5
+) -> Model:
+    """Returns poles in a row along y, with waving flags.
+
+    Args:
+        rng: random generator for height, wind and colours.
+        count: number of poles.
+        spacing: distance from one pole to the next [m].
+    """
+    dice = Dice(rng)
+    height = dice.uniform(7.5, 9.5)
+    wind = dice.uniform(-math.pi, math.pi)
+    parts = []
+    for k in range(count):
+        y = in_a_row(k, spacing, count)
+        parts.append(post(f"pole_{k}", 0.05, height, (0, y), COLOURS["white"]))
+        yaw = round(wind + dice.uniform(-0.15, 0.15), 3)
+        rgb = dice.tinted((1.0, 1.0, 1.0), 0.15, 0.85)
+        at = (0, y, height - 0.1)
+        parts.append(mesh_part(f"flag_{k}", "flag", at, yaw, rgb))
+    return assemble(*parts)
+
+
+def garage(rng: np.random.Generator) -> Model:
+    """Returns a garage for one car, with its door at -y."""
+    dice = Dice(rng)
+    walls = dice.pick(CHOICES["garage_walls"])
+    door = dice.pick(CHOICES["garage_door"])
+    tall = dice.uniform(2.3, 2.8, 3)
+    # The walls begin 0.3 m below the ground.
+    size, center = (3, 5.8, tall + 0.3), (0, 0, tall / 2 - 0.15)
+    lid, top = (3.2, 6.1, 0.16), (0, 0, tall + 0.08)
+    return assemble(
+        block("walls", size, center, rgb=walls),
+        block("roof", lid, top, rgb=COLOURS["concrete"]),
+        block("door", (2.4, 0.06, 2.1), (0, -2.92, 1.05), rgb=door),
+    )
+
+
+def bus_shelter(rng: np.random.Generator) -> Model:
+    """Returns a shelter, 4 m by 1.5 m, open towards +x, with a stop."""
+    # Which end has the advertisement: 1 for +y. The mirror image has meshes of
+    # its own: a mirrored mesh would be inside out.
+    advert = Dice(rng).pick((1, -1))
+    mesh = f"shelter_{'left' if advert > 0 else 'right'}"
+    return assemble(
+        mesh_part("frame", f"{mesh}_frame", rgb=COLOURS["dark"]),
+        mesh_part("panes", f"{mesh}_panes", rgb=COLOURS["pane"]),
+        post("stop", 0.03, 2.9, (0.9, -2.6 * advert), COLOURS["steel"]),
+    )
+
+
+def cafe_table(rng: np.random.Generator) -> Model:
+    """Returns a table with four chairs under an umbrella."""
+    dice = Dice(rng)
+    height = dice.uniform(2.5, 2.75)
+    yaw = dice.uniform(-math.pi, math.pi, 3)
+    rgb, top = dice.pick(CHOICES["cafe_umbrella"]), (0, 0, height)
+    return assemble(
+        mesh_part("table", "cafe_set", yaw=yaw, rgb=COLOURS["cafe_table"]),
+        post("pole", 0.025, height, rgb=COLOURS["steel"]),
+        mesh_part("umbrella", "cafe_umbrella", top, yaw / 3, rgb),
+    )
+
+
+def market_stall(rng: np.random.Generator) -> Model:
+    """Returns a market stall under an awning."""
+    dice = Dice(rng)
+    scale = (1.0, dice.uniform(0.9, 1.2, 3), 1.0)
+    stall, awning = COLOURS["stall"], dice.pick(CHOICES["market_awning"])
+    return assemble(
+        mesh_part("stall", "market_stall", rgb=stall, scale=scale),
+        mesh_part("awning", "market_awning", rgb=awning, scale=scale),
+    )
+
+
+def basketball_hoop(rng: np.random.Generator) -> Model:
+    """Returns a basketball hoop on a post; its board faces +x."""
+    height, grey = Dice(rng).uniform(3.4, 3.7), COLOURS["grey"]
+    red, board = CHOICES["play"][0], (0.05, 1.8, 1.05)
+    return assemble(
+        post("post", 0.07, height, rgb=grey),
+        block("arm", (0.9, 0.1, 0.1), (0.4, 0, height - 0.3), rgb=grey),
+        block("board", board, (0.85, 0, height), rgb=red),
+        block("rim", (0.46, 0.46, 0.03), (1.12, 0, height - 0.4)),
+    )
+
+
+SQUARES = {
+    "basketball_hoop": Builder("pole", basketball_hoop),
+    "bus_shelter": Builder("other-structure", bus_shelter),
+    "cafe_table": Builder("other-object", cafe_table),
+    "flag_poles": Builder("pole", flag_poles),
+    "fountain": Builder("other-structure", fountain),
+    "garage": Builder("other-structure", garage),
+    "market_stall": Builder("other-structure", market_stall),
+    "obelisk": Builder("other-structure", obelisk),
+    "statue": Builder("other-structure", statue),
+}
