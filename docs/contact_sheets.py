@@ -146,7 +146,9 @@ def _write(
 
     for picture in pictures:
         if x and x + picture.width > _SHEET[0]:
-            x, y, line = 0, y + line + _GAP, 0
+            x = 0
+            y += line + _GAP
+            line = 0
         if y and y + picture.height > _SHEET[1]:
             finish()
             sheet = Image.new("RGB", _SHEET, "#888")

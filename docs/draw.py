@@ -159,7 +159,8 @@ def survival(path: Path) -> str:
             (panels[0], tables[1][name], -0.18, "none"),
             (panels[1], strict[name], 0.0, colour),
         ):
-            shown, at = 100.0 * np.array(shares), y + offset
+            shown = 100.0 * np.array(shares)
+            at = y + offset
             heights = np.full(len(shown), at)
             axes.scatter(shown, heights, s=34, ec=colour, fc=fill)
             ends = [at - 0.17, at + 0.17]
@@ -393,7 +394,8 @@ def _allan(axes: Axes) -> None:
         gyroscope_random_walk=4e-6,
         seed=3,
     )
-    rate, number = 100, 1054
+    rate = 100
+    number = 1054
     errors = ImuErrors(noises, rate)
     # The integral of what an IMU at rest measures.
     blocks = np.concatenate([errors.of_block(k) for k in range(number)])
@@ -422,7 +424,8 @@ def _allan(axes: Axes) -> None:
 
 def _spectra(axes: Axes) -> None:
     """Draws the spectra of roads along lines over those of their classes."""
-    step, window = 0.1, 600.0
+    step = 0.1
+    window = 600.0
     along = np.arange(0.0, 3000.0, step)
     for k, roughness in enumerate("ABCDE"):
         profile = RoadProfile(roughness, 0)

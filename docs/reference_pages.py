@@ -177,7 +177,8 @@ def own_fields(model: type[BaseModel]) -> dict[str, FieldInfo]:
 def explain_fields(model: type[BaseModel]) -> tuple[str, dict[str, str]]:
     """Returns what the docstring says of a model, and of each field."""
     docstring = griffe.Docstring(inspect.getdoc(model) or "")
-    description, meanings = "", {}
+    description = ""
+    meanings = {}
     for section in docstring.parse("google"):
         if section.kind is griffe.DocstringSectionKind.text:
             description = description or section.value

@@ -214,7 +214,9 @@ class _Writing:
     """Writes stages, the meshes they need, and the structure table."""
 
     def __init__(self, world: OldWorld, draft: Path, seed: int):
-        self._world, self._draft, self._seed = world, draft, seed
+        self._world = world
+        self._draft = draft
+        self._seed = seed
         self.sizes: dict[str, tuple[int, int]] = {}
         self._triangles: dict[str, int] = {}
         self._past: dict[str, Structure] = {}

@@ -187,7 +187,9 @@ class City:
         Raises:
             InputError: the city has no building.
         """
-        self._world, self._rates, self._seed = world, rates, seed
+        self._world = world
+        self._rates = rates
+        self._seed = seed
         self._kept_free = kept_free
         self.tally = Tally(rates)
         self.year = 0
@@ -697,10 +699,13 @@ class City:
     def _move(self, place: str) -> None:
         """Replaces street furniture nearby, on the same side of the kerb."""
         old = self._places[place]
-        rng, foot = self._rng("moved", place), self._foot(old)
+        rng = self._rng("moved", place)
+        foot = self._foot(old)
         middle = np.array(foot.centroid.coords[0])
         ground = self._world.ground
-        offset, turn, rise = np.zeros(2), 0.0, 0.0
+        offset = np.zeros(2)
+        turn = 0.0
+        rise = 0.0
         farthest = self._rates[MOVED]
         for _ in range(_TRIES if farthest else 0):
             angle = rng.uniform(-np.pi, np.pi)

@@ -59,7 +59,8 @@ class OldWorld:
         stages = list(folder.stages().values())
         if not stages:
             raise InputError(f"{folder.path}: no stage_NN.sdf: not a map")
-        self.folder, self.path = folder, stages[-1]
+        self.folder = folder
+        self.path = stages[-1]
         self._read_table()
         self.visuals, self._elements = _read_visuals(self.path)
         self._world = load_world(self.path)
@@ -78,7 +79,8 @@ class OldWorld:
 
     def _read_table(self) -> None:
         path = self.folder.structures
-        whole, real = ("instance", "label", YEAR_COLUMN), ("x", "y", "z", "yaw")
+        whole = ("instance", "label", YEAR_COLUMN)
+        real = ("x", "y", "z", "yaw")
         records = read_records(path, ("name", "class", *whole[:2], *real))
         self.columns = read_rows(path)[0][1]
         for line, row in records:
@@ -109,7 +111,8 @@ class OldWorld:
         xyz = triple(float(row[axis]) for axis in "xyz")
         yaw = float(row["yaw"])
         X_SW = RigidTransform(RollPitchYaw(0, 0, yaw), xyz).inverse()
-        parts, meshes = [], {}
+        parts = []
+        meshes = {}
         for visual in self._elements[name]:
             pose = np.array(visual.findtext("pose", _NO_POSE).split(), float)
             X_SP = X_SW @ RigidTransform(RollPitchYaw(*pose[3:]), pose[:3])

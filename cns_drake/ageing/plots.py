@@ -323,7 +323,8 @@ def storey_on(
     w, d = x1 - x0, y1 - y0
     if min(w, d) < 5.0:
         return None
-    rgb, middle = _colour(rng), ((x0 + x1) / 2, (y0 + y1) / 2)
+    rgb = _colour(rng)
+    middle = ((x0 + x1) / 2, (y0 + y1) / 2)
     model = assemble(
         block("wall", (w, d, 3.2), (*middle, z + 1.5), rgb=rgb),
         block(

@@ -65,9 +65,13 @@ class _Task:
         """Records what is done; returns whether it is something else."""
         is_new = activity != self.activity
         if is_new or not self.total or done < self.done:
-            self.since, self.first, self.pace = now, done, Pace()
-        self.activity, self.done = activity, done
-        self.total, self.unit = total, unit
+            self.since = now
+            self.first = done
+            self.pace = Pace()
+        self.activity = activity
+        self.done = done
+        self.total = total
+        self.unit = unit
         self.pace.measure(done - self.first, now - self.since)
         return is_new
 
@@ -167,7 +171,8 @@ class Display(Listener):
     ) -> Iterator[_JobsDisplay]:
         shown = _JobsDisplay(self, costs, num_done, unit, self._now)
         with self._lock:
-            before, self._jobs = self._jobs, shown
+            before = self._jobs
+            self._jobs = shown
         try:
             yield shown
         finally:
@@ -223,7 +228,8 @@ class Display(Listener):
 
     def _print(self, text: str, now: float) -> None:
         if text:
-            self._printed, self._has_changed = now, False
+            self._printed = now
+            self._has_changed = False
             self._write(f"{printable(text)}\n")
 
     def _erase(self) -> None:

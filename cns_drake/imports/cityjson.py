@@ -814,7 +814,8 @@ def _families(city: CityFile) -> dict[str, list[CityObject]]:
     """Returns id of each object without parents -> the object and its parts."""
     groups: dict[str, list[CityObject]] = {}
     for name, one in city.objects.items():
-        root, seen = name, {name}
+        root = name
+        seen = {name}
         while True:
             parents = [
                 p

@@ -324,7 +324,9 @@ def _samples(triangles: np.ndarray, spacing: float) -> np.ndarray:
     owner, u = _parts(lines)
     steps = u * lengths.min(axis=1)[owner] / spacing
     line, v = _parts(np.maximum(np.ceil(steps).astype(int), 1))
-    owner, u, v = owner[line], u[line][:, None], v[:, None]
+    owner = owner[line]
+    u = u[line][:, None]
+    v = v[:, None]
     return a[owner] + u * ((1.0 - v) * (b - a)[owner] + v * (c - a)[owner])
 
 

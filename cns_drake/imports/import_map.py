@@ -85,7 +85,8 @@ def import_city(
         staged = staged.near(drives, options.within, city.faults)
         ground = ground_of(staged.kept, options.dressed)
     drives = _lifted(drives, ground, city.faults)
-    bare, dressing = staged.kept, None
+    bare = staged.kept
+    dressing = None
     added: list[Imported] = []
     with draft_folder(output) as draft:
         (draft / MESH_FOLDER).mkdir()
@@ -211,7 +212,8 @@ def drive_along(path: Path) -> WaypointDrive:
     points, _ = read_waypoints(path)
     control = load_waypoint_path(path, POINT_SPACING).points[:, :2]
     driven, radii = search.driven_path(control)
-    radius, (x, y) = radii.min(), driven[radii.argmin()]
+    radius = radii.min()
+    x, y = driven[radii.argmin()]
     if radius < TIGHTEST_RADIUS:
         raise InputError(
             f"{path}: a bend at {x:.1f}, {y:.1f} has a radius of {radius:.2f} "

@@ -266,9 +266,11 @@ def _stands(one: Imported, stage: int, options: ImportOptions) -> bool:
     A structure that was demolished at an unknown date stands at all stages
     except the last, if its year (or its missing year) allows it.
     """
-    years, until = options.years, one.until
+    years = options.years
+    until = one.until
     if one.is_gone:
-        years, until = years[:-1], None
+        years = years[:-1]
+        until = None
         if stage >= len(years):
             return False
     if not years:

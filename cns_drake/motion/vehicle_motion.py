@@ -267,10 +267,12 @@ class VehicleMotion(LeafSystem):
 
     def _calc_state(self, context: Context, value: AbstractValue) -> None:
         """Sets a Context of the plant, and the plant's vdot."""
-        time, period = context.get_time(), self._period
+        time = context.get_time()
+        period = self._period
         tick = round(time / period) if period else 0
         if period is None or tick * period != time:
-            states, row = self._states(np.array([time])), 0
+            states = self._states(np.array([time]))
+            row = 0
         else:
             number, row = divmod(tick, _BLOCK)
             states = self._block(number, period)
@@ -286,7 +288,9 @@ class VehicleMotion(LeafSystem):
 
     def _states(self, times: np.ndarray) -> _State:
         """Returns the states at times (N,); each depends only on its time."""
-        plant, base, scratch = self._plant, self._base, self._default.Clone()
+        plant = self._plant
+        base = self._base
+        scratch = self._default.Clone()
         moments = self._trajectory.at(times)
         X_WBs, motion = poses_and_motion(moments)
         q = np.empty((len(times), plant.num_positions()))
@@ -312,7 +316,8 @@ class VehicleMotion(LeafSystem):
     def _calc_bodies(
         self, name: str, context: Context, output: AbstractValue
     ) -> None:
-        plant, (now, vdot) = self._plant, self._state.Eval(context)
+        plant = self._plant
+        now, vdot = self._state.Eval(context)
         if name == "body_spatial_accelerations":
             # The port of a plant would have those of its dynamics.
             output.set_value(plant.CalcSpatialAccelerationsFromVdot(now, vdot))

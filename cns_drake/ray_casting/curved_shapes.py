@@ -199,7 +199,8 @@ class CapsuleAxes:
         if not (seen and len(rays.d_Sset)):
             return
         _, groups, _, matrices, sizes = zip(*seen, strict=True)
-        X_LCs, (half, radius) = np.array(matrices), np.transpose(sizes)
+        X_LCs = np.array(matrices)
+        half, radius = np.transpose(sizes)
         X_OCs = product(np.array([group.X_OL for group in groups]), X_LCs)
         angle, way = np.transpose([_bound(group.motion) for group in groups])
         # Rays along an axis start in a cone about it, which is wider if the

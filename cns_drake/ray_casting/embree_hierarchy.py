@@ -563,7 +563,8 @@ def _divide(num_rays: int, num_threads: int) -> list[tuple[int, int]]:
     early takes another range. Later ranges are shorter, so that all threads
     finish at about the same time.
     """
-    parts, first = [], 0
+    parts = []
+    first = 0
     while first < num_rays:
         share = (num_rays - first) // (2 * num_threads)
         size = max(share // _BLOCK, 1) * _BLOCK if num_threads > 1 else num_rays
@@ -576,7 +577,8 @@ def _list_owners(scenes: Collection[_Built]) -> tuple[np.ndarray, np.ndarray]:
     """Returns `_Tree.first_primitive` and `_Tree.owner_of_primitive`."""
     widest = max(1, *(len(built.owners) for built in scenes))
     first = np.zeros((len(scenes), widest), np.int64)
-    owners, count = [np.zeros(0, np.int32)], 0
+    owners = [np.zeros(0, np.int32)]
+    count = 0
     known: dict[int, int] = {}
     for row, built in enumerate(scenes):
         same = known.setdefault(built.scene, row)
@@ -651,14 +653,16 @@ def _cast_packets(
     storage = np.zeros((12 + 10 + 1) * lanes + 16, np.float32)
     start = (-storage.ctypes.data % 64) // 4
     aligned = storage[start : start + 23 * lanes].reshape(23, lanes)
-    packet, valid = aligned[:22], aligned[22].view(np.int32)
+    packet = aligned[:22]
+    valid = aligned[22].view(np.int32)
     packet_id = packet.view(np.uint32)
     num_origins, num_rotations = len(rays.p_OSset), len(rays.R_OSset)
     num_ranges = len(rays.max_ranges)
     # Indices are incremented: remainders would take a tenth of the casting
     # time.
     origin, rotation = first % num_origins, first % num_rotations
-    reach, time = first % num_ranges, first % len(rays.times)
+    reach = first % num_ranges
+    time = first % len(rays.times)
     for begin in range(first, last, lanes):
         count = min(lanes, last - begin)
         valid[:] = 0

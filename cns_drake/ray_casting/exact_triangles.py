@@ -175,7 +175,8 @@ def _divide(
     behind, side = np.empty(_BINS), np.empty((2, 3))
     pending = np.empty((2 * _DEEPEST, 3), np.int64)
     pending[0, 0], pending[0, 1], pending[0, 2] = 0, 0, len(order)
-    waiting, size = 1, 1
+    waiting = 1
+    size = 1
     while waiting:
         waiting -= 1
         node, begin = pending[waiting, 0], pending[waiting, 1]
@@ -196,7 +197,8 @@ def _divide(
         for i in range(1, 3):
             if side[1, i] - side[0, i] > side[1, axis] - side[0, axis]:
                 axis = i
-        start, width = side[0, axis], side[1, axis] - side[0, axis]
+        start = side[0, axis]
+        width = side[1, axis] - side[0, axis]
         split = begin
         if width > 0.0:
             scale = _BINS * (1.0 - 1e-9) / width
@@ -215,7 +217,9 @@ def _divide(
                 number += in_bin[k]
                 behind[k] = number * _half_area(side)
             _empty(side)
-            number, least, best = 0, np.inf, 1
+            number = 0
+            least = np.inf
+            best = 1
             for k in range(1, _BINS):
                 _widen(side, bins[k - 1, 0], bins[k - 1, 1])
                 number += in_bin[k - 1]
@@ -295,7 +299,8 @@ def _cast(
                 p[i] += R_LO[i, j] * (p_Oset[ray, j] - p_OL[j])
                 d[i] += R_LO[i, j] * d_Oset[ray, j]
             r[i] = 1.0 / d[i] if d[i] != 0.0 else np.inf
-        best, met = np.float64(hits.ranges[ray]), -1
+        best = np.float64(hits.ranges[ray])
+        met = -1
         size = 1
         stack[0] = 0
         while size:

@@ -153,7 +153,8 @@ class MovingGroups:
             return NOTHING_PLACED
         frames = self._frames
         X_WFs, rows = self._find_poses(calc_X_WF, known)
-        moves, reaches = np.zeros(len(frames), bool), self._radii
+        moves = np.zeros(len(frames), bool)
+        reaches = self._radii
         if motions:
             moves = np.array([frame in motions for frame in frames])
             reaches = reaches.copy()

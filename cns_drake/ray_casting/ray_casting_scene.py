@@ -283,7 +283,8 @@ def _face_origins(
     Returns:
         (N,) whether each ray has met the outside of a surface, by its winding.
     """
-    is_outside, n = np.zeros(len(hits.group), np.bool_), np.empty(3)
+    is_outside = np.zeros(len(hits.group), np.bool_)
+    n = np.empty(3)
     normals, group = hits.normals, hits.group
     for ray in range(len(normals)):
         if group[ray] < 0:
@@ -322,14 +323,17 @@ def _meet_plane(
     """
     counts = len(rays.p_OSset), len(rays.R_OSset), len(X_OLs)
     origin = turn = pose = -1
-    height, normal_S = 0.0, np.empty(3)
+    height = 0.0
+    normal_S = np.empty(3)
     for ray in range(len(rays.d_Sset)):
         if ray == 0 or max(counts) > 1:
             # Indices are incremented, because remainders take long.
             origin = origin + 1 if origin + 1 < counts[0] else 0
             turn = turn + 1 if turn + 1 < counts[1] else 0
             pose = pose + 1 if pose + 1 < counts[2] else 0
-            R, X, height = rays.R_OSset[turn], X_OLs[pose], 0.0
+            R = rays.R_OSset[turn]
+            X = X_OLs[pose]
+            height = 0.0
             for i in range(3):
                 height += X[i, 2] * (X[i, 3] - rays.p_OSset[origin, i])
                 normal_S[i] = (

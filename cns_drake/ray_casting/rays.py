@@ -65,7 +65,8 @@ def rotate(R_FSset: np.ndarray, d_Sset: np.ndarray) -> np.ndarray:
         R_FSset: (L, 3, 3) orientations of S in F.
         d_Sset: (N, 3) directions in S.
     """
-    d_Fset, turn = np.empty((len(d_Sset), 3)), -1
+    d_Fset = np.empty((len(d_Sset), 3))
+    turn = -1
     for ray in range(len(d_Sset)):
         turn = turn + 1 if turn + 1 < len(R_FSset) else 0
         R, d = R_FSset[turn], d_Sset[ray]

@@ -290,7 +290,8 @@ class BagWriter:
         """Returns whether the existing file is the start of this recording."""
         if not stream.replaying:
             return True
-        found, path = "", self._files.fingerprint
+        found = ""
+        path = self._files.fingerprint
         if part_path(path).is_file():
             path = part_path(path)
         if path.is_file():

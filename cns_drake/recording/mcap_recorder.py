@@ -440,7 +440,8 @@ class McapRecorder(LeafSystem):
         force = _value_of(self._specific_force, context)
         if turn is None and force is None:
             return {}
-        odometry, quat_xyzw = _value_of(self._odometry, context), None
+        odometry = _value_of(self._odometry, context)
+        quat_xyzw = None
         if odometry is not None and self._X_BI is not None:
             R_WI = odometry.X_WB.rotation() @ self._X_BI.rotation()
             quat_xyzw = messages.to_quat_xyzw(R_WI)

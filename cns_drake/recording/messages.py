@@ -94,7 +94,8 @@ def _cloud_frame(dtype: np.dtype, frame_id: str) -> list[bytes]:
 @functools.cache
 def _point_fields(dtype: np.dtype) -> tuple[list[tuple], list[int]]:
     """Returns PointFields of records, and offsets of bytes in no field."""
-    fields, padding = [], set(range(dtype.itemsize))
+    fields = []
+    padding = set(range(dtype.itemsize))
     for name, (scalar, offset, *_) in (dtype.fields or {}).items():
         padding.difference_update(range(offset, offset + scalar.itemsize))
         fields.append((name, offset, point_field_datatype(scalar), 1))

@@ -163,7 +163,8 @@ def make_areas(
     bays = {}
     for name, road in roads.items():
         if road.parking > 0 and road.length > 2 * _BAY_CLEARANCE:
-            edge, far = road.half_width, road.half_width + road.parking
+            edge = road.half_width
+            far = road.half_width + road.parking
             bays[name, "right"] = _band(road, -far, -edge, _BAY_CLEARANCE)
             bays[name, "left"] = _band(road, edge, far, _BAY_CLEARANCE)
     wide = [r for r in roads.values() if 0 < r.median < r.length]

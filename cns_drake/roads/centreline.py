@@ -70,11 +70,13 @@ class Centreline:
                 f"{lengths[segment]:.2f} m long"
             )
         self._pieces: list[_Piece] = []
-        position, heading = points[0], headings[0]
+        position = points[0]
+        heading = headings[0]
         for k, straight in enumerate(np.maximum(spare, 0.0)):
             self._append(position, heading, 0.0, straight)
             if k < len(turns):
-                corner, tangent = points[k + 1], tangents[k + 1]
+                corner = points[k + 1]
+                tangent = tangents[k + 1]
                 if tangent > 0:
                     begin = corner - tangent * _direction(heading)
                     curvature = np.sign(turns[k]) / radii[k]

@@ -139,7 +139,8 @@ def make_lane_path(
                 loop, last = _turn_round(network, leg, after, first, aside)
                 begin = length - last
             else:
-                loop, last = np.zeros((0, 3)), leg.end or length
+                loop = np.zeros((0, 3))
+                last = leg.end or length
                 begin = None
             points = _leg_points(network, leg, first, last, aside)
             pieces += [points, loop]

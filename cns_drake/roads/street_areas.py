@@ -71,7 +71,8 @@ class RoadSurface:
         z = np.empty(len(xy))
         owners = self._owners[index]
         for k in np.unique(owners):
-            chosen, road = owners == k, self._roads[k]
+            chosen = owners == k
+            road = self._roads[k]
             inside = np.clip(stations[chosen], 0.0, road.full_length)
             z[chosen] = road.height(inside)
         return z

@@ -123,7 +123,8 @@ def find_loop(
         ValueError: there is no room; the message says how much is needed.
     """
     shapely.prepare(area)
-    needed, widest = np.inf, 0.0
+    needed = np.inf
+    widest = 0.0
     for centre in centres:
         begin = float(centre) - _ahead(lanes_at(float(centre))[1])
         (x, y, heading), width = lanes_at(begin)

@@ -119,7 +119,8 @@ def make_waypoint_path(
     room = np.minimum(usable[:-1], usable[1:])
     tangents = tan(np.where(is_loop, 0.0, np.abs(turns)) / 2)
     radii = np.minimum(_CORNER_RADIUS, room / np.maximum(tangents, 1e-9))
-    corners, corner_radii = [waypoints[:1]], []
+    corners = [waypoints[:1]]
+    corner_radii = []
     for at, loops in enumerate(is_loop):
         corner = waypoints[at + 1 : at + 2]
         if loops:

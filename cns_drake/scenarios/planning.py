@@ -63,7 +63,8 @@ def plan_drive(
 
         trajectory = plan_drive(load_scenario("downtown_01"))
     """
-    driver, network = scenario.driver, None
+    driver = scenario.driver
+    network = None
     spacing = FINE_SPACING if driver.departs else POINT_SPACING
     if scenario.waypoints is not None:
         path = load_waypoint_path(

@@ -36,7 +36,8 @@ def collected_errors() -> Iterator[list[str]]:
                 records.append(record)
 
     logger = logging.getLogger("drake")
-    collector, propagate = Collector(), logger.propagate
+    collector = Collector()
+    propagate = logger.propagate
     logger.addHandler(collector)
     logger.propagate = False
     try:

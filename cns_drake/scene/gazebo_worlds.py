@@ -331,7 +331,8 @@ class _Simplifier:
                 self._copy_pose(element, made)
         taken = {sibling.get("name") for sibling in target}
         for joint in source.iterfind("joint"):
-            name, child = joint.get("name", ""), joint.findtext("child") or ""
+            name = joint.get("name", "")
+            child = joint.findtext("child") or ""
             if name in self._referred - taken:
                 attached = {"name": name, "attached_to": child.strip()}
                 made = SubElement(target, "frame", attached)
@@ -366,7 +367,8 @@ class _Simplifier:
             file = model_file(place)
             root = read_xml(file)
             self._note_references(root)
-            models, folder = root.findall("model"), file.parent
+            models = root.findall("model")
+            folder = file.parent
             lights, actors = root.findall("light"), root.findall("actor")
             self.skip("lights", len(lights))
             self.skip("actors", len(actors))
@@ -595,7 +597,8 @@ def _name(element: Element, target: Element) -> str:
     """Returns an element's name, changed if it is already in use."""
     wanted = _legal(element.get("name", element.tag))
     taken = {sibling.get("name") for sibling in target}
-    name, count = wanted, 1
+    name = wanted
+    count = 1
     while name in taken:
         count += 1
         name = f"{wanted}_{count}"

@@ -53,7 +53,8 @@ def _block(
 ) -> np.ndarray:
     """Returns the rows of numbers behind a keyword and its header."""
     at = words.index(keyword)
-    rows, begin = int(words[at + 1]), at + header
+    rows = int(words[at + 1])
+    begin = at + header
     block = np.array(words[begin : begin + rows * columns])
     return block.reshape(rows, columns)
 
@@ -96,7 +97,8 @@ class MeshFiles:
             if not np.abs(surface.p_GVset).max() <= LARGEST_SIZE:
                 raise ValueError(f"larger than {LARGEST_SIZE:g} m")
         except PARSER_ERRORS as error:
-            source, fault = shape.source(), " ".join(str(error).split())
+            source = shape.source()
+            fault = " ".join(str(error).split())
             file = f"{source.path()}: " if source.is_path() else ""
             raise InputError(f"{file}geometry '{name}': {fault}") from error
         self._surfaces[key] = surface

@@ -281,7 +281,8 @@ class GeometryReader:
 
 
 def _check_record(record: GeometryRecord) -> None:
-    where, reflectivity = f"geometry '{record.name}'", record.reflectivity
+    where = f"geometry '{record.name}'"
+    reflectivity = record.reflectivity
     if record.is_deformable:
         raise InputError(
             f"{where}: a LiDAR cannot see deformable geometry; hide it, or "

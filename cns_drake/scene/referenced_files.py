@@ -96,7 +96,8 @@ def referenced_files(
             name = os.path.relpath(place, model.parent)
             status = watch.take_down(place)
             if status is None:
-                place, name = _find(finder, uri, folder), uri
+                place = _find(finder, uri, folder)
+                name = uri
                 status = watch.take_down(place)
             for one, size in _files_at(place, status, watch):
                 key = name

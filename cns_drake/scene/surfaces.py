@@ -141,5 +141,6 @@ def tessellate(surface: Surface, sides: int = _SIDES) -> TriangleSurface:
     if isinstance(surface, CylinderSurface):
         radius, z = np.array([surface.radius]), np.array([half])
     else:
-        radius, z = surface.radius * radius, surface.radius * z + half
+        radius = surface.radius * radius
+        z = surface.radius * z + half
     return TriangleSurface(*revolved(radius, z, sides))

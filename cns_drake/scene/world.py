@@ -73,7 +73,8 @@ def _parse_faults(path: Path) -> Iterator[None]:
 
 def _read_names(scene_graph: SceneGraph, sdf: Path) -> dict[GeometryId, str]:
     """Returns the name of each geometry."""
-    inspector, names = scene_graph.model_inspector(), {}
+    inspector = scene_graph.model_inspector()
+    names = {}
     for geometry_id in inspector.GetAllGeometryIds():
         try:
             names[geometry_id] = inspector.GetName(geometry_id)
@@ -86,7 +87,8 @@ def _check_visible(
     scene_graph: SceneGraph, sdf: Path, notes: tuple[str, ...]
 ) -> set[str]:
     """Checks what a LiDAR can see; returns the names of visible structures."""
-    inspector, structures = scene_graph.model_inspector(), set()
+    inspector = scene_graph.model_inspector()
+    structures = set()
     for geometry_id in inspector.GetAllGeometryIds(Role.kPerception):
         name = inspector.GetName(geometry_id)
         structures.add(structure_name(name))

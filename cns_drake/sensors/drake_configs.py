@@ -528,7 +528,8 @@ class _SignalToLcm(framework.LeafSystem):
     ):
         """Declares an input for each port."""
         super().__init__()
-        self._names, self._values = names, values
+        self._names = names
+        self._values = values
         for index, port in enumerate(ports):
             if port.get_data_type() == framework.PortDataType.kVectorValued:
                 self.DeclareVectorInputPort(f"u{index}", port.size())

@@ -268,7 +268,8 @@ def _copy_for_cameras(
     scene_graph: SceneGraph, world: World, classes: bool, with_vehicle: bool
 ) -> CameraScene:
     """Copies the scene for the cameras on the vehicle."""
-    plant, inspector = world.plant, scene_graph.model_inspector()
+    plant = world.plant
+    inspector = scene_graph.model_inspector()
     context = plant.CreateDefaultContext()
     world_frame = inspector.world_frame_id()
 

@@ -172,7 +172,8 @@ def kept_clear(
         The walkways with the free part of their width, cut where nobody can
         pass. Crossings without a walkway at each end are left out.
     """
-    tree, found = shapely.STRtree(things), []
+    tree = shapely.STRtree(things)
+    found = []
     node = 1 + max((max(way.start, way.end) for way in walkways), default=0)
     for way in walkways:
         points = _lengthened(way.points[:, :2], _BEFORE)
@@ -220,12 +221,14 @@ def kept_clear(
         if way.crossing >= 0 and len(bars):
             continue
         for before, after in pairwise([-1, *bars.tolist(), len(barred)]):
-            rows, nodes = slice(before + 1, after), [way.start, way.end]
+            rows = slice(before + 1, after)
+            nodes = [way.start, way.end]
             if after - before <= _LEAST_POINTS:
                 continue
             for k, is_cut in enumerate((before >= 0, after < len(barred))):
                 if is_cut:
-                    nodes[k], node = node, node + 1
+                    nodes[k] = node
+                    node += 1
             found.append(
                 replace(
                     way,
@@ -360,7 +363,8 @@ def with_unmarked_crossings(
     for k in graph.lanes:
         points = graph.pieces[k].points
         margin = int(_FROM_LANE_ENDS / SPACING)
-        middle, step = len(points) // 2, int(_TRIAL_STEP / SPACING)
+        middle = len(points) // 2
+        step = int(_TRIAL_STEP / SPACING)
         first = margin + (middle - margin) % step
         rows = range(first, len(points) - margin, step)
         for row in sorted(rows, key=lambda row: abs(row - middle)):

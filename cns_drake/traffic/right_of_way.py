@@ -100,7 +100,9 @@ def grant_ways(traffic: Traffic, k: int) -> None:
         k: number of the current time step.
     """
     streets, cars, crossings = traffic.streets, traffic.cars, traffic.crossings
-    t, pieces, num_cars = k * STEP, streets.pieces, len(cars)
+    t = k * STEP
+    pieces = streets.pieces
+    num_cars = len(cars)
     first = np.full(len(pieces), -1)
     for i in range(num_cars):
         lane = cars[i].path[CURRENT]
@@ -228,7 +230,8 @@ def _is_soon_free(traffic: Traffic, i: int, way: int, t: float) -> bool:
     conflicting places when it gets there.
     """
     streets, cars, crossings = traffic.streets, traffic.cars, traffic.crossings
-    car, pieces = cars[i], streets.pieces
+    car = cars[i]
+    pieces = streets.pieces
     front = car.s - pieces[car.path[CURRENT]].length
     pace = streets.speed[pieces[way].first]
     for c in range(len(crossings)):
@@ -248,7 +251,8 @@ def _is_soon_free(traffic: Traffic, i: int, way: int, t: float) -> bool:
         other = cars[j]
         if j == i or other.held < 0:
             continue
-        size, held = int(car.large or other.large), other.held
+        size = int(car.large or other.large)
+        held = other.held
         place = streets.begin[size, way, held]
         rear = rear_on_way(streets, other)
         last = streets.clear[size, held, way]
@@ -289,7 +293,9 @@ def _serve(traffic: Traffic, c: int, k: int, last: int) -> int:
     `last` is the highest `order` so far; the result is the new one.
     """
     streets, cars = traffic.streets, traffic.cars
-    one, place, t = traffic.crossings[c], len(streets.pieces) + c, k * STEP
+    one = traffic.crossings[c]
+    place = len(streets.pieces) + c
+    t = k * STEP
     if one.users > 0:
         return last
     needed = one.length / _WALKING_SPEED + WALK_GROUP + _WALKING_RESERVE
@@ -311,7 +317,8 @@ def _serve(traffic: Traffic, c: int, k: int, last: int) -> int:
         car = cars[i]
         if car.held < 0 or car.order > one.order:
             continue
-        rear, size = rear_on_way(streets, car), int(car.large)
+        rear = rear_on_way(streets, car)
+        size = int(car.large)
         ahead = streets.begin[size, car.held, place] - rear - car.length
         clear = streets.clear[size, car.held, place]
         if rear < clear and ahead < _stops_within(car):
@@ -370,7 +377,8 @@ def _take(
 @compiled
 def _take_crossing(traffic: Traffic, taken: np.ndarray, c: int) -> None:
     """Marks the ways that walkers on the c-th crossing exclude."""
-    begin, num_pieces = traffic.streets.begin, taken.shape[1]
+    begin = traffic.streets.begin
+    num_pieces = taken.shape[1]
     for way in range(num_pieces):
         for size in range(2):
             if begin[size, way, num_pieces + c] < np.inf:
@@ -380,7 +388,8 @@ def _take_crossing(traffic: Traffic, taken: np.ndarray, c: int) -> None:
 @compiled
 def _is_ready(streets: Streets, car: Any, k: int) -> bool:
     """Returns whether a vehicle has waited at its signal or stop line."""
-    t, way = k * STEP, car.path[CURRENT + 1]
+    t = k * STEP
+    way = car.path[CURRENT + 1]
     row = streets.pieces[way]
     if 0.0 < streets.until[k, car.path[CURRENT]] < _EGO_IS_NEAR:
         return True
@@ -397,7 +406,8 @@ def _has_room(traffic: Traffic, i: int, k: int) -> bool:
     `grant_ways`.
     """
     streets, cars = traffic.streets, traffic.cars
-    car, pieces = cars[i], streets.pieces
+    car = cars[i]
+    pieces = streets.pieces
     lane, way = car.path[CURRENT], car.path[CURRENT + 1]
     beyond = car.path[CURRENT + 2]
     is_ego_near = 0.0 < streets.until[k, lane] < _EGO_IS_NEAR

@@ -267,7 +267,8 @@ def make_walkways(network: RoadNetwork, graph: LaneGraph) -> list[Walkway]:
                         # On a wide sidewalk, walkers wait at the kerb.
                         part = 1.0 - _BEFORE_KERB / distance
                         stop = np.append(start[:2] + part * ahead, start[2])
-                        node, number = number, 2 * len(nodes) + len(found)
+                        node = number
+                        number = 2 * len(nodes) + len(found)
                         spur = resampled(np.array([start, stop]))
                         found.append(
                             Walkway(spur, _CROSSING_HALF_WIDTH, node, number)

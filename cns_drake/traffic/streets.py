@@ -106,7 +106,8 @@ def make_signals(graph: LaneGraph, begin: np.ndarray) -> Signals:
             # Walkers have green in the phase in which the least flow crosses
             # their way.
             crossed = [cost[ways, column].sum() for ways in own]
-            k, row = int(np.argmin(crossed)), len(pieces) + column
+            k = int(np.argmin(crossed))
+            row = len(pieces) + column
             green_from[row], green_for[row] = starts[k], green[k]
     offsets = _offsets(
         graph, flow, owner, Signals(cycle, green_from, green_for)
@@ -171,7 +172,8 @@ def _offsets(
     cycle, green_from, green_for = signals
     # Behind each way, a lane and its first way.
     lane = np.array([(*p.after, k)[0] for k, p in enumerate(graph.pieces)])
-    after, number = lane[lane], len(lane)
+    after = lane[lane]
+    number = len(lane)
     time = np.array(
         [p.length / min(p.limit, _COLUMN_SPEED) for p in graph.pieces]
     )
@@ -182,8 +184,10 @@ def _offsets(
     )
     leave = green_from[way] + time[way] + time[lane[way]]
     leave = leave[:, None] + green_for[way, None] * _LEAVING_SHARES
-    weight, after = flow[way], after[way]
-    last, begins = green_for[after, None], green_from[after, None]
+    weight = flow[way]
+    after = after[way]
+    last = green_for[after, None]
+    begins = green_from[after, None]
     offsets = np.zeros(1 + max(0, owner.max()))
 
     def wait() -> float:
@@ -515,7 +519,8 @@ def swept_hulls(
     ahead = front_axle - rear_axle
     ahead /= np.linalg.norm(ahead, axis=1)[:, None]
     centre = rear_axle - axles[0] * ahead
-    reach, half = size[0] / 2, size[1] / 2 + _CLEARANCE
+    reach = size[0] / 2
+    half = size[1] / 2 + _CLEARANCE
     corners = outlines(centre, ahead, reach, reach, half)
     points = np.concatenate([corners[:-1], corners[1:]], axis=1)
     return front, np.array(shapely.convex_hull(shapely.multipoints(points)))

@@ -128,7 +128,8 @@ def find_runs(graph: LaneGraph, points: np.ndarray) -> list[_Run]:
             change[row, :off][np.isin(near, others)] = cost
     np.fill_diagonal(change, 0.0)
     # Dynamic programming finds the sequence of pieces with the least cost.
-    cost, before = misfit[0], np.zeros(misfit.shape, int)
+    cost = misfit[0]
+    before = np.zeros(misfit.shape, int)
     for row in range(1, len(points)):
         costs = cost[:, None] + change
         before[row] = costs.argmin(axis=0)
@@ -139,7 +140,8 @@ def find_runs(graph: LaneGraph, points: np.ndarray) -> list[_Run]:
         best[row - 1] = before[row, best[row]]
     starts = np.flatnonzero(np.diff(best, prepend=-1))
     pieces = np.append(near, -1)[best[starts]].tolist()
-    firsts, s = _STEP * starts, place[starts, best[starts]]
+    firsts = _STEP * starts
+    s = place[starts, best[starts]]
     for k, (before_it, piece) in enumerate(pairwise(pieces), 1):
         if before_it >= 0 and piece in graph.pieces[before_it].after:
             # The boundary is between two points.
@@ -188,14 +190,16 @@ class Follower:
             box: size of the car.
             start: number of the time step at which the drive begins.
         """
-        self._path, self._profile = trajectory.path, trajectory.speed_profile
+        self._path = trajectory.path
+        self._profile = trajectory.speed_profile
         self._square = self._profile.speed**2
         # The front bumper's path, which continues straight beyond the end.
         u = _STEP * np.arange(int((self._path.end + box.front) / _STEP) + 1)
         jet = self._path.evaluate(u)
         beyond = np.maximum(u - self._path.end, 0.0)[:, None]
         self._runs = find_runs(graph, jet.p[:, :2] + beyond * jet.dp[:, :2])
-        self._box, self._start = box, start
+        self._box = box
+        self._start = start
         # Like any other, the drive begins at rest.
         self._leaves = start + round(REACH * KNOT_PERIOD / STEP)
         self._run = 0
@@ -230,7 +234,8 @@ class Follower:
             traffic: the traffic, in which the car is the last of the vehicles.
             k: number of the time step.
         """
-        car, u = traffic.cars[-1], self.u[-1]
+        car = traffic.cars[-1]
+        u = self.u[-1]
         if k < self._leaves or self.arrived:
             self.u.append(u)
             return
@@ -251,7 +256,9 @@ class Follower:
         v = min(v, np.interp(ahead, self._profile.u, self._square) ** 0.5)
         u += 0.5 * (car["v"] + v) * STEP
         if u > self._path.end - 2 * _AHEAD and v < 0.1:
-            u, v, self.arrived = self._path.end, 0.0, True
+            u = self._path.end
+            v = 0.0
+            self.arrived = True
         self.u.append(u)
         car["v"] = v
         self._place(traffic.streets, car)
@@ -265,7 +272,8 @@ class Follower:
         inf if the car need not stop.
         """
         front = self.u[-1] + self._box.front
-        who, pieces = len(traffic.cars) - 1, traffic.streets.pieces
+        who = len(traffic.cars) - 1
+        pieces = traffic.streets.pieces
         gap, speed = np.inf, 0.0
         other = int(car["left_lane"])
         if other >= 0:
@@ -287,7 +295,8 @@ class Follower:
 
     def _place(self, streets: Streets, car: np.void) -> None:
         """Sets the pieces on which the car is now."""
-        front, runs = self.u[-1] + self._box.front, self._runs
+        front = self.u[-1] + self._box.front
+        runs = self._runs
         while self._run < len(runs) - 1 and front >= runs[self._run].last:
             self._run += 1
         run = runs[self._run]
@@ -304,12 +313,14 @@ class Follower:
         if self._held is not None and front >= self._held.last:
             car["granted"] = False
             if front - car["length"] >= self._held.last:
-                car["held"], self._held = -1, None
+                car["held"] = -1
+                self._held = None
         if piece < 0:
             return
         path[CURRENT] = piece
         car["s"] = run.s + front - run.first
-        column, before = CURRENT, run
+        column = CURRENT
+        before = run
         for other in runs[: self._run][::-1]:
             column -= 1
             if column < 0 or other.piece < 0:

@@ -292,7 +292,8 @@ def _places(
 ) -> tuple[np.ndarray, ...]:
     """Returns x, y, z at a distance `back` behind each front bumper [m]."""
     s = cars["s"] - back
-    path, column = cars["path"], np.full(cars.shape, CURRENT)
+    path = cars["path"]
+    column = np.full(cars.shape, CURRENT)
 
     def piece_in(column: np.ndarray) -> np.ndarray:
         return np.take_along_axis(path, column[..., None], -1)[..., 0]
@@ -305,7 +306,8 @@ def _places(
     piece = piece_in(column)
     places = places_on(streets, piece, s)
     changing = (column == CURRENT) & (cars["left_lane"] >= 0)
-    car, piece = cars[changing], piece[changing]
+    car = cars[changing]
+    piece = piece[changing]
     u = (s[changing] - car["change_start"]) / car["change_length"]
     u = np.minimum(np.maximum(u, 0.0), 1.0)
     share = u * u * u * (10.0 - 15.0 * u + 6.0 * (u * u))
@@ -481,7 +483,8 @@ def lane_over(streets: Streets, car: Any, c: int) -> tuple[int, float, float]:
         crossing [m]; and the distance until its rear has left it [m]. Without
         such a lane, the result is -1, inf and inf.
     """
-    begin, number = -car.s, len(streets.pieces) + c
+    begin = -car.s
+    number = len(streets.pieces) + c
     for column in range(CURRENT, NUM_PIECES):
         piece = car.path[column]
         if piece < 0:
@@ -516,9 +519,12 @@ def find_prior(traffic: Traffic, i: int) -> tuple[float, float, float]:
         the gap to the vehicle that it must follow [m], inf for none; and the
         speed of the followed vehicle [m/s].
     """
-    line, gap, speed = np.inf, np.inf, 0.0
+    line = np.inf
+    gap = np.inf
+    speed = 0.0
     streets, cars, crossings = traffic.streets, traffic.cars, traffic.crossings
-    car, pieces = cars[i], streets.pieces
+    car = cars[i]
+    pieces = streets.pieces
     for c in range(len(crossings)):
         if crossings[c].order > 0 and not crossings[c].marked:
             lane, enters, _ = lane_over(streets, car, c)
@@ -599,7 +605,9 @@ def accelerations(traffic: Traffic) -> np.ndarray:
             gap_2, speed_2 = find_ahead(traffic, car.left_lane, s * scale, i)
             if gap_2 < gap:
                 gap, speed = gap_2, speed_2
-        column, begin, line = CURRENT, pieces[lane].length - s, np.inf
+        column = CURRENT
+        begin = pieces[lane].length - s
+        line = np.inf
         while begin < SIGHT:
             is_way = pieces[car.path[column]].is_way
             if not is_way and (column > CURRENT or not car.granted):
@@ -684,7 +692,9 @@ def _is_better(traffic: Traffic, k: int, i: int, target: int) -> bool:
         return False
     rear = there - car.length
     # The next vehicle behind. No vehicle may be beside it, ahead or behind.
-    behind, who, is_beside = np.inf, -2, False
+    behind = np.inf
+    who = -2
+    is_beside = False
     at = traffic.head[target]
     while at >= 0:
         other = traffic.entries[at]

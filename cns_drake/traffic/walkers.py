@@ -226,7 +226,8 @@ class Crowd:
         crossings["to_end"], crossings["to_start"] = np.inf, -np.inf
         on = self._paths.paths["crossing"][walkers["path"]]
         rows = np.flatnonzero(on >= 0)
-        c, walkers = on[rows], walkers[rows]
+        c = on[rows]
+        walkers = walkers[rows]
         along = crossings["along"][c]
         place = ((walkers["xy"] - crossings["start"][c]) * along).sum(axis=1)
         row = self._paths.paths["first"][walkers["path"]] + walkers["at"]
@@ -423,7 +424,8 @@ def _forces(
     """
     force = np.zeros((len(walkers), 2))
     for i in range(len(walkers)):
-        one, path = walkers[i], paths.paths[walkers[i].path]
+        one = walkers[i]
+        path = paths.paths[walkers[i].path]
         here = path.first + one.at
         low, high = paths.limits[here]
         right = (paths.tangents[here, 1], -paths.tangents[here, 0])
@@ -560,7 +562,8 @@ def _stop(x: float, y: float, vx: float, vy: float) -> tuple[float, float]:
 def _nearest(paths: Paths, walker: Any, x: float, y: float) -> int:
     """Returns the row of the point on a walker's path nearest to a place."""
     path, points = paths.paths[walker.path], paths.points
-    best, nearest = np.inf, path.first
+    best = np.inf
+    nearest = path.first
     for at in range(max(walker.at - 3, 0), min(walker.at + 4, path.num_points)):
         row = path.first + at
         dx, dy = x - points[row, 0], y - points[row, 1]

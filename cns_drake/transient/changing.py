@@ -141,7 +141,8 @@ class Bay:
             The middle (2,) [m] and yaw [rad] of the car; None if it is too big.
         """
         skew = float(rng.uniform(-_SKEW, _SKEW))
-        across, turned = rng.uniform(size=2), rng.uniform() < 0.5
+        across = rng.uniform(size=2)
+        turned = rng.uniform() < 0.5
         c, s = math.cos(skew), abs(math.sin(skew))
         half = half_size * c + half_size[::-1] * s
         low, high = half - self.reach[1::2], self.reach[::2] - half
@@ -185,12 +186,14 @@ def change_parked_cars(around: Surroundings, share: float) -> None:
         around: surroundings of the drive, which are changed.
         share: share of the cars that are changed, from 0 to 1.
     """
-    editing, bays = around.editing, make_bays(around)
+    editing = around.editing
+    bays = make_bays(around)
     if not bays:
         editing.note("parked_cars: the world has no car, truck or bus")
     cars = [around.things[name] for name in bays]
     for car, rng in around.chosen(_PARKED_CARS, cars, share):
-        bay, fate = bays[car.name], rng.uniform()
+        bay = bays[car.name]
+        fate = rng.uniform()
         if fate < _GONE:
             editing.remove(car, _PARKED_CARS)
         elif fate < _GONE + _MOVED:
@@ -225,7 +228,8 @@ def _replace_car(
     around: Surroundings, car: Structure, bay: Bay, rng: np.random.Generator
 ) -> None:
     """Puts another car in a bay; leaves the bay empty if it is too small."""
-    editing, forms = around.editing, list(_FORMS)
+    editing = around.editing
+    forms = list(_FORMS)
     shares = np.array(list(_FORMS.values()), float)
     for k in rng.choice(len(forms), len(forms), False, shares / shares.sum()):
         builder = PARKED_CARS[forms[k]]
@@ -528,7 +532,8 @@ def change_world(
         putting_up.put_up_works(around, config.works)
     if config.snow > 0.0:
         # Snow comes last, so that it covers new objects as well.
-        ground, world = around.ground, around.editing.finish()
+        ground = around.ground
+        world = around.editing.finish()
         around = replace(
             around, editing=SceneEditing(world), things=read_structures(world)
         )

@@ -251,7 +251,8 @@ class _Stretch:
             length: distance between the two ends of the object [m]; an object
                 of length 0 stands upright.
         """
-        ground, yaw = around.ground, self.yaw + turn
+        ground = around.ground
+        yaw = self.yaw + turn
         middle = self.place(x, y)
         along = np.array([math.cos(yaw), math.sin(yaw)]) * length / 2
         ends = np.array([middle, middle - along, middle + along])
@@ -377,7 +378,8 @@ class _Site:
     def build(self, every: Obstacles) -> None:
         """Adds fences, machines where there is room, and new kerb stones."""
         x, length, width = self.x, self.length, self.width
-        middle, across = (_SITE_INNER + width) / 2, width - _SITE_INNER
+        middle = (_SITE_INNER + width) / 2
+        across = width - _SITE_INNER
         sides = (
             (x, _SITE_INNER, 0.0, length),
             (x, width, 0.0, length),
@@ -481,7 +483,8 @@ def fill_roadsides(around: Surroundings, share: float) -> None:
                 continue
             builder = OBJECTS[str(rng.choice(row.kinds))]
             sizes = {k: float(rng.uniform(*v)) for k, v in row.sizes.items()}
-            model, length = builder.build(rng, **sizes), sizes.get("length", 0)
+            model = builder.build(rng, **sizes)
+            length = sizes.get("length", 0)
             turn = float(rng.choice(row.turns))
             first = float(rng.uniform(*row.nearest))
             places = product(np.arange(first, row.farthest, _STEP), row.along)

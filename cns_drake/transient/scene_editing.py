@@ -176,7 +176,8 @@ class SceneEditing:
         triangles = surface.triangles[kept]
         # The mesh is unscaled, so that parts that shared a mesh share one
         # again.
-        shape, scale = self._shape(part), np.ones(3)
+        shape = self._shape(part)
+        scale = np.ones(3)
         # Of the shapes with triangles, only boxes and cones have no scale.
         if isinstance(shape, geometry.Mesh | geometry.Convex):
             scale = np.array(shape.scale3())

@@ -72,7 +72,8 @@ class StructurePart:
         elif isinstance(
             surface, surfaces.CylinderSurface | surfaces.CapsuleSurface
         ):
-            r, half = surface.radius, surface.length / 2
+            r = surface.radius
+            half = surface.length / 2
             if isinstance(surface, surfaces.CapsuleSurface):
                 half += r
             p_GPs = _BOX * (r, r, half)

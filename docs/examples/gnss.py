@@ -114,8 +114,10 @@ class Gnss(LeafSystem):
     ):
         """Declares the ports; for the arguments see `GnssConfig`."""
         super().__init__()
-        self._body, self._X_BG = body.index(), X_BG
-        self._noise, self._seed = noise, seed
+        self._body = body.index()
+        self._X_BG = X_BG
+        self._noise = noise
+        self._seed = seed
         self.DeclareAbstractInputPort(
             "body_poses", AbstractValue.Make([RigidTransform()])
         )

@@ -201,7 +201,8 @@ def align(
             read.
     """
     if hold_first:
-        target, held = Submaps(first), 0.0
+        target = Submaps(first)
+        held = 0.0
     else:
         target, held = make_consistent(first)
     source, moving = make_consistent(second)

@@ -239,7 +239,8 @@ def _describe_pcd(header: dict[str, list[str]]) -> tuple[np.dtype, int]:
 
     if "FIELDS" not in header:
         raise ValueError("PCD header: FIELDS is missing or wrong")
-    names, sizes = header["FIELDS"], of("SIZE")
+    names = header["FIELDS"]
+    sizes = of("SIZE")
     kinds = [
         _PCD_TYPES.get(kind.upper(), "") for kind in header.get("TYPE", [])
     ]
@@ -255,7 +256,9 @@ def _describe_pcd(header: dict[str, list[str]]) -> tuple[np.dtype, int]:
         )
     fields: list[tuple] = []
     for position, name in enumerate(names):
-        size, kind, count = sizes[position], kinds[position], counts[position]
+        size = sizes[position]
+        kind = kinds[position]
+        count = counts[position]
         if size not in _PCD_SIZES.get(kind, ()) or count < 1:
             raise ValueError(
                 f"PCD header: {name}: no type {header['TYPE'][position]} of"
@@ -388,7 +391,8 @@ def _read_ply(path: Path, block: int, on_note: OnNote) -> Iterator[np.ndarray]:
     for name in "xyz":
         if name not in (dtype.names or ()) or dtype[name].kind != "f":
             raise ValueError(f"PLY header: no floating-point property {name}")
-    count, alone = element.number, element is elements[-1]
+    count = element.number
+    alone = element is elements[-1]
     if encoding == "ascii":
         offset = _behind_lines(path, offset, sum(one.number for one in before))
         # A vertex takes at least one byte.
@@ -662,7 +666,8 @@ def _read_bin(
     layout = find_layout([path], columns)
     if layout.note:
         on_note(layout.note)
-    dtype, size = layout.dtype, path.stat().st_size
+    dtype = layout.dtype
+    size = path.stat().st_size
     if size % dtype.itemsize:
         raise ValueError(
             f"{size} bytes is not a whole number of points of"

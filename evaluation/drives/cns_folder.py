@@ -81,7 +81,8 @@ class CnsFolderDrive(FileDrive):
         resolved = path.resolve()
         self._imu_path = path / _IMU
         mount = _find_mount(resolved, chosen)
-        name, scenario = resolved.name, read_scenario(path)
+        name = resolved.name
+        scenario = read_scenario(path)
         if mount is not None and mount.parent == resolved.parent.parent:
             name = f"{resolved.parent.name}_{resolved.name}".lower()
             scenario = scenario or {

@@ -109,7 +109,8 @@ class KittiDrive(BinDrive):
                 f" {times_path}"
             )
         calibration = path / "calib.txt"
-        X_CS, unit = np.eye(4), None
+        X_CS = np.eye(4)
+        unit = None
         if is_there(calibration):
             rows = _read_calibration(calibration)
             X_CS = pose_matrices(calibration, rows["Tr"])[0]
@@ -209,7 +210,8 @@ def _numbered_files(path: Path) -> tuple[list[Path], list[int]]:
         if re.fullmatch("[0-9]{1,9}", text) is None:
             raise InputError(f"{frames}: row {row + 1}: {text!r} is no number")
     renumbered = numbers == list(range(len(files)))
-    found, numbers = numbers, list(map(int, rows))
+    found = numbers
+    numbers = list(map(int, rows))
     for row, (before, number) in enumerate(itertools.pairwise(numbers)):
         if number <= before:
             raise InputError(

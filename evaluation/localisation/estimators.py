@@ -350,7 +350,8 @@ def _by_small_gicp(
     if kind == "VGICP":
         target = (surroundings.voxels(settings.resolution), source)
         X_VW = _voxel_shift(settings.resolution)
-    X, iterations = X_VW @ start, 0
+    X = X_VW @ start
+    iterations = 0
     options: dict = {} if kind == "VGICP" else {"registration_type": kind}
     for width in filter(None, (settings.width, settings.last_width)):
         found = small_gicp.align(

@@ -60,7 +60,9 @@ def align_robustly(
     Returns:
         The estimated X_WS, and the number of steps.
     """
-    X, width, total = start.copy(), widths[0], 0
+    X = start.copy()
+    width = widths[0]
+    total = 0
     while True:
         begin = X
         for _ in range(iterations):

@@ -127,7 +127,9 @@ def _of_points(both: _Labelled) -> dict[str, float]:
         )
     # Rows: truth; columns: prediction.
     table = cells.reshape(size, size)
-    right, true, found = np.diag(table), table.sum(axis=1), table.sum(axis=0)
+    right = np.diag(table)
+    true = table.sum(axis=1)
+    found = table.sum(axis=0)
     known = true > 0
     result = {"miou": math.nan}
     for k, name in enumerate(_CLASSES):

@@ -390,7 +390,8 @@ class VoxelAccumulator:
             table = np.zeros(slots, dtype=SLOT)
             sampled = np.zeros((slots, self._sampled.shape[1]), dtype=np.uint8)
             move(self._table, self._sampled, table, sampled)
-            self._table, self._sampled = table, sampled
+            self._table = table
+            self._sampled = sampled
         needed = self._num_samples + number
         if self._divisions and needed > len(self._samples):
             samples = np.empty((2 * needed, 3))

@@ -465,7 +465,8 @@ def match(
     to_center = np.sqrt(((_cells(others) + 0.5 - sides) ** 2).sum(axis=1))
     is_near = (to_center < _REACH) & (difference < limit)
     of_query, of_table = of_query[is_near], of_table[is_near]
-    heights, others = query.heights[of_query], table.triangles.heights[of_table]
+    heights = query.heights[of_query]
+    others = table.triangles.heights[of_table]
     common = count_bits(heights & others)
     similarity = 2.0 * common / (count_bits(heights) + count_bits(others))
     is_alike = similarity.sum(axis=1) / 3.0 > min_similarity - _ROUNDING

@@ -84,7 +84,9 @@ def polar_image(points: np.ndarray, sensor_height: float) -> np.ndarray:
     x, y, z = points.T
     ring = np.hypot(x, y) * (RINGS / REACH)
     near = ring < RINGS
-    x, y, ring = x[near], y[near], ring[near].astype(np.int64)
+    x = x[near]
+    y = y[near]
+    ring = ring[near].astype(np.int64)
     height = z[near] + sensor_height
     sector = np.arctan2(y, x) * (SECTORS / (2.0 * math.pi))
     cell = ring * SECTORS + np.floor(sector).astype(np.int64) % SECTORS

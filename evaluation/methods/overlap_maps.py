@@ -205,7 +205,8 @@ def coarse_maps(
         row is set if column k is occupied. (H, S) int64, the number of occupied
         cells of each map.
     """
-    rows, num_maps = GRID >> halvings, maps.max() + 1
+    rows = GRID >> halvings
+    num_maps = maps.max() + 1
     bits = np.zeros((len(turns), rows, num_maps), np.uint64)
     counts = np.zeros((len(turns), num_maps), np.int64)
     for heading in range(len(turns)):

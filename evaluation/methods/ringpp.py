@@ -235,7 +235,8 @@ class RingPlusPlus(Method[Ring, RingDatabase]):
             for heading in headings
         ]
         best = 1 if fits[1][0] > fits[0][0] else 0
-        offset, yaw = fits[best][1], headings[best]
+        offset = fits[best][1]
+        yaw = headings[best]
         cell = 2.0 * self.config.half_width / num_cells
         return yaw_pose(yaw, -offset[0] * cell, -offset[1] * cell)
 

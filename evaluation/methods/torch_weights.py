@@ -165,7 +165,8 @@ class _Machine:
         return popped
 
     def _since_mark(self) -> list:
-        items, self.stack = self.stack, self._marks.pop()
+        items = self.stack
+        self.stack = self._marks.pop()
         return items
 
     def _set(self, items: list | tuple) -> None:

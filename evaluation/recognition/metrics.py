@@ -230,7 +230,8 @@ def resampled_weights(
     Returns:
         (B, Q) float64 counts. Without blocks, each row sums to Q.
     """
-    number, of_query = num_queries, np.arange(num_queries)
+    number = num_queries
+    of_query = np.arange(num_queries)
     if blocks is not None:
         known, of_query = np.unique(blocks, return_inverse=True)
         number = len(known)

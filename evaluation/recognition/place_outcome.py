@@ -426,7 +426,8 @@ def place_numbers(
             interval = percentile_interval(kept_share(drawn, other))
             yield now.number(name, float(kept_share(today, then)), interval)
         if is_paired:
-            right, was = outcomes.is_right, before.outcomes.is_right
+            right = outcomes.is_right
+            was = before.outcomes.is_right
             yield now.number("lost", float((was & ~right).sum()))
             yield now.number("found", float((right & ~was).sum()))
             added = visible_change_added(

@@ -160,7 +160,8 @@ def compare_with_gates(
     Raises:
         InputError: if the method returns an invalid result.
     """
-    places, queries = database.places, query.queries
+    places = database.places
+    queries = query.queries
     if is_known is None:
         is_known = _known_places(database, query, protocol)
     indexed = method.build_database(places.descriptors)

@@ -255,7 +255,10 @@ def _look(
         p = others[i]
         distance = _length(p)
         _find_corners(p, angles, starts, corners, away)
-        farthest, nearest, count, is_shown = 0.0, math.inf, 0, False
+        farthest = 0.0
+        nearest = math.inf
+        count = 0
+        is_shown = False
         for quadrant in range(4):
             corner = corners[quadrant]
             if corner < 0:

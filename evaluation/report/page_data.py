@@ -172,7 +172,9 @@ def camera_images(
     Raises:
         InputError: if the drive cannot be read.
     """
-    times_ns, shown, faults = drive.image_stamps_ns, {}, 0
+    times_ns = drive.image_stamps_ns
+    shown = {}
+    faults = 0
     if len(times_ns) == 0:
         return None
     for number in np.unique(_nearest(times_ns, stamps_ns)):

@@ -40,7 +40,8 @@ class Reporter(Listener):
             or activity != self._activity
             or now - self._reported >= _REPORT_INTERVAL
         ):
-            self._activity, self._reported = activity, now
+            self._activity = activity
+            self._reported = now
             self._send("doing", activity, int(done), int(total), unit)
 
     def note(self, text: str) -> None:

@@ -491,7 +491,8 @@ def dress_city(
     """
     always = set.intersection(*map(set, staged.standing.values()))
     is_paved = grounds.is_dense(staged.kept)
-    kept, streets = staged.kept, city.streets
+    kept = staged.kept
+    streets = city.streets
     # Streets and sidewalks that the file does not have.
     laid: list[Imported] = []
     if drives:

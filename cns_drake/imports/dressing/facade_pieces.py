@@ -227,7 +227,8 @@ def with_shops(plan: FacadePlan, paving: upper_sides.UpperSides) -> FacadePlan:
     """
     top = plan.floor + plan.style.storey - 0.75
     top = min(top, plan.ground + _SHOP_TOP)
-    street, openings = set(plan.on_street), []
+    street = set(plan.on_street)
+    openings = []
     for o in plan.openings:
         if o in street and o.x1 - o.x0 >= _LEAST_SHOP:
             shop = o._replace(kind="shop", z1=top)
@@ -401,7 +402,8 @@ def _in_outline(
 
 def _reliefs(opening: Opening, plan: FacadePlan) -> list[tuple[Relief, str]]:
     """Returns the reliefs of an opening, and the materials of their fronts."""
-    style, kind = plan.style, opening.kind
+    style = plan.style
+    kind = opening.kind
     x0, x1, z0 = opening.x0, opening.x1, opening.z0
     height = opening.z1 - z0
     if kind == "shop":
@@ -429,7 +431,8 @@ def _reliefs(opening: Opening, plan: FacadePlan) -> list[tuple[Relief, str]]:
         )
     found = []
     for relief in bay(x0, x1):
-        depth, material = relief.depth, "body"
+        depth = relief.depth
+        material = "body"
         if kind == "window" and depth > 0.0:
             material = "glass" if depth == style.depth else "frames"
         elif kind == "shop" and depth >= _SHOP_DEPTH:
@@ -488,7 +491,8 @@ def _add_plinth(
     out: Assembly, plan: FacadePlan, reliefs: Sequence[tuple[Relief, str]]
 ) -> int:
     """Adds the plinth of a wall, if any; returns the number of plinths."""
-    panel, reach = plan.panel, _PLINTH_REACH
+    panel = plan.panel
+    reach = _PLINTH_REACH
     top = plan.ground + plan.style.plinth
     is_there = plan.style.plinth and plan.stands_on_ground
     if not is_there or not 0.1 < top < panel.height:
@@ -512,7 +516,8 @@ def _has_balcony(opening: Opening) -> bool:
 def _add_balconies(out: Assembly, plan: FacadePlan) -> int:
     count = 0
     for o in filter(_has_balcony, plan.openings):
-        middle, z = (o.x0 + o.x1) / 2, o.z0 - 0.02
+        middle = (o.x0 + o.x1) / 2
+        z = o.z0 - 0.02
         half = min(_BALCONY_WIDTH, 1.5 * (o.x1 - o.x0)) / 2
         x0 = max(0.1, middle - half)
         x1 = min(plan.panel.length - 0.1, middle + half)

@@ -62,7 +62,8 @@ def beside_street(
     point = Point(xy)
     distances = shapely.distance(courses, point)
     nearest = int(np.argmin(distances))
-    line, half = courses[nearest], streets[nearest].width / 2.0
+    line = courses[nearest]
+    half = streets[nearest].width / 2.0
     station = station_at(line, line.project(point))
     foot = np.array([station.x, station.y])
     offset = xy - foot
@@ -109,11 +110,13 @@ def without_curves(model: Model) -> Model:
 
     A polyhedron has the same cross-section area as the shape that it replaces.
     """
-    parts, meshes = [], dict(model.meshes)
+    parts = []
+    meshes = dict(model.meshes)
     for part in model.parts:
         shape = part.shape
         if isinstance(shape, CylinderShape):
-            r, is_disc = shape.radius, shape.length < shape.radius
+            r = shape.radius
+            is_disc = shape.length < shape.radius
             name = _DISC if is_disc else _POST
             sides = _SIDES_OF_DISC if is_disc else _SIDES
             scaled = MeshShape(name, (r, r, shape.length))
@@ -572,7 +575,8 @@ def _place_thing(
 
 def _light(placing: StreetRoom, row: Row, rng: np.random.Generator) -> None:
     """Places lamps along a street where the file has none."""
-    s, side = float(rng.uniform(3.0, 12.0)), 1.0
+    s = float(rng.uniform(3.0, 12.0))
+    side = 1.0
     while s < row.line.length:
         for offset in (row.half + FROM_EDGE, row.half - 0.4, 2.3):
             xy, yaw = place_along(row.line, s, side, offset)
@@ -587,7 +591,8 @@ def _light(placing: StreetRoom, row: Row, rng: np.random.Generator) -> None:
             if placing.place(lamp, "lamp_post", xy, yaw, rng):
                 placing.found.at_random["Lamp post"] += 1
                 break
-        s, side = s + _LAMP_EVERY, -side
+        s += _LAMP_EVERY
+        side = -side
 
 
 def _furnish(placing: StreetRoom, row: Row, rng: np.random.Generator) -> None:

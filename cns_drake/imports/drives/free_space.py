@@ -119,7 +119,8 @@ def find_free_space(
     least = _FROM_WALL
     paved = ndimage.binary_closing(on_road, iterations=1) & ~blocked
     if _largest(_clearance(paved) >= _FROM_EDGE) * CELL**2 >= _LEAST_ROAD:
-        free, least = paved, _FROM_EDGE
+        free = paved
+        least = _FROM_EDGE
     elif blocked.any():
         free &= _between(blocked)
     outlines = joined(walls)[:, [0, 1, 2, 0], :2]

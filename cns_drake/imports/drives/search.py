@@ -492,7 +492,8 @@ def _leads_on(lane: Lane, after: Lane) -> bool:
     if lane.way == after.way:
         return False
     a, b = lane.line[-1] - lane.line[-2], after.line[1] - after.line[0]
-    cross, dot = a[0] * b[1] - a[1] * b[0], a @ b
+    cross = a[0] * b[1] - a[1] * b[0]
+    dot = a @ b
     return bool(abs(np.degrees(np.arctan2(cross, dot))) <= SHARPEST_TURN_DEG)
 
 

@@ -67,7 +67,8 @@ class Spiral:
         turn = self.sharpest * length
         if turn > _MOST_TURN:
             raise ValueError(f"turns by up to {turn:.0f} rad")
-        self._start, self._growth = start, (end - start) / length
+        self._start = start
+        self._growth = (end - start) / length
         panels = math.ceil(turn / _TURN) + 1
         self._panel = length / panels
         ends = np.arange(panels) * self._panel
@@ -150,7 +151,8 @@ class Cubic:
             0,
             _PANELS - 1,
         )
-        low, begin = self._reached[index], index * self._panel
+        low = self._reached[index]
+        begin = index * self._panel
         whole = np.maximum(self._reached[index + 1] - low, 1e-12)
         size = (arc - low) / whole * self._panel
         for _ in range(_NEWTON_STEPS):

@@ -293,7 +293,8 @@ def _check_ids(elements: Iterable[Element]) -> None:
 def _plain(own: str, taken: set[str]) -> str:
     """Returns a new, unique name of letters, digits, dots and dashes."""
     stem = _stem(own)
-    name, number = stem, 1
+    name = stem
+    number = 1
     while name in taken:
         number += 1
         name = f"{stem}-{number}"

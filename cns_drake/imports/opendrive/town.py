@@ -138,7 +138,8 @@ def on_carriageway(quads: np.ndarray, carriageway: BaseGeometry) -> np.ndarray:
     outlines = np.asarray(shapely.polygons(quads[..., :2]))
     inside = shapely.contains_properly(carriageway, outlines)
     found = [as_triangles(quads[inside])]
-    rest, outlines = quads[~inside], outlines[~inside]
+    rest = quads[~inside]
+    outlines = outlines[~inside]
     squares = np.floor(rest[:, 0, :2] / _SQUARE).astype(int)
     for square in np.unique(squares, axis=0):
         chosen = np.flatnonzero((squares == square).all(axis=1))

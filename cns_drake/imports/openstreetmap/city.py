@@ -314,9 +314,11 @@ def _barriers(
         name, tags, line, _ = way
         kind = tags.get("barrier")
         if kind == "hedge":
-            (width, usual), semantic_class = _HEDGE, "vegetation"
+            width, usual = _HEDGE
+            semantic_class = "vegetation"
         elif kind in ("wall", "fence", "city_wall"):
-            (width, usual), semantic_class = _WALL, "fence"
+            width, usual = _WALL
+            semantic_class = "fence"
         else:
             continue
         where = (name, features.faults)

@@ -333,7 +333,8 @@ class StreetTraffic:
         traffic keeps right, and -1 if it keeps left.
         """
         self.stretches = list(_stretches(streets, crossed))
-        self._side, self._crossed = side, crossed
+        self._side = side
+        self._crossed = crossed
         self._arms: defaultdict[int, list[_Arm]] = defaultdict(list)
         for k, stretch in enumerate(self.stretches):
             for end, node in zip((0, -1), stretch.nodes, strict=True):

@@ -175,7 +175,8 @@ class CameraScene(LeafSystem):
             is_anchored = frame in anchored
             if is_anchored:
                 X_FG = calc_X_WF(frame) @ X_FG
-            entry, rgb = table[one.structure], one.rgb or _GREY
+            entry = table[one.structure]
+            rgb = one.rgb or _GREY
             surface = tessellate(one.surface, _SIDES)
             corners = len(surface.p_GVset)
             look = look_of(one.name, entry.semantic_class, rgb, corners)
@@ -251,7 +252,8 @@ class CameraScene(LeafSystem):
     def _calc_geometry_pose(
         self, context: Context, output: AbstractValue
     ) -> None:
-        known, poses = self._poses.Eval(context), FramePoseVector()
+        known = self._poses.Eval(context)
+        poses = FramePoseVector()
         for frame, own in self.frames.items():
             poses.set_value(own, RigidTransform(known.X_WFs[known.rows[frame]]))
         output.set_value(poses)
@@ -306,7 +308,8 @@ def _as_mesh(
         np.stack([a[:, 0], a[:, 2], -a[:, 1]], axis=1)
         for a in (places, np.repeat(normals, 3, axis=0))
     ]
-    kinds, attributes = ["VEC3", "VEC3"], {"POSITION": 0, "NORMAL": 1}
+    kinds = ["VEC3", "VEC3"]
+    attributes = {"POSITION": 0, "NORMAL": 1}
     material: dict[str, Any] = {"doubleSided": True}
     files: dict[str, bytes] = {}
     extra: dict[str, Any] = {}

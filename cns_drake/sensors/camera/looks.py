@@ -123,7 +123,8 @@ def _leaves(rng: np.random.Generator) -> np.ndarray:
     pen = ImageDraw.Draw(picture)
     turn = np.linspace(0.0, 2.0 * np.pi, 9)
     for place in rng.uniform(0, _SIDE, (900, 2)):
-        long, angle = rng.uniform(14, 22), rng.uniform(0.0, np.pi)
+        long = rng.uniform(14, 22)
+        angle = rng.uniform(0.0, np.pi)
         leaf = long * np.exp(1j * angle) * (np.cos(turn) + 0.45j * np.sin(turn))
         shade = rng.uniform(0.55, 1.5)
         for dx in (-_SIDE, 0, _SIDE):

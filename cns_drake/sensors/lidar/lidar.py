@@ -507,7 +507,8 @@ class Lidar(LeafSystem):
         model = self._returns or self._measurement
         reach = model.reach(self.pattern.max_range)
         p_WSset, _ = self._calc_poses(context)
-        middle, way = p_WSset[0], 0.0
+        middle = p_WSset[0]
+        way = 0.0
         if len(p_WSset) > 1:
             middle = p_WSset.mean(axis=0)
             way = np.linalg.norm(p_WSset - middle, axis=1).max()
@@ -839,7 +840,8 @@ class SeenGeometry:
         p_WS: np.ndarray,
     ) -> None:
         doing("preparing the ray casting")
-        structures, self._materials = self._lidar.structures, None
+        structures = self._lidar.structures
+        self._materials = None
         names = [
             structure_name(geometry.name, is_scoped=structures is None)
             for geometry in self._geometries
@@ -952,7 +954,8 @@ def assemble_points(
     for k in range(len(beams)):
         # For a signed index, numba looks at each use whether it counts from
         # the end.
-        beam, point = np.uint64(beams[k]), scan[k]
+        beam = np.uint64(beams[k])
+        point = scan[k]
         x = table.d_Sset[beam, 0] * ranges[k]
         y = table.d_Sset[beam, 1] * ranges[k]
         z = table.d_Sset[beam, 2] * ranges[k]

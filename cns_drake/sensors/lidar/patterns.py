@@ -224,7 +224,8 @@ class LimitedPattern(BeamPattern):
             elevations_deg: limits of the elevation [deg].
         """
         self.min_range, self.max_range = whole.min_range, whole.max_range
-        self.period, self.repeats = whole.period, whole.repeats
+        self.period = whole.period
+        self.repeats = whole.repeats
         self._whole = whole
         self._limits = tuple(azimuths_deg), tuple(elevations_deg)
         self._first = _limit(whole.beams(0), *self._limits)

@@ -118,7 +118,8 @@ class CalibratedReturns:
         return max_range + 8.0 * self.sheet.range_noise
 
     def _receiver(self, min_range: float, max_range: float) -> Receiver:
-        sheet, scattering = self.sheet, None
+        sheet = self.sheet
+        scattering = None
         if not self.weather.is_clear:
             scattering = tabulate_scattering(
                 self.weather,
@@ -264,9 +265,11 @@ class CalibratedReturns:
             one[beams.ring] for one in errors
         )
         x, y, z = beams.d_Sset.T
-        shift, own = 0.0, 0.0
+        shift = 0.0
+        own = 0.0
         if head.tick_deg:
-            tick, now = np.radians(head.tick_deg), np.arctan2(y, x)
+            tick = np.radians(head.tick_deg)
+            now = np.arctan2(y, x)
             shift = np.rint(now / tick) * tick - now
             own = (uniform(key, laser, len(sizes)) - 0.5) * 2.0 * tick
             own = own[beams.ring]
@@ -345,7 +348,8 @@ class CalibratedTurn:
             range_error: (N,) range error of each beam's laser [m].
             gain: (N,) gain of each beam's laser.
         """
-        self.range_error, self.gain = range_error, gain
+        self.range_error = range_error
+        self.gain = gain
         self.reported = reported
         self.p_SLset = np.outer(height, (0.0, 0.0, 1.0))
         self.beam = np.asarray(beams.packet_order, np.int64)

@@ -159,12 +159,16 @@ def _merge(
     energy, geometry = np.empty(count), np.empty(count, np.int32)
     echo = -1
     for one in range(num_beams):
-        begin, index, most = 0.0, -1, 0.0
+        begin = 0.0
+        index = -1
+        most = 0.0
         for k in row[first[one] : first[one + 1]]:
             distance = light.distance[k]
             snr = target_snr(budget, extinction, light.energy[k], distance)
             if index < 0 or distance - begin > resolution:
-                begin, index, most = distance, index + 1, snr
+                begin = distance
+                index += 1
+                most = snr
                 if index == _MOST_ECHOES:
                     break
                 echo += 1
@@ -181,7 +185,8 @@ def _merge(
                 mean[echo] = way / total[echo]
                 energy[echo] = echo_energy(budget, total[echo], mean[echo])
             if snr > most:
-                most, geometry[echo] = snr, light.geometry[k]
+                most = snr
+                geometry[echo] = light.geometry[k]
     echo += 1
     return _Pulses(
         beam[:echo],
@@ -205,7 +210,8 @@ def _sorted(light: Light, num_beams: int) -> tuple[np.ndarray, np.ndarray]:
     for beam in light.beam:
         first[beam + 1] += 1
     first = np.cumsum(first)
-    row, end = np.empty(len(light.beam), np.int64), first[:-1].copy()
+    row = np.empty(len(light.beam), np.int64)
+    end = first[:-1].copy()
     away = light.distance
     for k, beam in enumerate(light.beam):
         place = end[beam]
@@ -315,7 +321,8 @@ def _detect(
     is_seen[unsure] = uniform(
         key, pulses.beam[unsure], draw[unsure]
     ) < detection_probability(pulses.snr[unsure])
-    seen, draw = select(pulses, is_seen), draw[is_seen]
+    seen = select(pulses, is_seen)
+    draw = draw[is_seen]
     error = range_deviation(receiver.budget, seen.snr)
     error *= normal(key, seen.beam, draw + 1)
     error += range_error[seen.beam]
@@ -384,9 +391,11 @@ def _intensity(
     scale is logarithmic.
     """
     unit, retro_from = receiver.sheet.response, receiver.sheet.retro_from
-    rest, draw = _FULL_INTENSITY - retro_from, _first_draw(pulses)
+    rest = _FULL_INTENSITY - retro_from
+    draw = _first_draw(pulses)
     energy = pulses.energy
-    intensity, is_above = retro_from * energy, energy > 1.0
+    intensity = retro_from * energy
+    is_above = energy > 1.0
     if unit.slope:
         root = np.sqrt(np.minimum(energy, 1.0))
         root *= np.minimum(unit.far / pulses.distance, 1.0)

@@ -82,7 +82,8 @@ def find_sides(shots: Shots, orders: np.ndarray, hits: BeamHits) -> Sides:
     rest = 1.0 - uniform(shots.key, shots.beam[row], draw)
     turn = uniform(shots.key, shots.beam[row], draw + 1) - 0.5
     angle = 2.0 * np.pi * share * turn
-    d_Wset, reach = np.empty_like(toward), np.empty(len(row), np.float32)
+    d_Wset = np.empty_like(toward)
+    reach = np.empty(len(row), np.float32)
     sides = Sides(row, neighbour, share, d_Wset, reach)
     _aim(sides, toward, rest, angle, hits, shots.divergence, shots.max_range)
     return sides
@@ -118,7 +119,9 @@ def _aim(
     """
     for side in range(len(rest)):
         i, j = sides.row[side], sides.neighbour[side]
-        d, u, d_W = hits.d_Wset[i], toward[side], sides.d_Wset[side]
+        d = hits.d_Wset[i]
+        u = toward[side]
+        d_W = sides.d_Wset[side]
         radius = divergence * np.sqrt(-0.5 * np.log(rest[side]))
         along = radius * np.cos(angle[side])
         across = radius * np.sin(angle[side])
@@ -231,7 +234,8 @@ def _find_edges(
 
     Neighbours follow each other in the order, at most an angle [rad] apart.
     """
-    edges, count = np.empty((len(order), 2), np.int64), 0
+    edges = np.empty((len(order), 2), np.int64)
+    count = 0
     # As names of their own, fields are fast.
     d_Wset, geometry = hits.d_Wset, hits.geometry
     for k in range(len(order) - 1):

@@ -244,7 +244,8 @@ def texture(
         part = contrast[geometry[k]]
         if part == 0.0:
             continue
-        ray, group = row[beam[k]], group_of[geometry[k]]
+        ray = row[beam[k]]
+        group = group_of[geometry[k]]
         place = ray % len(p_WSset) if len(p_WSset) > 1 else 0
         x = y = z = 0.0
         for i in range(3):

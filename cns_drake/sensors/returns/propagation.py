@@ -238,7 +238,8 @@ def _step(
     way = 0
     flat = _FLATNESS + divergence
     for ray in range(count):
-        medium, geometry = ways.inside[ray], met.geometry[ray]
+        medium = ways.inside[ray]
+        geometry = met.geometry[ray]
         left, sent = ways.depth[ray], ways.energy[ray]
         length = ways.length[ray] + met.ranges[ray]
         if medium >= 0:
