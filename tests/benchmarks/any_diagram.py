@@ -55,7 +55,8 @@ class Scene:
         self.rng = np.random.default_rng(1)
         self.graph = scene_graph
         self.source = scene_graph.RegisterSource("boxes")
-        self.frames, self.boxes = [], []
+        self.frames = []
+        self.boxes = []
         for k in range(num_boxes):
             frame = scene_graph.RegisterFrame(
                 self.source, GeometryFrame(f"box_{k}")
@@ -186,7 +187,8 @@ def main():
 
 def shapes(count):
     """Returns a SceneGraph of boxes, spheres and cylinders for all roles."""
-    rng, graph = np.random.default_rng(2), SceneGraph()
+    rng = np.random.default_rng(2)
+    graph = SceneGraph()
     graph.AddRenderer("vtk", MakeRenderEngineVtk(RenderEngineVtkParams()))
     source = graph.RegisterSource("shapes")
     for k in range(count):
@@ -244,7 +246,8 @@ def beside_drake():
     def step_along_rays():
         """Casts by sphere tracing, down to a millimetre."""
         for d_W in d_Ws:
-            way, step = 0.0, 1.0
+            way = 0.0
+            step = 1.0
             while step > 1e-3 and way < 120.0:
                 p_WQ = X_WS.translation() + way * d_W
                 near = query.ComputeSignedDistanceToPoint(p_WQ)

@@ -144,7 +144,8 @@ def with_triangles(
     for k in rng.permutation(len(geometries)):
         own = count_triangles([geometries[k]])
         if surplus < 0 and own > 0:
-            geometries[k], surplus = None, surplus + own
+            geometries[k] = None
+            surplus += own
         elif surplus > 0 and own > 0:
             geometries[k] = _divided(geometries[k])
             surplus -= 3 * own

@@ -61,7 +61,8 @@ class OsmFile:
 
 def draw_town(houses: int) -> OsmFile:
     """Returns houses at random, and the streets between their blocks."""
-    town, lot = OsmFile(), random.Random(1)
+    town = OsmFile()
+    lot = random.Random(1)
     side = math.ceil(math.sqrt(houses))
     for number in range(houses):
         x, y = (SPACING * place for place in divmod(number, side))

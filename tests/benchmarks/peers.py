@@ -93,7 +93,9 @@ def make_stage(drive: str, num_poses: int, folder: Path) -> Stage:
     """Returns a drive's stage and rays; O is the middle of its poses."""
     poses = sensor_poses(drive, num_poses)
     p_WO = np.round(np.mean([X_WS.translation() for X_WS in poses], axis=0))
-    vertices, triangles, count = [], [], 0
+    vertices = []
+    triangles = []
+    count = 0
     for geometry in read_stage(drive):
         if isinstance(geometry.surface, TriangleSurface):
             p_WVset = geometry.X_FG.multiply(geometry.surface.p_GVset.T).T
@@ -246,7 +248,8 @@ def pybullet_caster(stage: Stage) -> Caster:
     pybullet.createMultiBody(0, shape, physicsClientId=client)
 
     def cast(p, d):
-        origins, ends = np.tile(p, (len(d), 1)), p + REACH * d
+        origins = np.tile(p, (len(d), 1))
+        ends = p + REACH * d
         ranges = []
         for start in range(0, len(d), _BATCH):
             block = slice(start, start + _BATCH)

@@ -180,7 +180,8 @@ def _compare(scene, theirs, poses, d_S, cast, reach) -> None:
         both = np.isfinite(a) & np.isfinite(b)
         error = np.abs(a[both] - b[both])
         apart = int((error > EDGE).sum()) + int((~both & (a != b)).sum())
-        total, far = total + len(a), far + apart
+        total += len(a)
+        far += apart
         if (error <= EDGE).any():
             worst = max(worst, float(error[error <= EDGE].max()))
     print(

@@ -44,7 +44,8 @@ def test_every_field_is_explained(model):
 
 
 def test_every_model_has_a_table():
-    found, waiting = set(), list(MODELS)
+    found = set()
+    waiting = list(MODELS)
     while waiting:
         model = waiting.pop()
         found.add(model)

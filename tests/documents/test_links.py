@@ -28,7 +28,8 @@ def follow(page, file):
 
 
 def test_pages_are_reached_from_the_readme():
-    reached, waiting = set(), {"README.md"}
+    reached = set()
+    waiting = {"README.md"}
     while waiting:
         page = PAGES[waiting.pop()]
         reached.add(page.name)

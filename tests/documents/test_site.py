@@ -39,7 +39,9 @@ class Links(HTMLParser):
 
     def __init__(self, path):
         super().__init__()
-        self.targets, self.anchors, self.scripts = set(), set(), set()
+        self.targets = set()
+        self.anchors = set()
+        self.scripts = set()
         self.feed(path.read_text())
 
     def handle_starttag(self, tag, attrs):
@@ -92,7 +94,8 @@ def test_a_share_stays_on_one_line(site):
 
 
 def test_every_public_name_is_explained(site):
-    explained, examples = set(), 0
+    explained = set()
+    examples = 0
     pages = sorted((site / "api").rglob("*.html"))
     for path in pages:
         explained |= {str(a).rpartition(".")[2] for a in Links(path).anchors}

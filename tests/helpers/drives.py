@@ -74,7 +74,8 @@ def wavy_points(seed) -> np.ndarray:
     s = SPACING * np.arange(150)
     heading, height = np.zeros_like(s), np.zeros_like(s)
     for _ in range(4):
-        length, phase = rng.uniform(60, 200), rng.uniform(0, 2 * np.pi)
+        length = rng.uniform(60, 200)
+        phase = rng.uniform(0, 2 * np.pi)
         heading += rng.uniform(0.2, 0.5) * np.sin(
             2 * np.pi * s / length + phase
         )

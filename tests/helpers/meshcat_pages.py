@@ -88,7 +88,8 @@ class _Decoder:
     """As much of MessagePack as Meshcat writes."""
 
     def __init__(self, data):
-        self._data, self._at = data, 0
+        self._data = data
+        self._at = 0
 
     def value(self):
         code = self._number(">B")

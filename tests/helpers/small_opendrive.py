@@ -75,7 +75,8 @@ TWO_LANES = (
 
 def straight(name, x0, y0, x1, y1, *, junction="-1", lanes=TWO_LANES, **more):
     """A straight road with two lanes and sidewalks."""
-    length, heading = math.hypot(x1 - x0, y1 - y0), math.atan2(y1 - y0, x1 - x0)
+    length = math.hypot(x1 - x0, y1 - y0)
+    heading = math.atan2(y1 - y0, x1 - x0)
     line = geometry(0.0, float(x0), float(y0), heading, length, "<line/>")
     own = (section(0.0, *lanes),)
     return road(name, length, [line], own, junction=junction, **more)
@@ -128,7 +129,8 @@ def _integrated(piece, wanted, step=0.02):
         return np.array([math.cos(state[2]), math.sin(state[2]), curvature])
 
     state = np.array([_number(piece, k) for k in ("x", "y", "hdg")])
-    at, found = 0.0, []
+    at = 0.0
+    found = []
     for goal in wanted:
         count = max(1, math.ceil((goal - at) / step))
         h = (goal - at) / count

@@ -123,7 +123,8 @@ def write_transient_town(folder, *, slopes=False):
                 shape = mesh_shape(f"{form}_{part}", scale)
                 visuals.append(visual(f"{name}/{part}", shape, *pose))
             rows[name] = "car"
-        tree, tall = f"tree_{k:03d}", rng.uniform(0.8, 1.2, 3)
+        tree = f"tree_{k:03d}"
+        tall = rng.uniform(0.8, 1.2, 3)
         for part in ("wood", "crown"):
             shape = mesh_shape(f"lime_tree_a_{part}", tall)
             visuals.append(visual(f"{tree}/{part}", shape, 5 * k, 13.5, 0.05))

@@ -118,7 +118,8 @@ def test_stages_follow_from_the_history(long):
         text = (long / f"stage_{stage}.sdf").read_text()
         return set(re.findall('visual name="([^/"]+)/', text))
 
-    rows, told = _rows(long), names("01")
+    rows = _rows(long)
+    told = names("01")
     for stage, years in (("02", range(1, 4)), ("03", range(4, 9))):
         for row in rows:
             if int(row["year"]) not in years:
@@ -431,7 +432,8 @@ def names_in(folder, stage):
 @pytest.mark.slow
 def test_each_stage_is_what_the_history_tells(long):
     """Scaffolds, uses of empty plots and annexes have rows as well."""
-    standing, rows = names_in(long, "01"), _rows(long)
+    standing = names_in(long, "01")
+    rows = _rows(long)
     assert {"put_up", "taken_down", "demolished", "frame"} <= {
         row["event"] for row in rows
     }

@@ -187,7 +187,8 @@ def test_rays_from_above_never_see_the_inside(name):
 
 @pytest.mark.parametrize("name", ["brick_block", "office", "hotel"])
 def test_windows_lie_as_deep_as_asked(name):
-    footprint, rng = box(-14, -12, 14, 12), np.random.default_rng(4)
+    footprint = box(-14, -12, 14, 12)
+    rng = np.random.default_rng(4)
     asked = BUILDERS[name](ARCHETYPES[name], Site(footprint, "b"), 30.0, rng)
     model = sample(name, footprint, 30.0, np.random.default_rng(4))
     xs, zs = np.meshgrid(np.linspace(-12, 12, 300), np.linspace(8, 20, 200))

@@ -85,7 +85,8 @@ def test_stages_differ_by_the_listed_names_only(name, stages):
     for path in stage_files(name):
         stage = path.stem.removeprefix("stage_")
         present = visuals(path)
-        absent, sites = stages.absent(stage), stages.sites(stage).keys()
+        absent = stages.absent(stage)
+        sites = stages.sites(stage).keys()
         standing = {structure_of(v) for v in present}
         on_lots = {n for n in standing if lot_of(n)}
         assert standing - on_lots == names - absent | sites

@@ -26,7 +26,8 @@ def test_clearance_is_a_distance():
 
 
 def test_an_ignored_polygon_may_be_near_but_not_overlap():
-    ground, neighbour = Occupancy(), box(0, 0, 10, 10)
+    ground = Occupancy()
+    neighbour = box(0, 0, 10, 10)
     ground.add(neighbour)
     assert ground.is_free(box(10, 0, 20, 10), 3.0, neighbour)
     assert not ground.is_free(box(9, 0, 20, 10), 3.0, neighbour)
@@ -36,7 +37,8 @@ def test_it_agrees_with_brute_force():
     rng = np.random.default_rng(4)
     corners = rng.uniform(0, 100, (300, 2))
     boxes = [box(x, y, x + 4, y + 3) for x, y in corners]
-    ground, taken = Occupancy(), []
+    ground = Occupancy()
+    taken = []
     for candidate in boxes:
         free = all(candidate.distance(other) >= 1.0 for other in taken)
         assert ground.is_free(candidate, 1.0) == free

@@ -70,7 +70,8 @@ def test_points_lie_on_the_geometry_that_was_hit(world, geometries, scans):
     """Drake's signed distance of a point is at most a tenth of a millimetre."""
     rng = np.random.default_rng(0)
     inspector = world.scene_graph.model_inspector()
-    checked, refused = 0, 0
+    checked = 0
+    refused = 0
     for p_W, d_W, hits in scans:
         seen = np.unique(hits.geometry[hits.geometry >= 0])
         for index in rng.choice(seen, 15, replace=False):
@@ -130,7 +131,9 @@ def _open3d_scene(stage_file):
     import open3d
 
     meshes = {}
-    vertices, triangles, count = [], [], 0
+    vertices = []
+    triangles = []
+    count = 0
     for visual in ElementTree.parse(stage_file).iter("visual"):
         X_WG = _pose(visual.findtext("pose", "0 0 0 0 0 0"))
         (shape,) = visual.find("geometry")

@@ -62,7 +62,8 @@ def test_check_is_silent_when_all_is_well(world, capsys):
 
 
 def test_check_names_what_would_change(world, capsys):
-    changed, stale = world / "structures.csv", world / "meshes" / "old.obj"
+    changed = world / "structures.csv"
+    stale = world / "meshes" / "old.obj"
     good = changed.read_bytes()
     changed.write_bytes(good + b"#")
     stale.write_text("")

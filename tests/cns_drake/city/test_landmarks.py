@@ -69,6 +69,7 @@ def test_a_model_is_stretched_about_the_middle_of_its_lot(name, number, folder):
     expected = before[:, :, :2] * (across, 1.0) + np.array((3.0, -7.0))
     # Positions are rounded to 1 mm, scales to 0.0001.
     np.testing.assert_allclose(after[:, :, :2], expected, atol=0.01, rtol=2e-4)
-    z, z_before = after[:, :, 2], before[:, :, 2]
+    z = after[:, :, 2]
+    z_before = before[:, :, 2]
     assert z.max() == pytest.approx(z_before.max() * high / height, abs=0.01)
     assert z.min() == pytest.approx(z_before.min(), abs=0.002)

@@ -95,7 +95,10 @@ def test_windows_of_a_gable_are_recesses_with_a_pane():
 
 
 def test_a_hip_on_a_turned_rectangle():
-    eaves, fascia, z, top = 0.5, 0.3, 6.0, 9.3
+    eaves = 0.5
+    fascia = 0.3
+    z = 6.0
+    top = 9.3
     roof = roofs.hip(TURNED, z, top, eaves, fascia)
     assert out_of_plane(roof) < 1e-9
     # A box of 15 m by 10 m below, half a prism and a pyramid above.

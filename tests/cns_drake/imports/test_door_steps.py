@@ -46,7 +46,9 @@ def low_floors(structures):
 def test_floors_rise_with_the_paving(shops):
     city, drive = shops
     # Paving that rises along the street, across the heights of all doors.
-    x, y, slope = 100.0, 40.0, 0.001
+    x = 100.0
+    y = 40.0
+    slope = 0.001
     ground = np.array(
         [[(-x, -y, 0.0), (x, -y, 0.0), (x, y, 0.0)],
          [(-x, -y, 0.0), (x, y, 0.0), (-x, y, 0.0)]]

@@ -120,7 +120,8 @@ def test_recesses_take_their_volume_and_nothing_else(row):
             for name in ("body", "roof", "glass", "frames", "doors")
             if name in parts
         ]
-        taken, deepest = 0.0, 0.0
+        taken = 0.0
+        deepest = 0.0
         for triangle, out in fronts(one, parts):
             taken -= area(triangle[None]) * out
             deepest = min(deepest, out)
@@ -389,7 +390,8 @@ def write_quarter(folder):
 
 
 def run_import(folder, *options):
-    source, output = write_quarter(folder), folder / "quarter"
+    source = write_quarter(folder)
+    output = folder / "quarter"
     result = CliRunner().invoke(
         app, ["import", str(source), "--output", str(output), *options]
     )

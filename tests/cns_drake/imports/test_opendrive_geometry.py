@@ -47,7 +47,8 @@ SHAPES = [
 
 def write_every_kind(path):
     """A road of all curves, with heights, roll, and lanes that change."""
-    pieces, s = [], 0.0
+    pieces = []
+    s = 0.0
     for k, (shape, length) in enumerate(SHAPES):
         # Roads are apart, so that none hides the faults of another.
         pieces.append(
@@ -91,7 +92,8 @@ def outlines(path):
 def deviation(path, spacing, only=None):
     """The greatest distance of independent places from the program's [m]."""
     bands = outlines(path)
-    worst, count = 0.0, 0
+    worst = 0.0
+    count = 0
     for name, number, _, inner, outer in sampled_lanes(path, spacing, only):
         for edge, points in (("inner", inner), ("outer", outer)):
             lines = [LineString(getattr(b, edge)) for b in bands[name, number]]

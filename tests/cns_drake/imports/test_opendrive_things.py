@@ -214,7 +214,8 @@ def test_a_wall_without_gaps_follows_the_curve(tmp_path, curvature, t0, t1):
     assert (found.name, found.semantic_class) == ("object_1_0_0", "fence")
     s = np.linspace(START, START + LENGTH, 2000)
     t = t0 + (t1 - t0) * (s - START) / LENGTH
-    angle, radius = s * curvature, 1 / curvature - t
+    angle = s * curvature
+    radius = 1 / curvature - t
     middle = np.stack(
         [radius * np.sin(angle), 1 / curvature - radius * np.cos(angle)], axis=1
     )

@@ -337,7 +337,8 @@ def test_nobody_meets_anybody(blocks):
     assert len(plan.kinds) == plan.walkers.values.shape[1] == 12
     paved = surface(city).buffer(0.1)
     shapely.prepare(paved)
-    on_street, crossed = [], 0
+    on_street = []
+    crossed = 0
     for t in np.arange(0.0, 120.0, 0.25):
         xy, yaw = ego(np.array([t]))
         xy[:, 0] += (EGO_BOX.rear + EGO_BOX.front) / 2

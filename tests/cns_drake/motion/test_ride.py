@@ -133,7 +133,10 @@ def test_steady_acceleration_tilts_the_body(sign):
 
     # Two axles that carry the body over springs in series with tyres.
     k = 2 * 21900.0 * 190000.0 / (21900.0 + 190000.0)
-    m, h, front, rear = 1480.0, 0.55, 1.5, 1.3
+    m = 1480.0
+    h = 0.55
+    front = 1.5
+    rear = 1.3
     # Moments about y: heave and pitch are coupled unless both arms are alike.
     stiffness = np.array(
         [
@@ -152,7 +155,8 @@ def test_steady_acceleration_tilts_the_body(sign):
 
 
 def test_bends_and_slopes_tilt_the_body_by_the_specific_force():
-    radius, slope = 30.0, 0.1
+    radius = 30.0
+    slope = 0.1
     trajectory = ride(helix_points(radius, slope, 160), Level())
     t = trajectory.duration / 2
     moment = trajectory.at(t)

@@ -15,7 +15,8 @@ def line(start, angle, length, step):
 
 @pytest.mark.slow
 def test_the_spectrum_along_lines_is_that_of_the_class():
-    step, window = 0.1, 600.0
+    step = 0.1
+    window = 600.0
     spectra = []
     for seed in range(5):
         profile = RoadProfile("C", seed)

@@ -53,7 +53,8 @@ def test_static_tilt_is_that_of_springs_in_series_with_tyres():
     np.testing.assert_allclose(q[:2], 0.0, atol=1e-12)
 
     q = car.at_rest(leftward)
-    body, axles = 4 * SPRING * 0.8**2 + 2 * bar, 4 * TYRE * 0.8**2
+    body = 4 * SPRING * 0.8**2 + 2 * bar
+    axles = 4 * TYRE * 0.8**2
     stiffness = body * axles / (body + axles)
     # Right side down.
     assert q[1] == pytest.approx(3.0 * weight / (stiffness - weight * GRAVITY))

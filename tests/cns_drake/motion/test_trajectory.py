@@ -186,7 +186,8 @@ def test_path_integrals():
 
 
 def test_wheels_of_a_steady_bend_roll_on_circles():
-    radius, r = 25.0, smoothed_radius(25.0)
+    radius = 25.0
+    r = smoothed_radius(25.0)
     trajectory = Trajectory(lane_path(helix_points(radius, 0, 100)), CAREFUL)
     t = trajectory.duration / 2 + np.array([0.0, 0.5])
     yaw_rate = trajectory.path_parameter(t)[1] / radius

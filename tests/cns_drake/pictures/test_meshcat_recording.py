@@ -104,7 +104,8 @@ def scan_at(time, name):
 class _Car(LeafSystem):
     def __init__(self, plant):
         super().__init__()
-        self._plant, self._scratch = plant, plant.CreateDefaultContext()
+        self._plant = plant
+        self._scratch = plant.CreateDefaultContext()
         # One object is reused for all times, as a careless system may do.
         self._X_WB = RigidTransform()
         time = {self.time_ticket()}

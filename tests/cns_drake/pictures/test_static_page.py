@@ -34,7 +34,8 @@ def test_page_holds_the_same_commands_in_the_same_order(meshcat):
 
 
 def test_page_is_smaller_than_the_one_of_drake(meshcat):
-    page, original = make_static_page(meshcat, "t"), meshcat.StaticHtml()
+    page = make_static_page(meshcat, "t")
+    original = meshcat.StaticHtml()
     # 30,000 equal vertices and 10,000 faces, 480 kB raw.
     assert len(page) < len(original) - 600_000
 

@@ -78,7 +78,8 @@ def test_nearness_of_many_shapes_is_that_of_each():
         X_WF = RigidTransform(
             RollPitchYaw(*rng.uniform(-3.0, 3.0, 3)), rng.uniform(-9.0, 9.0, 3)
         )
-        X_FL, surface = np.eye(4), SHAPES[k % len(SHAPES)]
+        X_FL = np.eye(4)
+        surface = SHAPES[k % len(SHAPES)]
         if k % len(SHAPES) == 0:
             X_FL = np.diag([0.5, 1.0, 2.0, 1.0])
         member = (k, RigidTransform([0.1, 0.0, 0.2]), surface)

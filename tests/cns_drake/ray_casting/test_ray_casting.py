@@ -323,7 +323,8 @@ def test_a_ray_that_hardly_leaves_a_plane(axis, tiny):
     walls = []
     for k in range(3):
         for side in (-1, 1):
-            size, place = np.full(3, 30.0), np.zeros(3)
+            size = np.full(3, 30.0)
+            place = np.zeros(3)
             size[k], place[k] = 1.0, side * 5.0
             walls.append(geometry(box_surface(size), RigidTransform(place)))
     scene = RayCastingScene(walls, {WORLD}, identity)

@@ -21,7 +21,8 @@ def feed(write, count):
 
 
 def test_everything_is_written_in_order_and_elsewhere():
-    written, threads = [], set()
+    written = []
+    threads = set()
 
     def write(*message):
         written.append(message)
@@ -35,7 +36,8 @@ def test_everything_is_written_in_order_and_elsewhere():
 
 
 def test_few_messages_wait():
-    handed, lags = 0, []
+    handed = 0
+    lags = []
 
     def write(k):
         lags.append(handed - k)
@@ -48,7 +50,8 @@ def test_few_messages_wait():
 
 
 def test_small_messages_go_with_the_next_large_one():
-    written, has_large = [], threading.Event()
+    written = []
+    has_large = threading.Event()
 
     def write(data):
         written.append(data)

@@ -114,7 +114,8 @@ def test_depths_are_those_along_the_rays_of_K():
 @pytest.mark.slow
 def test_edges_of_labels_are_where_K_has_them():
     """The wall fills a quadrant whose corner is ahead; no pixel is off."""
-    size, z = 40.0, 10.0
+    size = 40.0
+    z = 10.0
     for corner in ([0.021, -0.013], [-0.037, 0.045]):
         place = [corner[0] + size / 2, corner[1] + size / 2, z + 0.5]
         images = rendered(

@@ -114,7 +114,8 @@ def test_a_real_run_ends_in_one_line_and_goes_on(tmp_path, request, disk):
         for chunk in chunks
         if chunk.message_start_time == start_ns
     )
-    output, preexec = tmp_path, None
+    output = tmp_path
+    preexec = None
     if disk == "tmpfs":
         small = request.getfixturevalue("tmpfs")
         small.leave(half // PAGE)

@@ -150,7 +150,8 @@ def test_imu_says_what_it_does_not_measure():
 
 @pytest.mark.parametrize("variance", [0.0, 1e-13, 2e-12, 0.04])
 def test_noise_has_its_variance_and_no_value_none(variance):
-    vector, variances = np.zeros(3), (variance, 3 * variance)
+    vector = np.zeros(3)
+    variances = (variance, 3 * variance)
     imu = decode(messages.make_imu(None, vector, vector, STAMP_NS, variances))
     for covariance, expected in zip(
         (imu.linear_acceleration_covariance, imu.angular_velocity_covariance),

@@ -317,7 +317,8 @@ def test_more_definitions_than_a_recording_has(tmp_path):
 def test_false_chunks_do_not_keep_a_reader_busy():
     # Each has the form of a chunk up to the end of the file, and must be read
     # to find out that it is none.
-    count, size = 3000, 53
+    count = 3000
+    size = 53
     total = 8 + count * size
     content = bytearray(MCAP0_MAGIC)
     for _ in range(count):

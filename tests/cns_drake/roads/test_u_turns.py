@@ -240,7 +240,9 @@ def test_faults_of_turning_round(tmp_path, style, legs, fault):
 
 @pytest.mark.parametrize("turn_deg", [-179, -155, 151, 170, 180])
 def test_waypoints_that_double_back_are_loops(turn_deg):
-    start, heading, turn = np.array([3.0, -2.0]), 0.4, np.radians(turn_deg)
+    start = np.array([3.0, -2.0])
+    heading = 0.4
+    turn = np.radians(turn_deg)
     legs = [
         40.0 * np.array([np.cos(angle), np.sin(angle)])
         for angle in (heading, heading + turn)

@@ -35,7 +35,8 @@ def test_a_straight_line_is_followed_exactly(load):
 @pytest.mark.parametrize("turn_deg", [-120, -90, -10, 45, 149])
 def test_corners_are_arcs(turn_deg):
     turn = np.radians(turn_deg)
-    start, angle = np.array([7.0, -3.0]), 0.4
+    start = np.array([7.0, -3.0])
+    angle = 0.4
     legs = 60.0 * np.array([np.cos(angle), np.sin(angle)])
     onward = 60.0 * np.array([np.cos(angle + turn), np.sin(angle + turn)])
     corner = start + legs

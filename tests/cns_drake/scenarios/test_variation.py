@@ -245,7 +245,8 @@ class Redrawing:
     """Draws cities with a row of trees, ten times the seed of them."""
 
     def __init__(self, town, output):
-        self.town, self.output = town, output
+        self.town = town
+        self.output = output
         self.calls = []
 
     def __call__(self, map_folder, stage, seeds):

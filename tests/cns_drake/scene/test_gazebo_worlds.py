@@ -72,7 +72,8 @@ def link(geometry=BOX, extra="", pose="", name="l"):
 
 def boxes(world):
     """Structure -> least and greatest coordinates of its surfaces (2, 3)."""
-    plant, found = world.plant, {}
+    plant = world.plant
+    found = {}
     context = plant.CreateDefaultContext()
     inspector = world.scene_graph.model_inspector()
     for one in read_perception_geometry(inspector):

@@ -282,7 +282,8 @@ def binary_ply(order, faces, size="uchar", end="\n", more=b""):
 def test_faces_of_ply_have_three_corners(tmp_path, corners):
     """Open3D 0.19 reads the other ones from memory that is not theirs."""
     path = tmp_path / "thing.ply"
-    few, good = tuple(range(corners)), (0, 1, 2, 3)
+    few = tuple(range(corners))
+    good = (0, 1, 2, 3)
     row = " ".join(map(str, (corners, *few)))
     texts = [ply(FACES.format("vertex_index").replace("face 1", "face 2"),
                  f"4 0 1 2 3\n{row}\n").encode()]  # fmt: skip

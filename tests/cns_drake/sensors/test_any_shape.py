@@ -206,7 +206,8 @@ def test_a_mesh_in_memory_is_that_of_the_file(kind, meshes, tmp_path):
         text, data = gltf_text(NODES, uri="parts/mesh.bin")
         files = {"parts/mesh.bin": MemoryFile(data, ".bin", "bin")}
     else:
-        text, files = meshes[kind].read_text(), {}
+        text = meshes[kind].read_text()
+        files = {}
     in_memory = InMemoryMesh(
         mesh_file=MemoryFile(text, f".{kind}", "mesh"), supporting_files=files
     )

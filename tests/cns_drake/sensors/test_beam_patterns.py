@@ -378,7 +378,8 @@ PATTERNS = {
 def test_every_pattern_measures_a_room_exactly(name):
     """Beam for beam, in the third frame, against the closed form."""
     pattern = PATTERNS[name]
-    size, p_WS = (9.0, 8.0, 6.0), np.array([0.7, 0.2, -0.4])
+    size = (9.0, 8.0, 6.0)
+    p_WS = np.array([0.7, 0.2, -0.4])
     stage = Stage()
     for axis in range(3):
         for side in (-1, 1):

@@ -324,7 +324,8 @@ def test_many_changes_leave_nothing_behind(seed, tmp_path):
     for step in range(40):
         storm.change()
         scan = stage.eval()
-        fresh, used = stage.context.Clone(), stage.context
+        fresh = stage.context.Clone()
+        used = stage.context
         stage.context = fresh
         np.testing.assert_array_equal(scan, stage.eval())
         stage.context = used

@@ -246,7 +246,8 @@ def test_all_kinds_of_shapes_hide_each_other():
     expected = np.full((3, len(p)), np.inf)
     d_G = d @ X_GW.rotation().matrix().T
     expected[0] = ellipsoid((X_GW @ p.T).T, d_G, axes)
-    away, half = p - [4.0, 6.0, 4.0], np.array([3.0, 0.25, 4.5])
+    away = p - [4.0, 6.0, 4.0]
+    half = np.array([3.0, 0.25, 4.5])
     sides = [(s * half - away) / d for s in (-1.0, 1.0)]
     near = np.minimum(*sides).max(axis=1)
     far = np.maximum(*sides).min(axis=1)

@@ -75,7 +75,9 @@ class Scanned:
                     one.get_geometry_pose_output_port(),
                     scene_graph.get_source_pose_port(one.get_source_id()),
                 )
-        self.plant, self.other, self.free = plant, other, free
+        self.plant = plant
+        self.other = other
+        self.free = free
         self.diagram = builder.Build()
         self.context = self.diagram.CreateDefaultContext()
         self.is_posed = is_posed
@@ -90,7 +92,8 @@ class Scanned:
                 plant.GetMyMutableContextFromRoot(self.context), body, X
             )
         if self.is_posed:
-            frames, X_WFs = {}, []
+            frames = {}
+            X_WFs = []
             for plant in (self.plant, self.other):
                 context = plant.GetMyContextFromRoot(self.context)
                 for k in map(BodyIndex, range(1, plant.num_bodies())):

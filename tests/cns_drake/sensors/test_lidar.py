@@ -23,7 +23,8 @@ from cns_drake.sensors.lidar.patterns import POINT_DTYPE
 
 def test_box_room():
     """A room's inner walls, seen from a tilted sensor off its middle."""
-    size, center = (10.0, 8.0, 3.0), np.array([0.7, 0.2, 1.0])
+    size = (10.0, 8.0, 3.0)
+    center = np.array([0.7, 0.2, 1.0])
     stage = Stage()
     for axis in range(3):
         for side in (-1, 1):
@@ -204,7 +205,8 @@ def test_a_cloned_context_sees_for_itself():
     stage.add("wall", Box(1.0, 9.0, 9.0), RigidTransform([20.5, 0.0, 0.0]))
     stage.finish(X_PS=RigidTransform(), pattern=FORWARD)
     assert ahead(stage.eval()) == pytest.approx(20.0, abs=1e-5)
-    original, stage.context = stage.context, stage.context.Clone()
+    original = stage.context
+    stage.context = stage.context.Clone()
     assert ahead(stage.eval()) == pytest.approx(20.0, abs=1e-5)
     stage.add_to_context(frame, Box(1.0, 9.0, 9.0))
     assert ahead(stage.eval()) == pytest.approx(10.0, abs=1e-5)
@@ -226,7 +228,8 @@ def test_a_cloned_context_has_poses_of_its_own():
         return ahead(stage.eval())
 
     assert ahead_from(1.0) == pytest.approx(19.0, abs=1e-5)
-    original, stage.context = stage.context, stage.context.Clone()
+    original = stage.context
+    stage.context = stage.context.Clone()
     assert ahead_from(3.0) == pytest.approx(17.0, abs=1e-5)
     stage.context = original
     assert ahead(stage.eval()) == pytest.approx(19.0, abs=1e-5)

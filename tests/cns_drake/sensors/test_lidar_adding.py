@@ -142,7 +142,8 @@ def test_bodies_of_another_source():
     plant, scene_graph = AddMultibodyPlantSceneGraph(builder, 0.0)
     plant.Finalize()
     source = scene_graph.RegisterSource("puppets")
-    frames, poses = [], FramePoseVector()
+    frames = []
+    poses = FramePoseVector()
     for name, x in (("mine", 3.0), ("other", 10.0)):
         frame = scene_graph.RegisterFrame(source, GeometryFrame(name))
         ball = GeometryInstance(RigidTransform(), Sphere(1.0), name)
@@ -257,7 +258,9 @@ def test_it_is_added_to_a_body_or_a_frame():
     ],
 )
 def test_returns_that_cannot_be(pattern, options, fault):
-    scene_graph, place, X_PS = SceneGraph(), None, RigidTransform()
+    scene_graph = SceneGraph()
+    place = None
+    X_PS = RigidTransform()
     builder = DiagramBuilder()
     builder.AddSystem(scene_graph)
     place = scene_graph.world_frame_id()

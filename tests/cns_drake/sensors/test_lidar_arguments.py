@@ -130,7 +130,8 @@ def test_sensors_need_a_finalized_plant(place):
 
 
 def test_odometry_keeps_the_pose_of_the_call():
-    site, X_PB = Site(), RigidTransform([0.0, 0.0, 1.0])
+    site = Site()
+    X_PB = RigidTransform([0.0, 0.0, 1.0])
     odometry = add_odometry(site.builder, site.world, X_PB=X_PB)
     X_PB.SetIdentity()
     assert odometry.X_PB.translation().tolist() == [0.0, 0.0, 1.0]

@@ -130,7 +130,8 @@ def test_each_point_has_its_geometry_body_and_model():
 def test_ports_have_methods_as_those_of_drakes_cameras():
     field = Field()
     field.add("ball", Sphere(1.0))
-    lidar, names = field.finish().lidar, set()
+    lidar = field.finish().lidar
+    names = set()
     for k in range(lidar.num_output_ports()):
         port = lidar.get_output_port(k)
         names.add(port.get_name())
@@ -440,7 +441,9 @@ def test_planes_and_what_stands_before_them():
 def test_a_cone_is_true():
     rng = np.random.default_rng(2)
     n = 2000
-    height, a, b = 4.0, 10.0, 6.0
+    height = 4.0
+    a = 10.0
+    b = 6.0
     field = Field()
     cone = field.add("cone", MeshcatCone(height, a, b))
     d = rng.normal(size=(n, 3)) * [1.0, 1.0, 0.2]
@@ -451,7 +454,9 @@ def test_a_cone_is_true():
     p = np.array([0.5, -0.4, 2.0])
     field.move(field.car, RigidTransform(p))
     scale = np.array([1 / a, 1 / b, 1 / height])
-    P, D, sign = p * scale, d * scale, np.array([1.0, 1.0, -1.0])
+    P = p * scale
+    D = d * scale
+    sign = np.array([1.0, 1.0, -1.0])
     A, B = (D * D * sign).sum(axis=1), (P * D * sign).sum(axis=1)
     root = np.sqrt(B * B - A * (P * P * sign).sum())
     roots = np.stack([(-B - root) / A, (-B + root) / A])

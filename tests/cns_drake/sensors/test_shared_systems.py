@@ -68,7 +68,8 @@ class Reader:
 def test_a_thread_may_interrupt_another_at_any_line(make, port):
     expected = Reader(make(), port).at(1.0)
     system = make()
-    other, times = Reader(system, port), itertools.cycle([6.0, 12.0, 18.0])
+    other = Reader(system, port)
+    times = itertools.cycle([6.0, 12.0, 18.0])
     lines = set()
 
     def interrupt(frame, *_):
@@ -78,7 +79,8 @@ def test_a_thread_may_interrupt_another_at_any_line(make, port):
             other.at(next(times))
         return interrupt
 
-    reader, before = Reader(system, port), sys.gettrace()
+    reader = Reader(system, port)
+    before = sys.gettrace()
     sys.settrace(interrupt)
     try:
         found = reader.at(1.0)

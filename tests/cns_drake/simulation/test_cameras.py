@@ -124,7 +124,8 @@ def test_points_of_the_lidar_meet_depths_and_classes(recording, messages):
     poses = frames_of(messages)
     X_CL = np.linalg.inv(poses["front"]) @ poses["lidar"]
     K = messages["/front/camera_info"][0][1].k.reshape(3, 3)
-    scans, seen = McapDrive(recording), set()
+    scans = McapDrive(recording)
+    seen = set()
     for k, (depth, label) in enumerate(
         zip(messages["/front/depth"], messages["/front/label"], strict=True)
     ):
@@ -136,11 +137,14 @@ def test_points_of_the_lidar_meet_depths_and_classes(recording, messages):
         p = np.stack([scan["x"], scan["y"], scan["z"]], axis=1).astype(float)
         p_C = p @ X_CL[:3, :3].T + X_CL[:3, 3]
         ahead = p_C[:, 2] > 0.5
-        p_C, expected = p_C[ahead], scan["label"][ahead]
+        p_C = p_C[ahead]
+        expected = scan["label"][ahead]
         u, v = (p_C @ K.T)[:, :2].T / p_C[:, 2]
         col, row = np.rint([u, v]).astype(int)
         inside = (col > 0) & (col < 319) & (row > 0) & (row < 239)
-        col, row, z = col[inside], row[inside], p_C[inside, 2]
+        col = col[inside]
+        row = row[inside]
+        z = p_C[inside, 2]
         assert len(z) > 500
         around = np.stack(
             [Z[row + i, col + j] for i in (-1, 0, 1) for j in (-1, 0, 1)]

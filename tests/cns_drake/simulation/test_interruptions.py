@@ -113,7 +113,8 @@ def kill_often(runner, output, seed, uninterrupted):
     kills = recordings = most_lost = 0
     while True:
         folder = output / str(recordings) / "tiny_01"
-        readable, killed = 0, True
+        readable = 0
+        killed = True
         while killed:
             kill_signal = None
             if kills < KILLS_EACH:

@@ -51,7 +51,8 @@ class Drive:
             odometry=add_odometry(builder, robot),
             period=PERIOD,
         )
-        self.plant, self.robot = plant, robot
+        self.plant = plant
+        self.robot = robot
         self.diagram = builder.Build()
         self.simulator = Simulator(self.diagram, self.fresh_context())
 

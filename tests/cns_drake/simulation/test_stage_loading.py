@@ -60,7 +60,8 @@ def test_recordings_and_surveys_see_the_same_changes(scenario, tmp_path):
         simulate(changed, tmp_path / name)
     first, second = (recorded(tmp_path / n) for n in ("first", "second"))
     assert first.read_bytes() == second.read_bytes()
-    recording, survey = McapDrive(first, None), SimulatedDrive(changed)
+    recording = McapDrive(first, None)
+    survey = SimulatedDrive(changed)
     plain = SimulatedDrive(scenario)
     for index in range(3):
         scan = recording.scan(index)

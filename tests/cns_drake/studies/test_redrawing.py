@@ -237,7 +237,8 @@ def test_an_interrupted_run_leaves_nothing_and_goes_on(
     town, tmp_path, monkeypatch
 ):
     output = tmp_path / "cities"
-    replace, calls = os.replace, []
+    replace = os.replace
+    calls = []
 
     def interrupted(source, target):
         calls.append(target)

@@ -79,7 +79,8 @@ def extent(body):
 @pytest.mark.parametrize("number", range(len(KINDS)))
 def test_vehicles_stand_on_the_ground_and_fill_their_boxes(bodies, number):
     """And the wheels are below the axles with which they follow lanes."""
-    kind, body = KINDS[number], bodies[number]
+    kind = KINDS[number]
+    body = bodies[number]
     low, high = extent(body)
     length, width, height = kind.size
     assert low[2] == pytest.approx(0.0, abs=1e-9)
@@ -129,7 +130,8 @@ def test_the_boxes_of_large_and_of_small_vehicles():
 
 
 def test_kinds_are_drawn_by_their_shares():
-    rng, number = np.random.default_rng(7), 20_000
+    rng = np.random.default_rng(7)
+    number = 20_000
     count = np.bincount(draw_kinds(number, rng), minlength=len(KINDS))
     shares = np.array([kind.share for kind in KINDS])
     expected = number * shares / shares.sum()

@@ -159,7 +159,8 @@ def test_the_ego_car_is_another_one_than_all_vehicles():
 
 def test_vehicles_begin_apart_from_each_other_and_from_the_lines():
     """9 m apart, 1 m from the lane's ends; they can stop before its end."""
-    streets, rng = two_lanes(60.0), np.random.default_rng(5)
+    streets = two_lanes(60.0)
+    rng = np.random.default_rng(5)
     places, speeds = [], []
     for _ in range(150):
         kinds = [KINDS[k] for k in rng.integers(len(KINDS), size=6)]
@@ -205,7 +206,8 @@ def test_of_two_drawn_ways_that_to_the_emptier_lane(others, expected):
         cars = np.append(cars, vehicles((1, 200.0, V)))
         cars["path"][-1, CURRENT + 1 :] = -1
     traffic = traffic_of(streets, cars, seed=7)
-    number, first = 600, 0
+    number = 600
+    first = 0
     for _ in range(number):
         choose_way(traffic, 0)
         way, beyond = cars["path"][0, CURRENT + 1 : CURRENT + 3]

@@ -33,9 +33,11 @@ def test_vehicles_that_leave_one_signal_on_green_meet_green(limit, time):
 
     No column is faster than 9 m/s.
     """
-    pieces, count = [], 4
+    pieces = []
+    count = 4
     for j in range(count):
-        at, first = 90.0 * j * AHEAD, len(pieces)
+        at = 90.0 * j * AHEAD
+        first = len(pieces)
         across = at + 70.0 * AHEAD - 40.0 * ASIDE
         # Behind the last one a way without a signal leads back.
         pieces += [
@@ -46,7 +48,8 @@ def test_vehicles_that_leave_one_signal_on_green_meet_green(limit, time):
             piece(across + 30 * ASIDE, ASIDE, 20.0, first + 2, junction=j,
                   phase=1, way=True),
         ]  # fmt: skip
-    at, first = 90.0 * count * AHEAD, len(pieces)
+    at = 90.0 * count * AHEAD
+    first = len(pieces)
     pieces += [
         piece(at, AHEAD, 60.0, first + 1, junction=count, limit=limit),
         piece(at + 60 * AHEAD, AHEAD, 30.0, 0, junction=count, way=True),
@@ -137,7 +140,8 @@ def test_walkers_cross_while_vehicles_before_them_wait(name):
     graph = make_lane_graph(network)
     begin = find_conflicts(graph)[0][0]
     signals = make_signals(graph, begin)
-    t, number = np.arange(0.0, signals.cycle, 0.1), len(graph.pieces)
+    t = np.arange(0.0, signals.cycle, 0.1)
+    number = len(graph.pieces)
     with_signal = 0
     for c in range(number, len(begin)):
         walk = green_at(signals, c, t)

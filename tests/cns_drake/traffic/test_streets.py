@@ -127,7 +127,8 @@ def test_vehicles_leave_a_lane_before_the_ego_car_is_there():
             is_far = is_ego_far(streets, 0, 2, s_free + beyond, wait)
             assert is_far == (beyond > 0)
     # It is on the first lane: vehicles may follow 2 m behind it.
-    k, rear = 100, s[100] - 1.0
+    k = 100
+    rear = s[100] - 1.0
     assert is_ego_far(streets, k, 0, rear - 2.01, 5.0)
     assert not is_ego_far(streets, k, 0, rear - 1.99, 5.0)
     oncoming, _ = drive(-1)
@@ -203,13 +204,15 @@ def bend(radius):
 def swept_radii(radius, size, axles):
     """Both axles are on a circle, and the body's axis is on a chord."""
     height = radius * np.cos((axles[1] - axles[0]) / 2 / radius)
-    half, middle = size[1] / 2 + 0.25, sum(axles) / 2
+    half = size[1] / 2 + 0.25
+    middle = sum(axles) / 2
     reach = max(size[0] / 2 - middle, size[0] / 2 + middle)
     return height - half, np.hypot(height + half, reach)
 
 
 def test_what_a_bus_sweeps_in_a_bend():
-    size, axles = LARGEST.size[:2], (-2.0, 3.6)
+    size = LARGEST.size[:2]
+    axles = (-2.0, 3.6)
     _, hulls = swept_hulls(bend(20.0), size, axles)
     swept = shapely.union_all(hulls)
     inner, outer = swept_radii(20.0, size, axles)

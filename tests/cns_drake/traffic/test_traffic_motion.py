@@ -82,7 +82,8 @@ def make_plan():
 
 def test_slow_walkers_swing_their_limbs_less():
     """By the part of 1.2 m/s at which they walk, and all faster ones alike."""
-    t, zero = 0.1 * np.arange(30), np.zeros(30)
+    t = 0.1 * np.arange(30)
+    zero = np.zeros(30)
     rows = [[speed * t, zero, zero, zero, 5.0 * t] for speed in (0.6, 0.3, 1.5)]
     rows.append([zero, 0.6 * t, zero, zero, 5.0 * t])
     none = Tracks(0.1, np.zeros((30, 0, 5)))

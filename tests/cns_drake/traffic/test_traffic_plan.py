@@ -349,7 +349,9 @@ def test_walkers_pass_what_stands_on_sidewalks():
         ego=far,
         ego_box=BOX,
     )
-    tree, met, near = shapely.STRtree(things), 0, 0
+    tree = shapely.STRtree(things)
+    met = 0
+    near = 0
     for t in np.arange(0.0, 40.0, 0.5):
         walkers = traffic.walkers.at(t)[0]
         sizes = np.tile(WALKER_SIZE[:2], (len(walkers), 1))

@@ -23,7 +23,9 @@ B = 2.0
 
 def straight_lanes(lengths, start, along):
     """Returns pieces that follow each other on a line."""
-    rows, points, begin = np.zeros(len(lengths), PIECE), [], 0.0
+    rows = np.zeros(len(lengths), PIECE)
+    points = []
+    begin = 0.0
     for row, length in zip(rows, lengths, strict=True):
         row["first"], row["num_points"] = len(points), 5
         row["step"], row["length"] = length / 4, length
@@ -36,7 +38,8 @@ def straight_lanes(lengths, start, along):
 @pytest.mark.parametrize("s", [0.4, 3.0, 12.0])
 def test_a_bus_stands_with_both_axles_on_its_way(s):
     start = np.array([20.0, -30.0, 2.0])
-    heading, climb = 2.0, 0.1
+    heading = 2.0
+    climb = 0.1
     along = np.array([*(np.cos(climb) * f(heading) for f in (np.cos, np.sin))])
     along = np.append(along, np.sin(climb))
     lengths = [7.0, 2.0, 1.5, 20.0]
@@ -98,7 +101,10 @@ def test_brakes_for_a_slower_vehicle():
 
 def test_integrates_to_the_equilibrium_gap():
     """A following car ends at that gap within 1 %."""
-    leader, x, v, dt = 60.0, 0.0, 4.0, 0.1
+    leader = 60.0
+    x = 0.0
+    v = 4.0
+    dt = 0.1
     for _ in range(6000):
         new = max(0.0, v + dt * acceleration(v, leader - x, v - 10.0))
         x += 0.5 * (v + new) * dt

@@ -62,7 +62,8 @@ def test_a_walker_alone_relaxes_to_its_speed(angle):
     """Within 0.5 s: the rest shrinks by a fifth in a step of 0.1 s."""
     street = Street(angle, (10.0, 0.0, 1))
     street.walkers["velocity"] = 0.0
-    phase, s = street.walkers["phase"][0], 10.0
+    phase = street.walkers["phase"][0]
+    s = 10.0
     for k in range(1, 40):
         before = 1.0 - 0.8 ** (k - 1)
         street.step()
@@ -226,7 +227,9 @@ def test_few_walkers_cross_and_none_goes_back():
     crossings = make_crossings(graph)
     crowd = Crowd(1, ways[:2], crossings, np.random.default_rng(2))
     crowd = Crowd(1, ways, crossings, np.random.default_rng(2))
-    walkers, number, crosses = crowd.walkers, 500, 0
+    walkers = crowd.walkers
+    number = 500
+    crosses = 0
     for seed in range(number):
         walkers["path"], walkers["at"], walkers["next_path"] = 0, 118, -1
         walkers["xy"], walkers["velocity"] = (4.0 + 59.9, -2.0), 0.0
@@ -250,7 +253,8 @@ def test_walkers_use_a_crossing_that_is_open():
     crossings = make_crossings(graph)
     ways = [straight(0.5), over]
     crowd = Crowd(3, ways, crossings, np.random.default_rng(2))
-    walkers, ahead = crowd.walkers, np.array([np.cos(0.5), np.sin(0.5)])
+    walkers = crowd.walkers
+    ahead = np.array([np.cos(0.5), np.sin(0.5)])
     crossings["users"] = 3
     crossings["is_open"] = True
     for one, (s, path) in zip(

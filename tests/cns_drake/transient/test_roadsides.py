@@ -93,7 +93,8 @@ def test_a_part_has_some_of_the_things_of_the_whole(changed):
     for name, thing in some.items():
         assert np.array_equal(thing.p_WPs, whole[name].p_WPs)
     # Each stands by a draw of its own: five standard deviations.
-    expected, spread = 0.4 * len(whole), np.sqrt(0.24 * len(whole))
+    expected = 0.4 * len(whole)
+    spread = np.sqrt(0.24 * len(whole))
     assert abs(len(some) - expected) < 5 * spread
 
 

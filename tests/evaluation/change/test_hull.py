@@ -120,7 +120,8 @@ def test_nearly_flat_clouds_have_a_hull(thickness):
 
 @pytest.mark.parametrize("flat", [False, True])
 def test_a_margin_moves_each_face(flat):
-    R, offset = rotation(3), np.array([352_345.0, 4_026_780.0, 40.0])
+    R = rotation(3)
+    offset = np.array([352_345.0, 4_026_780.0, 40.0])
     cube = CUBE[CUBE[:, 2] == 0.0] if flat else CUBE
     top = 0.0 if flat else 3.0
     at = np.array([[0.5, 1.0, top + 0.5], [1.5, 1.0, 0.0], [0.5, 2.5, 0.0]])

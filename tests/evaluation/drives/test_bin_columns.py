@@ -22,7 +22,8 @@ def street():
 
 def columns(kind):
     """Returns a cloud with the columns of a program."""
-    points, even = street(), RNG.uniform(0.0, 1.0, (NUM, 3))
+    points = street()
+    even = RNG.uniform(0.0, 1.0, (NUM, 3))
     number = np.arange(NUM)
     normals = RNG.normal(size=(NUM, 3))
     normals /= np.linalg.norm(normals, axis=1, keepdims=True)

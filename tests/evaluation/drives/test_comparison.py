@@ -19,7 +19,8 @@ class Driven(Drive):
     """A drive without scans, at given poses, 20 a second."""
 
     def __init__(self, name, xyz, yaw, roll_pitch=None, world_frame="map"):
-        self.name, self.world_frame = name, world_frame
+        self.name = name
+        self.world_frame = world_frame
         angles = np.zeros((len(xyz), 3))
         angles[:, 0] = yaw
         if roll_pitch is not None:
@@ -118,7 +119,9 @@ def test_an_oscillation_has_its_spread_and_correlation_length():
 @pytest.mark.slow
 def test_an_ornstein_uhlenbeck_process_is_measured_as_it_is():
     rng = np.random.default_rng(RNG_SEED)
-    spread, length, step = 0.35, 50.0, 0.5
+    spread = 0.35
+    length = 50.0
+    step = 0.5
     decay = math.exp(-step / length)
     noise = rng.normal(size=200_000) * spread * math.sqrt(1 - decay**2)
     values = np.empty(len(noise))

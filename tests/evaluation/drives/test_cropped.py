@@ -21,7 +21,8 @@ def tilted_pose():
 
 def test_each_product_and_each_sum_is_rounded():
     """Python's floats are rounded so, on every processor."""
-    scan, X = random_scan(200), tilted_pose()
+    scan = random_scan(200)
+    X = tilted_pose()
     expected = []
     for x, y, z in zip(*(scan[axis].tolist() for axis in "xyz"), strict=True):
         moved = [a * x + b * y + c * z + d for a, b, c, d in X[:3].tolist()]

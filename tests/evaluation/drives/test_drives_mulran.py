@@ -144,7 +144,8 @@ def test_scans_beyond_the_poses_are_left_out_and_noted(tmp_path):
 
 
 def test_a_pose_at_the_very_stamp_serves_alone(tmp_path):
-    stamps_ns, X_UB = [T0_NS, T0_NS + 20 * SCAN_PERIOD_NS], pose_table()[1][:2]
+    stamps_ns = [T0_NS, T0_NS + 20 * SCAN_PERIOD_NS]
+    X_UB = pose_table()[1][:2]
     write_drive(tmp_path / "s", table=(stamps_ns, X_UB))
     with pytest.raises(InputError, match="time: no pose for the scan"):
         open_drive(tmp_path / "s")

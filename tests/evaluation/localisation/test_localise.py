@@ -157,7 +157,8 @@ def test_a_step_is_that_of_weighted_least_squares(method):
     surface = make_surface(street(density=1.0))
     X = a_pose(1.0, 2.0, 1.7)
     scan = poses.transform(poses.inverse(X), street(9, density=0.1)) + 0.05
-    width, spread = 1.5, None
+    width = 1.5
+    spread = None
     if method == "robust-gicp":
         cloud = small_gicp.PointCloud(scan)
         small_gicp.estimate_covariances(cloud, num_neighbors=10)
@@ -471,14 +472,16 @@ def test_an_end_without_a_pose_is_a_failure():
 @pytest.mark.parametrize(("number", "is_sparse"), [(9, True), (10, False)])
 def test_a_scan_of_few_points_is_a_failure(number, is_sparse):
     found = localiser(street(), "icp")
-    X_WS, still = a_pose(0, 0, 1.7), np.zeros((2, 3))
+    X_WS = a_pose(0, 0, 1.7)
+    still = np.zeros((2, 3))
     rows = np.array(
         [
             one_query(found, X_WS, street()[:number], *still),
             one_query(found, X_WS, street(), *still),
         ]
     )
-    values, notes = summary(rows), []
+    values = summary(rows)
+    notes = []
     note_sparse("town", rows, notes.append)
     assert values["success_03m_1deg"] == (0.5 if is_sparse else 1.0)
     assert values["without_pose"] == int(is_sparse) == len(notes)

@@ -257,7 +257,9 @@ def test_a_map_has_the_first_point_of_each_cell():
         scan["instance"] = rng.integers(1, 9, 500)
         builder.add(scan, np.eye(4))
         whole.append(scan)
-    whole, seen, expected = np.concatenate(whole), set(), []
+    whole = np.concatenate(whole)
+    seen = set()
+    expected = []
     for point in whole.tolist():
         cell = tuple(np.floor(np.array(point[:3]) / THINNED))
         if cell not in seen:

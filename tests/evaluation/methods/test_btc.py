@@ -39,7 +39,8 @@ def make_scene(seed, noise=0.0):
             )
         )
     for _ in range(4):
-        corner, width = rng.uniform(-SIZE, SIZE, 2), rng.uniform(5.0, 12.0)
+        corner = rng.uniform(-SIZE, SIZE, 2)
+        width = rng.uniform(5.0, 12.0)
         u, z = np.meshgrid(np.arange(0, width, 0.25), np.arange(0, 6, 0.25))
         wall = np.zeros((u.size, 3))
         wall[:, rng.integers(2)] = u.ravel()

@@ -111,7 +111,8 @@ class TestFindMotion:
     def test_brute_force(self, number):
         _, query, place = self.pairs(number, number // 3, number - number // 3)
         stride = number // 50 + 1
-        best, best_votes = None, 3
+        best = None
+        best_votes = 3
         for k in range(number // stride):
             X = align(query[k * stride], place[k * stride])
             votes = sum(
@@ -119,7 +120,8 @@ class TestFindMotion:
                 for q, p in zip(query, place, strict=True)
             )
             if votes > best_votes:
-                best, best_votes = X, votes
+                best = X
+                best_votes = votes
         assert best is not None
         np.testing.assert_allclose(find_motion(query, place), best, atol=1e-12)
 

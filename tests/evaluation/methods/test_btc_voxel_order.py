@@ -31,11 +31,13 @@ IN_CPP = [
 
 def by_lists(codes):
     """The same order by the rules of the library, element by element."""
-    num_buckets, entries = 13, []
+    num_buckets = 13
+    entries = []
     for k, code in enumerate(codes):
         if k == num_buckets:
             num_buckets = {13: 29, 29: 59, 59: 127, 127: 257, 257: 541}[k]
-            old, entries = entries, []
+            old = entries
+            entries = []
             for entry in old:
                 put(entries, entry, num_buckets)
         put(entries, (int(code), k), num_buckets)

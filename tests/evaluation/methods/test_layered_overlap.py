@@ -187,7 +187,8 @@ def pictures(scan, turn, halvings):
 
 def look_near(query, place, weights, start, moves):
     """Returns how much the best pose is above chance, and that pose."""
-    best, size = (-1, None), place.shape[1]
+    best = (-1, None)
+    size = place.shape[1]
     for heading, row, column in np.array(start) + moves:
         turned = query[heading % len(query)]
         wide = np.pad(turned, ((0, 0), (9, 9), (9, 9)))
@@ -214,10 +215,8 @@ def test_search_by_brute_force(seed):
     turned = [pictures(query, turn, 3) for turn in turns(24)]
     found = []
     for number, place in enumerate(places):
-        fixed, weights = (
-            pictures(place, (1 << 14, 0), 3),
-            np.array([1, 1, 2, 2]),
-        )
+        fixed = pictures(place, (1 << 14, 0), 3)
+        weights = np.array([1, 1, 2, 2])
         near = [
             look_near(turned, fixed, weights, (heading, 0, 0), moves)
             for heading in range(24)
@@ -226,7 +225,8 @@ def test_search_by_brute_force(seed):
         found += [(s - 0.5 * mean, number, pose) for s, pose in near]
     # 5 deg and 2 m, then 2.5 deg.
     turned = [pictures(query, turn, 2) for turn in turns(144)]
-    weights, scale = np.array([1, 1, 4, 2]), [6, 2, 2]
+    weights = np.array([1, 1, 4, 2])
+    scale = [6, 2, 2]
     least = 12
     for moves in (
         [*itertools.product((-2, 0, 2), range(-1, 2), range(-1, 2))],
@@ -240,7 +240,8 @@ def test_search_by_brute_force(seed):
                 turned, fixed, weights, np.array(pose) * scale, moves
             )
             found.append((surprise, number, pose))
-        scale, least = [1, 1, 1], 5
+        scale = [1, 1, 1]
+        least = 5
     # 2.5 deg and 1 m, then half of that; two places only.
     expected = np.full(len(places), np.nan)
     weights = np.array([3, 3, 2, 60, 5])

@@ -39,8 +39,10 @@ def test_coarse_maps(halvings):
     "start", [[1, 0, 0, 0], [0, 7, 2, -1], [2, 3, -3, 5], [1, 4, 4, 0]]
 )
 def test_best_overlaps(halvings, start):
-    query, places = some_cells(5), [some_cells(k) for k in range(20, 23)]
-    turned, weights = turns(8), np.array([1, 1, 4, 2])
+    query = some_cells(5)
+    places = [some_cells(k) for k in range(20, 23)]
+    turned = turns(8)
+    weights = np.array([1, 1, 4, 2])
     moves = np.array(
         [
             (turn, right, up)
@@ -145,7 +147,8 @@ def climb_slowly(query, wide, weights, turned, pose, steps):
 def test_last_search_climbs_by_cells_that_meet_neighbours(start, steps):
     query = some_cells(7, (500, 400, 300, 40, 200))
     place = some_cells(8, (900, 800, 700, 60, 300))
-    turned, weights = turns(288), np.array([3, 3, 2, 60, 5])
+    turned = turns(288)
+    weights = np.array([3, 3, 2, 60, 5])
     found = climb(
         *query,
         *place,

@@ -267,7 +267,8 @@ def save(
     path, state, monkeypatch, around=lambda state: state, *, as_parameter=False
 ):
     """Writes tensors as `torch.save` does."""
-    content, numbers = io.BytesIO(), itertools.count()
+    content = io.BytesIO()
+    numbers = itertools.count()
     names = types.ModuleType("torch._utils")
 
     class Tensor:

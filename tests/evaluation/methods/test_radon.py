@@ -57,7 +57,10 @@ def test_along_the_rows_and_columns():
 
 @pytest.mark.parametrize("angle_deg", [0.0, 17.0, 45.0, 133.0, 200.0, 301.0])
 def test_one_pixel_casts_a_hat(angle_deg):
-    size, row, column, value = 15, 4, 9, 2.5
+    size = 15
+    row = 4
+    column = 9
+    value = 2.5
     angle = math.radians(angle_deg)
     result = radon(dot(size, row, column, value), np.array([angle]))[0, :, 0]
     # Distance of the pixel from the ray through the centre.

@@ -190,7 +190,9 @@ class TestScore:
 
     def test_nothing_within_range(self):
         method = solid()
-        nothing, near, scene = np.empty((0, 3)), at(1.0, 0, 0), make_scene(1)
+        nothing = np.empty((0, 3))
+        near = at(1.0, 0, 0)
+        scene = make_scene(1)
         database = method.build_database(
             [method.describe_place(scan) for scan in (nothing, near, scene)]
         )

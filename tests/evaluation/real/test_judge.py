@@ -170,7 +170,8 @@ class Drive:
 
     def __init__(self, *positions, world="map", city="one"):
         self.X_WS = np.array([yaw_pose(*xy, 0.0, 0.0) for xy in positions])
-        self.world_frame, self.scenario = world, {"map": city}
+        self.world_frame = world
+        self.scenario = {"map": city}
 
     def __len__(self):
         return len(self.X_WS)

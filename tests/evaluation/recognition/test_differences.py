@@ -86,7 +86,8 @@ def test_equal_methods_differ_at_the_nominal_level():
 
 def test_a_difference_has_a_sign_and_an_interval():
     rng = np.random.default_rng(2)
-    scores, blocks = rng.normal(size=100), np.repeat(np.arange(20), 5)
+    scores = rng.normal(size=100)
+    blocks = np.repeat(np.arange(20), 5)
     good, poor = (
         outcomes_of(scores, rng.random(100) < share, blocks)
         for share in (0.9, 0.2)
@@ -138,7 +139,8 @@ def test_conditions_of_a_drive_draw_the_same_blocks():
 def test_intervals_by_blocks():
     """Where whole blocks are right or wrong, only their number counts."""
     rng = np.random.default_rng(5)
-    scores, blocks = rng.normal(size=100), np.repeat(np.arange(20), 5)
+    scores = rng.normal(size=100)
+    blocks = np.repeat(np.arange(20), 5)
     is_right = np.repeat(rng.random(20) < 0.6, 5)
     in_blocks = outcomes_of(scores, is_right, blocks)
     plain = outcomes_of(scores, is_right)

@@ -115,7 +115,8 @@ def test_empty_table_has_its_header():
 def test_every_column_of_numbers_has_a_range(tmp_path, monkeypatch):
     """A new column is entered in the table of ranges, or fails here."""
     content = make_content(tmp_path)
-    unknown, columns = set(), 0
+    unknown = set()
+    columns = 0
     made = Table.__post_init__
 
     def note(table):

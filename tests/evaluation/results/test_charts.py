@@ -330,7 +330,10 @@ def test_all_letters_can_be_read(chart, results, width):
 class _Page(HTMLParser):
     def __init__(self):
         super().__init__()
-        self.ids, self.links, self.tables, self.open = [], [], [], []
+        self.ids = []
+        self.links = []
+        self.tables = []
+        self.open = []
 
     def handle_starttag(self, tag, attrs):
         values = dict(attrs)

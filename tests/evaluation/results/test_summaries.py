@@ -139,8 +139,10 @@ def test_rank_correlations_are_those_of_scipy():
     rng = np.random.default_rng(3)
     rows, drawn = [], []
     for k in range(25):
-        stage, tcr = {"both.stage": f"s{k}"}, rng.random()
-        seen, auc = rng.random(), np.round(rng.random(), 1)
+        stage = {"both.stage": f"s{k}"}
+        tcr = rng.random()
+        seen = rng.random()
+        auc = np.round(rng.random(), 1)
         drawn.append((tcr, seen, 1.0 - auc))
         rows += [
             row(tcr, stage, metric="tcr_sym", task="change", method=""),

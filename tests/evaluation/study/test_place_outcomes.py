@@ -34,7 +34,8 @@ class Once:
 
     def __call__(self):
         recorded = open_drive(self.path)
-        read, scan = [], recorded.scan
+        read = []
+        scan = recorded.scan
 
         def once(index):
             assert index not in read

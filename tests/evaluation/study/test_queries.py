@@ -63,7 +63,8 @@ def score(row):
 
 
 def area(rows):
-    total, at = 0.0, None
+    total = 0.0
+    at = None
     for threshold in sorted({score(r) for r in rows if r["score"]})[::-1]:
         tp, fp, fn = count(rows, threshold)
         precision, recall = tp / (tp + fp), tp / max(tp + fn, 1)

@@ -421,7 +421,8 @@ def test_jobs_import_nothing_from_the_current_folder(tmp_path):
 
 
 def test_two_never_work_on_the_same(tmp_path):
-    output, pipe = tmp_path / "new" / "output", tmp_path / "pipe"
+    output = tmp_path / "new" / "output"
+    pipe = tmp_path / "pipe"
     os.mkfifo(pipe)
     script = (
         "import sys\n"

@@ -35,7 +35,8 @@ def accounts(light, receiver):
         echoes = []
         for group in groups[:MOST]:
             d, snr, k = map(np.array, zip(*group, strict=True))
-            total, mean = snr.sum(), (snr * d).sum() / snr.sum()
+            total = snr.sum()
+            mean = (snr * d).sum() / snr.sum()
             # As in clear air.
             gain = np.exp(2 * budget.own_extinction * mean)
             energy = total * mean**2 * gain / budget.scale

@@ -59,7 +59,8 @@ def test_reported_angles_are_nominal_and_true_ones_are_not():
     beams = pattern.beams(0)
     returns = CalibratedReturns.of_preset("hdl-64e", unit_seed=3)
     turn = returns.turn(beams)
-    true, nominal = turn.d_Sset, beams.d_Sset[beams.packet_order]
+    true = turn.d_Sset
+    nominal = beams.d_Sset[beams.packet_order]
     np.testing.assert_allclose(np.linalg.norm(true, axis=1), 1.0, atol=1e-12)
     ring = beams.ring[beams.packet_order]
     up = np.degrees(np.arcsin(true[:, 2]) - np.arcsin(nominal[:, 2]))
@@ -185,7 +186,8 @@ def test_lasers_have_their_places_however_poses_are_given():
     pattern = make_beam_pattern("hdl-64e")
     returns = CalibratedReturns.of_preset("hdl-64e", unit_seed=3)
     turn = returns.turn(pattern.beams(0))
-    zero, half = np.zeros(1, np.float32), np.full(1, 0.5, np.float32)
+    zero = np.zeros(1, np.float32)
+    half = np.full(1, 0.5, np.float32)
     materials = Materials(
         np.array([LAMBERT], np.uint8), half, zero, zero, half, *[zero] * 5
     )
@@ -220,7 +222,8 @@ def textured(p_WGset, contrast=0.5, **fields):
             for name in Materials._fields[1:]
         ),
     )
-    every, geometry = np.arange(count), np.zeros(count, np.int32)
+    every = np.arange(count)
+    geometry = np.zeros(count, np.int32)
     return texture(
         Light(every, np.full(count, 2.0), np.ones(count), geometry),
         every,
