@@ -327,9 +327,21 @@ def _write(path: Path, files: Sequence[Path]) -> None:
             )
             return
         words = [
-            *("ffmpeg", "-y", "-loglevel", "error", "-framerate", str(RATE)),
-            *("-i", str(files[0].parent / "%06d.png"), "-f", "mp4"),
-            *("-pix_fmt", "yuv420p", "-movflags", "+faststart", str(part)),
+            "ffmpeg",
+            "-y",
+            "-loglevel",
+            "error",
+            "-framerate",
+            str(RATE),
+            "-i",
+            str(files[0].parent / "%06d.png"),
+            "-f",
+            "mp4",
+            "-pix_fmt",
+            "yuv420p",
+            "-movflags",
+            "+faststart",
+            str(part),
         ]
         done = subprocess.run(words, capture_output=True, check=False)
         if done.returncode:

@@ -34,8 +34,17 @@ from evaluation.drives.text_tables import (
 _POSES = "gt.csv"
 _IMU = "imu.csv"
 _IMU_COLUMNS = (
-    *("time", "qx", "qy", "qz", "qw"),
-    *("wx", "wy", "wz", "ax", "ay", "az"),
+    "time",
+    "qx",
+    "qy",
+    "qz",
+    "qw",
+    "wx",
+    "wy",
+    "wz",
+    "ax",
+    "ay",
+    "az",
 )
 # Names of the folder in the paper and in the download.
 _FOLDERS = ("pcd", "LiDAR")
@@ -97,7 +106,9 @@ class CnsFolderDrive(FileDrive):
             X_WS=X_WB @ _read_mount(mount),
             read=lambda path, stamp_ns: read_cloud(path),
             tables=[
-                *(trajectory.path, self._imu_path, path / SCENARIO),
+                trajectory.path,
+                self._imu_path,
+                path / SCENARIO,
                 *([] if mount is None else [mount]),
             ],
             notes=tuple(chosen),

@@ -53,8 +53,11 @@ FARTHEST_START = 50.0
 NEAR = 7.5
 # Numbers of the summary that go into a table of results.
 _SHOWN = (
-    *("success_03m_1deg", "success_2m_5deg"),
-    *("translation_median", "translation_95", "rotation_median_deg"),
+    "success_03m_1deg",
+    "success_2m_5deg",
+    "translation_median",
+    "translation_95",
+    "rotation_median_deg",
     "auroc_own_score",
 )
 # Share of the right results whose scores pass the suggested threshold.
@@ -74,12 +77,24 @@ QUERY = np.dtype(
         *(
             (name, "<f8")
             for name in (
-                *("start_x", "start_y", "start_z"),
-                *("start_turn_x_deg", "start_turn_y_deg", "start_turn_z_deg"),
-                *("translation_error", "rotation_error_deg"),
-                *("along", "across", "up"),
-                *("own_score", "fit", "residual"),
-                *("std_along", "std_across", "std_up", "unmapped"),
+                "start_x",
+                "start_y",
+                "start_z",
+                "start_turn_x_deg",
+                "start_turn_y_deg",
+                "start_turn_z_deg",
+                "translation_error",
+                "rotation_error_deg",
+                "along",
+                "across",
+                "up",
+                "own_score",
+                "fit",
+                "residual",
+                "std_along",
+                "std_across",
+                "std_up",
+                "unmapped",
             )
         ),
         ("iterations", "<i8"),

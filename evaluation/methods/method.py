@@ -286,9 +286,18 @@ _OPTIONAL = {
 
 # Functions of the interface that a method's author may have written.
 _CALLED = (
-    *("__init__", "describe", "describe_place", "describe_batch"),
-    *("build_database", "score", "score_in_drive", "rerank"),
-    *("relative_pose", "relative_poses", "for_lidar", "assumption"),
+    "__init__",
+    "describe",
+    "describe_place",
+    "describe_batch",
+    "build_database",
+    "score",
+    "score_in_drive",
+    "rerank",
+    "relative_pose",
+    "relative_poses",
+    "for_lidar",
+    "assumption",
 )
 
 _MethodClass = TypeVar("_MethodClass", bound=type[Method])

@@ -18,8 +18,13 @@ if TYPE_CHECKING:
 
 
 _POSITIVE = (
-    *("radius", "query_spacing", "place_spacing", "max_range"),
-    *("scans_per_place", "exclude_recent", "overlap"),
+    "radius",
+    "query_spacing",
+    "place_spacing",
+    "max_range",
+    "scans_per_place",
+    "exclude_recent",
+    "overlap",
 )
 # Number of hexadecimal digits of a protocol's digest.
 _DIGEST_LENGTH = 12

@@ -241,7 +241,10 @@ def recognition_table(
         beside = f" In brackets or small: the value of {reference.title}."
     return Table(
         (
-            *("map", "DB → query", "TCR_sym", "visible change"),
+            "map",
+            "DB → query",
+            "TCR_sym",
+            "visible change",
             *tuple(measures) * len(methods),
         ),
         tuple(rows),

@@ -105,6 +105,14 @@ drive = open_drive("drives/metropolis_01")
 assert len(drive.stamps_ns) == len(drive.X_WS)
 """
 
+# Commands that simulate two frames, simulate a drive, run a study, and measure
+# place recognition.
+FRAMES = (
+    "cns-drake simulate metropolis_01 --frames 2 --output frames --overwrite"
+)
+DRIVE = "cns-drake simulate metropolis_01 --output drives"
+STUDY = "cns-drake reproduce metropolis --output output"
+PR = "cns-eval pr output/metropolis_01 output/metropolis_04 --method solid"
 # Row -> words of its command; the first word is a program of the environment.
 # Rows may use what earlier rows have written.
 ROWS = {
@@ -112,25 +120,12 @@ ROWS = {
     "--help": ("cns-drake", "--help"),
     "first scan of add_lidar": ("python", "-c", FIRST_SCAN),
     "first scan of add_lidar, again": ("python", "-c", FIRST_SCAN),
-    "simulate --frames 2": (
-        *("cns-drake", "simulate", "metropolis_01", "--frames", "2"),
-        *("--output", "frames", "--overwrite"),
-    ),
-    "simulate --frames 2, again": (
-        *("cns-drake", "simulate", "metropolis_01", "--frames", "2"),
-        *("--output", "frames", "--overwrite"),
-    ),
-    "simulate": (
-        *("cns-drake", "simulate", "metropolis_01", "--output", "drives"),
-    ),
+    "simulate --frames 2": FRAMES.split(),
+    "simulate --frames 2, again": FRAMES.split(),
+    "simulate": DRIVE.split(),
     "open its poses": ("python", "-c", OPENING),
-    "reproduce metropolis": (
-        *("cns-drake", "reproduce", "metropolis", "--output", "output"),
-    ),
-    "pr --method solid": (
-        *("cns-eval", "pr", "output/metropolis_01", "output/metropolis_04"),
-        *("--method", "solid"),
-    ),
+    "reproduce metropolis": STUDY.split(),
+    "pr --method solid": PR.split(),
 }
 
 

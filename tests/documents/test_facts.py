@@ -31,9 +31,14 @@ PRESENT = [
 ]
 # Options of tools of other projects, and one of the tests.
 FOREIGN_OPTIONS = {
-    *("--nthreads", "--nworkers", "--config"),
-    *("--tls-ca-file", "--tls-cert", "--tls-key"),
-    *("--topic", "--night"),
+    "--nthreads",
+    "--nworkers",
+    "--config",
+    "--tls-ca-file",
+    "--tls-cert",
+    "--tls-key",
+    "--topic",
+    "--night",
 }
 
 

@@ -28,8 +28,12 @@ class DaskProcesses:
     def __enter__(self):
         self._scheduler = self._start(
             "dask_scheduler",
-            *("--port", "0", "--no-dashboard", *self._options),
-            *("--host", "tls://127.0.0.1" if self._options else "127.0.0.1"),
+            "--port",
+            "0",
+            "--no-dashboard",
+            *self._options,
+            "--host",
+            "tls://127.0.0.1" if self._options else "127.0.0.1",
         )
         for line in self._scheduler.stderr:
             if "Scheduler at:" in line:
@@ -52,8 +56,14 @@ class DaskProcesses:
             worker = self._start(
                 "dask_worker",
                 self.address,
-                *("--nthreads", "1", "--no-nanny", "--no-dashboard"),
-                *("--memory-limit", "0", "--local-directory", self._folder),
+                "--nthreads",
+                "1",
+                "--no-nanny",
+                "--no-dashboard",
+                "--memory-limit",
+                "0",
+                "--local-directory",
+                self._folder,
                 *self._options,
                 quiet=True,
             )

@@ -779,8 +779,10 @@ RECIPES = {
             ("output output", "output slurm"),
         ),
         after=(
-            *("scheduler", "scenario of a world"),
-            *("waypoints", "start a city"),
+            "scheduler",
+            "scenario of a world",
+            "waypoints",
+            "start a city",
         ),
         file="cluster.sh",
         command=".venv/bin/dask --version && bash cluster.sh",

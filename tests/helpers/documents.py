@@ -11,8 +11,21 @@ ROOT = Path(__file__).resolve().parents[2]
 
 # First words of inline code that is meant to be run.
 PROGRAMS = (
-    *("cns-drake", "cns-eval", "dask", "python", "python3", "pip", "pytest"),
-    *("ruff", "ros2", "npm", "apt", "git", "docker", "pre-commit", "mkdocs"),
+    "cns-drake",
+    "cns-eval",
+    "dask",
+    "python",
+    "python3",
+    "pip",
+    "pytest",
+    "ruff",
+    "ros2",
+    "npm",
+    "apt",
+    "git",
+    "docker",
+    "pre-commit",
+    "mkdocs",
 )
 _FENCE = re.compile(r"^( *)```(\w*)\n(.*?)^\1```$", re.DOTALL | re.MULTILINE)
 _INLINE = re.compile(r"`([^`]+)`")

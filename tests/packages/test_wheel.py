@@ -26,8 +26,16 @@ PAGE = "https://example.org/owner/project"
 def wheel(tmp_path_factory):
     folder = tmp_path_factory.mktemp("wheel")
     run(
-        *(sys.executable, "-m", "pip", "wheel", "--quiet", "--no-deps"),
-        *("--no-build-isolation", "--wheel-dir", folder, ROOT),
+        sys.executable,
+        "-m",
+        "pip",
+        "wheel",
+        "--quiet",
+        "--no-deps",
+        "--no-build-isolation",
+        "--wheel-dir",
+        folder,
+        ROOT,
         env=os.environ | REPOSITORY,
     )
     (wheel,) = folder.glob("*.whl")
@@ -87,8 +95,15 @@ def test_it_runs_the_main_job_without_the_checkout(wheel, tmp_path):
     )
     assert where.startswith(str(site))
     run(
-        *(python, "-m", "cns_drake", "simulate", "suburbia_01"),
-        *("--frames", "2", "--output", "output"),
+        python,
+        "-m",
+        "cns_drake",
+        "simulate",
+        "suburbia_01",
+        "--frames",
+        "2",
+        "--output",
+        "output",
         **options,
     )
     drive = "output/suburbia_01"

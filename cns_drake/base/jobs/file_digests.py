@@ -79,6 +79,9 @@ def _state(path: str) -> list[int]:
     """
     stat = os.stat(path)
     return [
-        *(stat.st_size, stat.st_mtime_ns, stat.st_ctime_ns),
-        *(stat.st_ino, stat.st_dev),
+        stat.st_size,
+        stat.st_mtime_ns,
+        stat.st_ctime_ns,
+        stat.st_ino,
+        stat.st_dev,
     ]

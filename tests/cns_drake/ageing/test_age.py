@@ -442,7 +442,10 @@ def test_each_stage_is_what_the_history_tells(long):
             row = rows.pop(0)
             one, successor = row["structure"], row["successor"]
             if row["event"] in (
-                *("demolished", "felled", "removed", "taken_down"),
+                "demolished",
+                "felled",
+                "removed",
+                "taken_down",
                 "furniture",
             ):
                 standing.remove(one)

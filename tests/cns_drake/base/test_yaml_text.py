@@ -31,15 +31,27 @@ def test_what_people_write_is_read():
     ("text", "value"),
     [
         # Numbers as people write them.
-        *[("0", 0), ("-12", -12), ("+7", 7), ("0x1F", 31), ("007.5", 7.5)],
-        *[("1.5e+3", 1500.0), (".5", 0.5), ("-.inf", -math.inf)],
+        ("0", 0),
+        ("-12", -12),
+        ("+7", 7),
+        ("0x1F", 31),
+        ("007.5", 7.5),
+        ("1.5e+3", 1500.0),
+        (".5", 0.5),
+        ("-.inf", -math.inf),
         # PyYAML reads 90, 90.5, 5, 10, 10, 15.5, a date, and an error.
         *[(one, one) for one in ("1:30", "1:30.5", "0b101", "1_0", "1_5.5")],
         *[(one, one) for one in ("2012-01-15", "2001-99-99", "=")],
         # It leaves these as texts, so that older files have them.
         *[(one, one) for one in ("08", "-09", "2e-2", "0o17", "y", "N")],
-        *[("~", None), ("", None), ("True", True), ("false", False)],
-        *[("'010'", "010"), ('"on"', "on"), ("'no'", "no"), ("!!str 1", "1")],
+        ("~", None),
+        ("", None),
+        ("True", True),
+        ("false", False),
+        ("'010'", "010"),
+        ('"on"', "on"),
+        ("'no'", "no"),
+        ("!!str 1", "1"),
     ],
 )
 def test_a_scalar_is_what_is_written(text, value):

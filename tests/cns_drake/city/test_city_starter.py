@@ -126,8 +126,12 @@ def test_it_is_listed_and_driven(town, tmp_path):
     ]
     assert listed.stderr == ""
     done = run(
-        *("simulate", town / "sequence_02.yaml"),
-        *("--frames", 2, "--output", tmp_path),
+        "simulate",
+        town / "sequence_02.yaml",
+        "--frames",
+        2,
+        "--output",
+        tmp_path,
     )
     assert done.exit_code == 0, done.stderr
     drive = open_drive(tmp_path / "town_02")

@@ -185,7 +185,12 @@ def test_diagram_script_records_and_makes_a_page(files, tmp_path, capfd):
         capfd,
         "a.py",
         lambda: run_script(str(files / "drive.yaml"), "A drive."),
-        *("--frames", 2, "--output", tmp_path, "--recording", page),
+        "--frames",
+        2,
+        "--output",
+        tmp_path,
+        "--recording",
+        page,
     )
     assert status == 0
     assert "2 frames" in out

@@ -35,8 +35,14 @@ FOUND = list(commands())
 
 def test_there_are_such_options():
     assert {command.name for _, command, _ in FOUND} >= {
-        *("pr", "localise", "map-sessions", "export-pairs", "map-truth"),
-        *("train", "age", "simulate"),
+        "pr",
+        "localise",
+        "map-sessions",
+        "export-pairs",
+        "map-truth",
+        "train",
+        "age",
+        "simulate",
     }
 
 

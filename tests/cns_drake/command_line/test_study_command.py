@@ -148,7 +148,12 @@ RENAMED = {
     **{
         name: f"study {name}"
         for name in (
-            *("ladder", "levels", "size", "years", "fresh", "trend"),
+            "ladder",
+            "levels",
+            "size",
+            "years",
+            "fresh",
+            "trend",
             "map-pairs",
         )
     },

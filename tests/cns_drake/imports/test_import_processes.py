@@ -30,8 +30,13 @@ terminal.run(app, "cns-drake", heard_by(Printing()))
 def start(source, output):
     return subprocess.Popen(
         [
-            *(sys.executable, "-c", PROGRAM, "import"),
-            *(str(source), "--output", str(output)),
+            sys.executable,
+            "-c",
+            PROGRAM,
+            "import",
+            str(source),
+            "--output",
+            str(output),
         ],
         stderr=subprocess.PIPE,
         text=True,

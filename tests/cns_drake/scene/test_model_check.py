@@ -178,8 +178,14 @@ def test_faces_without_their_vertices(tmp_path, face, kind):
 @pytest.mark.parametrize(
     "face",
     [
-        *("f 1 2 3", "f -1 -2 -3", "f 1//7 2//7 3//7", "f 1/2/3 2 3 4"),
-        *("f 1 2 3 # 99", "# f 99\nf 1 2 3", "g f 99\nf 1 2 3", " f  1\t2 3 "),
+        "f 1 2 3",
+        "f -1 -2 -3",
+        "f 1//7 2//7 3//7",
+        "f 1/2/3 2 3 4",
+        "f 1 2 3 # 99",
+        "# f 99\nf 1 2 3",
+        "g f 99\nf 1 2 3",
+        " f  1\t2 3 ",
     ],
 )
 def test_faces_that_drake_reads(tmp_path, face):

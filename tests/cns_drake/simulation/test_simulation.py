@@ -68,10 +68,18 @@ def test_each_phase_is_told_before_it_begins(scenario, tmp_path, monkeypatch):
         simulate(scenario, tmp_path)
     file = world_file(scenario).name
     assert heard.activities == [
-        *("planning the drive", "plan_drive", "reading the stage"),
-        *("load_world", f"parsing {file}", "parsing vehicle.sdf"),
-        *("building the diagram", "make_station", "_advance"),
-        *("reading meshes", "preparing the ray casting", "simulating"),
+        "planning the drive",
+        "plan_drive",
+        "reading the stage",
+        "load_world",
+        f"parsing {file}",
+        "parsing vehicle.sdf",
+        "building the diagram",
+        "make_station",
+        "_advance",
+        "reading meshes",
+        "preparing the ray casting",
+        "simulating",
         "closing the recording",
     ]
     assert heard.counts("simulating")[-1] == (7, 7)

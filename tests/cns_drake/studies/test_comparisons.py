@@ -358,7 +358,9 @@ def test_queries_are_asked_as_a_condition_says(query_drive):
     common = replace(RECORDED, radius=5.0, query_spacing=20.0)
     found = Conditions(
         ladder(
-            *("hidden", "turn", "tilt"),
+            "hidden",
+            "turn",
+            "tilt",
             seeds=(3, 4),
             protocol={"base": "recorded", "radius": 5, "query_spacing": 20},
         ),
@@ -379,13 +381,19 @@ def test_drivers(query_drive):
     plain, *drivers = (one.database for one in found.compared())
     assert [one.driver.wander for one in drivers] == [0.35] * 4
     assert [bool(one.driver.lane_changes) for one in drivers] == [
-        *(False, True, True, True)
+        False,
+        True,
+        True,
+        True,
     ]
     assert [one.driver.follows for one in drivers] == [False, False, True, True]
     assert {one.driver.seed for one in drivers} == {5}
     assert all(one.traffic.vehicles > 0 for one in drivers[2:])
     assert [one.lidars == plain.lidars for one in drivers] == [
-        *(True, True, True, False)
+        True,
+        True,
+        True,
+        False,
     ]
     assert drivers[3].lidars["lidar"].xyz[:2] == (1.25, 5.0)
     assert drivers[3].lidars["lidar"].rpy_deg[2] == 180.0

@@ -179,10 +179,16 @@ def test_cases_have_levels(read):
     found = conditions(read(CASES))
     assert [tuple(one.factors.values()) for one in found] == [
         ("none", 0),
-        *(("snow", 1), ("snow", 2), ("snow", 3)),
+        ("snow", 1),
+        ("snow", 2),
+        ("snow", 3),
         ("returns", 1),
-        *(("driver", 1), ("driver", 2), ("driver", 3)),
-        *(("all", 1), ("all", 2), ("all", 3)),
+        ("driver", 1),
+        ("driver", 2),
+        ("driver", 3),
+        ("all", 1),
+        ("all", 2),
+        ("all", 3),
     ]
     assert [one.is_baseline for one in found] == [True] + [False] * 10
     fields = {tuple(one.factors.values()): one.causes for one in found}

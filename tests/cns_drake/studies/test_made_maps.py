@@ -57,8 +57,13 @@ def test_a_city_ages_once_for_all_of_its_years(town, tmp_path, steps):
     drive = load_scenario(town / "sequence_02.yaml")
     made = MadeMaps(tmp_path)
     for years, rates, seed in (
-        *((20, 1.0, 1), (5, 1.0, 1), (20, 1.0, 1), (5, 1.0, 2)),
-        *((5, 2.0, 1), (5, {"factor": 2}, 1), (5, {"felled": 0.5}, 1)),
+        (20, 1.0, 1),
+        (5, 1.0, 1),
+        (20, 1.0, 1),
+        (5, 1.0, 2),
+        (5, 2.0, 1),
+        (5, {"factor": 2}, 1),
+        (5, {"felled": 0.5}, 1),
     ):
         # It is where it was, as long as nothing is made.
         here = made.want_age(drive, years, rates, seed)

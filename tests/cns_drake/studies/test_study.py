@@ -258,7 +258,12 @@ def test_processes_change_nothing(town, tmp_path, jobs_done, capsys):
             capsys,
             "cns-drake",
             main,
-            *("study", path, "--jobs", "2", "--output", tmp_path / "there"),
+            "study",
+            path,
+            "--jobs",
+            "2",
+            "--output",
+            tmp_path / "there",
         )
     assert status == 0
     assert any(line.endswith("3 of 3 jobs done") for line in err.splitlines())

@@ -466,7 +466,8 @@ def vehicles_in_streets(graph, xy):
 @pytest.mark.parametrize(
     "name",
     [
-        *("downtown", "metropolis"),
+        "downtown",
+        "metropolis",
         pytest.param("riverside", marks=pytest.mark.night),
         pytest.param("suburbia", marks=pytest.mark.night),
     ],

@@ -88,7 +88,11 @@ def test_a_pair_writes_the_tables_of_a_study(capsys, towns, tmp_path):
     assert len({digests[name] for name in ("fair", "wide", "high")}) == 3
     assert made["set"].label == "solid, ranges 20"
     assert [made[one].protocol for one in made] == [
-        *("fair", "fair", "own", "own", "fair")
+        "fair",
+        "fair",
+        "own",
+        "own",
+        "fair",
     ]
     both = ["compare", tmp_path / "fair", tmp_path / "wide"]
     assert_refused(capsys, both, "no condition in common")

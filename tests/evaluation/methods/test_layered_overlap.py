@@ -251,8 +251,14 @@ def test_search_by_brute_force(seed):
     for number, pose in [*best.items()][:2]:
         place = places[number]
         common = climb(
-            *(query.cells, query.starts, place.cells, place.starts),
-            *(weights, turns(288), pose, np.array([(2, 4), (1, 2)])),
+            query.cells,
+            query.starts,
+            place.cells,
+            place.starts,
+            weights,
+            turns(288),
+            pose,
+            np.array([(2, 4), (1, 2)]),
         )[3:]
         cells = [weights @ np.diff(one.starts) + 150 for one in (query, place)]
         expected[number] = weights @ common / math.sqrt(math.prod(cells))

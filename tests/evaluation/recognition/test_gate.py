@@ -198,9 +198,15 @@ def test_the_option_of_pr_and_scores(capsys, towns, tmp_path):
         output = tmp_path / "scores.csv"
         status, _, _ = run_program(
             capsys,
-            *("scores", "--method", "layered-overlap", "--output", output),
-            *("--database", towns / "town_01_scans"),
-            *("--query", towns / "town_02_scans"),
+            "scores",
+            "--method",
+            "layered-overlap",
+            "--output",
+            output,
+            "--database",
+            towns / "town_01_scans",
+            "--query",
+            towns / "town_02_scans",
             *options,
         )
         assert status == 0

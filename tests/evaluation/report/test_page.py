@@ -319,7 +319,11 @@ def test_browser_data(content):
     # At (10, 2) places 1, 2, 3 are true, and second to fourth are 0, 1, 2.
     assert scan_context["ranks"] == [1, 3, None, 1, None]
     assert scan_context["why"] == [
-        *("", "twin", "no_candidate", "", "no_place"),
+        "",
+        "twin",
+        "no_candidate",
+        "",
+        "no_place",
     ]
     assert [one["why"] for one in back["methods"]] == [None]
     assert ring["ranks"] == [1, 1, 1, 6, None]

@@ -99,8 +99,10 @@ def on_map(browser, content, x, y):
 @pytest.mark.parametrize(
     ("size", "scheme"),
     [
-        *(((320, 600), "light"), (PHONE, "dark")),
-        *(((820, 1180), "light"), (DESKTOP, "dark")),
+        ((320, 600), "light"),
+        (PHONE, "dark"),
+        ((820, 1180), "light"),
+        (DESKTOP, "dark"),
     ],
 )
 def test_page_fits_its_screen(browser, address, size, scheme):

@@ -31,9 +31,18 @@ def make(method, database, before, after, interval=(0.25, 0.75)):
     }
     return [
         Row(
-            *("stages", "town", f"town_{database}", "town_03", 1),
+            "stages",
+            "town",
+            f"town_{database}",
+            "town_03",
+            1,
             {"both.stage": stage},
-            *("place", method, False, "fair", metric, value),
+            "place",
+            method,
+            False,
+            "fair",
+            metric,
+            value,
             *(interval if metric.startswith("kept") else ()),
         )
         for stage, values in known.items()

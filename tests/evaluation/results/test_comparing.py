@@ -455,7 +455,9 @@ def test_rows_by_another_protocol_are_left_out_and_named(tmp_path):
         for one in ({"radius": 25.0}, {"place_spacing": 8})
     )
     assert [one["protocol"] for one in (fair, wide, coarse)] == [
-        *("fair", "own", "own")
+        "fair",
+        "own",
+        "own",
     ]
     both = {"x": 0.5, "y": 0.4}
     one = write_table(tmp_path / "one", {"a": both}, **fair)

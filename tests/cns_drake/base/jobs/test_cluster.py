@@ -150,8 +150,17 @@ def certificates(tmp_path_factory):
     openssl(*new, "/CN=test", "-x509", "-keyout", "ca.key", "-out", "ca.pem")
     openssl(*new, "/CN=me", "-keyout", "me.key", "-out", "me.csr")
     openssl(
-        *("x509", "-req", "-in", "me.csr", "-CA", "ca.pem"),
-        *("-CAkey", "ca.key", "-CAcreateserial", "-out", "me.pem"),
+        "x509",
+        "-req",
+        "-in",
+        "me.csr",
+        "-CA",
+        "ca.pem",
+        "-CAkey",
+        "ca.key",
+        "-CAcreateserial",
+        "-out",
+        "me.pem",
     )
     files = {"ca-file": "ca.pem", "cert": "me.pem", "key": "me.key"}
     return {name: str(folder / file) for name, file in files.items()}
