@@ -29,9 +29,11 @@ from PIL import Image, ImageDraw, ImageFont
 sys.path.append(str(Path(__file__).resolve().parents[1] / "tests"))
 from helpers.browser import Browser, chromium
 
-# Widths of a desk's and of a phone's screen, and the size of a sheet [px].
+# Widths of a desk's and of a phone's screen [pixels].
 WIDTHS = (1440, 390)
+# Size of a sheet [pixels].
 _SHEET = (1600, 1700)
+# Greatest number of screens of a page.
 _MOST_SCREENS = 60
 # Height of a screen on which a page of a drive, which does not scroll, is shown
 # [px].

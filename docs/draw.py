@@ -80,6 +80,7 @@ _CITY = ("stage_*.sdf", "meshes/*", "sequence_*.yaml")
 _WIDTH = 7.0
 _FONT = {"font.size": 13, "axes.titlesize": "medium", "svg.hashsalt": "cns"}
 _DPI = 160
+# Size of a camera's view [pixels].
 _TILE = (704, 396)
 
 

@@ -42,6 +42,7 @@ RATES_NAME = "rates.csv"
 _MAX_SEED = 2**63
 # Half the width of the car with its mirrors, and some room [m].
 _HALF_CAR = 1.3
+# Distance between the places along a drive [m].
 _SPACING = 0.5
 # In each past year, a tree was lower by this height [m].
 _GROWTH = 0.4

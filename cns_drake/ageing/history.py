@@ -57,11 +57,13 @@ _LISTED = re.compile(
     "church|chapel|museum|town_hall|observation_tower|station|mill"
 )
 _DWELLING = re.compile("flats|block|house|terrace|walk_up|slab|building")
-# Trees: growth per year and height when planted, as ranges [m]; years after
-# which a tree is old; least height [m].
+# Least and greatest growth of a tree in a year [m].
 _GROWTH = (0.3, 0.5)
+# Least and greatest height of a tree when it is planted [m].
 _PLANTED = (2.6, 3.6)
+# After this number of years, a tree is old.
 _YOUNG_YEARS = 10
+# Lower plants are no trees [m].
 _LEAST_TREE = 3.0
 # A crown keeps this share of its reach away from walls.
 _CROWN_PART = 0.8

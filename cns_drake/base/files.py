@@ -15,6 +15,7 @@ from cns_drake.base.errors import InputError
 _WRITTEN_BYTES = 1 << 26
 # Some file systems allow 255; this leaves room for endings and joined names.
 _LONGEST_NAME_BYTES = 120
+# Number of characters at the beginning of a longer name that are kept.
 _KEPT_CHARACTERS = 20
 
 

@@ -5,9 +5,10 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass
 
-# An estimate is made once this share of the work is done, in at least this time
-# [s]: the first scans also load programs and cities.
+# An estimate is made once this share of the work is done.
 _LEAST_SHARE = 0.1
+# No estimate is made before this time [s]: the first scans also load programs
+# and cities.
 _LEAST_TIME = 3.0
 # The pace is steady if its two halves differ by at most this factor.
 _STEADY = 1.25

@@ -7,7 +7,7 @@ scans and maps in this form."""
 import numpy as np
 from numpy.typing import DTypeLike
 
-# No LiDAR sees that far [m]; larger numbers are not coordinates.
+# No LiDAR sees that far; larger numbers are not coordinates [m].
 FARTHEST_RETURN = 10_000.0
 _XYZI = ("x", "y", "z", "intensity")
 

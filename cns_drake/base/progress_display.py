@@ -24,10 +24,12 @@ from cns_drake.base.progress import (
 # What takes less time than this is not mentioned [s].
 PATIENCE = 1.0
 # In a log, another activity gets a line at once, but not many lines a second
-# [s]. The same activity gets one again after a while, which grows with the time
-# since the start: a long run should not fill its log.
+# [s].
 _CHANGE_INTERVAL = 1.0
+# The same activity gets another line after at least this time [s].
 _INTERVAL = 1.8
+# This time grows to this share of the time since the start: a long run should
+# not fill its log.
 _GROWTH = 1 / 30
 # How often it is checked whether something must be shown [s].
 _TICK = 0.25

@@ -38,9 +38,11 @@ _USUAL = (
     "baujahr",
     "start_date",
 )
-# Placeholders for an unknown year; the second one only in Dutch registers.
+# Placeholder for an unknown year.
 _PLACEHOLDER = 9999
+# Placeholder for an unknown year in Dutch registers.
 _DUTCH_PLACEHOLDER = 1005
+# Names of the year of construction in Dutch registers.
 _DUTCH = ("oorspronkelijkbouwjaar", "bouwjaar")
 
 

@@ -21,8 +21,9 @@ from cns_drake.city.geometry import (
 from cns_drake.imports.faces import joined, surface_samples
 from cns_drake.imports.foreign_city import Imported
 
-# Cell size of a guessed ground, and how far it extends beyond the city [m].
+# Cell size of a guessed ground [m].
 CELL = 4.0
+# A guessed ground extends this far beyond the city [m].
 MARGIN = 40.0
 # Above this number of cells along a side, cells are larger.
 _MOST_CELLS = 500

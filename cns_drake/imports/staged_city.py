@@ -35,13 +35,14 @@ _SHARED = 0.3
 _FARTHEST = 10_000.0
 # Buildings within this distance of each other belong to one block [m].
 _SAME_BLOCK = 4.0
-# Share of the changing buildings that is drawn block by block, and share of
-# them that is lower at first; all others are missing.
+# Share of the changing buildings that is drawn block by block.
 _BY_BLOCK = 0.5
+# Share of the changing buildings that is lower at first; all others are
+# missing.
 _LOWER = 1.0 / 3.0
-# Only buildings at least this high can be lower [m]. They then have a share of
-# their height within this range.
+# Only buildings at least this high can be lower [m].
 _LEAST_HEIGHT = 7.0
+# A lower building has a share of its height within this range.
 _HEIGHTS = (0.4, 0.7)
 
 

@@ -38,10 +38,11 @@ _NUM_COLORS = 64
 # Direction towards the sun, in the south-west, so that the visible sides are
 # lit.
 _SUN_W = np.array([-0.50, -0.55, 0.67]) / np.linalg.norm([-0.50, -0.55, 0.67])
-# Margin around the view within which shadows are cast, and height of what casts
-# them [m].
+# Margin around the view within which shadows are cast [m].
 _SHADOW_MARGIN = 150.0
+# Height of what casts shadows [m].
 _SHADOW_HEIGHT = 120.0
+# Side of the map of shadows [pixels].
 _SHADOW_PIXELS = 4096.0
 
 _WHITE = [1.0, 1.0, 1.0, 1.0]

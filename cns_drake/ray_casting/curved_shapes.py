@@ -33,9 +33,9 @@ CurvedSurface = EllipsoidSurface | CylinderSurface | CapsuleSurface
 
 # Sides of a circle.
 _SIDES = 16
-# Least distance between shape and polyhedron: a fraction of the radius, and
-# [m]. It exceeds the errors of single precision.
+# Least distance between shape and polyhedron, as a fraction of the radius.
 _MARGIN = 0.005
+# Least distance in addition [m]. It exceeds the errors of single precision.
 _GAP = 1e-3
 # Rays are cast in closed form up to this angle to a capsule's axis (sine).
 _ALONG = 5e-3

@@ -53,9 +53,9 @@ ALL = SOLID | PROXY
 # Owner of the primitives of proxies.
 PROXY_OWNER = -2
 # Longest cones and rounded segments [radii]: longer ones lose hits to single
-# precision (measured at 3000: one in 40). Longer ones are cut into pieces, at
-# most as many as the second number.
+# precision (measured at 3000: one in 40), and are cut into pieces.
 _SLENDEREST = 700.0
+# Greatest number of these pieces.
 _MOST_PIECES = 1000
 
 

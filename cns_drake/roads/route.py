@@ -16,18 +16,19 @@ from cns_drake.roads.u_turn import find_loop
 
 # Distance between the points from which the path is interpolated [m].
 _DENSE_SPACING = 0.25
-# Length of a lane change where the road has room for it, and the least length
-# of one [m].
+# Length of a lane change where the road has room for it [m].
 LANE_CHANGE_LENGTH = 50.0
+# Least length of a lane change [m].
 MIN_LANE_CHANGE_LENGTH = 20.0
-# Length over which a car moves aside, and least distance of the middle of its
-# rear axle from kerbs and medians: its front swings out [m].
+# Length over which a car moves aside [m].
 _ASIDE_LENGTH = 25.0
+# Least distance of the middle of a car's rear axle from kerbs and medians: its
+# front swings out [m].
 CAR_ROOM = 1.4
 
-# Greatest distance before a junction at which a car turns round, and distance
-# between the places that are tried [m].
+# Greatest distance before a junction at which a car turns round [m].
 _TURNING_LENGTH = 30.0
+# Distance between the places of turning that are tried [m].
 _TURNING_STEP = 0.5
 
 LaneNumber = Annotated[int, Field(ge=1)]

@@ -13,11 +13,11 @@ from shapely.geometry.base import BaseGeometry
 from cns_drake.base.elementary import cos, sin
 from cns_drake.roads.centreline import Centreline, sample_stations
 
-# From the car in worlds/vehicle.sdf: its wheelbase, the distance from its
-# middle to a front wheel [m], and the greatest steering angle of the inner
-# wheel [rad].
+# From the car in worlds/vehicle.sdf: its wheelbase [m].
 _WHEELBASE = 2.8
+# Distance from the car's middle to a front wheel [m].
 _HALF_TRACK = 0.79
+# Greatest steering angle of the inner wheel [rad].
 _STEERING_LIMIT = 0.7
 # Length of the car behind the rear axle [m].
 REAR = 1.0

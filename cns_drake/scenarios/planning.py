@@ -36,7 +36,9 @@ _AROUND = np.array(
         for angle in np.radians(np.arange(0, 360, 10)).tolist()
     ]
 )
+# Range of these rays [m].
 _SIGHT = 5.0
+# Greatest z component of the normal of an obstacle.
 _STEEP = 0.7
 
 

@@ -48,7 +48,9 @@ _COLLADA_SURFACES = re.compile(rb"<(brep|convex_mesh)\b")
 _FLOAT = 5126
 # Modes of primitives below this number (points and lines) have no triangles.
 _FIRST_TRIANGLES = 4
+# Greatest mode of a primitive.
 _LAST_TRIANGLES = 6
+# Type of a chunk of JSON.
 _JSON = 0x4E4F534A
 
 

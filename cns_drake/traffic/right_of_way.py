@@ -39,6 +39,7 @@ _AT_LINE = 4.0
 # Traffic ahead of the ego car goes first and does not wait for signals if the
 # ego car comes within this time [s].
 _EGO_IS_NEAR = 80.0
+# Such traffic counts as if it had waited for this time longer [s].
 _GOES_FIRST = 1e6
 # Greatest expected wait on a way for vehicles [s].
 _WAIT_FOR_VEHICLES = 2.0

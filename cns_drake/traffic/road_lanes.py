@@ -14,11 +14,11 @@ from cns_drake.roads.road import ENDS, End, Junction, LaneRef, Road
 from cns_drake.traffic import lane_graph
 from cns_drake.traffic.lane_graph import LaneGraph, Piece, Walkway, resampled
 
-# Distance of stop lines from the end of a road with a crossing, and without
-# one; distance of a crossing's middle from the end of the road; width of a
-# crossing [m].
+# Distance of stop lines from the end of a road with a crossing [m].
 _STOP_LINE = 4.5
+# Distance of stop lines from the end of a road without a crossing [m].
 _STOP_LINE_ALONE = 1.0
+# Distance of a crossing's middle from the end of the road [m].
 _CROSSING_PLACE = 1.7
 _CROSSING_WIDTH = 2.4
 # Between its stop lines, a lane must have room for any vehicle. A shorter one
@@ -29,10 +29,11 @@ _MOST_JUNCTIONS = 4
 # Roads with more lanes have signals at their junctions, as in the city
 # generator.
 _LANES_WITHOUT_SIGNAL = 2
-# Distance of walkers from kerbs and walls; half the width in which they walk on
-# a crossing; the least such half width [m].
+# Distance of walkers from kerbs and walls [m].
 _MARGIN = 0.45
+# Half the width in which walkers walk on a crossing [m].
 _CROSSING_HALF_WIDTH = 0.8
+# Least half width in which walkers walk along a road [m].
 _LEAST_HALF_WIDTH = 0.3
 # Distance from the kerb at which walkers wait [m].
 _BEFORE_KERB = 1.4

@@ -205,16 +205,17 @@ def _offsets(
     return offsets
 
 
-# Greatest lateral acceleration in bends, and braking before them [m/s^2].
+# Greatest lateral acceleration in bends [m/s^2].
 _LATERAL = 2.2
+# Greatest braking before bends [m/s^2].
 _BEFORE_BENDS = 1.5
 # Speed below which bends do not reduce it [m/s].
 _SLOWEST = 2.5
 # The curvature is that of chords over this many points to both sides.
 _CHORD = 4
-# Distance between the places at which a vehicle's outline is tested, and free
-# space around it [m].
+# Distance between the places at which a vehicle's outline is tested [m].
 _STEP = 1.0
+# Free space around this outline [m].
 _CLEARANCE = 0.25
 # Half the width of the strip of a lane that vehicles need, including their
 # distance from the ego car [m].

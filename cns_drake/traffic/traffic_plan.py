@@ -386,9 +386,9 @@ _TRIES = 4
 _PART = 200
 # Boxes keep this distance, because they are compared only at some times [m].
 _APART = 0.1
-# Range of the gap between vehicles in a queue, and least distance of a vehicle
-# from the ego car that passes it [m].
+# Least and greatest gap between vehicles in a queue [m].
 _GAPS = (1.5, 3.5)
+# Least distance of a vehicle from the ego car that passes it [m].
 _LETS_PASS = 0.4
 
 # The ego car's motion: times (K,) -> places (K, 2) [m] and headings (K,) [rad].

@@ -70,9 +70,9 @@ _LEAST_CHANGE_SPEED = 3.0
 # Least gap to vehicles in the other lane [m].
 _CHANGE_GAP = 4.0
 
-# At the start, a vehicle needs this length of lane in addition to its own [m],
-# and drives at this share of the allowed speed.
+# At the start, a vehicle needs this length of lane in addition to its own [m].
 _SPACE = 9.0
+# At the start, a vehicle drives at this share of the allowed speed.
 _PART_OF_SPEED = 0.5
 # Number of random places that are tried for a vehicle.
 _TRIES = 200

@@ -38,13 +38,13 @@ from cns_drake.transient.world_structures import (
 
 _PARKED_CARS = "parked_cars"
 _PARKED = frozenset({"car", "truck", "bus"})
-# Share of the changed bays whose car has gone, and of those whose car has
-# moved. All others get another car.
+# Share of the changed bays whose car has gone.
 _GONE = 0.3
+# Share of the changed bays whose car has moved. All others get another car.
 _MOVED = 0.2
-# Greatest free length of a bay in front of a car and behind it, and beside it
-# [m].
+# Greatest free length of a bay in front of a car and behind it [m].
 _LENGTHWISE = 0.5
+# Greatest free width of a bay beside a car [m].
 _SIDEWAYS = 0.25
 # Greatest turn of a car relative to its bay [rad].
 _SKEW = 0.03

@@ -320,16 +320,18 @@ def _stretches(
 _WORKS_CELL = 20.0
 _LENGTHS = (6.0, 14.0)
 _TRIES = 6
-# Sites extend from the first distance from the kerb to one of the others [m].
+# Sites extend from this distance from the kerb [m].
 _SITE_INNER = 0.4
-_WIDTHS = (4.6, 2.7)
+# They extend to one of these distances from the kerb [m].
+_SITE_OUTER = (4.6, 2.7)
 # Width of new kerb stones, which narrow the carriageway [m].
 _KERB_WIDTH = 0.3
 # Height of new kerb stones above the carriageway [m].
 _KERB_HEIGHT = 0.13
 _KERB_RGB = (0.8, 0.8, 0.78)
-# Objects on wide and on narrow sites -> weight in the random choice.
+# Objects on wide sites -> weight in the random choice.
 _WIDE = {"excavator": 3, "skip": 2, "soil_heap": 1, "brick_pallets": 1}
+# Objects on narrow sites -> weight in the random choice.
 _NARROW = {"skip": 3, "brick_pallets": 2, "portable_toilet": 1}
 _OPEN = frozenset({"pole", "traffic-sign", "vegetation"}) | GROUND_CLASSES
 
@@ -354,7 +356,7 @@ def put_up_works(around: Surroundings, share: float) -> None:
             x = float(rng.uniform(-spare, spare))
             free = [
                 width
-                for width in _WIDTHS
+                for width in _SITE_OUTER
                 if solid.is_free(
                     stretch.rectangle(x, length, _SITE_INNER, width)
                 )

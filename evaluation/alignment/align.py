@@ -48,9 +48,10 @@ When = Literal["auto", "always", "never"]
 
 # Number of keyframes that test a guess; a guess holds if half of them fit.
 _NUM_PROBES = 8
-# Loops that must agree: least number, and least share of the tried keyframes.
-# In a city of equal blocks, 15 % of the keyframes fitted a wrong guess.
+# Least number of loops that must agree.
 _FEWEST_LOOPS = 4
+# Least share of the tried keyframes whose loops must agree. In a city of equal
+# blocks, 15 % of the keyframes fitted a wrong guess.
 _LEAST_YIELD = 0.25
 # Number of times that keyframes without a loop are tried again.
 _ROUNDS = 3
@@ -60,10 +61,11 @@ _ROUNDS = 3
 _DRIFT = 0.3
 # Heights are not changed if the ground is within this distance of zero [m].
 _GROUND_TOLERANCE = 0.25
-# Self-loops: number of pairs to try; number of pairs that must fit, so that no
-# chance fit bends a drive; and number of rounds if the drive has drifted.
+# Self-loops: number of pairs to try.
 _MOST_SELF_LOOPS = 30
+# Number of pairs that must fit, so that no chance fit bends a drive.
 _FEWEST_SELF_LOOPS = 3
+# Number of rounds if the drive has drifted.
 _STRAIGHTENINGS = 3
 
 

@@ -23,8 +23,9 @@ from evaluation.drives.sampling import gather
 from evaluation.methods.method import yaw_pose
 from evaluation.methods.scan_context import ScanContext
 
-# Factors of the kernel's width, and number of iterations for each.
+# Factors of the kernel's width.
 _WIDTHS = (100.0, 30.0, 10.0, 3.0, 1.0)
+# Number of iterations for each factor.
 _STEPS = 8
 # Limit of the squared, normalised error: 95 % of the chi-squared distribution
 # with six degrees of freedom.
@@ -34,10 +35,11 @@ _STILL = 1e-6
 # Here no score is required: in a changed city, right candidates score 0.3 to
 # 0.5, and wrong ones are outvoted.
 _CANDIDATES = 5
-# Greatest error of a pair under a guess [m, rad]. The distance allows for half
-# a lane, the spacing of keyframes and drift; the angle for sectors of six
-# degrees.
+# Greatest distance error of a pair under a guess [m]. It allows for half a
+# lane, the spacing of keyframes and drift.
 _NEAR = 8.0
+# Greatest angular error of a pair under a guess [rad]. It allows for sectors of
+# six degrees.
 _TURN = np.radians(12.0)
 # Two pairs determine a turn if they are this far apart [m].
 _BASELINE = 20.0

@@ -32,9 +32,9 @@ _STILL = (0.005, 2e-4)
 _PARALLEL = 0.7
 _FEWEST_PAIRS = 20
 _SEED = 7
-# Standard deviation of a point's distance from its plane [m]; number of
-# neighbouring points that have a common error and count as one.
+# Standard deviation of a point's distance from its plane [m].
 _SIGMA = 0.1
+# Number of neighbouring points that have a common error and count as one.
 _CORRELATED = 50.0
 
 

@@ -10,10 +10,12 @@ from evaluation.alignment.registration import Surface, make_surface
 from evaluation.drives.sampling import sample_frames, travelled
 from evaluation.maps.voxel_maps import VoxelAccumulator
 
-# Distance between keyframes along the path [m]; longer on very long drives,
-# shorter on very short ones.
+# Distance between keyframes along the path [m].
 _SPACING = 10.0
+# Very short drives have a smaller distance, so that they get this many
+# keyframes.
 _FEWEST_KEYFRAMES = 20
+# Very long drives have a larger distance, so that they get no more than this.
 _MOST_KEYFRAMES = 400
 # A submap contains the scans within this distance along the path on either side
 # of its keyframe, at this spacing, with points out to this range [m].

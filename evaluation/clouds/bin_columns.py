@@ -30,9 +30,10 @@ _WINDOWS = 4
 _MOST_BINS = 16
 # Average number of values per bin; also the least number of points.
 _FILLED = 16
-# Least information that the column must have about the value [nat], and least
-# excess over random columns, in standard deviations.
+# Least information that the column must have about the value [nat].
 _LEAST_INFORMATION = 0.05
+# Least excess of the information over that of random columns, in standard
+# deviations.
 _SIGNIFICANCE = 5.0
 # If fewer columns have at least this share of the information, they are right.
 _ALMOST = 0.9

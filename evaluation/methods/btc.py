@@ -51,11 +51,12 @@ from evaluation.methods.btc_triangles import (
 )
 from evaluation.methods.method import Method, MethodConfig, register
 
-# Fixed in the public program: approximate greatest number of pairs to try,
-# greatest distance of an aligned vertex from its partner [m], and number of
-# pairs that must agree on a motion.
+# Fixed in the public program: approximate greatest number of pairs to try.
 _TRIALS = 50
+# Fixed in the public program: greatest distance of an aligned vertex from its
+# partner [m].
 _VERTEX_LIMIT = 3.0
+# Fixed in the public program: number of pairs that must agree on a motion.
 _MIN_AGREEING = 4
 
 # Greatest number of layers: the bits of an int64 without its sign.

@@ -19,21 +19,25 @@ from scipy.spatial import cKDTree
 
 from cns_drake.base.compiled import compiled
 
-# Fixed in the public program: side, in cells, of a square that may contain one
-# keypoint; least number of points of an image; and by how many heights a cell
-# may have fewer than its neighbour and still continue a line.
+# Fixed in the public program: side of a square that may contain one keypoint
+# [cells].
 _SEGMENT = 5
+# Fixed in the public program: least number of points of an image.
 _MIN_POINTS = 6
+# Fixed in the public program: by how many heights a cell may have fewer than
+# its neighbour and still continue a line.
 _LINE_MARGIN = 3
 
 _NEIGHBOURS = ((0, 1), (1, 0), (1, 1), (1, -1))
 
 # Fixed in the public program: least excess of the sum of the two short sides
-# over the long one [m]; greatest difference of the sides of two triangles of a
-# cloud that count as the same [m]; and greatest distance of a query from the
-# center of a cell that is searched [cells].
+# over the long one [m].
 _MIN_DETOUR = 0.2
+# Fixed in the public program: greatest difference of the sides of two triangles
+# of a cloud that count as the same [m].
 _SAME = 0.001
+# Fixed in the public program: greatest distance of a query from the center of a
+# cell that is searched [cells].
 _REACH = 1.5
 
 # The search reaches this much farther, to allow for rounding.

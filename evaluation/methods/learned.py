@@ -45,8 +45,9 @@ WEIGHTS_VERSION = 1
 # For each 3 x 3 convolution: channels in, channels out, stride over rings,
 # stride over sectors.
 LAYERS = ((CHANNELS, 16, 2, 2), (16, 32, 2, 2), (32, 64, 2, 1), (64, 16, 1, 1))
-# Numbers of the map of features: rings x channels, and sectors.
+# Number of features: rings x channels.
 FEATURES = 8 * 16
+# Number of sectors of the map of features.
 TURNS = 48
 # Number of frequencies of a map along its sectors; the highest frequency has no
 # phase and is left out.

@@ -33,9 +33,9 @@ _KERB_STEP = (0.08, 0.30)
 # length [m].
 _SECTORS = 90
 _RING = 2.0
-# Greatest change of the ground's height from one step to the next [m], and
-# greatest slope.
+# Greatest change of the ground's height from one step to the next [m].
 _GROUND_STEP = 0.15
+# Greatest slope of the ground.
 _GROUND_SLOPE = 0.2
 
 # Rows and columns added around the cells of a place: twice the greatest step of
@@ -43,11 +43,13 @@ _GROUND_SLOPE = 0.2
 _MARGIN = 13
 # The unit of sines and cosines is 2 to minus this power.
 _UNIT_BITS = 14
-# Masks: every second bit, every second pair of bits, every second nibble, and
-# the first bit of every byte.
+# Mask of every second bit.
 _EVERY_2ND = np.uint64(0x5555555555555555)
+# Mask of every second pair of bits.
 _PAIRS = np.uint64(0x3333333333333333)
+# Mask of every second nibble.
 _NIBBLES = np.uint64(0x0F0F0F0F0F0F0F0F)
+# Mask of the first bit of every byte.
 _BYTES = np.uint64(0x0101010101010101)
 
 

@@ -24,6 +24,7 @@ from cns_drake.base.terminal import note
 MOST_BYTES = 200_000_000
 # Greatest number of instructions of a pickle; a tensor takes some thirty.
 _MOST_STEPS = 200_000
+# Greatest number of axes of a tensor.
 _MOST_AXES = 16
 # How far dictionaries are searched for tensors.
 _DEEPEST = 6

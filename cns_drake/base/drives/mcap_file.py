@@ -50,9 +50,10 @@ from cns_drake.base.drives.mcap_records import (
 from cns_drake.base.errors import InputError
 from cns_drake.base.files import check_regular, user_errors
 
-# An index or a table of structures has a few megabytes; as Python objects it
-# takes a hundred times as much memory.
+# An index has a few megabytes; as Python objects it takes a hundred times as
+# much memory.
 SUMMARY_LIMIT_BYTES = 1 << 25
+# A table of structures has a few megabytes, too.
 _ATTACHMENT_LIMIT_BYTES = 1 << 23
 # Size of a chunk's record without its data.
 _CHUNK_FIELDS_BYTES = 1 << 10
@@ -61,14 +62,15 @@ _RECORD_LIMIT_BYTES = CHUNK_LIMIT_BYTES + _CHUNK_FIELDS_BYTES
 # checksum.
 _FOOTER = struct.Struct("<BQQQI")
 # A chunk's index, after its record header: where the chunk begins, and the size
-# of the table of message indexes that follows, with a channel id and an offset
-# in each entry.
+# of the table of message indexes that follows.
 _CHUNK_INDEX = struct.Struct("<16xQ8xI")
+# An entry of this table: a channel id, and an offset.
 _CHUNK_INDEX_ENTRY = struct.Struct("<HQ")
 # A message, after its record header: channel id, sequence, two times.
 _MESSAGE_HEADER = struct.Struct("<HIQQ")
 # A message index, after its record header: channel id, length of the rest.
 _INDEX_HEADER = struct.Struct("<HI")
+# An entry of the rest: log time [ns], and offset in the chunk [bytes].
 _INDEX_ENTRY = np.dtype([("log_time", "<u8"), ("offset", "<u8")])
 # The chunk that is being read, and its neighbour where messages interleave.
 _CHUNKS_KEPT = 2

@@ -21,8 +21,9 @@ from typing import NamedTuple
 from cns_drake.base.files import user_errors
 from cns_drake.base.version import installed_versions
 
-# The folder of the packages, and their names.
+# The folder of the packages.
 _ROOT = Path(__file__).parents[3]
+# Names of the packages.
 _PACKAGES = ("cns_drake", "evaluation")
 # Packages of others that influence numbers.
 _LIBRARIES = (

@@ -32,6 +32,7 @@ from cns_drake.imports.options import ImportFaults
 # Within this distance of drives, sidewalks get kerbs and missing ones are added
 # [m].
 _WITHIN = 80.0
+# Height of kerbs above the carriageway [m].
 KERB_HEIGHT = 0.12
 # The sides of a kerb reach this far down from its upper edges [m].
 _KERB_DEPTH = 0.25

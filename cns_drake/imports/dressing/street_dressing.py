@@ -454,6 +454,7 @@ def fill_car_park(placing: StreetRoom, one: Imported, seed: int) -> None:
 _THINGS_WITHIN = 100.0
 # Distance between random lamps, and from them to those of the file [m].
 _LAMP_EVERY = 27.0
+# Mean distance between random small objects [m].
 _SMALL_EVERY = 22.0
 
 

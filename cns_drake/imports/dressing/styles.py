@@ -29,10 +29,16 @@ _NEW_FROM = 1965
 # Least and greatest storey height that a tag's number of levels may lead to
 # [m].
 _STOREYS = (2.3, 6.0)
-_LARGE_HOUSE = 260.0  # [m^2]
-_HIGH_HOUSE = 9.5  # [m]
-_HIGH_BLOCK = 26.0  # [m]
-_SMALL = 45.0  # [m^2]
+# A building whose use is not tagged is a house if its area is smaller than this
+# [m^2].
+_LARGE_HOUSE = 260.0
+# Such a house is lower than this [m].
+_HIGH_HOUSE = 9.5
+# A building whose use is not tagged is an office if it is higher than this [m].
+_HIGH_BLOCK = 26.0
+# A low building whose use is not tagged is a shed if its area is smaller than
+# this [m^2].
+_SMALL = 45.0
 
 
 @dataclass(frozen=True)

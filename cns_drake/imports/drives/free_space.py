@@ -13,13 +13,13 @@ from cns_drake.imports.foreign_city import Imported, boxes_of
 from cns_drake.imports.ground import Ground
 
 CELL = 1.0  # [m]
-# A car passes below things higher than this above the ground, and over things
-# no higher than a kerb [m].
+# A car passes below things higher than this above the ground [m].
 _HEADROOM = 3.5
+# A car passes over things no higher than a kerb [m].
 _KERB = 0.3
-# Least distance from the middle of a path to a wall, and to the edge of a road
-# [m].
+# Least distance from the middle of a path to a wall [m].
 _FROM_WALL = 2.5
+# Least distance from the middle of a path to the edge of a road [m].
 _FROM_EDGE = 1.6
 # Share of this distance that a car that follows the path may lose.
 _SLACK = 0.6
@@ -28,6 +28,7 @@ _HALF_CAR = 1.1
 # Half the width of the widest street; wider open ground is outside the city
 # [m].
 _HALF_STREET = 20.0
+# Distance between the samples of a surface [m].
 _SAMPLE_SPACING = 0.5
 # Room is searched within this distance of a city's middle, since no drive is
 # longer [m].

@@ -41,8 +41,9 @@ _DEGREE = 5
 _MARGIN = 1.01
 # Distance between the places where bends and room are checked [m].
 _STEP = 0.25
-# Greatest and least length of a proposed drive [m].
+# Greatest length of a proposed drive [m].
 LONGEST = 1500.0
+# Least length of a proposed drive [m].
 SHORTEST = 80.0
 
 # The place (2,) of an obstacle: a bend that is too tight, or no room [m].
@@ -50,26 +51,29 @@ Obstacle = np.ndarray
 # Takes places (N, 2) along a path [m]. Returns the first place (2,) without
 # room for a car, or None.
 Room = Callable[[np.ndarray], np.ndarray | None]
-# Least and greatest length of the second drive's own arms [m].
+# Least length of the second drive's own arms [m].
 _SHORTEST_ARM = 40.0
+# Greatest length of the second drive's own arms [m].
 _LONGEST_ARM = LONGEST / 3
 # Shares of the first drive's length. For each of two trials: between the first
 # and the second number, the second drive may join the first one; it leaves it
-# between 1 minus the second number and the third number. Then the least share
-# that both have in common.
+# between 1 minus the second number and the third number.
 _SHARED = ((0.25, 0.5, 0.75), (0.0, 0.7, 1.0))
+# Least share of the first drive's length that both have in common.
 _LEAST_SHARED = 0.15
-# Greatest number of places to join and to leave that are tried, and least
-# distance between them [m].
+# Greatest number of places to join and to leave that are tried.
 _MOST_PLACES = 12
+# Least distance between these places [m].
 _APART = 10.0
 # Greatest number of ways that are tried as first drive, and as second drive.
 _MOST_TRIES = 30
 # Greatest number of ends that are tried to find a way that passes no place
 # twice.
 _MOST_ENDS = 20
-# Number of pieces from which ways are searched; fewer in large graphs.
+# Greatest number of pieces from which ways are searched.
 _MOST_STARTS = 200
+# In large graphs, ways are searched from fewer pieces, so that this number of
+# pieces is reached at most.
 _MOST_REACHED = 400_000
 
 
@@ -415,12 +419,14 @@ _WAYPOINT_SPACING = 15.0
 _SIMPLIFICATIONS = (1.5, 1.0, 0.7, 2.0, 3.0)
 # Numbers of cells in a running mean; the values were found by trial.
 _STRAIGHTENED = (5, 11, 17)
+# Distance between the points of a way along lanes [m].
 _LANE_SPACING = 1.0
 # Share of their lateral offset that cars keep in a turn. In narrow streets and
 # sharp corners they have to swing out.
 _AT_TURNS = (1.0, 0.6, 0.2)
 # A turn begins and ends this far from its sharpest place [m].
-_TURN = 12.0
+_TURN_REACH = 12.0
+# A way turns where it bends by more than this [deg/m].
 _SHARP_DEG_PER_M = 4.0
 # Tolerances of waypoints relative to the lanes, tried in turn [m].
 _TOLERANCES = (0.2, 0.4, 0.8, 1.2)
@@ -654,7 +660,7 @@ class StreetGraph(WayGraph):
         along /= np.maximum(np.linalg.norm(along, axis=1), 1e-9)[:, None]
         heading = np.unwrap(np.arctan2(along[:, 1], along[:, 0]))
         bends = np.abs(np.gradient(heading)) > np.radians(_SHARP_DEG_PER_M)
-        reach = int(_TURN / _LANE_SPACING)
+        reach = int(_TURN_REACH / _LANE_SPACING)
         near = np.convolve(bends, np.ones(2 * reach + 1), mode="same") > 0
         right = np.column_stack([along[:, 1], -along[:, 0]]) * self._side
         found: WaypointDrive | Obstacle = middle[len(middle) // 2]

@@ -26,10 +26,10 @@ from cns_drake.imports.foreign_city import make_imported
 from cns_drake.imports.opendrive.lanes import LaneBand, is_raised, lane_class
 from cns_drake.roads.carriageway import Areas
 
-# Least and greatest width of a step, and least length of the kerb before it
-# [m].
+# Least and greatest width of a step [m].
 _STEP = (0.02, 2.0)
-_BEFORE = 1.0
+# Least length of the kerb before a step [m].
+_KERB_BEFORE = 1.0
 # The kerbs on both sides of a step have the same direction within this angle;
 # the step itself turns by more [rad].
 _ASTRAY = np.radians(45.0)
@@ -104,7 +104,7 @@ def _tapers(xy: np.ndarray) -> Iterator[np.ndarray]:
         straight = before[: _straight_on(before, -ahead) + 1]
         chain = _kerb(behind, ahead)
         reach = np.hypot(*np.diff(straight, axis=0).T).sum()
-        if reach < _BEFORE or len(chain) < 2:
+        if reach < _KERB_BEFORE or len(chain) < 2:
             continue
         within = min(_LONGEST_TAPER, _TAPER_RATIO * aside)
         dense = shapely.get_coordinates(

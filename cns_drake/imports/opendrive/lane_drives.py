@@ -18,10 +18,10 @@ from cns_drake.traffic.lane_joining import (
     usual_limit,
 )
 
-# A lane follows another one if its start is within the first distance of the
-# other's end, and their headings differ by less than the second number [m,
-# rad].
+# A lane follows another one if its start is within this distance of the other's
+# end [m].
 _NEAR = 0.6
+# Their headings differ by less than this [rad].
 _ASTRAY = np.radians(20.0)
 # A lane at least this long may be a ring that follows itself [m].
 _SHORTEST_RING = 10.0

@@ -28,11 +28,12 @@ DRIVEN = frozenset(TYPES["driven lanes"])
 _RAISED = frozenset({"sidewalk", "walking", "curb"})
 # A lane at least this high has a kerb [m].
 _LEAST_KERB = 0.03
-# Greatest distance between two places on an edge, and greatest error of chords
-# of the reference line, of widths and of heights: edges are then exact to 5 mm
-# [m].
+# Greatest distance between two places on an edge [m].
 _SPACING = 2.0
+# Greatest error of chords of the reference line, of widths and of heights:
+# edges are then exact to 5 mm [m].
 _SAG = 0.002
+# Greatest number of places on the edges of a road.
 _MOST_STATIONS = 200_000
 # No lane is farther from the reference line than this along x or y [m].
 _FARTHEST = 50_000.0

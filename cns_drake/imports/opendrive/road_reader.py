@@ -42,9 +42,11 @@ _FAR = 10_000.0
 _ROUNDING = 0.01
 # Pieces of a road's course that are farther apart are counted [m].
 _WIDEST_JOINT = 0.1
-# Greatest width of a lane, and greatest curvature of a curve [m, 1/m].
+# Greatest width of a lane [m].
 _WIDEST = 100.0
+# Greatest curvature of a curve [1/m].
 _SHARPEST = 100.0
+# Shorter pieces are left out [m].
 _SHORTEST = 1e-5
 # Greatest height of a kerb [m].
 _HIGHEST_LANE = 1.0

@@ -334,12 +334,14 @@ _KERBS = (0.03, 0.3)
 # Greatest area that the generator fills with ground [m^2, m].
 _LARGEST_AREA = 8e6
 _LONGEST_SIDE = 9000.0
-# Parking lanes: least and greatest length of a bay, share of the bays that are
-# taken, and least width of the lane [m].
+# Least and greatest length of a bay of a parking lane [m].
 _BAY = (5.8, 7.4)
-_FILL = 0.6
-_BAY_WIDTH = 1.9
-_CROWN = 1.5  # [m]
+# Share of the bays that are taken.
+_TAKEN_SHARE = 0.6
+# Least width of a parking lane [m].
+_LEAST_PARKING = 1.9
+# About the radius of a tree's crown, in pictures [m].
+_CROWN = 1.5
 # Least and greatest speed of a drive [m/s].
 _SPEEDS = (3.0, 12.0)
 # Classes that the picture from above shows; small things could not be seen.
@@ -531,7 +533,7 @@ def _park(
 ) -> None:
     """Parks cars in parking lanes, facing in the direction of traffic."""
     for band in bands:
-        if band.kind != "parking" or band.width.min() < _BAY_WIDTH:
+        if band.kind != "parking" or band.width.min() < _LEAST_PARKING:
             continue
         rng = draft.task(
             "parking", band.road.name, band.section, band.lane.number
@@ -544,7 +546,7 @@ def _park(
             x, y = (np.interp(place, along, band.middle[:, k]) for k in (0, 1))
             nearest = int(np.abs(along - place).argmin())
             yaw = float(band.heading[nearest]) + (np.pi if backwards else 0.0)
-            taken = rng.uniform() < _FILL
+            taken = rng.uniform() < _TAKEN_SHARE
             if taken:
                 place_car(draft, cars, (float(x), float(y)), yaw, rng, ("bay",))
             place += float(rng.uniform(*_BAY))

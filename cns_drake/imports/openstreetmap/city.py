@@ -62,9 +62,11 @@ _COMPASS = (
 # Objects that carry a lamp which is an object of its own.
 _POSTS = ("pole", "straight_mast", "bent_mast", "mast")
 _TREE_DISTANCE = 8.0  # [m]
-# Greatest sizes of barriers and trees [m].
+# Greatest height of a barrier or a tree [m].
 _TALLEST = 150.0
+# Width and usual height of a hedge [m].
 _HEDGE = (0.8, 1.2)
+# Width and usual height of a wall [m].
 _WALL = (0.2, 1.6)
 # How far the sea extends beyond the buildings [m].
 _SEA = 60.0

@@ -52,6 +52,7 @@ _KERB = 0.12
 _WHITE = (0.86, 0.86, 0.84)
 # Width of the stripes of a zebra crossing, and of the gaps between them [m].
 _STRIPE_WIDTH = 0.5
+# Length of the stripes [m].
 _STRIPE_LENGTH = 3.0
 # Height of the stripes above the street [m].
 _STRIPE_HEIGHT = 0.01

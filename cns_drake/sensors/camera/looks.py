@@ -16,8 +16,9 @@ import numpy as np
 _SIDE = 512
 # Gamma: an sRGB value is about this root of the light (IEC 61966-2-1).
 GAMMA = 2.2
-# Where the sun is, and the colour of the sky at the horizon.
+# Direction towards the sun.
 SUN_W = np.array([-0.5, 0.55, 0.75]) / np.linalg.norm([-0.5, 0.55, 0.75])
+# Colour of the sky at the horizon.
 HORIZON_RGB = np.array([204.0, 221.0, 237.0]) / 255.0
 
 

@@ -24,16 +24,21 @@ from cns_drake.sensors.returns.weather import Scattering
 
 # The index of the weather, in place of a geometry's.
 SCATTERED = -2
-# Numbers of a beam's random draws; lower numbers belong to the sub-rays.
+# Number of the first of a beam's random draws for echoes; lower numbers belong
+# to the sub-rays.
 _FIRST_ECHO_DRAW = 128
+# Number of draws for each echo.
 _DRAWS_PER_ECHO = 4
+# Number of the first draw for drops.
 _FIRST_DROP_DRAW = 200
-# Greatest numbers of echoes of surfaces, and of drops, per beam.
+# Greatest number of echoes of surfaces per beam.
 _MOST_ECHOES = 12
+# Greatest number of drops per beam.
 _MOST_DROPS = 8
 # Energy of a retro-reflector at which intensity saturates: 10,000 times that of
 # a white target.
 _FULL_RETRO = 1e4
+# Intensity at which it saturates.
 _FULL_INTENSITY = 255.0
 
 

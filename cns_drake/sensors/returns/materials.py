@@ -24,12 +24,17 @@ LAMBERT, RETRO, GLASS, LEAVES, BEADS, SPRAYS = range(6)
 
 # Class -> its fields; the YAML file explains them.
 _CLASSES = parse_yaml(Path(__file__).with_name("materials.yaml").read_bytes())
-# Diffuse reflectivity of the dust on a pane, and of water.
+# Diffuse reflectivity of the dust on a pane.
 _GLASS_DUST = 0.02
+# Diffuse reflectivity of water.
 _WATER = 0.02
+# Diffuse reflectivity of bark.
 _BARK = 0.30
+# Diffuse reflectivity of road markings, without their beads.
 _MARKINGS = 0.47
+# Reflectivity of the retro-reflective sheeting of a traffic sign.
 _SHEETING = 220.0
+# Reflectivity of a retro-reflective number plate.
 _PLATE = 160.0
 # Leaf area in a volume of leaves [1/m]: crowns have 0.5 to 2.5 (Hosoi and
 # Omasa, 2006), clipped hedges more. Fitted to the first place of KITTI.
