@@ -1,6 +1,6 @@
 """Commands made from functions, and options of both command-line programs."""
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Collection, Mapping
 import functools
 import inspect
 import re
@@ -10,6 +10,7 @@ from typing import Annotated, Any
 import typer
 from typer.core import TyperCommand
 
+from cns_drake.base.errors import InputError
 from cns_drake.base.terminal import check_finite
 
 Jobs = Annotated[
@@ -28,15 +29,6 @@ Scheduler = Annotated[
         "the jobs on several machines. They must all see the output folder "
         "under the same path. By default the environment variable "
         "DASK_SCHEDULER_ADDRESS, if it is set.",
-    ),
-]
-SessionSpacing = Annotated[
-    float,
-    typer.Option(
-        metavar="METRES",
-        min=0.01,
-        help="Distance that the car drives between two scans of a map [m]. "
-        "A smaller distance makes a denser map.",
     ),
 ]
 MethodSettings = Annotated[
@@ -62,6 +54,30 @@ Tables = Annotated[
         "--tables",
         help="Write wide tables, too (.csv, .md and .tex): survival, tcr, "
         "place_recognition, poses and others. They are views of the results.",
+    ),
+]
+
+Json = Annotated[
+    bool, typer.Option("--json", help="Print the results as one JSON object.")
+]
+LidarName = Annotated[
+    str | None,
+    typer.Option(
+        "--lidar",
+        metavar="NAME",
+        help="LiDAR to read, if a recording has several: the name in its "
+        "topic /NAME/points, or the whole topic.",
+    ),
+]
+Columns = Annotated[
+    int | None,
+    typer.Option(
+        "--columns",
+        metavar="N",
+        min=3,  # x, y, z
+        help="Number of float32 values per point in .bin files, of which the "
+        "first three are x, y and z. By default it is guessed from the values; "
+        "give it if the guess is wrong.",
     ),
 ]
 
@@ -93,6 +109,15 @@ class Command(TyperCommand):
             one.help = helps.get(one.name, one.help)
         super().__init__(*args, help=text, params=params, **settings)
 
+    def parse_args(self, ctx: Any, args: list[str]) -> list[str]:
+        """Reads the command line, after refusing options of other days."""
+        former = getattr(self.callback, "former_options", {})
+        for word in args[: args.index("--")] if "--" in args else args:
+            option = word.partition("=")[0]
+            if option in former:
+                raise InputError(f"{option}: is now {former[option]}")
+        return super().parse_args(ctx, args)
+
     def invoke(self, ctx: Any) -> Any:
         """Runs the command, after checking that its numbers are finite."""
         # Only options with a lower limit are checked here; others are checked
@@ -106,6 +131,65 @@ class Command(TyperCommand):
             }
         )
         return super().invoke(ctx)
+
+
+def former_options(
+    replaced: Mapping[str, str],
+) -> Callable[[Callable[..., None]], Callable[..., None]]:
+    """Returns a decorator that names the new spelling of a command's options.
+
+    Args:
+        replaced: option of an earlier version -> what replaces it, such as
+            `--lidar`. Giving the former option is an error that names the new
+            one.
+    """
+
+    def decorate(command: Callable[..., None]) -> Callable[..., None]:
+        command.former_options = replaced  # type: ignore[attr-defined]
+        return command
+
+    return decorate
+
+
+def given_options(context: typer.Context) -> list[str]:
+    """Returns the names of parameters that stand on the command line.
+
+    Parameters that have their defaults, or values from the environment, are not
+    among them.
+    """
+    sources = {
+        str(one.name): context.get_parameter_source(str(one.name))
+        for one in context.command.params
+    }
+    return [
+        name
+        for name, source in sources.items()
+        if source is not None and source.name == "COMMANDLINE"
+    ]
+
+
+def check_only_with(
+    context: typer.Context, chosen: str, allowed: Collection[str]
+) -> None:
+    """Refuses options that have no effect together with a chosen one.
+
+    Args:
+        context: context of the command that runs.
+        chosen: name of the chosen option's parameter.
+        allowed: names of all parameters that have an effect with it.
+
+    Raises:
+        InputError: another option was given; the message names both.
+    """
+    for name in given_options(context):
+        if name not in (chosen, *allowed):
+            (one,) = (p for p in context.command.params if p.name == name)
+            shown = max(one.opts, key=len)
+            if one.param_type_name == "argument":
+                shown = one.make_metavar(context).strip("[]")
+            raise InputError(
+                f"{shown}: not together with --{chosen.replace('_', '-')}"
+            )
 
 
 def with_options(

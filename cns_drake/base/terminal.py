@@ -2,7 +2,7 @@
 
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 import contextlib
-import json
+from json import dumps
 import logging
 import math
 import os
@@ -68,7 +68,7 @@ def make_program(
         summary: text at the beginning of the program's help.
         epilog: text at the end of the program's help.
         renamed: name of a former command -> the command that replaces it, such
-            as `simulate`, or `cns-eval scores` if another program has it.
+            as `simulate`, or `cns-eval pr --scores` if another program has it.
             Calling a former command is an error whose message names the new
             one.
         groups: heading -> commands that the help lists under it; by default
@@ -323,7 +323,7 @@ def next_command(*words: object) -> None:
 
 def print_json(values: dict) -> None:
     """Prints a result as one JSON object."""
-    print(json.dumps(values, indent=2, allow_nan=False))
+    print(dumps(values, indent=2, allow_nan=False))
 
 
 def print_rows(rows: Iterable[tuple[str, str]]) -> None:
@@ -332,6 +332,21 @@ def print_rows(rows: Iterable[tuple[str, str]]) -> None:
     width = max(len(name) for name, _ in rows)
     for name, value in rows:
         print(printable(f"{name:<{width}}  {value}"))
+
+
+def show(
+    values: Mapping,
+    rows: Iterable[tuple[str, str]] | str,
+    *,
+    json: bool,
+) -> None:
+    """Prints a result as JSON; or as rows, or text, for people."""
+    if json:
+        print_json(dict(values))
+    elif isinstance(rows, str):
+        print(rows)
+    else:
+        print_rows(rows)
 
 
 def number(value: float | None) -> str:

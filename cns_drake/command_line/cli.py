@@ -10,19 +10,18 @@ from cns_drake.base import terminal
 from cns_drake.base.commands import Command
 from cns_drake.base.progress_display import shown
 from cns_drake.base.terminal import example
-from cns_drake.command_line import learning, simulating, studying
+from cns_drake.command_line import exporting, learning, simulating, studying
 from cns_drake.command_line.maps import age, city, import_city, list_drives
 
 # Command -> its example, line by line.
 _EXAMPLES: dict[Callable[..., None], tuple[str, ...]] = {
     list_drives: ("list",),
     simulating.simulate: ("simulate metropolis_01 --output drives",),
-    simulating.film: ("film metropolis_01 --output metropolis.webp",),
     simulating.scan: (
         "scan worlds/metropolis/stage_01.sdf \\",
         "    --pose 0 0 1.6 0 0 1.57 --output scan.pcd",
     ),
-    simulating.export: (
+    exporting.export: (
         "export drives/metropolis_01 \\",
         "    --format kitti --output kitti",
     ),
@@ -30,18 +29,9 @@ _EXAMPLES: dict[Callable[..., None], tuple[str, ...]] = {
         "generate metropolis_01 metropolis_04 \\",
         "    --output drives --jobs 2",
     ),
-    simulating.repair: ("repair damaged.mcap --output whole.mcap",),
     studying.reproduce: ("reproduce metropolis --output study --quick",),
     studying.study: ("study ladder suburbia --quick --output ladder",),
-    learning.map_truth: (
-        "map-truth metropolis_01 metropolis_04 \\",
-        "    --output maps",
-    ),
     learning.train: ("train --output mine.npz --minutes 10",),
-    learning.export_pairs: (
-        "export-pairs riverside_01 riverside_02 \\",
-        "    --format pointnetvlad --output pairs",
-    ),
     import_city: (
         "import delft.city.jsonl \\",
         "    --years 1930 1970 2000 2020 --output delft",
@@ -61,13 +51,9 @@ app = terminal.make_program(
     example("cns-drake simulate metropolis_01 --output drives"),
     groups={
         "Make cities": ("import", "age", "city"),
-        "Drive through them": (
-            *("list", "simulate", "film", "scan", "generate", "repair"),
-        ),
-        "Study what change costs": (
-            *("study", "reproduce", "train", "map-truth"),
-        ),
-        "Convert for other programs": ("export", "export-pairs"),
+        "Drive through them": ("list", "simulate", "scan", "generate"),
+        "Study what change costs": ("study", "reproduce", "train"),
+        "Convert for other programs": ("export",),
     },
     renamed={
         "ladder": "study ladder",
@@ -77,7 +63,11 @@ app = terminal.make_program(
         "fresh": "study fresh",
         "trend": "study trend",
         "map-pairs": "study map-pairs",
-        "overlap": "export-pairs A B --format overlap-table",
+        "overlap": "export A B --format overlap-table",
+        "export-pairs": "export DRIVE ... --format pointnetvlad|overlap",
+        "map-truth": "export A B --format map-truth",
+        "film": "export DRIVE --format film",
+        "repair": "export FILE.mcap --format mcap",
     },
 )
 for _command, (_first, *_rest) in _EXAMPLES.items():

@@ -62,6 +62,16 @@ Overwrite = Annotated[
         "--overwrite", help="Record again, and replace existing recordings."
     ),
 ]
+Vary = Annotated[
+    Path | None,
+    typer.Option(
+        metavar="FAMILY.yaml",
+        help="File of a family of drives (one drive and what varies in it), "
+        "whose members are taken in addition to the named drives. Their "
+        "scenario files are written to <output>/scenarios, and cities that are "
+        "generated for them to <output>/cities.",
+    ),
+]
 Maps = Annotated[
     list[str] | None,
     typer.Argument(

@@ -225,67 +225,6 @@ def _switches(texts: Iterable[str]) -> dict[str, str]:
     return found
 
 
-def film(
-    scenario: Annotated[str, typer.Argument(metavar="NAME|SCENARIO.yaml")],
-    output: Annotated[
-        Path | None, typer.Option(metavar="FILE.webp|.mp4")
-    ] = None,
-    seconds: Annotated[
-        float, typer.Option(min=1.0, max=60.0, metavar="S")
-    ] = 20.0,
-    size: Annotated[str, typer.Option(metavar="WxH")] = "640x360",
-    start: Annotated[float | None, typer.Option(min=0.0, metavar="S")] = None,
-    traffic: options.Traffic = None,
-) -> None:
-    """Film the same stretch of a drive in each stage of its city.
-
-    The film is a series of shots of equal length. First, one shot per stage
-    shows the stretch from behind the car, with the points that the LiDAR
-    measures. Then one shot per stage shows it from above.
-
-    Args:
-        scenario: Name of a shipped drive, or a scenario file of your own.
-        output: File for the film. Its name ends in .webp, or in .mp4, which
-            needs ffmpeg. By default NAME.webp.
-        seconds: Length of the film [s]. All shots together have this length.
-        size: Width and height of the film in pixels, each from 32 to 1920.
-        start: Time in the drive at which the stretch begins [s]. By default,
-            it begins where the road ahead is straightest.
-        traffic: Number of moving vehicles. The same number of walkers is added.
-            By default as the scenario says; if the scenario has no traffic, 60
-            vehicles and 60 walkers are added, provided that the streets have
-            room.
-    """
-    with uninterrupted():
-        from cns_drake.scenarios.scenario_files import load_scenario
-        from cns_drake.simulation.film import make_film, with_some_traffic
-
-    drive = load_scenario(scenario)
-    path = output or Path(f"{drive.name}.webp")
-    match = re.fullmatch(r"(\d{1,4})x(\d{1,4})", size)
-    width, height = map(int, match.groups()) if match else (0, 0)
-    if not (32 <= width <= 1920 and 32 <= height <= 1920):
-        raise InputError(
-            f"--size: '{size}' is not of the form WxH with 32 to 1920 pixels, "
-            "such as 640x360"
-        )
-    if traffic is None:
-        drive = with_some_traffic(drive)
-    else:
-        drive = drive.with_traffic(traffic)
-    number = make_film(
-        drive,
-        path,
-        seconds=seconds,
-        size=(width, height),
-        start=start,
-        on_note=note,
-    )
-    print(f"{path}: {number} images")
-    words = ("--output", "drives", "--recording", "drive.html")
-    next_command("cns-drake", "simulate", scenario, *words)
-
-
 def scan(
     world: Annotated[Path, typer.Argument(metavar="WORLD.sdf")],
     pose: Annotated[
@@ -361,18 +300,12 @@ def generate(
     jobs: commands.Jobs = None,
     scheduler: commands.Scheduler = None,
     overwrite: options.Overwrite = False,
-    vary: Annotated[Path | None, typer.Option(metavar="FAMILY.yaml")] = None,
+    vary: options.Vary = None,
 ) -> None:
     """Record many drives.
 
     Skips finished recordings and resumes interrupted ones, so after an
     interruption you can run the same command again.
-
-    Args:
-        vary: File of a family of drives (one drive and what varies in it),
-            whose members are recorded in addition to the named drives. Their
-            scenario files are written to <output>/scenarios, and cities that
-            are generated for them to <output>/cities.
     """
     with uninterrupted():
         from cns_drake.base.jobs.cluster import choose_cluster
@@ -392,78 +325,3 @@ def generate(
     for scenario in scenarios:
         typer.echo(output / scenario.name)
     next_command("cns-eval", "report", output, "--output", "report")
-
-
-def export(
-    drive: Annotated[Path, typer.Argument(metavar="DRIVE")],
-    layout: Annotated[
-        Literal["cns", "kitti", "mulran", "tum"], typer.Option("--format")
-    ],
-    output: Annotated[Path, typer.Option()],
-    sensor: Annotated[str | None, typer.Option(metavar="NAME")] = None,
-    absent_in: Annotated[str | None, typer.Option(metavar="STAGE")] = None,
-    sequence: Annotated[
-        int | None, typer.Option(metavar="NN", min=0, max=999)
-    ] = None,
-) -> None:
-    """Convert a recording to a common data format.
-
-    Args:
-        drive: Folder of a recording, or its .mcap file.
-        layout: Format to write: cns (the CNS data set), kitti (KITTI odometry),
-            mulran (MulRan) or tum (only the trajectory).
-        output: Folder for the exported drive. It can be new or empty, or
-            contain earlier exports.
-        sensor: Name of the LiDAR to export, if the recording has several.
-        absent_in: Another stage of the map, such as 01. Points on structures
-            that do not exist in this other stage get SemanticKITTI's labels of
-            moving objects (252 to 259), as if these structures had moved. Only
-            with --format kitti.
-        sequence: Number of the exported drive, which names its folder
-            sequences/NN. By default the digits at the end of the drive's name.
-            Only with --format kitti.
-    """
-    with uninterrupted():
-        from cns_drake.export.exporting import export_drive
-
-    drive = export_drive(
-        drive,
-        layout,
-        output,
-        lidar=sensor,
-        absent_in=absent_in,
-        sequence=sequence,
-        on_note=note,
-    )
-    typer.echo(drive)
-    if layout != "tum":
-        next_command(
-            *("cns-eval", "pr", drive, drive),
-            *("--method", "solid", "--exclude-recent", 30),
-        )
-
-
-def repair(
-    file: Annotated[Path, typer.Argument(metavar="FILE")],
-    output: Path | None = None,
-) -> None:
-    """Recover the readable part of a damaged MCAP file.
-
-    Args:
-        file: MCAP file to recover. It is not changed.
-        output: File to write; by default <name>_repaired.mcap.
-    """
-    with uninterrupted():
-        from cns_drake.recording.repair import repair_mcap
-
-    result = repair_mcap(file, output)
-    typer.echo(
-        f"{result.output}: {result.num_messages} messages over "
-        f"{result.seconds:.2f} s recovered; "
-        + (
-            f"damaged places: {result.num_faults}, the first at "
-            f"{result.first_fault}"
-            if result.num_faults
-            else "the file was whole"
-        )
-    )

@@ -241,7 +241,9 @@ def _times(
         way = trajectory.positions(ends) - trajectory.positions(starts)
         start = float(starts[np.argmax(np.linalg.norm(way, axis=1))])
     elif start > end:
-        raise InputError(f"--start: {start:g} s: the drive takes {end:.1f} s")
+        raise InputError(
+            f"--start-time: {start:g} s: the drive takes {end:.1f} s"
+        )
     return np.minimum(start + moments, end)
 
 

@@ -168,7 +168,8 @@ def open_survey(place: str | Path) -> Survey:
     if not (folder / "scenario.yaml").is_file():
         raise InputError(
             f"{folder}: no scenario.yaml: the geometry of a recording by others"
-            " is not known (cns-eval map-sessions makes its maps)"
+            " is not known (cns-drake export --format map-sessions makes its"
+            " maps)"
         )
     drive = McapDrive(path)
     _check_instances(drive, path)

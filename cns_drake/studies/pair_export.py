@@ -135,11 +135,11 @@ def export_pairs(
             name, or drives cannot be simulated; the error names all of these.
     """
     if not scenarios:
-        raise InputError("export-pairs: no drive to learn from")
+        raise InputError("export: no drive to learn from")
     every = [*scenarios, *held_out]
     names = [one.name for one in every]
     for name in repeated(names):
-        raise InputError(f"export-pairs: two drives are named {name}")
+        raise InputError(f"export: two drives are named {name}")
     make_folder(output)
     output = output.absolute()
     parts = {name: Part(output / "parts" / f"{name}.data") for name in names}

@@ -19,10 +19,10 @@ from cns_drake.base.progress_display import shown
 from cns_drake.base.terminal import example, number
 from evaluation.command_line import options
 from evaluation.command_line.localising import localise
-from evaluation.command_line.map_updating import map_sessions, map_update
+from evaluation.command_line.map_updating import map_update
 from evaluation.command_line.real import real
-from evaluation.command_line.trajectories import drives, trajectory
-from evaluation.recognition.protocol import RECORDED_PROTOCOL, RetrievalProtocol
+from evaluation.command_line.trajectories import compare_paths
+from evaluation.recognition.protocol import RetrievalProtocol
 from evaluation.recognition.protocol_options import with_protocol
 
 if TYPE_CHECKING:
@@ -34,9 +34,26 @@ if TYPE_CHECKING:
 # Command of an earlier version -> the command that replaces it.
 RENAMED = {
     "ranking": "compare --rankings",
+    "scores": "pr DATABASE QUERY --method METHOD --scores FILE.csv",
+    "drives": "tcr A B --paths",
+    "trajectory": "localise DRIVE --estimate FILE.tum",
+    "map-sessions": "cns-drake export A B --format map-sessions",
     "trend": "cns-drake study FILE.yaml FOLDER",
 }
 
+# Parameters that have an effect together with an option that changes what a
+# command does.
+_WITH_PATHS = ("source", "target", "align", "lidar", "columns", "json")
+_WITH_SCORES = (
+    "database",
+    "query",
+    "method",
+    "parameter",
+    "sensor_height",
+    "gate",
+    "radius",
+    "columns",
+)
 _NOT_FINITE = "points are not finite, and left out"
 
 app = terminal.make_program(
@@ -45,9 +62,8 @@ app = terminal.make_program(
     example("cns-eval tcr before.pcd after.pcd"),
     groups={
         "Measure change": ("tcr",),
-        "Recognise places": ("pr", "scores", "report", "compare", "real"),
-        "Localise, and keep maps": ("localise", "map-update", "map-sessions"),
-        "Look at drives": ("drives", "trajectory"),
+        "Recognise places": ("pr", "report", "compare", "real"),
+        "Localise, and keep maps": ("localise", "map-update"),
     },
     renamed=RENAMED,
 )
@@ -58,13 +74,15 @@ app = terminal.make_program(
     epilog=example("cns-eval tcr drives/metropolis_01 drives/metropolis_04"),
 )
 def tcr(
+    context: typer.Context,
     source: Annotated[Path, typer.Argument(metavar="A")],
     target: Annotated[Path, typer.Argument(metavar="B")],
     control: Annotated[Path | None, typer.Option(metavar="C")] = None,
     align: options.Align = "auto",
-    lidar: options.LidarName = None,
-    columns: options.Columns = None,
-    json: options.Json = False,
+    lidar: commands.LidarName = None,
+    columns: commands.Columns = None,
+    paths: Annotated[bool, typer.Option("--paths")] = False,
+    json: commands.Json = False,
 ) -> None:
     """Measure how much changed between two drives or maps.
 
@@ -80,12 +98,25 @@ def tcr(
         control: Third drive, on A's route in B's stage or on B's route in A's
             stage. With it, the command prints how large TCR_sym is if only the
             routes differ and nothing has changed.
+        paths: Compare how the two drives were driven, instead of what changed.
+            Every 5 m along A, the command measures how B differs from A:
+            sideways offset, lane, heading and height. It also prints which
+            share of the time each car stands, and its speeds. For comparison,
+            it shows the same numbers for two pairs of real drives: two drives
+            of Boreas, 28 days apart, and KAIST 01 and 02 of MulRan.
     """
+    if paths:
+        commands.check_only_with(context, "paths", _WITH_PATHS)
+        first, second = options.open_noted(
+            source, target, lidar=lidar, columns=columns
+        )
+        compare_paths(first, second, align, json=json)
+        return
     from evaluation.change import drive_change as change
 
-    paths = [path for path in (source, target, control) if path is not None]
+    named = [path for path in (source, target, control) if path is not None]
     surveys, alignments = change.survey_in_one_world(
-        paths, align, lidar, columns
+        named, align, lidar, columns
     )
     report = change.compare_maps(
         surveys[0],
@@ -101,12 +132,7 @@ def tcr(
             terminal.note(f"{one.name}: {ignored} {_NOT_FINITE}")
     for alignment in alignments:
         terminal.note(alignment.to_text())
-    options.show(report.to_json(), _change_rows(report), json=json)
-
-
-app.command(
-    cls=Command, epilog=example("cns-eval drives drives/riverside_01 mine")
-)(drives)
+    terminal.show(report.to_json(), _change_rows(report), json=json)
 
 
 @app.command(
@@ -118,6 +144,7 @@ app.command(
 )
 @with_protocol
 def pr(
+    context: typer.Context,
     database: Annotated[Path, typer.Argument(metavar="DATABASE")],
     query: Annotated[Path, typer.Argument(metavar="QUERY")],
     method: options.MethodName,
@@ -125,8 +152,8 @@ def pr(
     parameter: options.Parameters = None,
     sensor_height: options.SensorHeight = 1.6,
     align: options.Align = "auto",
-    lidar: options.LidarName = None,
-    columns: options.Columns = None,
+    lidar: commands.LidarName = None,
+    columns: commands.Columns = None,
     across_maps: Annotated[bool, typer.Option("--across-maps")] = False,
     truth: Annotated[
         str, typer.Option(metavar="radius|overlap:PART")
@@ -142,7 +169,8 @@ def pr(
     hide_sector: Annotated[float, typer.Option(metavar="DEG")] = 0.0,
     seed: int = 0,
     output: Annotated[Path | None, typer.Option(metavar="DIR")] = None,
-    json: options.Json = False,
+    scores: Annotated[Path | None, typer.Option(metavar="FILE.csv")] = None,
+    json: commands.Json = False,
     *,
     protocol: RetrievalProtocol,
 ) -> None:
@@ -166,7 +194,7 @@ def pr(
             shows, at any distance.
         overlaps: CSV file to write, with the overlap of each query with each
             place. Needs --truth overlap:PART.
-        exact_overlaps: File with exact overlaps, as cns-drake export-pairs
+        exact_overlaps: File with exact overlaps, as cns-drake export
             --format overlap-table writes it. Without it, overlaps are estimated
             from the scans. Needs --truth overlap:PART.
         turn_queries: Whether to turn each query by a random yaw, as if the car
@@ -178,7 +206,18 @@ def pr(
         seed: Seed of the random turns, tilts and hidden sectors of the queries.
         output: Folder to write results.csv and queries.csv to, in the same form
             as those of a study; created if it does not exist.
+        scores: CSV file to write, with a score for each pair of a query and a
+            place, instead of the results. DATABASE and QUERY are then folders
+            of scans without poses, in .bin, .pcd, .npy or .ply files. Every
+            query is compared with every place, even if the method usually skips
+            some places to save time. The score is empty where the method
+            rejects the place.
     """
+    if scores is not None:
+        commands.check_only_with(context, "scores", _WITH_SCORES)
+        chosen = _chosen_method(method, parameter, sensor_height)
+        _write_scores(chosen, database, query, scores, protocol, columns)
+        return
     from cns_drake.base import files
     from cns_drake.base.errors import InputError
     from evaluation.drives.drive_views import CountedDrive
@@ -279,64 +318,7 @@ def pr(
         terminal.note(f"wrote {output / RESULTS} and {QUERIES}")
     values = outcome.to_json(mode)
     values["parameters"] = chosen.config.model_dump(mode="json")
-    options.show(values, _recognition_rows(outcome, mode), json=json)
-
-
-@app.command(
-    cls=Command,
-    epilog=example(
-        "cns-eval scores --method solid --output scores.csv \\",
-        "    --database kitti/sequences/01/velodyne \\",
-        "    --query kitti/sequences/04/velodyne",
-    ),
-)
-def scores(
-    method: options.MethodName,
-    database: Annotated[Path, typer.Option()],
-    query: Annotated[Path, typer.Option()],
-    output: Annotated[Path, typer.Option()],
-    parameter: options.Parameters = None,
-    sensor_height: options.SensorHeight = 1.6,
-    gate: Annotated[bool, typer.Option("--gate")] = False,
-    radius: float = RECORDED_PROTOCOL.radius,
-    columns: options.Columns = None,
-) -> None:
-    """Score every pair of scans from two folders.
-
-    Use this command for scans without poses, in .bin, .pcd, .npy or .ply files.
-    Every query is compared with every place, even if the method usually
-    skips some places to save time. The score is empty where the method rejects
-    the place.
-
-    Args:
-        database: Folder with the scans of the places, one file per scan.
-        query: Folder with the scans of the queries, one file per scan.
-        output: CSV file to write, with a score for each pair of a query and a
-            place.
-        gate: Reject top-ranked places that are farther from the query than
-            --radius, according to the method's own pose estimate. It has no
-            effect on methods that estimate no pose.
-        radius: Greatest distance between query and place that --gate accepts
-            [m].
-    """
-    from evaluation.recognition import scan_folders
-
-    protocol = RetrievalProtocol(radius=radius, gate=gate)
-    chosen = _chosen_method(method, parameter, sensor_height)
-    num_ignored = scan_folders.write_scores(
-        chosen,
-        database,
-        query,
-        output,
-        gate_radius=protocol.gate_radius,
-        columns=columns,
-        on_note=terminal.note,
-    )
-    if num_ignored:
-        terminal.note(f"{num_ignored} {_NOT_FINITE}")
-    terminal.note(f"wrote {output}")
-    if (note := chosen.assumption(None)) is not None:
-        terminal.note(note)
+    terminal.show(values, _recognition_rows(outcome, mode), json=json)
 
 
 app.command(
@@ -357,8 +339,8 @@ def report(
     output: Annotated[Path, typer.Option()],
     method: options.OwnMethods = None,
     parameter: commands.MethodSettings = None,
-    lidar: options.LidarName = None,
-    columns: options.Columns = None,
+    lidar: commands.LidarName = None,
+    columns: commands.Columns = None,
     jobs: commands.Jobs = None,
     scheduler: commands.Scheduler = None,
     costs: commands.Costs = True,
@@ -410,7 +392,7 @@ def compare(
     ] = None,
     gate: Annotated[bool, typer.Option("--gate")] = False,
     rankings: Annotated[bool, typer.Option("--rankings")] = False,
-    json: options.Json = False,
+    json: commands.Json = False,
 ) -> None:
     """Rank the methods in tables of results.
 
@@ -469,35 +451,47 @@ def compare(
                 f"{number(alike.tau)}  {_interval_text(alike.interval)}",
             )
         )
-    options.show(found.to_json(), rows, json=json)
+    terminal.show(found.to_json(), rows, json=json)
 
 
 app.command(
     cls=Command, epilog=example("cns-eval real real_scans --output real")
 )(real)
 app.command(
-    cls=Command,
-    epilog=example(
-        "cns-eval trajectory drives/metropolis_04 \\",
-        "    results/latest/metropolis_04_poses_tum.txt",
-    ),
-)(trajectory)
-
-app.command(
     cls=Command, epilog=example("cns-eval map-update maps --baseline distance")
 )(map_update)
-app.command(
-    cls=Command,
-    epilog=example(
-        "cns-eval map-sessions mulran/KAIST01 mulran/KAIST02 \\",
-        "    --output kaist",
-    ),
-)(map_sessions)
 
 
 def main() -> None:
     """Runs the command line and exits with its status."""
     terminal.run(app, "cns-eval", shown())
+
+
+def _write_scores(
+    method: Method,
+    database: Path,
+    query: Path,
+    output: Path,
+    protocol: RetrievalProtocol,
+    columns: int | None,
+) -> None:
+    """Writes the scores of `pr --scores`, and shows the notes on them."""
+    from evaluation.recognition import scan_folders
+
+    num_ignored = scan_folders.write_scores(
+        method,
+        database,
+        query,
+        output,
+        gate_radius=protocol.gate_radius,
+        columns=columns,
+        on_note=terminal.note,
+    )
+    if num_ignored:
+        terminal.note(f"{num_ignored} {_NOT_FINITE}")
+    terminal.note(f"wrote {output}")
+    if (note := method.assumption(None)) is not None:
+        terminal.note(note)
 
 
 def _chosen_method(

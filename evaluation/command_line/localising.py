@@ -8,18 +8,30 @@ import typer
 
 from cns_drake.base import commands, terminal
 from evaluation.command_line import options
+from evaluation.command_line.trajectories import measure_estimate
+
+# Parameters that have an effect together with `--estimate`.
+_WITH_ESTIMATE = (
+    "place",
+    "frame",
+    "time_offset",
+    "lidar",
+    "columns",
+    "json",
+)
 
 
 def localise(
+    context: typer.Context,
     place: Annotated[Path, typer.Argument(metavar="MAP")],
-    query: Annotated[Path, typer.Argument(metavar="QUERY")],
+    query: Annotated[Path | None, typer.Argument(metavar="QUERY")] = None,
     method: Annotated[
-        str,
+        str | None,
         typer.Option(
             "--method",
             metavar="NAME|FILE.py",
         ),
-    ],
+    ] = None,
     start: float = 0.5,
     start_turn: float = 2.0,
     seed: int = 0,
@@ -29,12 +41,15 @@ def localise(
     odometry_drift: Annotated[
         float | None, typer.Option(metavar="PART")
     ] = None,
+    estimate: Annotated[Path | None, typer.Option(metavar="FILE.tum")] = None,
+    frame: options.Frame = "lidar",
+    time_offset: Annotated[float, typer.Option(metavar="S")] = 0.0,
     align: options.Align = "auto",
-    lidar: options.LidarName = None,
-    columns: options.Columns = None,
+    lidar: commands.LidarName = None,
+    columns: commands.Columns = None,
     jobs: commands.Jobs = None,
     output: Annotated[Path | None, typer.Option(metavar="DIR")] = None,
-    json: options.Json = False,
+    json: commands.Json = False,
 ) -> None:
     """Localise scans in a map.
 
@@ -47,6 +62,12 @@ def localise(
     odometry, CNS) or point clouds (.pcd .ply .npy .bin). If MAP is a drive, its
     scans are merged at their true poses. If QUERY is a point cloud, it is one
     scan, whose true pose is the origin of the map.
+
+    With --estimate, the command measures the errors of poses that another
+    program estimated, and nothing else: MAP is then the drive with the true
+    poses, and there is no QUERY. It prints two errors, as evo and KITTI define
+    them. ATE is the root mean square of the distances from the true trajectory
+    after rigid alignment. Drift is the error of the motion over 100 m of path.
 
     Args:
         place: Drive or point cloud to use as the map.
@@ -69,6 +90,12 @@ def localise(
             share of the distance driven. With 0.01, the default, lengths are
             wrong by about 1 %, and the heading drifts by about 0.01 deg per
             metre.
+        estimate: File with the trajectory of MAP as another program estimated
+            it. It is a TUM file: time [s], x y z and a quaternion x y z w.
+        frame: Frame whose poses --estimate contains: the LiDAR's (lidar) or the
+            vehicle's (base_link).
+        time_offset: Time to add to the times of --estimate [s], if its clock
+            differs from that of the drive.
         output: Folder to write. It gets localisation.csv, which lists the
             result of each query. If you give --track, it also gets a picture.
     """
@@ -83,6 +110,19 @@ def localise(
     from evaluation.localisation import localise as queries
     from evaluation.study.chosen_methods import parse_setting
 
+    if estimate is not None:
+        commands.check_only_with(context, "estimate", _WITH_ESTIMATE)
+        (truth,) = options.open_noted(place, lidar=lidar, columns=columns)
+        measure_estimate(truth, estimate, frame, time_offset, json=json)
+        return
+    for name in ("frame", "time_offset"):
+        if name in commands.given_options(context):
+            option = name.replace("_", "-")
+            raise InputError(f"--{option}: only together with --estimate")
+    if query is None:
+        raise InputError("QUERY: missing")
+    if method is None:
+        raise InputError("--method: missing")
     num_jobs = choose_cluster(jobs, None).num_workers
     starts = queries.Starts(start, start_turn, seed)
     if track and query_spacing is not None:
@@ -156,7 +196,7 @@ def localise(
             draw_track(rows, output / "track")
         queries.write_rows(rows, output / "localisation.csv")
         terminal.note(f"wrote {output / 'localisation.csv'}")
-    options.show(values, _rows(values), json=json)
+    terminal.show(values, _rows(values), json=json)
 
 
 def _rows(values: dict) -> Iterator[tuple[str, str]]:

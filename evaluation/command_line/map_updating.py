@@ -1,4 +1,4 @@
-"""Commands on maps that have grown old: `map-update` and `map-sessions`."""
+"""The command `map-update`."""
 
 from collections.abc import Iterator
 from enum import Enum
@@ -8,14 +8,7 @@ from typing import Annotated
 import typer
 
 from cns_drake.base import terminal
-from cns_drake.base.commands import SessionSpacing
-from evaluation.command_line.options import (
-    Columns,
-    Json,
-    LidarName,
-    open_noted,
-    show,
-)
+from cns_drake.base.commands import Json
 
 
 class BaselineName(str, Enum):
@@ -36,10 +29,10 @@ def map_update(
 
     The command compares labels with the true labels: your own (--labels-a and
     --labels-b) or, without these options, those of a shipped change detector,
-    the baseline. DIR is a folder that cns-drake map-truth wrote, or a folder
-    with the same files for real drives: A/map.ply, A/truth.npy, B/map.ply and
-    B/truth.npy. A baseline also needs the scans and poses in this folder.
-    Points whose true label is 255 are ignored.
+    the baseline. DIR is a folder that cns-drake export --format map-truth
+    wrote, or a folder with the same files for real drives: A/map.ply,
+    A/truth.npy, B/map.ply and B/truth.npy. A baseline also needs the scans and
+    poses in this folder. Points whose true label is 255 are ignored.
 
     Args:
         folder: Folder with the maps and their true labels.
@@ -80,41 +73,7 @@ def map_update(
         for session, labels in zip(pair, found, strict=True):
             sessions.write_labels(output / f"{session.side}.npy", labels)
     scores = score(pair, truth, found, class_names(folder))
-    show({"method": name, **scores}, _rows(name, scores), json=json)
-
-
-def map_sessions(
-    a: Annotated[Path, typer.Argument(metavar="A")],
-    b: Annotated[Path, typer.Argument(metavar="B")],
-    *,
-    output: Annotated[Path, typer.Option(metavar="DIR")],
-    spacing: SessionSpacing = 1.0,
-    lidar: LidarName = None,
-    columns: Columns = None,
-) -> None:
-    """Make unlabelled maps of two recorded drives.
-
-    The command writes the maps, scans and poses that cns-drake map-truth
-    writes, but no labels. Use it for drives whose world is unknown, such as
-    real ones. Both drives must be in the same world frame. Before cns-eval
-    map-update can score labels, add your true labels, A/truth.npy and
-    B/truth.npy.
-
-    Args:
-        a: Older drive A.
-        b: Newer drive B, through the same place.
-        output: Folder for both maps, with their scans and poses.
-    """
-    from cns_drake.base.drives.drive import check_same_world
-    from cns_drake.base.files import draft_folder
-    from evaluation.map_update.sessions import SIDES, write_session
-
-    drives = open_noted(a, b, lidar=lidar, columns=columns)
-    check_same_world(*drives)
-    with draft_folder(output) as draft:
-        for side, drive in zip(SIDES, drives, strict=True):
-            write_session(drive, draft / side, spacing)
-    print(output)
+    terminal.show({"method": name, **scores}, _rows(name, scores), json=json)
 
 
 def _rows(name: str, scores: dict) -> Iterator[tuple[str, str]]:

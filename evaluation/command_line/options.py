@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Sequence
 import math
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Literal
@@ -18,6 +18,8 @@ if TYPE_CHECKING:
 
 # Option: when drives are aligned to one world.
 When = Literal["auto", "always", "never"]
+# Option: frame whose poses an estimated trajectory contains.
+Frame = Literal["lidar", "base_link"]
 Align = Annotated[
     When,
     typer.Option(
@@ -25,9 +27,6 @@ Align = Annotated[
         "compared. With auto, they are aligned only if their world frames "
         "differ."
     ),
-]
-Json = Annotated[
-    bool, typer.Option("--json", help="Print the results as one JSON object.")
 ]
 MethodName = Annotated[
     str,
@@ -48,26 +47,6 @@ Parameters = Annotated[
 ]
 SensorHeight = Annotated[
     float, typer.Option(help="Height of the LiDAR above the ground [m].")
-]
-LidarName = Annotated[
-    str | None,
-    typer.Option(
-        "--lidar",
-        metavar="NAME",
-        help="LiDAR to read, if a recording has several: the name in its "
-        "topic /NAME/points, or the whole topic.",
-    ),
-]
-Columns = Annotated[
-    int | None,
-    typer.Option(
-        "--columns",
-        metavar="N",
-        min=3,  # x, y, z
-        help="Number of float32 values per point in .bin files, of which the "
-        "first three are x, y and z. By default it is guessed from the values; "
-        "give it if the guess is wrong.",
-    ),
 ]
 OwnMethods = Annotated[
     list[Path] | None,
@@ -111,16 +90,6 @@ def aligned(
         return first, second
     terminal.note(alignment.report.to_text())
     return alignment.first, alignment.second
-
-
-def show(
-    values: Mapping, rows: Iterable[tuple[str, str]], *, json: bool
-) -> None:
-    """Prints values as JSON, or as rows."""
-    if json:
-        terminal.print_json(dict(values))
-    else:
-        terminal.print_rows(rows)
 
 
 def overlap_of(truth: str) -> float | None:

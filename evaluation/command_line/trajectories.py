@@ -1,73 +1,53 @@
-"""Commands on trajectories: `drives` and `trajectory`."""
+"""What `tcr --paths` and `localise --estimate` print of trajectories."""
 
 from __future__ import annotations
 
 from collections.abc import Iterator
 from math import isnan
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Literal
-
-import typer
+from typing import TYPE_CHECKING
 
 from cns_drake.base import terminal
 from evaluation.command_line import options
 
 if TYPE_CHECKING:
+    from evaluation.drives import Drive
     from evaluation.drives.comparison import DriveComparison, Driving
 
 
-def drives(
-    first: Annotated[Path, typer.Argument(metavar="A")],
-    second: Annotated[Path, typer.Argument(metavar="B")],
-    align: options.Align = "auto",
-    lidar: options.LidarName = None,
-    columns: options.Columns = None,
-    json: options.Json = False,
+def compare_paths(
+    first: Drive, second: Drive, when: options.When, *, json: bool
 ) -> None:
-    """Compare the paths of two drives.
-
-    Every 5 m along A, the command measures how B differs from A: sideways
-    offset, lane, heading and height. It also prints which share of the time
-    each car stands, and its speeds. For comparison, it shows the same numbers
-    for two pairs of real drives: two drives of Boreas, 28 days apart, and KAIST
-    01 and 02 of MulRan.
+    """Prints how the paths of two drives along the same streets differ.
 
     Args:
-        first: Recorded drive A.
-        second: Recorded drive B along the same streets.
+        first: drive A.
+        second: drive B.
+        when: whether to align them to one world before.
+        json: whether to print JSON.
     """
     from evaluation.drives.comparison import compare_drives
 
-    pair = options.aligned(
-        options.open_noted(first, second, lidar=lidar, columns=columns), align
-    )
-    found = compare_drives(*pair)
-    options.show(found.to_json(), _drive_rows(found), json=json)
+    found = compare_drives(*options.aligned((first, second), when))
+    terminal.show(found.to_json(), _drive_rows(found), json=json)
 
 
-def trajectory(
-    drive: Annotated[Path, typer.Argument(metavar="DRIVE")],
-    estimate: Annotated[Path, typer.Argument(metavar="ESTIMATE.tum")],
-    frame: Literal["lidar", "base_link"] = "lidar",
-    time_offset: Annotated[float, typer.Option(metavar="S")] = 0.0,
-    lidar: options.LidarName = None,
-    columns: options.Columns = None,
-    json: options.Json = False,
+def measure_estimate(
+    truth: Drive,
+    estimate: Path,
+    frame: options.Frame,
+    time_offset: float,
+    *,
+    json: bool,
 ) -> None:
-    """Measure the errors of an estimated trajectory.
-
-    The estimate is a TUM file: time [s], x y z and a quaternion x y z w. The
-    command prints two errors, as evo and KITTI define them. ATE is the root
-    mean square of the distances from the true trajectory after rigid alignment.
-    Drift is the error of the motion over 100 m of path.
+    """Prints the errors of an estimated trajectory.
 
     Args:
-        drive: Recorded drive with the true trajectory.
-        estimate: File with the estimated trajectory.
-        frame: Frame whose poses the file contains: the LiDAR's (lidar) or the
-            vehicle's (base_link).
-        time_offset: Time to add to the times of the estimate [s], if its clock
-            differs from that of the drive.
+        truth: drive with the true trajectory.
+        estimate: TUM file.
+        frame: frame whose poses the file contains.
+        time_offset: time to add to the times of the estimate [s].
+        json: whether to print JSON.
     """
     from evaluation.alignment.trajectory_errors import trajectory_errors
     from evaluation.drives.text_tables import (
@@ -75,7 +55,6 @@ def trajectory(
         read_quaternions,
     )
 
-    (truth,) = options.open_noted(drive, lidar=lidar, columns=columns)
     found = read_quaternions(estimate, None, parse_seconds)
     errors = trajectory_errors(truth, found, frame, time_offset)
     if errors.num_outside:
@@ -84,11 +63,11 @@ def trajectory(
             " left out"
         )
     named = {"drive": truth.name, "frame": frame}
-    options.show(named | errors.to_json(), errors.to_rows(), json=json)
+    terminal.show(named | errors.to_json(), errors.to_rows(), json=json)
 
 
 def _drive_rows(found: DriveComparison) -> Iterator[tuple[str, str]]:
-    """Yields the rows of `drives`: the pair, then Boreas, then KAIST."""
+    """Yields the rows of `tcr --paths`: the pair, then Boreas, then KAIST."""
 
     def shown(value: float | str, boreas: str = "", kaist: str = "") -> str:
         if isinstance(value, float):

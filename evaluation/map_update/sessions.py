@@ -389,7 +389,8 @@ def read_pair(folder: Path) -> Pair:
     for side in SIDES:
         if not (folder / side).is_dir():
             raise InputError(
-                f"{folder}: no folder {side}; cns-drake map-truth makes both"
+                f"{folder}: no folder {side}; cns-drake export --format"
+                " map-truth makes both"
             )
     return Pair(*(read_session(folder / side) for side in SIDES))
 

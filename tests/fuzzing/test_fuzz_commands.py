@@ -73,7 +73,15 @@ COMMANDS = {
     "repair": (
         "repair",
         ("source.mcap",),
-        (_DRAKE, "repair", "source.mcap", "--output", "out/new.mcap"),
+        (
+            _DRAKE,
+            "export",
+            "source.mcap",
+            "--format",
+            "mcap",
+            "--output",
+            "out/new.mcap",
+        ),
         1,
     ),
     "tcr": (

@@ -255,18 +255,6 @@ RECIPES = {
         after=("RKO-LIO settings", "odometry drive"),
         prints=("poses", "ATE"),
     ),
-    "help: trajectory": Recipe(
-        "cns-eval trajectory drives/metropolis_04",
-        changes=(
-            ("drives/metropolis_04", "output/town_02"),
-            (
-                "results/latest/metropolis_04_poses_tum.txt",
-                "tum/town_02/lidar.tum",
-            ),
-        ),
-        after=("exports",),
-        prints=("ATE               0.000 m",),
-    ),
     "help: list": Recipe("cns-drake list", prints=("metropolis_04",)),
     "help: simulate": Recipe(
         "cns-drake simulate metropolis_01 --output drives",
@@ -276,22 +264,12 @@ RECIPES = {
         ),
         after=("own city",),
     ),
-    "help: film": Recipe(
-        "cns-drake film metropolis_01 --output metropolis.webp",
-        # A few boxes, which are drawn at once.
-        changes=(
-            ("metropolis_01", "boxes/sequence_01.yaml --traffic 0"),
-            ("metropolis.webp", "town.webp --seconds 1 --size 64x36"),
-        ),
-        after=("imported scenario",),
-        prints=("town.webp: 8 images",),
-        makes=("town.webp",),
-    ),
     "films": Recipe(
-        ".venv/bin/cns-drake film metropolis_01 --output film.webp",
+        ".venv/bin/cns-drake export metropolis_01 --format film "
+        "--output film.webp",
         changes=(
             ("metropolis_01", "town/sequence_01.yaml --size 64x36"),
-            ("film.webp", "film.webp --seconds 1 --traffic 0"),
+            (" film.webp", " film.webp --seconds 1 --traffic 0"),
             ("28.5 --seconds 8", "1 --seconds 1 --traffic 2"),
             ("docs/pictures/drive.webp", "drive.webp"),
         ),
@@ -307,8 +285,8 @@ RECIPES = {
         after=("own city",),
         prints=("output/town_01", "output/town_02"),
     ),
-    "help: repair": Recipe(
-        "cns-drake repair damaged.mcap",
+    "repair": Recipe(
+        ".venv/bin/cns-drake export damaged.mcap --format mcap",
         changes=(
             ("damaged.mcap", "output/town_01/town_01_0.mcap"),
             ("whole.mcap", "repaired.mcap"),
@@ -350,14 +328,6 @@ RECIPES = {
         ),
         after=("scans",),
     ),
-    "help: drives": Recipe(
-        "cns-eval drives drives/riverside_01",
-        changes=(
-            ("drives/riverside_01 mine", "output/town_01 output/town_02"),
-        ),
-        after=("own city",),
-        prints=("another lane",),
-    ),
     "help: pr": Recipe(
         "cns-eval pr drives/metropolis_01",
         changes=(_FIRST, _LAST, ("drives/", "output/")),
@@ -369,8 +339,8 @@ RECIPES = {
         after=("evaluation",),
         prints=("AUROC",),
     ),
-    "help: scores": Recipe(
-        "cns-eval scores --method solid",
+    "scores": Recipe(
+        ".venv/bin/cns-eval pr --scores",
         changes=(("sequences/04", "sequences/02"),),
         after=("exports",),
         makes=("scores.csv",),
@@ -439,7 +409,7 @@ RECIPES = {
         prints=("the nearest 7.90 m ahead",),
     ),
     "exports": Recipe(
-        ".venv/bin/cns-drake export ",
+        ".venv/bin/cns-drake export output/",
         changes=(_FIRST, _LAST),
         after=("own city",),
         makes=(
@@ -830,7 +800,8 @@ RECIPES = {
         makes=("overlaps.csv",),
     ),
     "exact overlap": Recipe(
-        ".venv/bin/cns-drake export-pairs metropolis_01 metropolis_04",
+        ".venv/bin/cns-drake export metropolis_01 metropolis_04 "
+        "--format overlap-table",
         changes=(
             (
                 "metropolis_01 metropolis_04",
@@ -863,7 +834,7 @@ RECIPES = {
         makes=("tracked/track.png",),
     ),
     "pairs": Recipe(
-        ".venv/bin/cns-drake export-pairs riverside_01 riverside_02 "
+        ".venv/bin/cns-drake export riverside_01 riverside_02 "
         "--format pointnetvlad",
         changes=(
             (
@@ -875,20 +846,8 @@ RECIPES = {
         prints=("pairs/training_queries_baseline2.pickle",),
         makes=("pairs/runs/town_0[12]/000000.bin",),
     ),
-    "help: pairs": Recipe(
-        "cns-drake export-pairs riverside_01",
-        changes=(
-            (
-                "riverside_01 riverside_02",
-                "town/sequence_01.yaml town/sequence_02.yaml",
-            ),
-        ),
-        after=("pairs",),
-        prints=("pairs/training_queries_baseline2.pickle",),
-    ),
     "pairs with overlaps": Recipe(
-        ".venv/bin/cns-drake export-pairs riverside_01 riverside_02 "
-        "--format overlap",
+        ".venv/bin/cns-drake export riverside_01 riverside_02 --format overlap",
         changes=(
             (
                 "riverside_01 riverside_02",
@@ -899,7 +858,8 @@ RECIPES = {
         prints=("overlaps/overlaps.npz",),
     ),
     "map truth": Recipe(
-        ".venv/bin/cns-drake map-truth metropolis",
+        ".venv/bin/cns-drake export metropolis_01 metropolis_04 "
+        "--format map-truth",
         changes=(
             (
                 "metropolis_01 metropolis_04",
@@ -909,18 +869,6 @@ RECIPES = {
         after=("own city",),
         prints=("maps",),
         makes=("maps/A/truth.npy", "maps/index.html"),
-    ),
-    "help: map-truth": Recipe(
-        "cns-drake map-truth metropolis_01",
-        changes=(
-            (
-                "metropolis_01 metropolis_04",
-                "town/sequence_01.yaml town/sequence_02.yaml --spacing 20",
-            ),
-            ("output maps", "output shown"),
-        ),
-        after=("own city",),
-        prints=("shown",),
     ),
     "map update": Recipe(
         ".venv/bin/cns-eval map-update",
@@ -933,21 +881,12 @@ RECIPES = {
         prints=("mean IoU",),
     ),
     "map sessions": Recipe(
-        ".venv/bin/cns-eval map-sessions",
+        ".venv/bin/cns-drake export drives/metropolis_01 "
+        "drives/metropolis_04 --format map-sessions",
         changes=(_FIRST, _LAST, ("drives/", "output/")),
         after=("own city",),
         prints=("two_sessions",),
         makes=("two_sessions/A/map.ply",),
-    ),
-    "help: map-sessions": Recipe(
-        "cns-eval map-sessions mulran",
-        changes=(
-            ("mulran/KAIST01", "output/town_01"),
-            ("mulran/KAIST02", "output/town_02"),
-            ("kaist", "sessions"),
-        ),
-        after=("own city",),
-        prints=("sessions",),
     ),
     "own data": Recipe(
         ".venv/bin/cns-eval tcr kitti",
@@ -963,7 +902,7 @@ RECIPES = {
         makes=("mine/sequences/0[12]/velodyne/000039.bin",),
     ),
     "own scans, pairs": Recipe(
-        ".venv/bin/cns-eval drives mine",
+        ".venv/bin/cns-eval tcr mine/sequences/01 mine",
         after=("own scans and poses",),
         prints=("another lane", "AUC", "AUROC"),
     ),
@@ -1045,10 +984,10 @@ NOT_RUN = {
     "test_example_diagrams runs the scenario",
     ".venv/bin/python diagrams/hardware_scenario.py": "runs in real time; "
     "test_example_diagrams runs it, too",
-    ".venv/bin/cns-drake map-truth suburbia": "drives through a shipped city, "
+    ".venv/bin/cns-drake export suburbia_01": "drives through a shipped city, "
     "for minutes",
-    ".venv/bin/cns-drake map-truth aged": "needs a city that has aged, and "
-    "minutes; the recipe map truth has a small one",
+    ".venv/bin/cns-drake export aged/sequence_01.yaml": "needs a city that has "
+    "aged, and minutes; the recipe map truth has a small one",
     ".venv/bin/cns-drake simulate docs/examples/like_nuscenes": "records a "
     "shipped drive, for minutes; test_real has recordings",
     ".venv/bin/cns-drake study docs/examples/nclt_twin": "ages a shipped city "
@@ -1056,10 +995,11 @@ NOT_RUN = {
     ".venv/bin/cns-drake study docs/examples/anchor": "likewise, for minutes",
     ".venv/bin/cns-drake study docs/examples/robust": "localises in a shipped "
     "city, for half an hour",
-    ".venv/bin/cns-eval tcr data/": "needs data sets that cannot be shipped",
+    ".venv/bin/cns-eval tcr data/MulRan": "needs data sets that cannot be "
+    "shipped",
     ".venv/bin/cns-eval pr data/nclt": "needs them, too",
     ".venv/bin/cns-eval pr data/sequences": "needs KITTI's scans",
-    ".venv/bin/cns-eval drives data/": "likewise, though poses alone do",
+    ".venv/bin/cns-eval tcr data/boreas": "likewise, though poses alone do",
     ".venv/bin/cns-drake import neukolln": "needs the file that is not shipped",
     "/** A batch of rays": "C++ of a design",
     "lidars: typing.Mapping": "lines of an example of Drake's",

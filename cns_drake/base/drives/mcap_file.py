@@ -89,7 +89,7 @@ LOCATION = np.dtype(
 _ORDER = ("log_time_ns", "chunk", "offset")
 # Records that hold messages, or define what messages are.
 _HOLDING = (Opcode.CHUNK, Opcode.MESSAGE, Opcode.SCHEMA, Opcode.CHANNEL)
-_REPAIR = "(cns-drake repair saves what is whole)"
+_REPAIR = "(cns-drake export --format mcap saves what is whole)"
 
 
 def _read_body(stream: BinaryIO, limit: int, what: str) -> bytes:

@@ -18,6 +18,7 @@ from cns_drake.scenarios.shipped import recordable_drives
 pytestmark = pytest.mark.slow
 
 DIAGRAMS = ROOT / "diagrams"
+FILM = ("--format", "film")
 POSE = ["--pose", "0", "0", "1.6", "0", "0", "-0.5"]
 
 
@@ -80,7 +81,7 @@ def test_list_names_the_drives():
 def test_no_arguments_show_the_help():
     result = run()
     assert result.returncode == 0
-    for command in ("list", "simulate", "generate", "repair", "scan"):
+    for command in ("list", "simulate", "generate", "export", "scan"):
         assert command in result.stdout
 
 
@@ -215,16 +216,34 @@ def test_diagram_script_records_and_makes_a_page(files, tmp_path, capfd):
         (["simulate", "{files}/drive.yaml", "--lidar", "x"], "--lidar: .*'x'"),
         (["simulate", "{files}/drive.yaml", "--frames", "0"], "--frames"),
         (["simulate", "{files}/drive.yaml", "--bogus"], "--bogus"),
-        (["film", "atlantis_01"], "unknown drive 'atlantis_01'"),
-        (["film", "{files}/drive.yaml", "--size", "64"], "--size: '64'"),
-        (["film", "{files}/drive.yaml", "--size", "31x64"], "--size: '31x64'"),
-        (["film", "{files}/drive.yaml", "--size", "64x1921"], "--size: "),
-        (["film", "{files}/drive.yaml", "--seconds", "0"], "--seconds"),
-        (["film", "{files}/drive.yaml", "--seconds", "nan"], "--seconds: nan"),
-        (["film", "{files}/drive.yaml", "--start", "-1"], "--start"),
+        (["export", "atlantis_01", *FILM], "unknown drive 'atlantis_01'"),
         (
-            ["film", "{files}/drive.yaml", "--start", "1e6"],
-            "--start: 1e.06 s: ",
+            ["export", "{files}/drive.yaml", *FILM, "--size", "64"],
+            "--size: '64'",
+        ),
+        (
+            ["export", "{files}/drive.yaml", *FILM, "--size", "31x64"],
+            "--size: '31x64'",
+        ),
+        (
+            ["export", "{files}/drive.yaml", *FILM, "--size", "64x1921"],
+            "--size: ",
+        ),
+        (
+            ["export", "{files}/drive.yaml", *FILM, "--seconds", "0"],
+            "--seconds",
+        ),
+        (
+            ["export", "{files}/drive.yaml", *FILM, "--seconds", "nan"],
+            "--seconds: nan",
+        ),
+        (
+            ["export", "{files}/drive.yaml", *FILM, "--start-time", "-1"],
+            "--start-time",
+        ),
+        (
+            ["export", "{files}/drive.yaml", *FILM, "--start-time", "1e6"],
+            "--start-time: 1e.06 s: ",
         ),
         (["scan", "{files}/gone.sdf", *POSE], "gone.sdf: .*gone.obj"),
         (["scan", "{files}/torn.sdf", *POSE], "torn.sdf: "),
@@ -272,23 +291,23 @@ def test_diagram_script_records_and_makes_a_page(files, tmp_path, capfd):
 )
 def test_faults_are_one_line(files, tmp_path, capfd, arguments, fault):
     output = tmp_path / "output"
-    if arguments[0] in ("film", "scan"):
-        output = tmp_path / {"film": "a.webp", "scan": "a.bin"}[arguments[0]]
+    if arguments[0] in ("export", "scan"):
+        output = tmp_path / {"export": "a.webp", "scan": "a.bin"}[arguments[0]]
     arguments = [a.format(files=files) for a in arguments]
     result = run_here(capfd, *arguments, "--output", output)
     assert_one_line(result, fault)
     assert not output.exists()
 
 
-@pytest.mark.parametrize("command", ["simulate", "film", "scan", "generate"])
+@pytest.mark.parametrize("command", ["simulate", "export", "scan", "generate"])
 def test_output_that_cannot_be_written(files, capfd, command):
     arguments = {
         "simulate": ["simulate", files / "drive.yaml"],
-        "film": ["film", files / "drive.yaml"],
+        "export": ["export", files / "drive.yaml", *FILM],
         "scan": ["scan", files / "good.sdf", *POSE],
         "generate": ["generate", files / "drive.yaml"],
     }[command]
-    ending = ".webp" if command == "film" else ".bin"
+    ending = ".webp" if command == "export" else ".bin"
     output = files / "file" / f"below{ending}"
     result = run_here(capfd, *arguments, "--output", output)
     assert_one_line(result, r"file(/[\w./]+)?: \w+")

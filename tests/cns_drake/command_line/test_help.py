@@ -111,7 +111,7 @@ def test_version(program, capsys):
         ("cns-drake", "sim", ["simulate"]),
         ("cns-drake", "city --s", ["--start", "--seed"]),
         ("cns-eval", "pr --mode f", ["filtered"]),
-        ("cns-eval", "t", ["tcr", "trajectory"]),
+        ("cns-eval", "re", ["report", "real"]),
     ],
 )
 def test_completion(program, begun, completed, capsys, monkeypatch):

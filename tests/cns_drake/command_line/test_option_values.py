@@ -37,9 +37,7 @@ def test_there_are_such_options():
     assert {command.name for _, command, _ in FOUND} >= {
         "pr",
         "localise",
-        "map-sessions",
-        "export-pairs",
-        "map-truth",
+        "export",
         "train",
         "age",
         "simulate",

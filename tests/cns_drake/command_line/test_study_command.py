@@ -6,7 +6,6 @@ from helpers.eval_program import run_program
 import pytest
 
 from cns_drake.__main__ import main
-from cns_drake.command_line.cli import app
 from cns_drake.studies import study as study_module
 from cns_drake.studies.experiment import load_experiment, shipped_experiments
 
@@ -142,36 +141,3 @@ def test_an_output_is_needed(capsys, asked):
     assert (status, out) == (2, "")
     assert err == "cns-drake: error: --output: missing\n"
     assert not asked
-
-
-RENAMED = {
-    **{
-        name: f"study {name}"
-        for name in (
-            "ladder",
-            "levels",
-            "size",
-            "years",
-            "fresh",
-            "trend",
-            "map-pairs",
-        )
-    },
-    "overlap": "export-pairs A B --format overlap-table",
-}
-
-
-@pytest.mark.parametrize("old", RENAMED)
-@pytest.mark.parametrize("rest", [(), ("--help",), ("a", "--output", "b")])
-def test_former_commands_name_the_new_one(capsys, old, rest):
-    status, out, err = run(capsys, old, *rest)
-    assert (status, out) == (2, "")
-    now = f"'cns-drake {old}' is now 'cns-drake {RENAMED[old]}'"
-    assert err == f"cns-drake: error: {now}\n"
-    name, *more = RENAMED[old].split()
-    assert name in {
-        one.name or one.callback.__name__.replace("_", "-")
-        for one in app.registered_commands
-    }
-    if name == "study":
-        assert more[0] in shipped_experiments()

@@ -144,7 +144,9 @@ class TestTimes:
         end = trajectory.duration
         assert _times(trajectory, 3, end)[0] == end
         np.testing.assert_allclose(_times(trajectory, 3, 2.0), [2, 2.1, 2.2])
-        with pytest.raises(InputError, match=r"--start: .*the drive takes"):
+        with pytest.raises(
+            InputError, match=r"--start-time: .*the drive takes"
+        ):
             _times(trajectory, 3, end + 1e-6)
 
 

@@ -112,7 +112,7 @@ def test_the_estimate_from_scans_is_close(short_recording):
 def test_its_table_is_the_truth(short_recording, tmp_path, capsys):
     scenario = short_recording / "scenario.yaml"
     table = tmp_path / "overlaps.csv"
-    command = ("export-pairs", scenario, scenario, "--format", "overlap-table")
+    command = ("export", scenario, scenario, "--format", "overlap-table")
     options = ("--spacing", "0.2", "--output", tmp_path)
     status, out, err = run_program(
         capsys, "cns-drake", main, *command, *options
@@ -141,7 +141,7 @@ def test_a_folder_that_cannot_be_is_refused_at_once(tmp_path, capsys):
     drives = ("metropolis_01", "metropolis_04")
     options = ("--format", "overlap-table", "--output", tmp_path / "file/here")
     status, out, err = run_program(
-        capsys, "cns-drake", main, "export-pairs", *drives, *options
+        capsys, "cns-drake", main, "export", *drives, *options
     )
     assert (status, out) == (2, "")
     (line,) = err.splitlines()

@@ -194,7 +194,7 @@ def test_labels_are_those_of_another_caster_but_at_edges(tmp_path):
 @pytest.mark.slow
 def test_recordings_are_labelled_and_scored(short_recording, tmp_path, capsys):
     output = tmp_path / "pair"
-    command = ("map-truth", short_recording, short_recording)
+    command = ("export", *2 * [short_recording], "--format", "map-truth")
     status, out, err = run_program(
         capsys, "cns-drake", main, *command, "--output", output
     )

@@ -144,14 +144,12 @@ def test_two_drives_of_one_name_are_refused(tmp_path):
 
 def test_submaps_have_no_overlaps(tmp_path, monkeypatch, capsys):
     file = write_scenario(tiny_scenario(tmp_path), tmp_path)
-    line = (
-        f"cns-drake export-pairs {file} --format overlap --scans 2 --output x"
-    )
+    line = f"cns-drake export {file} --format overlap --scans 2 --output x"
     monkeypatch.setattr(sys, "argv", line.split())
     with pytest.raises(SystemExit) as end:
         main()
     assert end.value.code == 2
-    assert "--scans: overlaps are those of single scans" in (
+    assert "--scans: not with --format overlap; only with pointnetvlad" in (
         capsys.readouterr().err
     )
 
@@ -236,7 +234,7 @@ def test_a_held_out_drive_may_be_named_with_the_others(
 
     monkeypatch.setattr(pair_export, "export_pairs", take)
     line = (
-        "cns-drake export-pairs riverside_01 riverside_02 --held-out"
+        "cns-drake export riverside_01 riverside_02 --held-out"
         f" riverside_02 --format pointnetvlad --output {tmp_path}"
     )
     monkeypatch.setattr(sys, "argv", line.split())

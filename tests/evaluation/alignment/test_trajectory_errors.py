@@ -1,4 +1,4 @@
-"""`cns-eval trajectory` against closed forms and KISS-ICP's measures."""
+"""`cns-eval localise --estimate` by closed forms and as KISS-ICP does."""
 
 import json
 
@@ -81,7 +81,7 @@ def test_true_poses_that_are_too_far_apart(tmp_path):
 
 def score(capsys, drive, path, *options):
     status, out, err = run(
-        capsys, "trajectory", drive, path, "--json", *options
+        capsys, "localise", drive, "--estimate", path, "--json", *options
     )
     assert status == 0, err
     return json.loads(out), err
@@ -230,7 +230,7 @@ def test_a_short_path_has_no_drift(capsys, drive, tmp_path):
         values, _ = score(capsys, drive, path)
         assert (values["drift_100m"] is not None) == has_drift
         assert values["drift_segments"] == int(has_drift)
-        _, out, _ = run(capsys, "trajectory", drive, path)
+        _, out, _ = run(capsys, "localise", drive, "--estimate", path)
         assert ("undefined  (the path is shorter)" in out) != has_drift
 
 
@@ -259,7 +259,10 @@ def test_estimates_that_cannot_be_used(capsys, drive, tmp_path):
 
     def refused(*words, options=()):
         assert_refused(
-            capsys, ["trajectory", drive, path, *options], path.name, *words
+            capsys,
+            ["localise", drive, "--estimate", path, *options],
+            path.name,
+            *words,
         )
 
     refused("No such file")
@@ -284,6 +287,6 @@ def test_estimates_that_cannot_be_used(capsys, drive, tmp_path):
     for offset in ("nan", "inf", "1e30"):
         assert_refused(
             capsys,
-            ["trajectory", drive, path, "--time-offset", offset],
+            ["localise", drive, "--estimate", path, "--time-offset", offset],
             "--time-offset",
         )

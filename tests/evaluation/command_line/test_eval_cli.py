@@ -276,14 +276,12 @@ def test_scores_of_all_pairs(capsys, towns, tmp_path):
     output = tmp_path / "scores.csv"
     status, out, err = run(
         capsys,
-        "scores",
+        "pr",
+        towns / "town_01_scans",
+        towns / "town_02_scans",
         "--method",
         "scan-context++",
-        "--database",
-        towns / "town_01_scans",
-        "--query",
-        towns / "town_02_scans",
-        "--output",
+        "--scores",
         output,
     )
     assert (status, out) == (0, "")
@@ -315,7 +313,7 @@ def test_help_is_instant_and_modules_stay_apart():
         [sys.executable, "-c", code], capture_output=True, text=True
     )
     assert done.returncode == 0, done.stderr
-    for command in ("tcr", "pr", "scores", "report"):
+    for command in ("tcr", "pr", "localise", "report"):
         assert command in done.stdout
 
 
@@ -365,8 +363,6 @@ def test_a_method_matches_sequences(capsys, towns, tmp_path):
     assert json.loads(out)["parameters"]["sequence"] == 20.0
     assert_refused(capsys, [*both, "sequence=-1"], "solid: sequence")
     (tmp_path / "scans").mkdir()
-    scores = ["scores", "--method", "solid", "--set", "sequence=20"]
-    scores += ["--output", tmp_path / "scores.csv"]
-    for side in ("--database", "--query"):
-        scores += [side, tmp_path / "scans"]
+    scores = ["pr", *2 * [tmp_path / "scans"], "--method", "solid"]
+    scores += ["--set", "sequence=20", "--scores", tmp_path / "scores.csv"]
     assert_refused(capsys, scores, "solid: sequence: scans of a folder")

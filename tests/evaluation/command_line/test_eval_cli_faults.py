@@ -78,9 +78,9 @@ def test_points_that_are_not_finite_are_noted(capsys, towns, tmp_path):
         tmp_path / "scans" / "a.npy",
         np.stack([scan[axis] for axis in "xyz"], axis=1),
     )
-    folders = ["--database", tmp_path / "scans", "--query", tmp_path / "scans"]
+    folders = [tmp_path / "scans", tmp_path / "scans"]
     output = tmp_path / "scores.csv"
-    scores = ["scores", "--method", "solid", *folders, "--output", output]
+    scores = ["pr", *folders, "--method", "solid", "--scores", output]
     status, _, err = run(capsys, *scores)
     assert status == 0
     assert err.startswith("14 points are not finite, and left out\n")
@@ -107,17 +107,8 @@ def test_bad_folders_of_scans(capsys, towns, tmp_path):
     good = towns / "town_01_scans"
 
     def scores(database, query, output=tmp_path / "out.csv"):
-        return [
-            "scores",
-            "--method",
-            "scan-context++",
-            "--database",
-            database,
-            "--query",
-            query,
-            "--output",
-            output,
-        ]
+        options = ["--method", "scan-context++", "--scores", output]
+        return ["pr", database, query, *options]
 
     empty = tmp_path / "empty"
     empty.mkdir()

@@ -210,14 +210,14 @@ def test_drives_that_cannot_be_compared_are_refused():
 
 def test_the_command_prints_the_rows_beside_real_pairs(capsys, towns):
     pair = [towns / "town_01", towns / "town_02"]
-    status, out, _ = run(capsys, "drives", *pair)
+    status, out, _ = run(capsys, "tcr", "--paths", *pair)
     assert status == 0
     header, stops, *_ = out.splitlines()
     assert header.split() == ["these", "Boreas", "KAIST"]
     assert stops.split()[-3:] == ["1166", "of", "1194"]
-    status, out, _ = run(capsys, "drives", *pair, "--json")
+    status, out, _ = run(capsys, "tcr", "--paths", *pair, "--json")
     values = json.loads(out)
     assert values["first"]["name"] == "town_01"
     fields = {f.name for f in dataclasses.fields(DriveComparison)}
     assert values.keys() == fields
-    assert_refused(capsys, ["drives", pair[0], towns / "none"], "none")
+    assert_refused(capsys, ["tcr", "--paths", pair[0], towns / "none"], "none")

@@ -148,21 +148,20 @@ class Own(Method):
         ),
     ],
 )
-@pytest.mark.parametrize("command", ["pr", "scores"])
+@pytest.mark.parametrize("data", ["drives", "scans"])
 def test_faults_of_a_method_are_one_line(
-    capsys, towns, tmp_path, monkeypatch, command, old, new, fault
+    capsys, towns, tmp_path, monkeypatch, data, old, new, fault
 ):
     monkeypatch.setattr(method, "_METHODS", dict(method._METHODS))
     text = _WHOLE.replace("{number}", "a")
     assert old in text
     path = tmp_path / "own.py"
     path.write_text(text.replace(old, new))
-    if command == "pr":
+    if data == "drives":
         words = ["pr", towns / "town_01", towns / "town_02"]
     else:
-        words = ["scores", "--database", towns / "town_01_scans"]
-        words += ["--query", towns / "town_02_scans"]
-        words += ["--output", tmp_path / "scores.csv"]
+        words = ["pr", towns / "town_01_scans", towns / "town_02_scans"]
+        words += ["--scores", tmp_path / "scores.csv"]
     assert_refused(capsys, [*words, "--method", path], fault)
     assert not (tmp_path / "scores.csv").exists()
 

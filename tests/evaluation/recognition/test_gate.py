@@ -198,15 +198,13 @@ def test_the_option_of_pr_and_scores(capsys, towns, tmp_path):
         output = tmp_path / "scores.csv"
         status, _, _ = run_program(
             capsys,
-            "scores",
+            "pr",
+            towns / "town_01_scans",
+            towns / "town_02_scans",
             "--method",
             "layered-overlap",
-            "--output",
+            "--scores",
             output,
-            "--database",
-            towns / "town_01_scans",
-            "--query",
-            towns / "town_02_scans",
             *options,
         )
         assert status == 0

@@ -1,0 +1,457 @@
+"""The command `export`: drives in the formats of other programs."""
+
+from collections.abc import Mapping
+from enum import Enum
+from pathlib import Path
+import re
+from typing import Annotated, Any
+
+import typer
+
+from cns_drake.base import commands
+from cns_drake.base.errors import InputError
+from cns_drake.base.interrupts import uninterrupted
+from cns_drake.base.terminal import next_command, note, show
+from cns_drake.command_line import options
+from cns_drake.command_line.simulating import family_members
+from evaluation.recognition.protocol import RetrievalProtocol
+
+
+class Format(str, Enum):
+    """Formats that the command writes."""
+
+    CNS = "cns"
+    KITTI = "kitti"
+    MULRAN = "mulran"
+    TUM = "tum"
+    MCAP = "mcap"
+    POINTNETVLAD = "pointnetvlad"
+    OVERLAP = "overlap"
+    OVERLAP_TABLE = "overlap-table"
+    MAP_TRUTH = "map-truth"
+    MAP_SESSIONS = "map-sessions"
+    FILM = "film"
+
+
+_CONVERTED = (Format.CNS, Format.KITTI, Format.MULRAN, Format.TUM)
+_PAIRS = (Format.POINTNETVLAD, Format.OVERLAP, Format.OVERLAP_TABLE)
+_MAPS = (Format.MAP_TRUTH, Format.MAP_SESSIONS)
+# Option -> the formats that it belongs to.
+_BELONGS: Mapping[str, tuple[Format, ...]] = {
+    "lidar": (*_CONVERTED, Format.MAP_SESSIONS),
+    "columns": (Format.MAP_SESSIONS,),
+    "absent_in": (Format.KITTI,),
+    "sequence": (Format.KITTI,),
+    "vary": _PAIRS,
+    "held_out": (Format.POINTNETVLAD, Format.OVERLAP),
+    "spacing": (*_PAIRS, *_MAPS),
+    "scans": (Format.POINTNETVLAD,),
+    "max_range": _PAIRS,
+    "jobs": _PAIRS,
+    "scheduler": _PAIRS,
+    "seconds": (Format.FILM,),
+    "size": (Format.FILM,),
+    "start_time": (Format.FILM,),
+    "traffic": (Format.FILM,),
+}
+# Distance between two clouds of training data, and two scans of a map [m].
+_PAIR_SPACING = 10.0
+_MAP_SPACING = 1.0
+
+
+@commands.former_options(
+    {"--sensor": "--lidar", "--start": "--start-time"},
+)
+def export(
+    context: typer.Context,
+    drives: Annotated[
+        list[str] | None, typer.Argument(metavar="DRIVE ...")
+    ] = None,
+    *,
+    layout: Annotated[Format, typer.Option("--format", metavar="FORMAT")],
+    output: Annotated[Path, typer.Option()],
+    lidar: commands.LidarName = None,
+    columns: commands.Columns = None,
+    absent_in: Annotated[str | None, typer.Option(metavar="STAGE")] = None,
+    sequence: Annotated[
+        int | None, typer.Option(metavar="NN", min=0, max=999)
+    ] = None,
+    spacing: Annotated[
+        float | None, typer.Option(min=0.01, metavar="METRES")
+    ] = None,
+    vary: options.Vary = None,
+    held_out: Annotated[list[str] | None, typer.Option(metavar="NAME")] = None,
+    scans: Annotated[int, typer.Option(min=1, metavar="N")] = 1,
+    max_range: Annotated[
+        float | None,
+        typer.Option(min=1.0, max=10_000.0, metavar="METRES"),
+    ] = None,
+    seconds: Annotated[
+        float, typer.Option(min=1.0, max=60.0, metavar="S")
+    ] = 20.0,
+    size: Annotated[str, typer.Option(metavar="WxH")] = "640x360",
+    start_time: Annotated[
+        float | None, typer.Option(min=0.0, metavar="S")
+    ] = None,
+    traffic: options.Traffic = None,
+    jobs: commands.Jobs = None,
+    scheduler: commands.Scheduler = None,
+    json: commands.Json = False,
+) -> None:
+    """Export drives to the formats of other programs.
+
+    With --format cns, kitti, mulran or tum, DRIVE is a recording, and the
+    command converts it. With mcap, DRIVE is a damaged .mcap file, whose
+    readable part is written to a new file.
+
+    With pointnetvlad, overlap or overlap-table, each DRIVE is a shipped drive
+    or a scenario file. The command simulates the drives without recording them,
+    and writes point clouds with exact positives, negatives and overlaps, to
+    train place recognition. To resume after an interruption, run the same
+    command again.
+
+    With map-truth, the command makes maps of two drives through the same place,
+    the older one first, and labels exactly what changed between them: every
+    point of the older map is kept, gone or unobserved in the newer drive, and
+    every point of the newer map is kept, new or newly seen. Each DRIVE is a
+    recording of cns-drake, a shipped drive or a scenario file. To score the
+    labels of your own change detector against them, run cns-eval map-update.
+    map-sessions makes the same maps without labels, from recordings whose world
+    is unknown, such as real drives. Before cns-eval map-update can score
+    labels, add your true labels, A/truth.npy and B/truth.npy.
+
+    With film, DRIVE is a shipped drive or a scenario file, and the command
+    films the same stretch of it in each stage of its city. First, one shot per
+    stage shows the stretch from behind the car, with the points that the LiDAR
+    measures. Then one shot per stage shows it from above.
+
+    Args:
+        drives: Drives to export. By default, pointnetvlad and overlap export
+            all shipped drives, or none with --vary.
+        layout: Format to write: cns (the CNS data set), kitti (KITTI odometry),
+            mulran (MulRan), tum (only the trajectory), mcap (a whole file);
+            pointnetvlad (clouds and pickle files as PointNetVLAD reads them),
+            overlap (scans and the exact overlap of each pair), overlap-table
+            (only a table of the overlaps between a database and a query drive,
+            for cns-eval pr --exact-overlaps); map-truth (two maps with labels
+            of what changed), map-sessions (two maps without labels); or film.
+        output: Folder to write; created if it does not exist. With mcap and
+            film it is a file. The name of a film ends in .webp, or in .mp4,
+            which needs ffmpeg. The folder of two maps must not exist yet.
+        absent_in: Another stage of the map, such as 01. Points on structures
+            that do not exist in this other stage get SemanticKITTI's labels of
+            moving objects (252 to 259), as if these structures had moved. Only
+            with --format kitti.
+        sequence: Number of the exported drive, which names its folder
+            sequences/NN. By default the digits at the end of the drive's name.
+            Only with --format kitti.
+        spacing: Distance that the car drives between two clouds of the training
+            data, or between two scans of a map [m]; by default 10, or 1 for
+            maps. A smaller distance makes a denser map.
+        held_out: Drive to keep for evaluation only. It is left out of the
+            training data even if you also name it as a training drive. May be
+            repeated. Only with --format pointnetvlad or overlap.
+        scans: Number of consecutive scans that are merged into each cloud (a
+            submap). Only with --format pointnetvlad.
+        max_range: Leave out points of training data that are farther than this
+            along x, y or z in the LiDAR's frame [m]. By default 50, or 100 for
+            overlap-table.
+        seconds: Length of the film [s]. All shots together have
+            this length.
+        size: Width and height of the film in pixels, each from 32 to 1920.
+        start_time: Time in the drive at which the filmed stretch begins [s]. By
+            default, it begins where the road ahead is straightest.
+        traffic: Number of moving vehicles in the film. The same number of
+            walkers is added. By default as the scenario says; if the scenario
+            has no traffic, 60 vehicles and 60 walkers are added, provided that
+            the streets have room.
+    """
+    values: dict[str, Any] = {
+        "lidar": lidar,
+        "columns": columns,
+        "absent_in": absent_in,
+        "sequence": sequence,
+        "vary": vary,
+        "held_out": held_out,
+        "spacing": spacing,
+        "scans": scans,
+        "max_range": max_range,
+        "jobs": jobs,
+        "scheduler": scheduler,
+        "seconds": seconds,
+        "size": size,
+        "start_time": start_time,
+        "traffic": traffic,
+    }
+    for name in commands.given_options(context):
+        formats = _BELONGS.get(name, (layout,))
+        if layout not in formats:
+            raise InputError(
+                f"--{name.replace('_', '-')}: not with --format {layout.value};"
+                f" only with {', '.join(one.value for one in formats)}"
+            )
+    words = drives or []
+    if layout in _PAIRS:
+        _export_pairs(words, layout, output, values, json=json)
+        return
+    number = 2 if layout in _MAPS else 1
+    if len(words) != number:
+        wanted = "one drive" if number == 1 else "two drives"
+        raise InputError(
+            f"--format {layout.value}: give {wanted}, not {len(words)}"
+        )
+    first = words[0]
+    if layout in _MAPS:
+        _write_maps(first, words[1], layout, output, values, json=json)
+    elif layout == Format.MCAP:
+        _repair(first, output, json=json)
+    elif layout == Format.FILM:
+        _film(first, output, values, json=json)
+    else:
+        _convert(first, layout, output, values, json=json)
+
+
+def _convert(
+    recording: str,
+    layout: Format,
+    output: Path,
+    values: Mapping[str, Any],
+    *,
+    json: bool,
+) -> None:
+    with uninterrupted():
+        from cns_drake.export.exporting import export_drive
+
+    path = export_drive(
+        Path(recording),
+        layout.value,
+        output,
+        lidar=values["lidar"],
+        absent_in=values["absent_in"],
+        sequence=values["sequence"],
+        on_note=note,
+    )
+    show({"output": str(path)}, str(path), json=json)
+    if layout != Format.TUM:
+        next_command(
+            "cns-eval",
+            "pr",
+            path,
+            path,
+            "--method",
+            "solid",
+            "--exclude-recent",
+            30,
+        )
+
+
+def _repair(file: str, output: Path, *, json: bool) -> None:
+    with uninterrupted():
+        from cns_drake.recording.repair import repair_mcap
+
+    result = repair_mcap(Path(file), output)
+    line = (
+        f"{result.output}: {result.num_messages} messages over "
+        f"{result.seconds:.2f} s recovered; "
+    )
+    if result.num_faults:
+        line += (
+            f"damaged places: {result.num_faults}, the first at "
+            f"{result.first_fault}"
+        )
+    else:
+        line += "the file was whole"
+    values = {
+        "output": str(result.output),
+        "messages": result.num_messages,
+        "seconds": result.seconds,
+        "faults": result.num_faults,
+    }
+    show(values, line, json=json)
+
+
+def _film(
+    scenario: str, output: Path, values: Mapping[str, Any], *, json: bool
+) -> None:
+    with uninterrupted():
+        from cns_drake.scenarios.scenario_files import load_scenario
+        from cns_drake.simulation.film import make_film, with_some_traffic
+
+    drive = load_scenario(scenario)
+    size = values["size"]
+    match = re.fullmatch(r"(\d{1,4})x(\d{1,4})", size)
+    width, height = map(int, match.groups()) if match else (0, 0)
+    if not (32 <= width <= 1920 and 32 <= height <= 1920):
+        raise InputError(
+            f"--size: '{size}' is not of the form WxH with 32 to 1920 pixels, "
+            "such as 640x360"
+        )
+    if values["traffic"] is None:
+        drive = with_some_traffic(drive)
+    else:
+        drive = drive.with_traffic(values["traffic"])
+    number = make_film(
+        drive,
+        output,
+        seconds=values["seconds"],
+        size=(width, height),
+        start=values["start_time"],
+        on_note=note,
+    )
+    show(
+        {"output": str(output), "images": number},
+        f"{output}: {number} images",
+        json=json,
+    )
+    words = ("--output", "drives", "--recording", "drive.html")
+    next_command("cns-drake", "simulate", scenario, *words)
+
+
+def _export_pairs(
+    names: list[str],
+    layout: Format,
+    output: Path,
+    values: Mapping[str, Any],
+    *,
+    json: bool,
+) -> None:
+    """Writes training data of simulated drives."""
+    with uninterrupted():
+        from cns_drake.base.jobs.cluster import choose_cluster
+        from cns_drake.scenarios.scenario_files import load_scenario
+        from cns_drake.scenarios.shipped import recordable_drives
+        from cns_drake.studies import pair_export
+
+    cluster = choose_cluster(values["jobs"], values["scheduler"])
+    spacing = values["spacing"] or _PAIR_SPACING
+    tested = [load_scenario(name) for name in values["held_out"] or ()]
+    if not names and values["vary"] is None:
+        names = list(recordable_drives())
+    learned = [load_scenario(name) for name in names]
+    if values["vary"] is not None:
+        learned += family_members(values["vary"], output, cluster)
+    if layout == Format.OVERLAP_TABLE:
+        if len(learned) != 2:
+            raise InputError(
+                "--format overlap-table: give two drives, database and query"
+            )
+        protocol = RetrievalProtocol(
+            query_spacing=spacing, max_range=values["max_range"] or 100.0
+        )
+        table = pair_export.write_overlap_table(
+            learned[0], learned[1], output, protocol
+        )
+        show({"output": [str(table)]}, str(table), json=json)
+        next_command(
+            "cns-eval",
+            "pr",
+            *(f"drives/{one.name}" for one in learned),
+            "--method",
+            "solid",
+            "--truth",
+            "overlap:0.5",
+            "--exact-overlaps",
+            table,
+        )
+        return
+    taken = {one.name for one in tested}
+    learned = [one for one in learned if one.name not in taken]
+    paths = pair_export.export_pairs(
+        learned,
+        tested,
+        output,
+        pair_export.ExportOptions(
+            layout.value,
+            spacing,
+            values["scans"],
+            values["max_range"] or 50.0,
+        ),
+        cluster,
+        note,
+    )
+    texts = [str(path) for path in paths]
+    show({"output": texts}, "\n".join(texts), json=json)
+
+
+def _write_maps(
+    a: str,
+    b: str,
+    layout: Format,
+    output: Path,
+    values: Mapping[str, Any],
+    *,
+    json: bool,
+) -> None:
+    """Writes maps of two drives, and the truth of what changed if it is known.
+
+    Args:
+        a: older drive.
+        b: newer drive.
+        layout: whether the maps get labels.
+        output: folder to write.
+        values: options by name.
+        json: whether to print the counts of labels as JSON.
+    """
+    spacing = values["spacing"] or _MAP_SPACING
+    if layout == Format.MAP_SESSIONS:
+        _write_sessions(a, b, output, spacing, values, json=json)
+        return
+    with uninterrupted():
+        from cns_drake.base.files import check_new_folder
+        from cns_drake.studies.map_truth import open_survey, write_truth
+        from evaluation.map_update.sessions import Label
+
+    check_new_folder(output)
+    first, second = open_survey(a), open_survey(b)
+    counts, table = write_truth(first, second, output, spacing)
+    result: dict[str, Any] = {"output": str(output)}
+    for side, found in counts.items():
+        named = {Label(one).name.lower(): n for one, n in sorted(found.items())}
+        result[side] = named
+        text = ", ".join(
+            f"{number} {name.replace('_', ' ')}"
+            for name, number in named.items()
+        )
+        note(f"{side}: {text}")
+        alone = [
+            row
+            for row in table
+            if row.side == side and row.alone and not row.moves
+        ]
+        mapped = sum(row.points > 0 for row in alone)
+        right = sum(row.verdict in ("gone", "new") for row in alone)
+        note(
+            f"{side}: {len(alone)} structures are in this drive's world alone;"
+            f" {mapped} are in its map, {right} of them gone or new"
+        )
+    show(result, str(output), json=json)
+    next_command("cns-eval", "map-update", output)
+
+
+def _write_sessions(
+    a: str,
+    b: str,
+    output: Path,
+    spacing: float,
+    values: Mapping[str, Any],
+    *,
+    json: bool,
+) -> None:
+    """Writes maps of two recordings without labels."""
+    with uninterrupted():
+        from cns_drake.base.drives.drive import check_same_world
+        from cns_drake.base.files import draft_folder
+        from evaluation.drives import open_drive
+        from evaluation.map_update.sessions import SIDES, write_session
+
+    drives = [
+        open_drive(Path(path), values["lidar"], values["columns"])
+        for path in (a, b)
+    ]
+    for text in (one for drive in drives for one in drive.notes):
+        note(text)
+    check_same_world(*drives)
+    with draft_folder(output) as draft:
+        for side, drive in zip(SIDES, drives, strict=True):
+            write_session(drive, draft / side, spacing)
+    show({"output": str(output)}, str(output), json=json)

@@ -1,0 +1,172 @@
+"""Commands and options: few, each with one meaning; former ones are named."""
+
+from helpers.eval_program import run_program
+import pytest
+import typer
+
+from cns_drake.command_line import cli as simulator
+from cns_drake.command_line import exporting
+from cns_drake.command_line.exporting import Format
+from cns_drake.studies.experiment import shipped_experiments
+from evaluation.command_line import cli as evaluation
+
+PROGRAMS = {"cns-drake": simulator, "cns-eval": evaluation}
+GROUPS = {
+    name: typer.main.get_command(program.app)
+    for name, program in PROGRAMS.items()
+}
+# Program and former command -> the call that replaces it.
+FORMER = {
+    **{
+        ("cns-drake", name): f"cns-drake study {name}"
+        for name in (
+            "ladder",
+            "levels",
+            "size",
+            "years",
+            "fresh",
+            "trend",
+            "map-pairs",
+        )
+    },
+    ("cns-drake", "overlap"): "cns-drake export A B --format overlap-table",
+    ("cns-drake", "export-pairs"): (
+        "cns-drake export DRIVE ... --format pointnetvlad|overlap"
+    ),
+    ("cns-drake", "map-truth"): "cns-drake export A B --format map-truth",
+    ("cns-drake", "film"): "cns-drake export DRIVE --format film",
+    ("cns-drake", "repair"): "cns-drake export FILE.mcap --format mcap",
+    ("cns-eval", "ranking"): "cns-eval compare --rankings",
+    ("cns-eval", "trend"): "cns-drake study FILE.yaml FOLDER",
+    ("cns-eval", "scores"): (
+        "cns-eval pr DATABASE QUERY --method METHOD --scores FILE.csv"
+    ),
+    ("cns-eval", "drives"): "cns-eval tcr A B --paths",
+    ("cns-eval", "trajectory"): "cns-eval localise DRIVE --estimate FILE.tum",
+    ("cns-eval", "map-sessions"): (
+        "cns-drake export A B --format map-sessions"
+    ),
+}
+
+
+def run(capsys, program, *words):
+    return run_program(capsys, program, PROGRAMS[program].main, *words)
+
+
+def options(program, command):
+    found = GROUPS[program].commands[command].params
+    return {one.opts[0]: one for one in found if one.opts[0].startswith("-")}
+
+
+def test_there_are_at_most_18_commands():
+    assert sum(len(group.commands) for group in GROUPS.values()) <= 18
+
+
+@pytest.mark.parametrize(("program", "old"), FORMER)
+@pytest.mark.parametrize("rest", [(), ("--help",), ("a", "--output", "b")])
+def test_former_commands_name_the_new_call(capsys, program, old, rest):
+    assert old not in GROUPS[program].commands
+    status, out, err = run(capsys, program, old, *rest)
+    assert (status, out) == (2, "")
+    now = FORMER[program, old]
+    assert err == f"{program}: error: '{program} {old}' is now '{now}'\n"
+    new_program, command, *words = now.split()
+    taken = options(new_program, command)
+    for word in words:
+        assert not word.startswith("--") or word in taken
+    if "--format" in words:
+        for one in words[words.index("--format") + 1].split("|"):
+            assert Format(one)
+    if command == "study" and words[0].islower():
+        assert words[0] in shipped_experiments()
+
+
+@pytest.mark.parametrize(
+    ("words", "now"),
+    [
+        (("export", "a", "--sensor", "rear"), "--sensor: is now --lidar"),
+        (("export", "a", "--sensor=rear"), "--sensor: is now --lidar"),
+        (("export", "a", "--start", "3"), "--start: is now --start-time"),
+    ],
+)
+def test_former_options_name_the_new_one(capsys, words, now):
+    status, out, err = run(capsys, "cns-drake", *words)
+    assert (status, out) == (2, "")
+    assert err == f"cns-drake: error: {now}\n"
+
+
+def test_a_word_after_two_dashes_is_no_option(capsys):
+    words = ("export", "--format", "cns", "--output", "x", "--", "--sensor")
+    _, _, err = run(capsys, "cns-drake", *words)
+    assert err == "cns-drake: error: --sensor: no recording (.mcap) there\n"
+
+
+@pytest.mark.parametrize("option", exporting._BELONGS)
+def test_options_of_other_formats_are_refused(capsys, tmp_path, option):
+    formats = exporting._BELONGS[option]
+    words = ["export", "a", "--output", tmp_path / "out"]
+    spelled = f"--{option.replace('_', '-')}"
+    # The least value of some numbers is 1; others are names.
+    words += [spelled, "4"]
+    for one in set(Format) - set(formats):
+        status, out, err = run(
+            capsys, "cns-drake", *words, "--format", one.value
+        )
+        assert (status, out) == (2, "")
+        assert f"{spelled}: not with --format {one.value}; only with " in err
+        assert err.count("\n") == 1
+    assert not list(tmp_path.iterdir())
+
+
+@pytest.mark.parametrize(
+    ("layout", "number", "wanted"),
+    [
+        ("cns", 2, "one drive"),
+        ("film", 0, "one drive"),
+        ("mcap", 3, "one drive"),
+        ("map-truth", 1, "two drives"),
+        ("map-sessions", 3, "two drives"),
+    ],
+)
+def test_formats_have_a_number_of_drives(
+    capsys, tmp_path, layout, number, wanted
+):
+    words = [*"abc"[:number], "--format", layout, "--output", tmp_path / "out"]
+    status, _, err = run(capsys, "cns-drake", "export", *words)
+    assert status == 2
+    fault = f"--format {layout}: give {wanted}, not {number}"
+    assert err == f"cns-drake: error: {fault}\n"
+
+
+# What turns a command into another one -> words of the command, an option that
+# has no effect then, and one that has.
+@pytest.mark.parametrize(
+    ("words", "refused"),
+    [
+        (("pr", "a", "b", "--method", "solid", "--scores", "s"), "--mode=all"),
+        (("pr", "a", "b", "--method", "solid", "--scores", "s"), "--json"),
+        (("tcr", "a", "b", "--paths"), "--control=c"),
+        (("localise", "a", "--estimate", "e"), "--start=1"),
+        (("localise", "a", "--estimate", "e"), "--method=gicp"),
+        (("localise", "a", "--estimate", "e"), "QUERY"),
+    ],
+)
+def test_options_without_an_effect_are_refused(capsys, words, refused):
+    status, out, err = run(capsys, "cns-eval", *words, refused)
+    assert (status, out) == (2, "")
+    name = refused.partition("=")[0]
+    (chosen,) = {"--scores", "--paths", "--estimate"} & set(words)
+    assert err.endswith(f"error: {name}: not together with {chosen}\n")
+
+
+@pytest.mark.parametrize(
+    ("words", "missing"),
+    [
+        (("localise", "a", "b"), "--method"),
+        (("localise", "a", "--method", "icp"), "QUERY"),
+    ],
+)
+def test_a_localisation_needs_query_and_method(capsys, words, missing):
+    status, _, err = run(capsys, "cns-eval", *words)
+    assert status == 2
+    assert err.endswith(f"cns-eval: error: {missing}: missing\n")
