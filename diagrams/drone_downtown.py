@@ -39,7 +39,8 @@ def main(page: Path = Path("drone.html"), duration: float = 6.0) -> None:
     of_plant = plant.GetMyMutableContextFromRoot(context)
     plant.SetFreeBodyPose(of_plant, body, X_WB)
     plant.SetFreeBodySpatialVelocity(of_plant, body, V_WB)
-    port, frames = lidar.GetOutputPort("point_cloud_W"), []
+    port = lidar.GetOutputPort("point_cloud_W")
+    frames = []
     while context.get_time() < duration - 1e-6:
         simulator.AdvanceTo(context.get_time() + lidar.pattern.period)
         cloud = port.Eval(lidar.GetMyContextFromRoot(context))

@@ -18,7 +18,9 @@ from cns_drake import add_lidar, save_meshcat_page
 
 CELL = Path(__file__).parent / "models" / "arm_cell.sdf"
 JOINTS = ("pan_joint", "lift_joint", "elbow_joint", "pitch_joint")
-START, END = [-0.9, 0.1, 1.2, 0.5], [0.9, 0.1, 1.2, 0.5]  # [rad]
+# Angles of the joints at the start and at the end [rad].
+START = [-0.9, 0.1, 1.2, 0.5]
+END = [0.9, 0.1, 1.2, 0.5]
 
 
 def main(page: Path = Path("wrist.html"), duration: float = 4.0) -> None:
@@ -42,7 +44,8 @@ def main(page: Path = Path("wrist.html"), duration: float = 4.0) -> None:
     MeshcatVisualizer.AddToBuilder(builder, scene_graph, meshcat)
     simulator = Simulator(builder.Build())
     port = lidar.GetOutputPort("point_cloud_W")
-    context, rows = simulator.get_context(), []
+    context = simulator.get_context()
+    rows = []
     while context.get_time() < duration - 1e-6:
         simulator.AdvanceTo(context.get_time() + lidar.pattern.period)
         cloud = port.Eval(lidar.GetMyContextFromRoot(context))

@@ -165,8 +165,10 @@ def _dormer(p: CourtBlock, x: float, z0: float, z1: float) -> Mesh:
     return merge_meshes(front, lid, sill)
 
 
-# Room in front of the walls for steps, and behind for eaves [m].
-_FRONT_M, _BACK_M = 1.5, 0.5
+# Room in front of the walls for steps [m].
+_FRONT_M = 1.5
+# Room behind the walls for eaves [m].
+_BACK_M = 0.5
 
 
 class WalkUp(Building):

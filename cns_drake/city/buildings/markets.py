@@ -17,8 +17,10 @@ from cns_drake.city.facades import (
     wings,
 )
 
-# Kept free in front for canopies and behind for gutters [m].
-_FRONT_M, _BACK_M = 0.4, 0.1
+# Kept free in front for canopies [m].
+_FRONT_M = 0.4
+# Kept free behind for gutters [m].
+_BACK_M = 0.1
 
 
 class ShopStrip(Building):

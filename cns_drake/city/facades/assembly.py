@@ -184,9 +184,9 @@ class Archetype(BaseModel, frozen=True, extra="forbid"):
     materials: tuple[str, ...] = ()
 
 
-# Plinths and pilasters may stand this far outside the footprint [m]. Above
-# `HEAD_ROOM_M`, the archetype's own overhang applies.
+# Plinths and pilasters may stand this far outside the footprint [m].
 GROUND_OVERHANG_M = 0.35
+# Above this height, the archetype's own overhang applies [m].
 HEAD_ROOM_M = 2.3
 
 

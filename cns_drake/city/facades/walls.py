@@ -24,8 +24,12 @@ from cns_drake.city.geometry.mesh import Mesh
 # Patches keep this distance from the ends of a wall [m]: two walls meet there,
 # and the corner is closed only if their reliefs are the same.
 END_MARGIN_M = 0.01
-# Number of chords of an arch, for narrow windows and for those wider than 2 m.
-_NARROW_ARCH, _WIDE_ARCH, _WIDE_ARCH_M = 4, 6, 2.0
+# Number of chords of an arch.
+_NARROW_ARCH = 4
+# Number of chords of a wide arch.
+_WIDE_ARCH = 6
+# An arch wider than this is wide [m].
+_WIDE_ARCH_M = 2.0
 
 
 class Band(NamedTuple):

@@ -746,8 +746,10 @@ class Openings:
                 self._out.add_to("trim", blade)
 
 
-# Depths of windows and of the leaves of doors behind the wall [m].
-GLASS_M, DOOR_M = 0.12, 0.2
+# Depth of windows behind the wall [m].
+GLASS_M = 0.12
+# Depth of the leaves of doors behind the wall [m].
+DOOR_M = 0.2
 
 
 def sash(

@@ -40,9 +40,10 @@ _KERB_WIDTH = 0.15
 # On slopes, the vertices of meshes are this far apart [m]. The sharpest bend of
 # a ramp (10 % over 1 m) is then exact to 13 mm, and most of it to 2 mm.
 _SPACING = 1.0
-# The wider spacing is used where the mesh then deviates by at most this much
-# [m].
-_WIDE_SPACING, _LEAST_SAG = 4.0, 0.004
+# Spacing of vertices where the mesh hardly deviates with it [m].
+_WIDE_SPACING = 4.0
+# This spacing is used where the mesh deviates by less than this [m].
+_LEAST_SAG = 0.004
 # On slopes, edging stones of sidewalks reach this deep, so that no gap opens
 # towards the coarser mesh of the ground beside them [m].
 _EDGING = 0.4
@@ -293,19 +294,23 @@ _RGB = (0.80, 0.79, 0.74)
 # Paint lies this high above the road, so that they are not in one plane [m].
 _THICKNESS = 0.004
 _LINE_WIDTH = 0.14
-# Length of a dash of a lane line and of the gap behind it [m].
-_DASH, _GAP = 3.0, 6.0
+# Length of a dash of a lane line [m].
+_DASH = 3.0
+# Length of the gap behind a dash [m].
+_GAP = 6.0
 # Lane lines are divided into pieces of at most this length, to follow curves
 # [m].
 _PIECE = 4.0
 # On slopes all paint is divided into pieces of this length [m].
 _SLOPE_PIECE = 1.0
-# From a junction's edge to both sides of its crossing, and to both sides of the
-# stop line behind it [m].
+# From a junction's edge to both sides of its crossing [m].
 _CROSSING = (0.8, 3.8)
+# From a junction's edge to both sides of the stop line behind its crossing [m].
 _STOP_LINE = (4.8, 5.2)
-# Width of a bar of a crossing, and distance from bar to bar [m].
-_BAR, _BAR_STEP = 0.5, 1.1
+# Width of a bar of a crossing [m].
+_BAR = 0.5
+# Distance from bar to bar [m].
+_BAR_STEP = 1.1
 # Roads that are shorter than this between their junctions get no markings [m].
 _LEAST_LENGTH = 2 * _STOP_LINE[1] + 4.0
 

@@ -33,9 +33,11 @@ _LOOK = {
 _QUAY_RGB = (0.55, 0.53, 0.50)
 # Distance between the vertices of meshes of ground with relief [m].
 _SPACING = 4.0
-# If the heights of the streets around an area differ by more than `_GENTLE`,
-# vertices are only `_FINE_SPACING` apart [m].
-_GENTLE, _FINE_SPACING = 4.0, 2.0
+# An area is gentle if the heights of the streets around it differ by less than
+# this [m].
+_GENTLE = 4.0
+# Elsewhere, vertices are only this far apart [m].
+_FINE_SPACING = 2.0
 # Range of the wavelengths of the swells [m].
 _WAVELENGTHS = (22.0, 60.0)
 
@@ -191,8 +193,9 @@ def _quay(
 
 # From the upper side of a bridge to its lower side [m].
 _DEPTH = 1.0
-# Distance of the piers from the banks, and their thickness [m].
+# Distance of the piers from the banks [m].
 _SPAN = 10.5
+# Thickness of the piers [m].
 _PIER = 1.2
 # Edges that two polygons share are found within this distance [m].
 _NEAR = 0.3

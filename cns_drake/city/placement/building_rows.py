@@ -32,7 +32,8 @@ _SIZES = ((1.0, 1.0), (1.0, 0.7), (0.75, 1.0), (0.5, 1.0), (0.5, 0.5))
 # Rounding may make walls of adjoining houses overlap by this much [m].
 _TOUCH = 0.005
 # Numbers of a rectangle's edges, counter-clockwise from the front.
-_RIGHT_EDGE, _LEFT_EDGE = 1, 3
+_RIGHT_EDGE = 1
+_LEFT_EDGE = 3
 
 
 @dataclass

@@ -19,7 +19,8 @@ from cns_drake.city.facades.walls import (
 from cns_drake.city.geometry.mesh import merge_meshes
 
 # A rectangle turned by 30 degrees and moved off the origin.
-_C, _S = math.cos(math.pi / 6), math.sin(math.pi / 6)
+_C = math.cos(math.pi / 6)
+_S = math.sin(math.pi / 6)
 TURNED = massing.rectangle(0, 0, 12, 8) @ np.array([[_C, _S], [-_S, _C]]) + (
     5.0,
     -3.0,

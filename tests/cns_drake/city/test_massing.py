@@ -9,7 +9,8 @@ from shapely.geometry import Point, Polygon, box
 from cns_drake.city.facades import details, massing
 from cns_drake.city.geometry.mesh import merge_meshes
 
-_C, _S = math.cos(0.7), math.sin(0.7)
+_C = math.cos(0.7)
+_S = math.sin(0.7)
 # A rectangle of 14 m by 9 m, turned by 0.7 rad.
 TURNED = massing.rectangle(1, 2, 15, 11) @ np.array([[_C, _S], [-_S, _C]])
 COURT = massing.u_shape(0, 0, 30, 20, 7, 8)
