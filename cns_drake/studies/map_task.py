@@ -52,7 +52,7 @@ class MapTask(Task):
                     f"{where}: {one!r} is none of {', '.join(known)}"
                 )
 
-    def measure(self, pair: Pair, jobs: Jobs) -> Part:
+    def measure(self, pair: Pair, jobs: Jobs) -> tuple[Part, ...]:
         methods = self.settings["methods"]
         if methods is None:
             # M3C2 needs the extra map-update.
@@ -66,7 +66,7 @@ class MapTask(Task):
             *(tuple(methods), float(self.settings["spacing"])),
         )
         part = jobs.files.part("map", pair.name)
-        return jobs.add(part, measure_maps, arguments, cost=_COST)
+        return (jobs.add(part, measure_maps, arguments, cost=_COST),)
 
     def numbers(self, found: Any, before: Any | None) -> Iterator[Number]:
         for method, scores in found.items():

@@ -2,6 +2,7 @@
 
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -66,11 +67,15 @@ from evaluation.study.collection import (
     group_cities,
 )
 from evaluation.study.engine import Engine, MeasuredPair, made_tasks
-from evaluation.study.recorded import RecordedCondition, recorded_comparisons
+from evaluation.study.recorded import (
+    RecordedCondition,
+    SurveyJobs,
+    recorded_comparisons,
+)
 from evaluation.study.tasks.change import ChangeTask
 from evaluation.study.tasks.localise import LocaliseTask
 from evaluation.study.tasks.place import CostTask, PlaceTask, PoseTask
-from evaluation.study.tasks.task import NamedDrive, Pair, Task
+from evaluation.study.tasks.task import Jobs, NamedDrive, Pair, Task
 
 TASKS: Mapping[str, type[Task]] = {
     task.name: task
@@ -371,7 +376,11 @@ class Study:
                     prints.setdefault(place, []).append(drives_digest)
             if not found:
                 self.on_note(f"{some.map_name}: no two drives to compare")
-            engine.add(found, self._distractors(some, found))
+            jobs: Callable[..., Jobs] = Jobs
+            if some.city is not None:
+                with_map = ChangeTask.name in self._tasks
+                jobs = partial(SurveyJobs, with_map=with_map)
+            engine.add(found, self._distractors(some, found), jobs)
         if not engine.jobs:
             raise InputError(
                 f"{self.source}: no condition that can be measured"

@@ -167,7 +167,8 @@ def survivals(rows: Iterable[Row], stages: Mapping[str, str]) -> list[Survival]:
         tuple[dict[str, Row], dict[str, Row]],
     ] = {}
     for row in rows:
-        if row.task == "place":
+        # Drives that never meet are in no table.
+        if row.task == "place" and {row.database, row.query} <= stages.keys():
             pair = row.map, stages[row.database], stages[row.query]
             sides = found.setdefault((pair, row.method), ({}, {}))
             sides[row[STAGE] == OWN][row.metric] = row

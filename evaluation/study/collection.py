@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Iterator
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 import os
 from pathlib import Path
 import re
@@ -15,10 +15,8 @@ from cns_drake.base.listing import listed, natural_key
 from evaluation.drives import find_readers, open_drive
 from evaluation.drives.cns_folder import holds_cns
 from evaluation.drives.kitti import holds_kitti
-from evaluation.recognition.protocol import RetrievalProtocol
-from evaluation.report.reference import NO_REFERENCE, Reference
-from evaluation.study.chosen_methods import MethodChoice
-from evaluation.study.surveys import DriveSource, RecordedDrive, described_key
+from evaluation.study.surveys import DriveSource, RecordedDrive
+from evaluation.study.tasks.task import NamedDrive
 
 # The names of drives that state map and stage, the first ones as those of NCLT,
 # Boreas and rosbag2, which end in a date and a time, the last ones as MulRan's.
@@ -71,6 +69,11 @@ class RecordingInfo:
         """Function that opens the drive."""
         return self.made_by or RecordedDrive(self.path.absolute())
 
+    @property
+    def named(self) -> NamedDrive:
+        """The drive as tasks measure it."""
+        return NamedDrive(self.name, self.source, self.needs)
+
     def drives_like(self, other: RecordingInfo) -> bool:
         """Returns whether another drive follows the same route.
 
@@ -79,42 +82,9 @@ class RecordingInfo:
         return self.way is not None and self.way == other.way
 
 
-# Two drives: a database and its query, or an earlier stage and a later one.
-Pair = tuple[RecordingInfo, RecordingInfo]
-
-
-@dataclass(frozen=True)
-class Run:
-    """One measurement: a method on a pair of drives, by a protocol.
-
-    Attributes:
-        method: the method.
-        protocol: the protocol.
-        places: key of the method's descriptions of the places.
-        queries: key of the method's descriptions of the queries.
-    """
-
-    method: MethodChoice
-    protocol: RetrievalProtocol
-    places: str
-    queries: str
-
-    @property
-    def repeats(self) -> bool:
-        """Whether this is a method's second run on the same pair of drives.
-
-        The first run is by the study's protocol. The second run is by the
-        protocol of published numbers, for a comparison with them.
-        """
-        return self.queries != self.method.key
-
-    @property
-    def shares_places(self) -> bool:
-        """Whether this run uses the place descriptions of the study's own runs.
-
-        Otherwise the places are described by the protocol of published numbers.
-        """
-        return self.places == self.method.key
+# Two recordings: of places and of queries, or of an earlier stage and of a
+# later one.
+Recordings = tuple[RecordingInfo, RecordingInfo]
 
 
 @dataclass(frozen=True)
@@ -126,16 +96,13 @@ class City:
         stages: stage -> the drive through this stage.
         others: further drives, such as controls, which follow the route of one
             stage through another stage.
-        reference: published numbers for comparison. They can add pairs of
-            drives, or a second protocol, to what a study measures.
     """
 
     name: str
     stages: dict[str, RecordingInfo]
     others: tuple[RecordingInfo, ...]
-    reference: Reference = NO_REFERENCE
 
-    def change_pairs(self) -> list[Pair]:
+    def change_pairs(self) -> list[Recordings]:
         """Returns the pairs of drives between which change is measured.
 
         Each drive of an earlier stage is paired with that of the last stage.
@@ -145,7 +112,9 @@ class City:
         )
         return [(recording, last) for recording in earlier]
 
-    def recognition_pairs(self, *, with_itself: bool = False) -> list[Pair]:
+    def recognition_pairs(
+        self, *, with_itself: bool = False
+    ) -> list[Recordings]:
         """Returns the pairs (database, query) for place recognition.
 
         Each earlier stage is paired with the last stage as the query. Two
@@ -162,48 +131,9 @@ class City:
             pairs += [(one, one) for one in self.stages.values()]
         return pairs
 
-    def runs(
-        self,
-        pair: Pair,
-        methods: Iterable[MethodChoice],
-        protocol: RetrievalProtocol,
-    ) -> list[Run]:
-        """Returns the runs of methods on a pair of drives.
-
-        There is a run of each method by the given protocol. If a method has
-        published numbers on the pair, measured by another protocol, a second
-        run by that protocol follows.
-
-        Args:
-            pair: drive of the database, and of the queries.
-            methods: the methods.
-            protocol: the study's protocol.
-        """
-        database, query = (one.stage for one in pair)
-        runs = [Run(one, protocol, one.key, one.key) for one in methods]
-        for choice in [one.method for one in runs]:
-            published = self.reference.protocol_of(
-                self.name, database, query, choice.name
-            )
-            if published is None:
-                continue
-            method = choice.make()
-            ours = replace(protocol.of(method), exclude_recent=None)
-            if (
-                published != ours
-                and ours.asked_like(published).of(method) == published
-            ):
-                key = places = described_key(choice.key, published)
-                if ours.described(queries=False) == published.described(
-                    queries=False
-                ):
-                    places = choice.key
-                runs.append(Run(choice, published, places, key))
-        return runs
-
     def unchanged_pair(
         self, database: RecordingInfo, query: RecordingInfo
-    ) -> Pair | None:
+    ) -> Recordings | None:
         """Returns the control of a pair: the same two routes, in one stage.
 
         One drive of the pair is replaced by a drive on the same route, but in
@@ -287,9 +217,7 @@ def nothing_to_compare(cities: Iterable[City]) -> list[str]:
     ]
 
 
-def group_cities(
-    recordings: Iterable[RecordingInfo], reference: Reference = NO_REFERENCE
-) -> list[City]:
+def group_cities(recordings: Iterable[RecordingInfo]) -> list[City]:
     """Groups recordings by map, and sorts the maps by name.
 
     Raises:
@@ -306,9 +234,7 @@ def group_cities(
             )
         paths[one.name] = one.path
     return [
-        _make_city(
-            name, [r for r in recordings if r.map_name == name], reference
-        )
+        _make_city(name, [r for r in recordings if r.map_name == name])
         for name in sorted({recording.map_name for recording in recordings})
     ]
 
@@ -420,9 +346,7 @@ def _place(
     )
 
 
-def _make_city(
-    name: str, recordings: list[RecordingInfo], reference: Reference
-) -> City:
+def _make_city(name: str, recordings: list[RecordingInfo]) -> City:
     stages = {}
     stages_there = {recording.stage for recording in recordings}
     for stage in sorted(stages_there, key=natural_key):
@@ -437,4 +361,4 @@ def _make_city(
         stages[stage] = (named or candidates)[0]
     chosen = {recording.name for recording in stages.values()}
     others = tuple(r for r in recordings if r.name not in chosen)
-    return City(name, stages, others, reference)
+    return City(name, stages, others)

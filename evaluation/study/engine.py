@@ -45,7 +45,7 @@ class MeasuredPair:
         pair: the drives as they are under the condition.
         protocol: protocol of the experiment, before the condition changes its
             queries.
-        parts: task -> file of its result, for the tasks that measure the pair.
+        parts: task -> files of its result, for the tasks that measure the pair.
     """
 
     map_name: str
@@ -55,7 +55,7 @@ class MeasuredPair:
     is_baseline: bool
     pair: Pair
     protocol: RetrievalProtocol
-    parts: dict[str, Part] = field(default_factory=dict)
+    parts: dict[str, tuple[Part, ...]] = field(default_factory=dict)
 
     @property
     def place(self) -> tuple[object, ...]:
@@ -72,9 +72,8 @@ class MeasuredPair:
 class Engine:
     """Measures pairs of drives by tasks and methods.
 
-    Add all pairs of each map with `add`, then call `run`. If other jobs make
-    the results of comparisons, append these to `measured`, with the files of
-    their results, and call `write_tables` once the jobs are done.
+    Add all pairs of each map with `add`, then call `run`. If `jobs` are run
+    beside others, call `write_tables` once they are done.
 
     Attributes:
         experiment: name of the experiment, which stands in the tables.
@@ -101,15 +100,17 @@ class Engine:
         self,
         comparisons: Sequence[MeasuredPair],
         distractors: Sequence[NamedDrive] = (),
-    ) -> None:
-        """Adds the jobs of all comparisons on one map.
+        make_jobs: Callable[..., Jobs] = Jobs,
+    ) -> Jobs:
+        """Adds the jobs of all comparisons on one map, and returns them.
 
         Args:
             comparisons: the comparisons.
             distractors: drives through other cities, whose places are added to
                 databases in this order.
+            make_jobs: class of the jobs, which says how drives are read.
         """
-        planned = Jobs(
+        planned = make_jobs(
             StudyFiles(self.output),
             tuple(choice for choice, _ in self.methods.values()),
             distractors,
@@ -122,12 +123,15 @@ class Engine:
             for one in comparisons:
                 both = one.pair.database.name, one.pair.query.name
                 is_new = not one.pair.may_repeat or both not in seen
-                if task.asks or is_new:
-                    one.parts[name] = task.measure(one.pair, planned)
+                if (task.asks or is_new) and (
+                    parts := task.measure(one.pair, planned)
+                ):
+                    one.parts[name] = parts
                 seen.add(both)
         self.jobs |= planned.jobs
         self._notes |= planned.notes
         self.measured += comparisons
+        return planned
 
     def run(self, cluster: Cluster) -> tuple[Results, QueryRows]:
         """Runs all jobs, writes both tables, and returns them.
@@ -179,13 +183,13 @@ class Engine:
         baselines: dict[tuple, dict[int, dict[str, Any]]] = {}
         for one in self.measured:
             if one.is_baseline:
-                values = {name: self._found(one, name) for name in one.parts}
+                values = {name: self.found(one, name) for name in one.parts}
                 baselines.setdefault(one.place, {})[one.seed] = values
         for one in self.measured:
             before = baselines.get(one.place, {})
             base = before.get(one.seed) or next(iter(before.values()), {})
             for name in one.parts:
-                found = self._found(one, name)
+                found = self.found(one, name)
                 for number in self.tasks[name].numbers(found, base.get(name)):
                     key = self._key(one, name, number.method, number.gate)
                     yield Row.of(number, **key)
@@ -195,12 +199,17 @@ class Engine:
         for one in self.measured:
             for name in one.parts:
                 for method, gate, columns in self.tasks[name].answers(
-                    self._found(one, name)
+                    self.found(one, name)
                 ):
                     key = self._key(one, name, method, gate)
                     yield Answers(**key, columns=columns)
 
-    def _found(self, one: MeasuredPair, task: str) -> Any:
+    def found(self, one: MeasuredPair, task: str) -> Any:
+        """Returns a task's result for a pair; its jobs must be done.
+
+        Raises:
+            InputError: the file of the result cannot be read.
+        """
         return self.tasks[task].found(one.parts[task], one.pair)
 
     def _key(

@@ -42,7 +42,6 @@ def explain_faults(
     drives: tuple[Part, Part],
     methods: tuple[MethodChoice, ...],
     results: tuple[Part, ...],
-    overlaps: Part,
     protocol: RetrievalProtocol,
 ) -> PairEvidence | None:
     """Returns evidence on why methods rank wrong places first for queries.
@@ -55,7 +54,6 @@ def explain_faults(
             query.
         methods: methods of the results.
         results: file with each method's outcomes on the pair.
-        overlaps: file with how much of each query's scan its best match shows.
         protocol: protocol of the results.
     """
     found = []
@@ -70,7 +68,7 @@ def explain_faults(
     database, query = (part.read() for part in drives)
     evidence = find_evidence(database, query, found, protocol)
     # Visible change is that of the queries as the protocol shows them.
-    return replace(evidence, overlaps=overlaps.read())
+    return replace(evidence, overlaps=found[0].columns["overlap"])
 
 
 def find_evidence(

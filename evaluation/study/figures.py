@@ -3,9 +3,10 @@
 from pathlib import Path
 
 from cns_drake.base.files import file_name, make_folder
+from cns_drake.base.jobs.running import Job
 from cns_drake.base.jobs.step import Reporter
 from cns_drake.base.progress import doing
-from evaluation.change.drive_change import ChangeResult, Surveyed, compare_maps
+from evaluation.change.drive_change import ChangeResult, compare_maps
 from evaluation.recognition.metrics import MODES
 from evaluation.report import figures
 from evaluation.report.page_data import (
@@ -15,8 +16,9 @@ from evaluation.report.page_data import (
     make_drive,
 )
 from evaluation.results.drawing import PIXELS
-from evaluation.study.collection import City, RecordingInfo
-from evaluation.study.parts import Part
+from evaluation.study.collection import City, Recordings
+from evaluation.study.parts import MakePart, Part, StudyFiles
+from evaluation.study.recorded import SurveyJobs
 from evaluation.study.surveys import (
     DriveSource,
     RecordedDrive,
@@ -25,6 +27,8 @@ from evaluation.study.surveys import (
 
 # Format of pictures on the page.
 _PAGE_KIND = PIXELS[-1]
+# Expected seconds to draw a city or a change.
+_COST = 5.0
 
 
 def draw_city(
@@ -90,10 +94,7 @@ def compare_stages(
     """
     doing("comparing the maps")
     read: list[SurveyedDrive] = [part.read() for part in drives]
-    earlier, later, *controls = (
-        Surveyed(one.name, one.coarse, one.positions, one.placed)
-        for one in read
-    )
+    earlier, later, *controls = (one.surveyed for one in read)
     control = controls[0] if controls else None
     report = compare_maps(earlier, later, control)
     result = ChangeResult(map_name, stages, report)
@@ -106,6 +107,66 @@ def compare_stages(
         stems,
     )
     return result
+
+
+def drawing_job(
+    city: City, files: StudyFiles, planned: SurveyJobs
+) -> tuple[Part, Job]:
+    """Returns the job that draws a city, and the file of its result.
+
+    Args:
+        city: the city.
+        files: files of the study.
+        planned: adds the surveys that are drawn.
+    """
+    needs: list[str] = []
+    surveys = [
+        (one, planned.survey(one.named, needs)) for one in city.stages.values()
+    ]
+    stem = files.figures / routes_stem(city)
+    part = files.part("pages", city.name)
+    shown = tuple(
+        (drive.stage, one.drive, one.fine, drive.source)
+        for drive, one in surveys
+    )
+    step = MakePart(
+        part, draw_city, (city.name, shown, stem), figure_files(stem)
+    )
+    return part, Job(f"draw {city.name}", step, tuple(needs), _COST)
+
+
+def change_job(
+    city: City, pair: Recordings, files: StudyFiles, planned: SurveyJobs
+) -> tuple[Part, Job]:
+    """Returns the job that draws a change, and the file of its result.
+
+    Args:
+        city: the city.
+        pair: recordings in the earlier and in the later stage of the city.
+        files: files of the study.
+        planned: adds the surveys that are compared.
+    """
+    both = city.unchanged_pair(*pair) or ()
+    drives = [*pair, *(one for one in both if one not in pair)]
+    needs: list[str] = []
+    surveys = [planned.survey(one.named, needs) for one in drives]
+    earlier, later = pair
+    stems = tuple(files.figures / name for name in change_stems(city, pair))
+    part = files.part("changes", earlier.name, later.name)
+    step = MakePart(
+        part,
+        compare_stages,
+        (
+            city.name,
+            (earlier.stage, later.stage),
+            tuple(one.drive for one in surveys),
+            (surveys[0].fine, surveys[1].fine),
+            stems,
+        ),
+        figure_files(*stems),
+    )
+    name = f"draw {city.name} {earlier.stage} > {later.stage}"
+    return part, Job(name, step, tuple(needs), _COST)
 
 
 def figure_files(*stems: Path) -> tuple[Path, ...]:
@@ -125,9 +186,7 @@ def routes_stem(city: City) -> str:
     return file_name(f"routes_{city.name}")
 
 
-def change_stems(
-    city: City, pair: tuple[RecordingInfo, RecordingInfo]
-) -> tuple[str, str]:
+def change_stems(city: City, pair: Recordings) -> tuple[str, str]:
     """Returns the file names, without ending, of the two figures of a change.
 
     The first figure shows which points changed, the second figure the sets of
@@ -157,8 +216,16 @@ def curves_stem(city: City) -> str:
     return file_name(f"pr_{city.name}")
 
 
-def illustrations(city: City, folder: Path) -> list[Illustration]:
-    """Returns the figures of a city, in the order of the report."""
+def illustrations(
+    city: City, folder: Path, *, with_curves: bool
+) -> list[Illustration]:
+    """Returns the figures of a city, in the order of the report.
+
+    Args:
+        city: the city.
+        folder: folder of the figures.
+        with_curves: whether precision-recall curves were drawn.
+    """
     shown = [
         Illustration(
             folder / routes_stem(city),
@@ -192,7 +259,7 @@ def illustrations(city: City, folder: Path) -> list[Illustration]:
                 strict=True,
             )
         ]
-    if city.recognition_pairs():
+    if with_curves:
         shown.append(
             Illustration(
                 folder / curves_stem(city),

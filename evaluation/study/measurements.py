@@ -1,19 +1,17 @@
 """Measures methods on one recording or on two."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import replace
 from typing import TypeAlias
 
 import numpy as np
-from threadpoolctl import threadpool_limits
 
 from cns_drake.base.jobs.step import Reporter
 from cns_drake.base.progress import track
 from evaluation.drives import check_same_world
-from evaluation.drives.drive_views import MovedDrive
 from evaluation.drives.sampling import gather
 from evaluation.methods.method import Method
-from evaluation.recognition.costs import Cost, measure_cost, query_ms
+from evaluation.recognition.costs import query_ms
 from evaluation.recognition.description import (
     DescribedDrive,
     Role,
@@ -43,62 +41,6 @@ TIMED = 9
 _LONGEST_MS = 3.6e6
 # Places that no method is known to take so long for.
 _MANY = 5000
-# Number of clouds and of queries whose costs are measured; the time of the
-# first does not count.
-_NUM_TRIALS = 12
-
-
-def recognise_places(
-    reporter: Reporter,
-    described: tuple[Part, Part],
-    overlaps: Part | None,
-    choice: MethodChoice,
-    protocol: RetrievalProtocol,
-) -> list[PlaceOutcome]:
-    """Returns a method's outcomes on two drives, without and with the gate.
-
-    Args:
-        reporter: reports notes.
-        described: files with the descriptions of the database and of the query.
-        overlaps: file with the result of `shown_overlaps`; None if overlaps
-            are not asked for.
-        choice: the method.
-        protocol: protocol of the comparison.
-    """
-    # The method comes first, because it registers the type of its
-    # descriptions.
-    method = choice.make()
-    (placed, database), (placed_query, query) = (p.read() for p in described)
-    check_same_world(placed, placed_query)
-    both = compare_with_gates(
-        method, database, query, protocol, [None, protocol.radius]
-    )
-    if not both[0].matches.any():
-        # Routes need not meet, nor close a loop.
-        reporter.note(
-            f"{query.name}: no query lies within {protocol.radius:g} m of a"
-            f" place of {database.name}"
-        )
-    shown = None if overlaps is None else overlaps.read()
-    return [
-        PlaceOutcome.of(
-            choice.key,
-            method,
-            replace(protocol, gate=is_gated),
-            one,
-            (query.name, query.queries.stamps_ns, query.queries.p_WSs),
-            [database.name] * len(one.database_frames),
-            shown,
-        )
-        for is_gated, one in zip((False, True), both, strict=True)
-    ]
-
-
-def outcomes_of(
-    reporter: Reporter, results: tuple[Part, ...]
-) -> list[PlaceOutcome]:
-    """Returns the outcomes in several files."""
-    return [one for part in results for one in part.read()]
 
 
 def shown_overlaps(
@@ -107,92 +49,89 @@ def shown_overlaps(
     described: tuple[Part, Part],
     choice: MethodChoice,
     protocol: RetrievalProtocol,
-) -> np.ndarray:
-    """Returns how much of each query's scan its best match shows, (Q,).
+    radii: tuple[float, ...],
+) -> dict[float, np.ndarray]:
+    """Returns how much of each query's scan its best match shows.
 
     Args:
         reporter: unused.
-        scans: files with the scans (`KeptDrive`) of database and query.
+        scans: files with the scans of database and query: a `KeptDrive`, or a
+            list of them.
         described: files with a method's descriptions of both, for the poses.
         choice: the method.
         protocol: protocol by which the queries are shown.
+        radii: radii of a match [m].
+
+    Returns:
+        Radius -> (Q,) overlaps; NaN without a match.
     """
     choice.make()  # It registers the type of its descriptions.
-    kept, asked = (part.read() for part in scans)
     (_, database), (_, query) = (part.read() for part in described)
-    return best_overlaps(
-        [
+    kept, asked = (part.read() for part in scans)
+    if not isinstance(kept, list):
+        kept = [
             gather(kept, frame, 1, protocol.max_range).astype(np.float32)
             for frame in database.places.frames.tolist()
-        ],
-        database.places.X_WS,
-        [
+        ]
+    if not isinstance(asked, list):
+        asked = [
             protocol.query_scan(asked, frame).astype(np.float32)
             for frame in query.queries.frames.tolist()
-        ],
-        query.queries.X_WS,
-        matches_within_radius(database, query, protocol),
-    )
+        ]
+    return {
+        radius: best_overlaps(
+            kept,
+            database.places.X_WS,
+            asked,
+            query.queries.X_WS,
+            matches_within_radius(
+                database, query, replace(protocol, radius=radius)
+            ),
+        )
+        for radius in radii
+    }
 
 
-def measure_costs(
+def measure_method(
     reporter: Reporter,
-    source: DriveSource,
-    surveyed: Part,
-    methods: tuple[MethodChoice, ...],
-    described: tuple[tuple[Part, Part], ...],
+    database: Part,
+    query: Part,
+    distractors: tuple[Part, ...],
+    num_distractors: int,
+    choice: MethodChoice,
+    overlaps: Part | None,
     protocol: RetrievalProtocol,
-) -> list[Cost]:
-    """Returns the time and memory that each method needs on one core.
+    radii: tuple[float, ...],
+) -> list[PlaceOutcome]:
+    """Returns the outcomes of one method, as `measure_places` does.
 
     Args:
-        reporter: reports progress.
-        source: opens the query drive.
-        surveyed: file with the `SurveyedDrive` of the query drive, from which
-            the drive's poses are read.
-        methods: the methods.
-        described: files with each method's descriptions of a database and of
-            the query.
-        protocol: protocol of the comparison.
+        reporter: reports notes.
+        database, query: files with the method's descriptions of the places and
+            of the queries.
+        distractors: for each drive through another city, the file with the
+            method's descriptions of its places.
+        num_distractors: see `measure_places`.
+        choice: the method.
+        overlaps: file with the result of `shown_overlaps`; None to leave
+            overlaps unknown.
+        protocol, radii: see `measure_places`.
     """
-    drive, known = source(), surveyed.read()
-    # A recording would be unpacked as a whole for its poses.
-    drive = MovedDrive(drive, known.X_WS, drive.world_frame, drive.datum)
-    costs = []
-    with threadpool_limits(limits=1):
-        for choice, parts in track(
-            zip(methods, described, strict=True),
-            "measuring costs",
-            len(methods),
-            "methods",
-        ):
-            method = choice.make()
-            number = protocol.scans(method)
-            last = max(len(drive) - number, 0)
-            frames = np.linspace(0, last, _NUM_TRIALS).astype(int).tolist()
-            clouds = [
-                gather(
-                    drive,
-                    frame,
-                    number,
-                    protocol.max_range,
-                    method.point_fields,
-                    protocol.scans_before(method),
-                )
-                for frame in frames
-            ]
-            (_, database), (_, query) = (part.read() for part in parts)
-            costs.append(
-                measure_cost(
-                    method,
-                    clouds,
-                    number,
-                    database,
-                    query,
-                    protocol.gate_radius,
-                )
-            )
-    return costs
+    # The method comes first, because it registers the type of its
+    # descriptions.
+    method = choice.make()
+    (placed, mapped), (placed_query, asked) = database.read(), query.read()
+    check_same_world(placed, placed_query, across_maps=True)
+    shown = {} if overlaps is None else overlaps.read()
+    searched, drives = crowded(mapped, distractors, num_distractors)
+    return _compare(
+        (choice, method),
+        (searched, drives),
+        asked,
+        (protocol, radii),
+        lambda radius, matches: shown.get(radius),
+        reporter,
+    )
 
 
 def measure_places(
@@ -241,17 +180,13 @@ def measure_places(
     ):
         method = choice.make()
         mapped, asked = places(k), queries(k)
-        searched, drives = crowded(mapped, distractors, k, num_distractors)
-        if len(searched.places.frames) > _MANY and _takes_long(
-            method, searched, asked
-        ):
-            reporter.note(f"{choice.name}: it would take over an hour")
-            continue
-        plain, *by_gate = compare_with_gates(
-            method, searched, asked, protocol, [None, *radii]
-        )
-        for radius, one in zip(radii, by_gate, strict=True):
-            matches = (plain.distances <= radius) & plain.is_known
+
+        def shown(
+            radius: float,
+            matches: np.ndarray,
+            mapped: DescribedDrive = mapped,
+            asked: DescribedDrive = asked,
+        ) -> np.ndarray:
             if radius not in overlaps:
                 overlaps[radius] = best_overlaps(
                     place_scans,
@@ -260,22 +195,68 @@ def measure_places(
                     asked.queries.X_WS,
                     matches[:, : len(place_scans)],
                 )
-            outcomes += [
-                PlaceOutcome.of(
-                    choice.key,
-                    method,
-                    replace(protocol, gate=is_gated, radius=radius),
-                    replace(found, matches=matches),
-                    (
-                        asked.name,
-                        asked.queries.stamps_ns,
-                        asked.queries.p_WSs,
-                    ),
-                    drives,
-                    overlaps[radius],
-                )
-                for is_gated, found in ((False, plain), (True, one))
-            ]
+            return overlaps[radius]
+
+        outcomes += _compare(
+            (choice, method),
+            crowded(
+                mapped, [parts[k] for parts in distractors], num_distractors
+            ),
+            asked,
+            (protocol, radii),
+            shown,
+            reporter,
+        )
+    return outcomes
+
+
+def _compare(
+    chosen: tuple[MethodChoice, Method],
+    database: tuple[DescribedDrive, list[str]],
+    query: DescribedDrive,
+    asked: tuple[RetrievalProtocol, tuple[float, ...]],
+    shown: Callable[[float, np.ndarray], np.ndarray | None],
+    reporter: Reporter,
+) -> list[PlaceOutcome]:
+    """Returns the outcomes of a method; none if it would take too long.
+
+    Args:
+        chosen: the method, as it was chosen and as it was made.
+        database: the described places, and the name of each one's drive.
+        query: the described queries.
+        asked: the protocol, and radii of a match [m].
+        shown: function that returns overlaps (Q,) of the queries for a radius
+            and the matches (Q, D) within it.
+        reporter: reports notes.
+    """
+    (choice, method), (searched, drives), (protocol, radii) = (
+        *(chosen, database),
+        asked,
+    )
+    if len(searched.places.frames) > _MANY and _takes_long(
+        method, searched, query
+    ):
+        reporter.note(f"{choice.name}: it would take over an hour")
+        return []
+    plain, *by_gate = compare_with_gates(
+        method, searched, query, protocol, [None, *radii]
+    )
+    outcomes = []
+    for radius, one in zip(radii, by_gate, strict=True):
+        matches = (plain.distances <= radius) & plain.is_known
+        overlaps = shown(radius, matches)
+        outcomes += [
+            PlaceOutcome.of(
+                choice.key,
+                method,
+                replace(protocol, gate=is_gated, radius=radius),
+                replace(found, matches=matches),
+                (query.name, query.queries.stamps_ns, query.queries.p_WSs),
+                drives,
+                overlaps,
+            )
+            for is_gated, found in ((False, plain), (True, one))
+        ]
     return outcomes
 
 
@@ -313,8 +294,7 @@ def _describe(
 
 def crowded(
     database: DescribedDrive,
-    distractors: tuple[tuple[Part, ...], ...],
-    method: int,
+    distractors: Sequence[Part],
     num_others: int,
 ) -> tuple[DescribedDrive, list[str]]:
     """Returns a database to which places of other cities are added.
@@ -325,9 +305,8 @@ def crowded(
 
     Args:
         database: a drive, with a method's descriptions of its places.
-        distractors: for each drive through another city, one file per method
-            with the descriptions of its places.
-        method: index of the method in these files.
+        distractors: for each drive through another city, the file with the
+            same method's descriptions of its places.
         num_others: number of places to append.
 
     Returns:
@@ -335,10 +314,10 @@ def crowded(
         from which it comes.
     """
     known = [database]
-    for parts in distractors:
+    for part in distractors:
         if sum(len(d.places.frames) for d in known[1:]) >= num_others:
             break
-        known.append(parts[method].read()[1])
+        known.append(part.read()[1])
     places = joined_scans(
         [one.places for one in known],
         range(len(known)),

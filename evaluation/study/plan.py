@@ -1,9 +1,11 @@
-"""The whole benchmark: its jobs, and the report made from their files."""
+"""A report: the experiment `stages` on recordings, and what its page shows."""
+
+from __future__ import annotations
 
 from collections import defaultdict
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
-from functools import cached_property
+from functools import cached_property, partial
 from pathlib import Path
 
 from cns_drake.base.errors import InputError
@@ -21,32 +23,34 @@ from evaluation.report import page, result_tables
 from evaluation.report.curve_figures import draw_pr_curves
 from evaluation.report.reference import NO_REFERENCE, Reference
 from evaluation.results.table import LAST, OWN, SETTINGS, STAGE, Results
-from evaluation.study import figures, measurements
+from evaluation.study import figures
 from evaluation.study.chosen_methods import MethodChoice, choose_methods
 from evaluation.study.collection import (
     City,
-    Pair,
     RecordingInfo,
-    Run,
+    Recordings,
     find_recordings,
     group_cities,
     nothing_to_compare,
 )
 from evaluation.study.engine import Engine, MeasuredPair, made_tasks
 from evaluation.study.fault_evidence import explain_faults
+from evaluation.study.measurements import measure_method
+from evaluation.study.method_costs import measure_method_costs
 from evaluation.study.parts import MakePart, Part, StudyFiles
-from evaluation.study.recorded import RecordedCondition, recorded_comparisons
+from evaluation.study.recorded import (
+    RecordedCondition,
+    SurveyJobs,
+    recorded_comparisons,
+)
+from evaluation.study.repeats import Repeat, repeats_of
 from evaluation.study.surveys import Further, Survey
-from evaluation.study.tasks.change import ChangeTask, surveyed_change
+from evaluation.study.tasks.change import ChangeTask
 from evaluation.study.tasks.place import PlaceTask, PoseTask
-from evaluation.study.tasks.task import Pair as ComparedPair
 from evaluation.study.tasks.task import Task
 
-# Expected seconds: for the maps of a drive of 3000 scans, for its places or
-# queries, to draw a city or a change, and to compare two drives by a method.
-_MAP_COST = 19.0
-_ROLE_COST = 10.0
-_DRAWING_COST = 5.0
+# Expected seconds to measure costs, and to compare two drives by a method.
+_COSTS_COST = 5.0
 _RECOGNITION_COST = 3.5
 # The experiment whose rows a report writes, its tasks and its seed.
 _EXPERIMENT = "stages"
@@ -58,7 +62,11 @@ _SEED = 1
 
 @dataclass(frozen=True)
 class Study:
-    """A comparison of recordings, with a report; recordings need not exist yet.
+    """A report on recordings, which need not exist yet.
+
+    It is the experiment `stages` on these recordings: its engine measures all
+    pairs of drives, and writes `results.csv` and `queries.csv`. The page, the
+    figures and the wide tables are made from the same files.
 
     A recording can serve as a control: its drive goes through one stage of a
     map, on the route of the drive through another stage. Its comparison with
@@ -88,11 +96,32 @@ class Study:
         Raises:
             InputError: two recordings have the same map and stage.
         """
-        return group_cities(self.recordings, self.reference)
+        return group_cities(self.recordings)
 
     @cached_property
-    def _files(self) -> StudyFiles:
+    def engine(self) -> Engine:
+        """The engine of the experiment `stages`."""
+        return Engine(
+            _EXPERIMENT,
+            made_tasks({name: {} for name in _TASKS}, _TASKS, _EXPERIMENT),
+            {
+                one.key: (
+                    one,
+                    {f"{SETTINGS}{one.name}.{k}": v for k, v in one.settings},
+                )
+                for one in self.methods
+            },
+            self.output.absolute(),
+        )
+
+    @property
+    def files(self) -> StudyFiles:
+        """The paths of all files."""
         return StudyFiles(self.output.absolute())
+
+    @cached_property
+    def _cities(self) -> list[_CityReport]:
+        return [_CityReport(self, city) for city in self.cities]
 
     def jobs(self) -> list[Job]:
         """Returns the jobs whose results `assemble` puts into a report.
@@ -104,7 +133,7 @@ class Study:
         Raises:
             InputError: see `cities`.
         """
-        jobs = [job for city in self.cities for job in self._city_jobs(city)]
+        jobs = [job for one in self._cities for job in one.jobs.values()]
         if self._costed_pairs:
             needs = tuple(job.name for job in jobs)
             jobs.append(self._cost_job(self._costed_pairs[0], needs))
@@ -112,13 +141,28 @@ class Study:
         return jobs
 
     @property
-    def _costed_pairs(self) -> list[Pair]:
+    def _costed_pairs(self) -> list[Recordings]:
         return [
             pair
             for city in self.cities
             for pair in city.recognition_pairs()
             if self.with_costs
         ]
+
+    def _cost_job(self, pair: Recordings, needs: tuple[str, ...]) -> Job:
+        """Returns the job that measures costs, after all other jobs."""
+        places, queries = (self.files.survey(one.name) for one in pair)
+        described = tuple(
+            (places.described(one.key), queries.described(one.key))
+            for one in self.methods
+        )
+        source, drive = pair[1].source, queries.drive
+        step = MakePart(
+            self.files.part("costs", "costs"),
+            measure_method_costs,
+            (source, drive, self.methods, described, self.protocol),
+        )
+        return Job("costs of the methods", step, needs, _COSTS_COST)
 
     def assemble(
         self,
@@ -155,8 +199,9 @@ class Study:
         Args:
             pages: name of a recording -> address of its 3-D page, relative to
                 the report. Recordings without a page are left out.
-            on_note: is called with a note on each city without a pair to
-                compare. The report contains these notes, too.
+            on_note: is called with a note on each pair without a match, and on
+                each city without a pair to compare. The report contains the
+                latter, too.
             with_tables: whether to write the wide tables.
 
         Returns:
@@ -166,7 +211,7 @@ class Study:
             InputError: a job has not been done, or a file cannot be written.
         """
         doing("writing the report")
-        folder = self._files.figures
+        folder = self.files.figures
         make_folder(folder)
         report = page.Report(pages=pages or {}, reference=self.reference)
         report.made_by = [
@@ -174,9 +219,16 @@ class Study:
             *(one.key for one in self.methods if one.settings),
             self.protocol.to_text(),
         ]
-        for city in self.cities:
-            self._collect(city, report)
-        report.results = self._results()
+        results, _ = self.engine.write_tables()
+        shown = (
+            row
+            for row in results.rows
+            if row.database != row.query
+            and (row.task == "change" or row.gate == self.protocol.gate)
+        )
+        report.results = Results(results.factors, tuple(shown))
+        for one in self._cities:
+            one.collect(report, on_note)
         if self.protocol.exclude_recent is None:
             report.notes = nothing_to_compare(self.cities)
         for note in report.notes:
@@ -184,334 +236,235 @@ class Study:
         report.differences = result_tables.method_differences(
             report.recognitions
         )
-        for shown in page.chart_illustrations(report, folder):
-            report.illustrations.insert(0, shown)
+        for illustration in page.chart_illustrations(report, folder):
+            report.illustrations.insert(0, illustration)
         if self._costed_pairs:
-            report.costs = self._files.part("costs", "costs").read()
+            report.costs = self.files.part("costs", "costs").read()
         written = page.write_report(
             report, self.output, with_tables=with_tables
         )
-        for city in self.cities:
-            for job in self._city_jobs(city):
+        for one in self._cities:
+            for job in one.jobs.values():
                 if isinstance(job.step, Survey):
                     job.step.files.spend()
         return written
 
-    def _results(self) -> Results:
-        """Writes the two tables; returns the results that the page shows."""
-        columns = {
-            one.key: {
-                f"{SETTINGS}{one.name}.{name}": value
-                for name, value in one.settings
-            }
-            for one in self.methods
+
+class _CityReport:
+    """The part of a report that one city makes.
+
+    Attributes:
+        jobs: name -> job: those of the engine, and those for the page, which
+            draw, explain wrong answers and repeat published runs.
+    """
+
+    def __init__(self, study: Study, city: City):
+        """Adds the pairs of the city to the engine of the study."""
+        self._study, self._city, self._files = study, city, study.files
+        protocol = study.protocol
+        with_itself = protocol.exclude_recent is not None
+        self._pairs = city.recognition_pairs(with_itself=with_itself)
+        self._repeats = {
+            (one.name, other.name): repeats_of(
+                (city.name, one.stage, other.stage),
+                study.methods,
+                protocol,
+                study.reference,
+            )
+            for one, other in city.recognition_pairs()
         }
-        engine = Engine(
-            _EXPERIMENT,
-            made_tasks({name: {} for name in _TASKS}, _TASKS, _EXPERIMENT),
-            {one.key: (one, columns[one.key]) for one in self.methods},
-            self._files.output,
+        measured = list(
+            recorded_comparisons(
+                city,
+                [
+                    RecordedCondition({STAGE: LAST}, LAST, True, protocol),
+                    RecordedCondition({STAGE: OWN}, OWN, False, protocol),
+                ],
+                _SEED,
+                # The page says which pairs have no control.
+                lambda text: None,
+                both_ways=True,
+                with_itself=with_itself,
+            )
         )
-        for city in self.cities:
-            engine.measured += self._comparisons(city)
-        results, _ = engine.write_tables()
-        shown = (
-            row
-            for row in results.rows
-            if row.task == "change" or row.gate == self.protocol.gate
+        self._measured = {
+            (*one.names, one.factors[STAGE]): one for one in measured
+        }
+        planned = study.engine.add(
+            measured, make_jobs=partial(SurveyJobs, further=self._further())
         )
-        return Results(results.factors, tuple(shown))
+        assert isinstance(planned, SurveyJobs)
+        self._drawing, job = figures.drawing_job(city, self._files, planned)
+        jobs = [job]
+        self._changes = []
+        for pair in city.change_pairs():
+            change, job = figures.change_job(city, pair, self._files, planned)
+            self._changes.append(change)
+            jobs.append(job)
+        for pair in self._pairs:
+            jobs += self._jobs_of(pair)
+        self.jobs = {**planned.jobs, **{job.name: job for job in jobs}}
 
-    def _comparisons(self, city: City) -> list[MeasuredPair]:
-        """Returns the comparisons of the experiment `stages`."""
-        found = recorded_comparisons(
-            city,
-            [
-                RecordedCondition({STAGE: LAST}, LAST, True, self.protocol),
-                RecordedCondition({STAGE: OWN}, OWN, False, self.protocol),
-            ],
-            _SEED,
-            # The page says which pairs have no control.
-            lambda text: None,
-            both_ways=True,
-        )
-        comparisons = list(found)
-        for one in comparisons:
-            place = self._outcomes(one.pair)
-            change = self._files.part("change", one.pair.name)
-            one.parts.update(place=place, pose=place, change=change)
-        return comparisons
+    def _own(self, pair: Recordings, stage: str = OWN) -> MeasuredPair | None:
+        """Returns a pair as it is measured, or (stage `last`) its control."""
+        return self._measured.get((pair[0].name, pair[1].name, stage))
 
-    def _outcomes(self, pair: ComparedPair) -> Part:
-        return self._files.part("place", pair.name)
+    def _further(self) -> dict[str, tuple[Further, ...]]:
+        """Returns drive -> its descriptions that second runs need."""
+        roles: dict[str, dict[Repeat, set[Role]]]
+        roles = defaultdict(lambda: defaultdict(set))
+        for (database, query), repeats in self._repeats.items():
+            for one in repeats:
+                # A drive's places and queries are described together.
+                key = replace(one, shares_places=True)
+                roles[query][key].add("queries")
+                if not one.shares_places:
+                    roles[database][key].add("places")
+        return {
+            drive: tuple(
+                (one.method, frozenset(needed), one.protocol)
+                for one, needed in some.items()
+            )
+            for drive, some in roles.items()
+        }
 
-    def _result(self, pair: Pair, key: str) -> Part:
-        """Returns the file with the result of a run, which `key` names."""
-        names = (one.name for one in pair)
-        return self._files.part("recognition", *names, key)
-
-    def _outcome(
-        self, city: City, pair: Pair, measured: Pair, run: Run
-    ) -> PlaceOutcome:
-        """Returns the outcome of a run, with the names that the page shows."""
-        wanted = run.protocol.gate
-        outcomes = self._result(measured, run.queries).read()
-        (found,) = (one for one in outcomes if one.is_gated == wanted)
-        stages = (one.stage for one in pair)
-        return replace(found, method=run.method.name, pair=(city.name, *stages))
-
-    def _evidence(self, pair: Pair) -> Part:
+    def _evidence(self, pair: Recordings) -> Part:
         """Returns the file with evidence on why best places are wrong."""
         return self._files.part("why", *(one.name for one in pair))
 
-    def _pairs(self, city: City) -> list[Pair]:
-        return city.recognition_pairs(
-            with_itself=self.protocol.exclude_recent is not None
+    def _repeated(self, pair: Recordings, one: Repeat) -> Part:
+        """Returns the file with the outcomes of a second run."""
+        return self._files.part(
+            "repeated", *(drive.name for drive in pair), one.method.key
         )
 
-    def _city_jobs(self, city: City) -> list[Job]:
-        pairs = {
-            f"{city.name} {pair[0].stage} > {pair[1].stage}": pair
-            for pair in self._pairs(city)
-        }
-        # Two pairs may share a control.
-        controls = {
-            f"control {both[0].name} > {both[1].name}": both
-            for pair in pairs.values()
-            if (both := city.unchanged_pair(*pair)) is not None
-        }
-        drives = {one.name: one for one in city.stages.values()}
-        roles: dict[str, set[Role]] = defaultdict(set)
-        for database, query in (*pairs.values(), *controls.values()):
-            drives |= {database.name: database, query.name: query}
-            roles[database.name].add("places")
-            roles[query.name].add("queries")
-        explained = {
-            one.name for pair in (pairs | controls).values() for one in pair
-        }
+    def _jobs_of(self, pair: Recordings) -> list[Job]:
+        """Returns the jobs that explain a pair and repeat published runs."""
+        own, protocol = self._own(pair), self._study.protocol
+        assert own is not None
+        surveys = [self._files.survey(one.name) for one in pair]
+        names = own.names
+        steps = [
+            MakePart(
+                self._evidence(pair),
+                explain_faults,
+                (
+                    (surveys[0].scans, surveys[1].scans),
+                    self._study.methods,
+                    own.parts["place"],
+                    protocol,
+                ),
+            )
+        ]
+        needs = (f"place {own.pair.name}",)
         jobs = [
             Job(
-                f"survey {name}",
-                Survey(
-                    one.source,
-                    frozenset(roles[name]),
-                    self.methods,
-                    self.protocol,
-                    self._files.survey(name),
-                    with_scans=name in explained,
-                    further=self._further(city, one),
-                ),
-                one.needs,
-                _MAP_COST + _ROLE_COST * len(roles[name]),
+                f"explain {names[0]} > {names[1]}",
+                steps[0],
+                needs,
+                _RECOGNITION_COST,
             )
-            for name, one in drives.items()
         ]
-        jobs.append(self._drawing_job(city))
-        jobs += [self._change_job(city, pair) for pair in city.change_pairs()]
-        jobs += [
-            self._recognition_job(city, pair, name, explains=name in pairs)
-            for name, pair in (pairs | controls).items()
-        ]
-        # Two pairs may share a control.
-        compared = {one.pair.name: one for one in self._comparisons(city)}
-        return jobs + [self._tcr_job(one) for one in compared.values()]
-
-    def _tcr_job(self, one: MeasuredPair) -> Job:
-        """Returns the job that measures change, as in the table of results."""
-        names = one.pair.database.name, one.pair.query.name
-        step = MakePart(
-            one.parts["change"],
-            surveyed_change,
-            tuple(self._files.survey(name).drive for name in names),
-        )
-        needs = tuple(f"survey {name}" for name in dict.fromkeys(names))
-        return Job(f"tcr {one.pair.name}", step, needs, _RECOGNITION_COST)
-
-    def _further(self, city: City, drive: RecordingInfo) -> tuple[Further, ...]:
-        """Returns the descriptions of a drive that repeated runs need."""
-        roles: dict[tuple[MethodChoice, RetrievalProtocol], set[Role]]
-        roles = defaultdict(set)
-        for pair in city.recognition_pairs():
-            for run in city.runs(pair, self.methods, self.protocol):
-                key = run.method, run.protocol
-                if run.repeats and pair[1] is drive:
-                    roles[key].add("queries")
-                if run.repeats and pair[0] is drive and not run.shares_places:
-                    roles[key].add("places")
-        return tuple(
-            (method, frozenset(needed), protocol)
-            for (method, protocol), needed in roles.items()
-        )
-
-    def _drawing_job(self, city: City) -> Job:
-        stages = city.stages.values()
-        surveys = [(one, self._files.survey(one.name)) for one in stages]
-        stem = self._files.figures / figures.routes_stem(city)
-        step = MakePart(
-            self._files.part("pages", city.name),
-            figures.draw_city,
-            (
-                city.name,
-                tuple(
-                    (drive.stage, one.drive, one.fine, drive.source)
-                    for drive, one in surveys
+        steps = [
+            MakePart(
+                self._repeated(pair, one),
+                measure_method,
+                (
+                    surveys[0].described(one.places),
+                    surveys[1].described(one.queries),
+                    *((), 0),
+                    *(one.method, None, one.protocol, (one.protocol.radius,)),
                 ),
-                stem,
-            ),
-            figures.figure_files(stem),
-        )
-        return Job(
-            f"draw {city.name}", step, _survey_names(stages), _DRAWING_COST
-        )
+            )
+            for one in self._repeats.get(names, ())
+        ]
+        if steps:
+            jobs.append(
+                Job(
+                    f"repeat {names[0]} > {names[1]}",
+                    Steps(steps[0].output, tuple(steps)),
+                    tuple(f"survey {name}" for name in names),
+                    _RECOGNITION_COST * len(steps),
+                )
+            )
+        return jobs
 
-    def _change_job(self, city: City, pair: Pair) -> Job:
-        both = city.unchanged_pair(*pair) or ()
-        drives = [*pair, *(one for one in both if one not in pair)]
-        earlier, later = pair
-        surveys = tuple(self._files.survey(one.name) for one in drives)
-        stems = tuple(
-            self._files.figures / name
-            for name in figures.change_stems(city, pair)
-        )
-        step = MakePart(
-            self._files.part("changes", earlier.name, later.name),
-            figures.compare_stages,
-            (
-                city.name,
-                (earlier.stage, later.stage),
-                tuple(one.drive for one in surveys),
-                (surveys[0].fine, surveys[1].fine),
-                stems,
-            ),
-            figures.figure_files(*stems),
-        )
-        return Job(
-            f"change {city.name} {earlier.stage} > {later.stage}",
-            step,
-            _survey_names(drives),
-            _DRAWING_COST,
-        )
+    def _outcomes(
+        self, pair: Recordings, parts: Iterable[Part]
+    ) -> list[PlaceOutcome]:
+        """Returns outcomes with the names and the gate that the page shows.
 
-    def _recognition_job(
-        self, city: City, pair: Pair, name: str, *, explains: bool
-    ) -> Job:
-        """Returns the job that runs the methods on a pair.
-
-        With `explains`, the job also finds why best places are wrong, and
-        repeats runs by the protocol of published numbers.
+        Methods for which no query has a match are left out.
         """
-        database, query = pair
-        surveys = [self._files.survey(one.name) for one in pair]
-        scans = surveys[0].scans, surveys[1].scans
-
-        overlaps = self._files.part("overlaps", *(one.name for one in pair))
-        steps = []
-        if self.methods:
-            first = self.methods[0]
-            described = tuple(one.described(first.key) for one in surveys)
-            steps.append(
-                MakePart(
-                    overlaps,
-                    measurements.shown_overlaps,
-                    (scans, described, first, self.protocol),
-                )
+        names = {one.key: one.name for one in self._study.methods}
+        stages = pair[0].stage, pair[1].stage
+        return [
+            replace(
+                one, method=names[one.method], pair=(self._city.name, *stages)
             )
-        runs = city.runs(pair, self.methods, self.protocol)
-        for run in runs:
-            if explains or not run.repeats:
-                arguments = (
-                    (
-                        surveys[0].described(run.places),
-                        surveys[1].described(run.queries),
-                    ),
-                    None if run.repeats else overlaps,
-                    run.method,
-                    run.protocol,
-                )
-                part = self._result(pair, run.queries)
-                steps.append(
-                    MakePart(part, measurements.recognise_places, arguments)
-                )
-        own = tuple(self._result(pair, one.key) for one in self.methods)
-        steps += [
-            MakePart(part, measurements.outcomes_of, (own,))
-            for part in {
-                self._outcomes(one.pair)
-                for one in self._comparisons(city)
-                if (one.pair.database.name, one.pair.query.name)
-                == (database.name, query.name)
-            }
+            for part in parts
+            for one in part.read()
+            if one.is_gated == self._study.protocol.gate
+            and one.outcomes.has_match.any()
         ]
-        if explains:
-            steps.append(
-                MakePart(
-                    self._evidence(pair),
-                    explain_faults,
-                    (scans, self.methods, own, overlaps, self.protocol),
-                )
-            )
-        cost = _RECOGNITION_COST * len(steps)
-        step = Steps(steps[0].output, tuple(steps))
-        return Job(name, step, _survey_names(pair), cost)
 
-    def _cost_job(self, pair: Pair, needs: tuple[str, ...]) -> Job:
-        """Returns the job that measures costs, after all other jobs."""
-        places, queries = (self._files.survey(one.name) for one in pair)
-        described = tuple(
-            (places.described(one.key), queries.described(one.key))
-            for one in self.methods
-        )
-        source, drive = pair[1].source, queries.drive
-        step = MakePart(
-            self._files.part("costs", "costs"),
-            measurements.measure_costs,
-            (source, drive, self.methods, described, self.protocol),
-        )
-        return Job("costs of the methods", step, needs, _DRAWING_COST)
+    def collect(
+        self, report: page.Report, on_note: Callable[[str], None]
+    ) -> None:
+        """Adds the results of the city to a report.
 
-    def _collect(self, city: City, report: page.Report) -> None:
-        """Adds the results of a city to a report."""
-        files = self._files
-        for earlier, later in city.change_pairs():
-            change = files.part("changes", earlier.name, later.name).read()
-            report.changes.append(change)
+        Args:
+            report: the report.
+            on_note: is called with a note on each pair without a match.
+        """
+        city = self._city
+        report.changes += [part.read() for part in self._changes]
         compared = []
-        for pair in self._pairs(city):
-            control = city.unchanged_pair(*pair)
-            for run in city.runs(pair, self.methods, self.protocol):
-                found = self._outcome(city, pair, pair, run)
-                if not found.outcomes.has_match.any():
-                    continue
-                if run.repeats:
-                    report.repeated.append(found)
-                    continue
-                compared.append(found)
-                if pair[0] is not pair[1]:
-                    before = None
-                    if control is not None:
-                        before = self._outcome(city, pair, control, run)
-                        if not before.outcomes.has_match.any():
-                            before = None
-                    report.pairs.append((found, before))
+        for pair in self._pairs:
+            own, control = self._own(pair), self._own(pair, LAST)
+            assert own is not None
+            found = self._outcomes(pair, own.parts["place"])
+            before = {}
+            if control is not None:
+                beside = self._outcomes(pair, control.parts["place"])
+                before = {one.method: one for one in beside}
+            compared += found
+            if not found:
+                # Routes need not meet, nor close a loop.
+                on_note(
+                    f"{pair[1].name}: no query lies within"
+                    f" {self._study.protocol.radius:g} m of a place of"
+                    f" {pair[0].name}"
+                )
+            if pair[0] is not pair[1]:
+                report.pairs += [(one, before.get(one.method)) for one in found]
+            repeated = [
+                self._repeated(pair, one)
+                for one in self._repeats.get(own.names, ())
+            ]
+            report.repeated += self._outcomes(pair, repeated)
             evidence = self._evidence(pair).read()
-            if evidence is not None and control is not None:
-                drives = (one.name for one in control)
-                unchanged = self._files.part("overlaps", *drives).read()
+            if evidence is not None and before:
+                unchanged = next(iter(before.values())).columns["overlap"]
                 evidence = replace(evidence, unchanged=unchanged)
             if evidence is not None:
-                report.evidence[pair[0].name, pair[1].name] = evidence
-            names = {one.name for one in (*pair, *(control or ()))}
-            for name in sorted(names - report.tracks.keys()):
-                survey = files.survey(name).drive.read()
+                report.evidence[own.names] = evidence
+            drives = {one.name for one in pair}
+            if control is not None:
+                drives |= {one.name for one, _ in control.pair.roles}
+            for name in sorted(drives - report.tracks.keys()):
+                survey = self._files.survey(name).drive.read()
                 report.tracks[name] = result_tables.DriveTrack(
                     survey.stamps_ns, survey.X_WS
                 )
         if compared:
-            stem = files.figures / figures.curves_stem(city)
+            stem = self._files.figures / figures.curves_stem(city)
             draw_pr_curves(city.name, compared, stem)
         report.recognitions += compared
-        report.drives.update(files.part("pages", city.name).read())
-        report.illustrations += figures.illustrations(city, files.figures)
+        report.drives.update(self._drawing.read())
+        report.illustrations += figures.illustrations(
+            city, self._files.figures, with_curves=bool(compared)
+        )
 
 
 def _restore(jobs: Sequence[Job]) -> None:
@@ -541,10 +494,6 @@ def _restore(jobs: Sequence[Job]) -> None:
                     needed += inputs
     for part in needed:
         part.restore()
-
-
-def _survey_names(recordings: Iterable[RecordingInfo]) -> tuple[str, ...]:
-    return tuple(f"survey {recording.name}" for recording in recordings)
 
 
 def write_report(

@@ -1,14 +1,28 @@
-"""Pairs of recordings, which a study compares as they are."""
+"""Pairs of recordings, which a study compares as they are.
+
+A recording is read once, for all that a study needs of it.
+"""
 
 from collections.abc import Callable, Iterable, Iterator, Mapping
+from dataclasses import dataclass, field
 from typing import Any, NamedTuple
 
 from cns_drake.base.jobs.fingerprint import fingerprint
-from evaluation.recognition.protocol import RetrievalProtocol
+from cns_drake.base.jobs.running import Job
+from evaluation.recognition.description import Role
+from evaluation.recognition.protocol import FAIR_PROTOCOL, RetrievalProtocol
 from evaluation.results.table import OWN
 from evaluation.study.collection import City
 from evaluation.study.engine import MeasuredPair
-from evaluation.study.tasks.task import NamedDrive, Pair
+from evaluation.study.measurements import DescribedSource
+from evaluation.study.parts import Part, SurveyFiles
+from evaluation.study.surveys import Further, Survey
+from evaluation.study.tasks.task import Jobs, NamedDrive, Pair
+
+# Expected seconds: for the maps of a drive of 3000 scans, and for its places or
+# queries.
+_MAP_COST = 19.0
+_ROLE_COST = 10.0
 
 
 class RecordedCondition(NamedTuple):
@@ -35,6 +49,7 @@ def recorded_comparisons(
     on_note: Callable[[str], None],
     *,
     both_ways: bool = False,
+    with_itself: bool = False,
 ) -> Iterator[MeasuredPair]:
     """Yields the comparisons of a map's recordings in all conditions.
 
@@ -44,22 +59,25 @@ def recorded_comparisons(
         seed: seed of the experiment.
         on_note: is called with a note on each pair without a control.
         both_ways: whether the two drives of a map are compared both ways.
+        with_itself: whether each drive is compared with itself, too.
     """
     conditions = list(conditions)
     pairs = city.recognition_pairs() if both_ways else city.change_pairs()
+    if with_itself:
+        pairs += [(one, one) for one in city.stages.values()]
     for pair in pairs:
         control = city.unchanged_pair(*pair)
         for condition in conditions:
             drives = pair if condition.stage == OWN else control
             if drives is None:
+                if pair[0] is pair[1]:
+                    continue
                 on_note(
                     f"{city.name}: no drive on the route of {pair[0].name} in"
                     f" the stage of {pair[1].name}"
                 )
                 continue
-            database, query = (
-                NamedDrive(one.name, one.source) for one in drives
-            )
+            database, query = (one.named for one in drives)
             # Queries are scored once for all radii.
             asked = condition.protocol.to_json() | {"radius": None}
             yield MeasuredPair(
@@ -77,3 +95,86 @@ def recorded_comparisons(
                 ),
                 condition.protocol,
             )
+
+
+@dataclass
+class SurveyJobs(Jobs):
+    """Jobs of a study that read each drive once.
+
+    One job surveys a drive: it maps the drive, describes its places and its
+    queries by all methods, and keeps their scans. If pairs describe drives by
+    several protocols, this is so for the first one only.
+
+    Attributes:
+        with_map: whether a map is made.
+        further: drive -> descriptions by a second protocol.
+    """
+
+    with_map: bool = True
+    further: Mapping[str, tuple[Further, ...]] = field(default_factory=dict)
+    # Drive -> its roles. They are known before the first survey is added.
+    _roles: dict[str, set[Role]] = field(default_factory=dict)
+    _protocol: RetrievalProtocol | None = None
+
+    def expect(self, pair: Pair) -> None:
+        super().expect(pair)
+        if self._protocol is None:
+            self._protocol = pair.protocol
+        for drive, role in pair.roles:
+            if self._is_surveyed(pair.protocol):
+                self._roles.setdefault(drive.name, set()).add(role)
+
+    def described(
+        self,
+        drive: NamedDrive,
+        role: Role,
+        protocol: RetrievalProtocol,
+        needs: list[str],
+        *,
+        kept: bool = False,
+    ) -> DescribedSource:
+        if not self._is_surveyed(protocol):
+            return super().described(drive, role, protocol, needs, kept=kept)
+        files = self.survey(drive, needs)
+        return (
+            files.scans,
+            *(files.described(one.key) for one in self.methods),
+        )
+
+    def mapped(
+        self, drive: NamedDrive, spacing: float | None, needs: list[str]
+    ) -> Part:
+        if spacing is not None:
+            return super().mapped(drive, spacing, needs)
+        return self.survey(drive, needs).drive
+
+    def survey(self, drive: NamedDrive, needs: list[str]) -> SurveyFiles:
+        """Returns the files of a drive's survey, and adds its job.
+
+        Args:
+            drive: the drive.
+            needs: list to which the name of the job is appended.
+        """
+        name = f"survey {drive.name}"
+        needs.append(name)
+        files = self.files.survey(drive.name)
+        if name not in self.jobs:
+            roles = frozenset(self._roles.get(drive.name, ()))
+            step = Survey(
+                drive.source,
+                roles,
+                self.methods,
+                self._protocol or FAIR_PROTOCOL,
+                files,
+                with_scans=bool(roles),
+                with_map=self.with_map,
+                further=self.further.get(drive.name, ()),
+            )
+            cost = self.with_map * _MAP_COST + _ROLE_COST * len(roles)
+            self.jobs[name] = Job(name, step, drive.needs, cost)
+        return files
+
+    def _is_surveyed(self, protocol: RetrievalProtocol) -> bool:
+        """Returns whether surveys describe queries and places by a protocol."""
+        assert self._protocol is not None
+        return protocol.described() == self._protocol.described()

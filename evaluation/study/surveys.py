@@ -20,11 +20,17 @@ from cns_drake.base.jobs.file_digests import file_digests
 from cns_drake.base.jobs.step import Reporter, Step
 from cns_drake.base.points import xyz
 from cns_drake.base.progress import doing, track
+from evaluation.change.drive_change import Surveyed
 from evaluation.drives import Drive, PlacedDrive, open_drive
 from evaluation.drives.drive_views import RecentScans
-from evaluation.drives.sampling import cropped, within_range
+from evaluation.drives.sampling import cropped, sample_frames, within_range
 from evaluation.maps.thumbnails import thumbnail
-from evaluation.maps.voxel_maps import CELL_SIZE, VoxelAccumulator, VoxelMap
+from evaluation.maps.voxel_maps import (
+    CELL_SIZE,
+    VoxelAccumulator,
+    VoxelMap,
+    map_drive,
+)
 from evaluation.methods import MethodConfig
 from evaluation.recognition import description
 from evaluation.recognition.protocol import FAIR_PROTOCOL, RetrievalProtocol
@@ -168,6 +174,11 @@ class SurveyedDrive:
         """(N, 3) positions of the sensor in the world [m]."""
         return self.X_WS[:, :3, 3]
 
+    @property
+    def surveyed(self) -> Surveyed:
+        """The map, with the names of the drive, its world and its map."""
+        return Surveyed(self.name, self.coarse, self.positions, self.placed)
+
 
 @dataclass(frozen=True)
 class KeptDrive:
@@ -308,6 +319,26 @@ def survey_recording(
         thumbnails=thumbnails,
     )
     return RecordingSurvey(placed, described, kept, surveyed, fine)
+
+
+def map_city(
+    reporter: Reporter, source: DriveSource, spacing: float | None
+) -> Surveyed:
+    """Returns the voxel map of a drive, to compute the change ratio (TCR).
+
+    Args:
+        reporter: reports progress.
+        source: function that opens the drive.
+        spacing: distance along the path between two scans in the map [m]; None
+            for all scans.
+    """
+    drive = source()
+    positions = drive.X_WS[:, :3, 3]
+    frames = None
+    if spacing is not None:
+        frames = sample_frames(positions, spacing).tolist()
+    voxels = map_drive(drive, CELL_SIZE, frames)
+    return Surveyed(drive.name, voxels, positions)
 
 
 def describe_recording(

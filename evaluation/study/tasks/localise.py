@@ -71,7 +71,7 @@ class LocaliseTask(Task):
     def _starts(values: Any) -> tuple[Starts, ...]:
         return tuple(Starts(float(r), float(turn)) for r, turn in values)
 
-    def measure(self, pair: Pair, jobs: Jobs) -> Part:
+    def measure(self, pair: Pair, jobs: Jobs) -> tuple[Part, ...]:
         # Estimators of the user are identified by path and content.
         named = tuple(
             Path(one).absolute() if one.endswith(".py") else one
@@ -87,7 +87,8 @@ class LocaliseTask(Task):
             *(named, texts, self._starts(self.settings["starts"]), spacing),
         )
         part = jobs.files.part("localise", pair.name)
-        return jobs.add(part, measure_localisation, arguments, cost=_COST)
+        found = jobs.add(part, measure_localisation, arguments, cost=_COST)
+        return (found,)
 
     def _runs(self, found: Sequence[np.ndarray]) -> Iterator[tuple[str, Any]]:
         """Yields the name of each method and initial error, and its queries."""

@@ -4,7 +4,8 @@ from collections.abc import Iterator, Sequence
 from dataclasses import replace
 from typing import Any
 
-from cns_drake.base.jobs.step import Reporter
+from cns_drake.base.jobs.running import Job
+from cns_drake.base.jobs.step import Reporter, Steps
 from cns_drake.base.progress import track
 from evaluation.recognition.costs import cpu_ms, query_ms
 from evaluation.recognition.place_outcome import (
@@ -14,8 +15,14 @@ from evaluation.recognition.place_outcome import (
     pose_numbers,
 )
 from evaluation.study.chosen_methods import MethodChoice
-from evaluation.study.measurements import TIMED, crowded, measure_places
-from evaluation.study.parts import Part
+from evaluation.study.measurements import (
+    TIMED,
+    crowded,
+    measure_method,
+    measure_places,
+    shown_overlaps,
+)
+from evaluation.study.parts import MakePart, Part
 from evaluation.study.tasks.task import Answered, Jobs, Pair, Task
 
 # Expected seconds to describe a pair and to compare it by all methods, and to
@@ -35,25 +42,55 @@ class PoseTask(Task):
     asks = True
     _numbers = staticmethod(pose_numbers)
 
-    def measure(self, pair: Pair, jobs: Jobs) -> Part:
+    def measure(self, pair: Pair, jobs: Jobs) -> tuple[Part, ...]:
         needs: list[str] = []
         radii = tuple(sorted(jobs.radii[pair.name]))
-        arguments = (
-            jobs.described(pair.database, "places", pair.protocol, needs),
-            jobs.described(pair.query, "queries", pair.protocol, needs),
-            jobs.elsewhere(pair, needs),
-            pair.distractors,
-            jobs.methods,
-            replace(pair.protocol, radius=radii[0]),
-            radii,
+        protocol = replace(pair.protocol, radius=radii[0])
+        database, query = (
+            jobs.described(drive, role, pair.protocol, needs)
+            for drive, role in pair.roles
         )
-        # The task `place` reads the same part.
-        part = jobs.files.part("place", pair.name)
-        return jobs.add(part, measure_places, arguments, needs, _COST)
+        others = jobs.elsewhere(pair, needs)
+        # The task `place` reads the same files.
+        if not (isinstance(database, tuple) and isinstance(query, tuple)):
+            part = jobs.files.part("place", pair.name)
+            arguments = (
+                *(database, query, others, pair.distractors),
+                *(jobs.methods, protocol, radii),
+            )
+            return (jobs.add(part, measure_places, arguments, needs, _COST),)
+        # Each method has a file, so that another method leaves it as it is.
+        shown = MakePart(
+            jobs.files.part("overlaps", pair.name),
+            shown_overlaps,
+            (
+                (database[0], query[0]),
+                (database[1], query[1]),
+                *(jobs.methods[0], protocol, radii),
+            ),
+        )
+        steps = [
+            MakePart(
+                jobs.files.part("place", pair.name, choice.key),
+                measure_method,
+                (
+                    *(database[k], query[k]),
+                    tuple(parts[k - 1] for parts in others),
+                    *(pair.distractors, choice, shown.part, protocol, radii),
+                ),
+            )
+            for k, choice in enumerate(jobs.methods, start=1)
+        ]
+        name = f"place {pair.name}"
+        whole = Steps(shown.part.path, (shown, *steps))
+        jobs.jobs[name] = Job(name, whole, tuple(needs), _COST)
+        return tuple(one.part for one in steps)
 
-    def found(self, part: Part, pair: Pair) -> Outcomes:
+    def found(self, parts: tuple[Part, ...], pair: Pair) -> Outcomes:
         radius = pair.protocol.radius
-        return [one for one in part.read() if one.radius == radius]
+        return [
+            one for part in parts for one in part.read() if one.radius == radius
+        ]
 
     def numbers(
         self, found: Outcomes, before: Outcomes | None
@@ -79,7 +116,7 @@ class CostTask(Task):
     name = "cost"
     asks = True
 
-    def measure(self, pair: Pair, jobs: Jobs) -> Part:
+    def measure(self, pair: Pair, jobs: Jobs) -> tuple[Part, ...]:
         needs: list[str] = []
         database, query = (
             jobs.described(drive, role, pair.protocol, needs, kept=True)
@@ -92,7 +129,7 @@ class CostTask(Task):
             *(pair.distractors, jobs.methods),
         )
         part = jobs.files.part("cost", pair.name)
-        return jobs.add(part, measure_costs, arguments, needs, _COSTS_COST)
+        return (jobs.add(part, measure_costs, arguments, needs, _COSTS_COST),)
 
     def numbers(self, found: Any, before: Any | None) -> Iterator[Number]:
         for method, (places, values) in found.items():
@@ -132,7 +169,8 @@ def measure_costs(
     ):
         method = choice.make()
         mapped = database[k].read()[1]
-        places = crowded(mapped, distractors, k, num_distractors)[0].places
+        others = [parts[k] for parts in distractors]
+        places = crowded(mapped, others, num_distractors)[0].places
         asked = query[k].read()[1].queries
         found[choice.key] = (
             len(places.frames),

@@ -18,10 +18,12 @@ from evaluation.recognition.protocol import RetrievalProtocol
 from evaluation.study.chosen_methods import MethodChoice
 from evaluation.study.measurements import DescribedSource
 from evaluation.study.parts import MakePart, Part, StudyFiles
-from evaluation.study.surveys import DriveSource, Survey
+from evaluation.study.surveys import DriveSource, Survey, map_city
 
 # Expected seconds to describe a drive by all methods.
 _DESCRIPTION_COST = 30.0
+# The same to map a drive with each of its scans, and for other work.
+_MAP_COST, _COST = 60.0, 20.0
 
 
 # A method, whether its gate was used, and its answers to Q queries: column -> Q
@@ -36,10 +38,13 @@ class NamedDrive:
     Attributes:
         name: its unique name.
         source: function that opens it.
+        needs: names of the jobs that record it; empty if it is there, or is
+            simulated while it is read.
     """
 
     name: str
     source: DriveSource
+    needs: tuple[str, ...] = ()
 
 
 @dataclass(frozen=True)
@@ -69,6 +74,12 @@ class Pair:
     protocol: RetrievalProtocol
     distractors: int = 0
     may_repeat: bool = False
+
+    @property
+    def closes_loops(self) -> bool:
+        """Whether a drive is compared with what it passed itself before."""
+        is_itself = self.database == self.query
+        return is_itself and self.protocol.exclude_recent is not None
 
     @property
     def roles(self) -> tuple[tuple[NamedDrive, Role], ...]:
@@ -141,6 +152,7 @@ class Jobs:
         """
         name = _description_name(drive, role, protocol)
         if not (kept or len(self._uses.get(name, ())) > 1):
+            needs += drive.needs
             return drive.source
         files = self.files.survey(name)
         step = Survey(
@@ -153,12 +165,30 @@ class Jobs:
             with_map=False,
         )
         job = f"describe {name}"
-        self.jobs[job] = Job(job, step, cost=_DESCRIPTION_COST)
+        self.jobs[job] = Job(job, step, drive.needs, _DESCRIPTION_COST)
         needs.append(job)
         return (
             files.scans,
             *(files.described(one.key) for one in self.methods),
         )
+
+    def mapped(
+        self, drive: NamedDrive, spacing: float | None, needs: list[str]
+    ) -> Part:
+        """Returns the file with a drive's map, and adds the job that makes it.
+
+        Args:
+            drive: the drive.
+            spacing: distance along the path between two scans in the map [m];
+                None for all scans.
+            needs: list to which the name of the job is appended.
+        """
+        name = drive.name if spacing is None else f"{drive.name} {spacing:g}"
+        part = self.files.part("mapped", name)
+        needs.append(f"mapped {part.path.stem}")
+        cost = _MAP_COST if spacing is None else _COST
+        arguments = (drive.source, spacing)
+        return self.add(part, map_city, arguments, drive.needs, cost)
 
     def elsewhere(
         self, pair: Pair, needs: list[str]
@@ -193,7 +223,7 @@ class Jobs:
         function: Callable[..., object],
         arguments: tuple[object, ...],
         needs: Iterable[str] = (),
-        cost: float = 20.0,
+        cost: float = _COST,
     ) -> Part:
         """Adds a job that writes a file of results; returns the file.
 
@@ -286,20 +316,22 @@ class Task(abc.ABC):
         }
 
     @abc.abstractmethod
-    def measure(self, pair: Pair, jobs: Jobs) -> Part:
+    def measure(self, pair: Pair, jobs: Jobs) -> tuple[Part, ...]:
         """Adds the jobs that measure a pair of drives to `jobs`.
 
         Returns:
-            The file to which the last job writes the result.
+            The files to which the jobs write the result; none if the task does
+            not apply to the pair.
         """
 
-    def found(self, part: Part, pair: Pair) -> Any:
+    def found(self, parts: tuple[Part, ...], pair: Pair) -> Any:
         """Returns the task's result for a pair of drives.
 
         Args:
-            part: file that `measure` has returned for the pair.
+            parts: files that `measure` has returned for the pair.
             pair: the pair.
         """
+        (part,) = parts
         return part.read()
 
     @abc.abstractmethod

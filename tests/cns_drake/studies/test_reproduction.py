@@ -102,7 +102,7 @@ def test_everything_is_planned_before_anything_runs(
         assert jobs[name].needs == ()
         assert jobs[f"survey {name}"].needs == (name,)
     assert "picture town drives" in jobs
-    assert "town 01 > 04" in jobs
+    assert "explain town_01 > town_04" in jobs
     for job in jobs.values():
         assert jobs.keys() >= set(job.needs)
     # Each job has its own path, which workers on any machine find.

@@ -21,16 +21,17 @@ pytestmark = [
 DRIVES = {"town_01", "town_04", "town_01_stage_04"}
 PAGES = {"town_01", "town_04"}
 SURVEYS = {f"survey {name}" for name in DRIVES}
-DRAWN = {"draw town", "change town 01 > 04"}
-COMPARED = {"town 01 > 04", "town 04 > 01"}
+DRAWN = {"draw town", "draw town 01 > 04"}
+COMPARED = {"place town_01 town_04", "place town_04 town_01"}
 CONTROL = {
-    "control town_01_stage_04 > town_04", "control town_04 > town_01_stage_04"
+    "place town_01_stage_04 town_04", "place town_04 town_01_stage_04"
 }  # fmt: skip
+EXPLAINED = {"explain town_01 > town_04", "explain town_04 > town_01"}
 MEASURED = {
-    "tcr town_01 town_04", "tcr town_04 town_01",
-    "tcr town_01_stage_04 town_04", "tcr town_04 town_01_stage_04",
+    "change town_01 town_04", "change town_04 town_01",
+    "change town_01_stage_04 town_04", "change town_04 town_01_stage_04",
 }  # fmt: skip
-STUDY = SURVEYS | DRAWN | COMPARED | CONTROL | MEASURED
+STUDY = SURVEYS | DRAWN | COMPARED | CONTROL | EXPLAINED | MEASURED
 PICTURES = {"picture town drives"}
 
 
@@ -92,16 +93,17 @@ def test_a_quick_study(reproduce, code, tmp_path):
     assert reproduce(quick=True) == DRAWN
     # Results of one method on all drives, and its part of their surveys.
     options = {"quick": True, "settings": ["solid.sensor_height=1.7"]}
-    assert reproduce(**options) == SURVEYS | COMPARED | CONTROL
+    assert reproduce(**options) == SURVEYS | COMPARED | CONTROL | EXPLAINED
     assert reproduce(**options) == set()
     # Results of each setting stay; why places are wrong is of all methods.
-    assert reproduce(quick=True) == COMPARED | CONTROL
+    assert reproduce(quick=True) == EXPLAINED
     # One drive, and all comparisons with it, which need descriptions of both.
     stage = tmp_path / "town" / "stage_01.sdf"
     change(stage, "</world>", "<!-- Changed. --></world>")
     surveys = {"survey town_01", "survey town_04"}
-    maps = {"tcr town_01 town_04", "tcr town_04 town_01"}
-    assert reproduce(quick=True) == surveys | DRAWN | COMPARED | maps
+    maps = {"change town_01 town_04", "change town_04 town_01"}
+    pairs = COMPARED | EXPLAINED | maps
+    assert reproduce(quick=True) == surveys | DRAWN | pairs
 
 
 @pytest.mark.night

@@ -18,7 +18,11 @@ from evaluation.drives import open_drive
 from evaluation.methods import make_method, method
 from evaluation.paper import reference_for
 from evaluation.recognition.place_recognition import run
-from evaluation.recognition.protocol import FAIR_PROTOCOL, PAPER_PROTOCOL
+from evaluation.recognition.protocol import (
+    FAIR_PROTOCOL,
+    PAPER_PROTOCOL,
+    RetrievalProtocol,
+)
 from evaluation.study import chosen_methods
 from evaluation.study.chosen_methods import choose_methods
 from evaluation.study.collection import find_recordings, group_cities
@@ -80,9 +84,7 @@ def recordings(tmp_path_factory):
 
 
 def find_cities(folder):
-    found = find_recordings(folder)
-    reference = reference_for({one.map_name for one in found})
-    return group_cities(found, reference)
+    return group_cities(find_recordings(folder))
 
 
 def test_recordings_find_their_roles(recordings):
@@ -514,6 +516,63 @@ def test_several_cities(tmp_path):
     assert change["map"] == "riverside"
     figures = {path.stem for path in (tmp_path / "out" / "figures").iterdir()}
     assert {"routes_metropolis", "routes_riverside"} <= figures
+
+
+@pytest.mark.usefixtures("unrendered_figures", "few_methods")
+def test_drives_that_never_meet(tmp_path):
+    """One map's drives meet, and those of the other one do not."""
+    for stage in ("01", "02"):
+        drive(tmp_path / "in" / f"town_{stage}", stage, "a", city="town")
+        pose = yaw_pose(900.0 * int(stage), 0.0, 0.0, 0.0)
+        scans = [make_scan(np.array([[5.0, 0.0, 1.0], [9.0, 2.0, 2.0]]))]
+        write_recording(tmp_path / "in" / f"apart_{stage}", scans, [pose])
+    notes = []
+    path = write_report(
+        tmp_path / "in",
+        tmp_path / "out",
+        Cluster(1),
+        on_note=notes.append,
+        with_tables=True,
+    )
+    said = [one for one in notes if "no query lies within 7.5 m" in one]
+    assert said == [
+        f"apart_{query}: no query lies within 7.5 m of a place of apart_{place}"
+        for place, query in (("01", "02"), ("02", "01"))
+    ]
+    for name in ("survival", "place_recognition", "why", "query_details"):
+        rows = read_csv(path.with_name(f"{name}.csv"))
+        assert {row["map"] for row in rows} == {"town"}
+    found = {
+        row["map"]: row["value"]
+        for row in read_csv(path.with_name("results.csv"))
+        if row["metric"] == "with_match"
+    }
+    assert found["apart"] == "0.0"
+
+
+@pytest.mark.usefixtures("unrendered_figures")
+def test_loops_are_in_the_table_of_results(tmp_path, few_methods):
+    """A drive beside itself has its rows, which the ranking leaves out."""
+    protocol = RetrievalProtocol(exclude_recent=0.04, radius=15.0)
+    for stage in ("01", "02"):
+        drive(tmp_path / "in" / f"town_{stage}", stage, "a", city="town")
+    path = studies.report(tmp_path / "in", tmp_path / "out", protocol=protocol)
+    rows = read_csv(path.with_name("results.csv"))
+    loops = [row for row in rows if row["database"] == row["query"]]
+    assert {row["query"] for row in loops} == {"town_01", "town_02"}
+    assert {row["both.stage"] for row in loops} == {"own"}
+    assert {row["task"] for row in loops} <= {"place", "pose"}
+    assert {row["method"] for row in loops} == set(few_methods)
+    wide = {
+        row["method"]: row["AUC"]
+        for row in read_csv(path.with_name("place_recognition.csv"))
+        if row["DB → query"] == "01 → 01" and row["mode"] == "all"
+    }
+    assert wide == {
+        row["method"]: row["value"]
+        for row in loops
+        if (row["query"], row["metric"], row["gate"]) == ("town_01", "auc", "0")
+    }
 
 
 def test_scans_without_points_are_refused(tmp_path):

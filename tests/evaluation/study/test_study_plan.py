@@ -47,16 +47,17 @@ def test_every_recording_is_surveyed_when_it_is_made(tmp_path):
 
 def test_pairs_wait_for_their_surveys(tmp_path):
     jobs = {job.name: job for job in Study(FAMILY, tmp_path).jobs()}
-    assert jobs["metropolis 01 > 04"].needs == (
-        "survey metropolis_01",
-        "survey metropolis_04",
-    )
-    assert jobs["change metropolis 01 > 04"].needs == (
+    both = ("survey metropolis_01", "survey metropolis_04")
+    for task in ("place", "change"):
+        assert (
+            job_of(jobs, task, "metropolis_01", "metropolis_04").needs == both
+        )
+    assert jobs["draw metropolis 01 > 04"].needs == (
         "survey metropolis_01",
         "survey metropolis_04",
         "survey metropolis_01_stage_04",
     )
-    assert jobs["change metropolis 02 > 04"].needs == (
+    assert jobs["draw metropolis 02 > 04"].needs == (
         "survey metropolis_02",
         "survey metropolis_04",
     )
@@ -65,14 +66,24 @@ def test_pairs_wait_for_their_surveys(tmp_path):
         "survey metropolis_02",
         "survey metropolis_04",
     )
-    control = "control metropolis_01_stage_04 > metropolis_04"
-    assert jobs[control].needs == (
+    control = job_of(jobs, "place", "metropolis_01_stage_04", "metropolis_04")
+    assert control.needs == (
         "survey metropolis_01_stage_04",
         "survey metropolis_04",
     )
+    own = job_of(jobs, "place", "metropolis_01", "metropolis_04")
+    explained = jobs["explain metropolis_01 > metropolis_04"]
+    assert explained.needs == (own.name,)
     # Four surveys, one city, two changes; two pairs and a control, each with
-    # its change for the table.
-    assert len(jobs) == 4 + 1 + 2 + 2 * 3
+    # its change; two pairs are explained.
+    assert len(jobs) == 4 + 1 + 2 + 2 * 3 + 2
+
+
+def job_of(jobs, task, database, query):
+    """Returns the job of a task on a pair, whose name ends with a digest."""
+    start = f"{task} {database} {query} "
+    (name,) = (one for one in jobs if one.startswith(start))
+    return jobs[name]
 
 
 def test_a_control_takes_the_place_of_one_drive():
@@ -107,10 +118,11 @@ def test_a_control_serves_both_ways(tmp_path):
     }
     roles = sorted(jobs["survey riverside_01_stage_02"].step.roles)
     assert roles == ["places", "queries"]
-    assert {
-        "control riverside_01_stage_02 > riverside_02",
-        "control riverside_02 > riverside_01_stage_02",
-    } <= jobs.keys()
+    for names in (
+        ("riverside_01_stage_02", "riverside_02"),
+        ("riverside_02", "riverside_01_stage_02"),
+    ):
+        assert job_of(jobs, "place", *names).step
 
 
 def test_jobs_can_go_anywhere(tmp_path, monkeypatch):
@@ -128,7 +140,10 @@ def test_jobs_can_go_anywhere(tmp_path, monkeypatch):
         assert job.cost > 0
         assert pickle.loads(pickle.dumps(job.step)) == job.step
     # The paper has this map in both directions.
-    assert {"riverside 01 > 02", "riverside 02 > 01"} <= set(names)
+    assert {
+        "repeat riverside_01 > riverside_02",
+        "repeat riverside_02 > riverside_01",
+    } <= set(names)
 
 
 def test_names_of_files_stay_apart(tmp_path):

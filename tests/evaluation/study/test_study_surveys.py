@@ -17,7 +17,7 @@ from evaluation.drives.sampling import within_range
 from evaluation.recognition.description import describe_drive
 from evaluation.recognition.protocol import PAPER_PROTOCOL
 from evaluation.study.chosen_methods import choose_methods
-from evaluation.study.measurements import recognise_places
+from evaluation.study.measurements import measure_method
 from evaluation.study.parts import MakePart, Part, SurveyFiles
 from evaluation.study.surveys import (
     RecordedDrive,
@@ -236,8 +236,8 @@ def test_drives_of_two_worlds_are_not_compared(tmp_path, recorded):
     survey(other, (solid,), surveys[1])
     part = Part(tmp_path / "results" / "solid.data")
     described = tuple(one.described(solid.name) for one in surveys)
-    arguments = described, None, solid, PAPER_PROTOCOL
-    step = MakePart(part, recognise_places, arguments)
+    arguments = (*described, (), 0, solid, None, PAPER_PROTOCOL, (7.5,))
+    step = MakePart(part, measure_method, arguments)
     with pytest.raises(InputError, match="poses in frame 'utm'"):
         step.run(Reporter())
     assert not part.path.parent.exists()

@@ -1,0 +1,74 @@
+"""Second runs of methods, by the protocol of published numbers."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from dataclasses import dataclass, replace
+
+from evaluation.recognition.protocol import RetrievalProtocol
+from evaluation.report.reference import Reference
+from evaluation.study.chosen_methods import MethodChoice
+from evaluation.study.surveys import described_key
+
+
+@dataclass(frozen=True)
+class Repeat:
+    """A second run of a method on a pair of drives.
+
+    The first run is by the study's protocol. The second run is by the protocol
+    of published numbers, for a comparison with them.
+
+    Attributes:
+        method: the method.
+        protocol: the protocol of the published numbers.
+        shares_places: whether the run uses the descriptions of the places of
+            the first run. Otherwise the places are described again.
+    """
+
+    method: MethodChoice
+    protocol: RetrievalProtocol
+    shares_places: bool
+
+    @property
+    def queries(self) -> str:
+        """Key of the method's descriptions of the queries."""
+        return described_key(self.method.key, self.protocol)
+
+    @property
+    def places(self) -> str:
+        """Key of the method's descriptions of the places."""
+        return self.method.key if self.shares_places else self.queries
+
+
+def repeats_of(
+    stages: tuple[str, str, str],
+    methods: Iterable[MethodChoice],
+    protocol: RetrievalProtocol,
+    reference: Reference,
+) -> list[Repeat]:
+    """Returns the second runs of methods on a pair of drives.
+
+    A method has one if the reference has numbers of it on the pair, measured by
+    another protocol.
+
+    Args:
+        stages: names of the map, and of the stages of database and query.
+        methods: the methods.
+        protocol: the study's protocol.
+        reference: the published numbers.
+    """
+    found = []
+    for choice in methods:
+        published = reference.protocol_of(*stages, choice.name)
+        if published is None:
+            continue
+        method = choice.make()
+        ours = replace(protocol.of(method), exclude_recent=None)
+        if (
+            published != ours
+            and ours.asked_like(published).of(method) == published
+        ):
+            places = (one.described(queries=False) for one in (ours, published))
+            shares_places = next(places) == next(places)
+            found.append(Repeat(choice, published, shares_places))
+    return found
