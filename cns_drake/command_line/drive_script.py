@@ -121,8 +121,13 @@ def run_drive(
         f"({run.real_time_factor:.1f} times real time)"
     )
     terminal.next_command(
-        *("cns-drake", "export", run.folder),
-        *("--format", "kitti", "--output", "kitti"),
+        "cns-drake",
+        "export",
+        run.folder,
+        "--format",
+        "kitti",
+        "--output",
+        "kitti",
     )
     return run
 

@@ -85,6 +85,11 @@ def train(
     print(output)
     print(picture)
     terminal.next_command(
-        *("cns-eval", "report", "drives", "--output", "report"),
-        *("--set", f"learned.weights={output}"),
+        "cns-eval",
+        "report",
+        "drives",
+        "--output",
+        "report",
+        "--set",
+        f"learned.weights={output}",
     )

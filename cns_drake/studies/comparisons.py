@@ -44,8 +44,10 @@ _DATABASE_FIELDS = ("distractors", "lateral")
 # Sections whose random draws depend on the seed of the condition.
 _SEEDED = ("transient", "traffic", "ride", "driver")
 _RETURNS = ("ideal", "calibrated")
-# Names of stages by their position among the stages of a map.
-FIRST, EARLIER = "first", "earlier "
+# Name of a map's first stage.
+FIRST = "first"
+# The beginning of the names of a map's earlier stages, such as `earlier 1`.
+EARLIER = "earlier "
 # Number of names for earlier stages: `earlier 1` to `earlier 4`.
 _STEPS = 4
 # The LiDAR of the database is this far ahead of the query's [m], because no two
@@ -410,7 +412,8 @@ class PairOfDrives:
 
     def _stage(self, side: str, drive: Scenario, wanted: Any) -> str:
         """Returns the stage for a stage's name or for a word such as `last`."""
-        own, last = str(drive.stage), self._last_stage
+        own = str(drive.stage)
+        last = self._last_stage
         stages = list(map_folder(drive).stages())
         if wanted in (OWN, LAST, FIRST):
             return {OWN: own, LAST: last, FIRST: next(iter(stages), own)}[
@@ -498,7 +501,8 @@ class PairOfDrives:
         content = fingerprint(drive.replaced(name="").model_dump(mode="json"))
         known = self._known[side]
         if content not in known:
-            name, plain = drive.name, self._plain[side]
+            name = drive.name
+            plain = self._plain[side]
             if not self.same_route and drive == plain.replaced(
                 stage=drive.stage
             ):

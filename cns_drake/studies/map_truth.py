@@ -75,9 +75,10 @@ _GRAZING = 1.0
 _FIRST_LOOKS = 32.0
 # Number of points per cast.
 _CHUNK = 1 << 15
-# Sides of the tiles in which points are found, and in which rays to them are
-# neighbours [m].
-_TILE, _FINE = 16.0, 1.0
+# Side of the tiles in which points are found [m].
+_TILE = 16.0
+# Side of the cubes in which rays to points are neighbours [m].
+_RAY_CUBE = 1.0
 # Recorded poses are those of the scenario up to this [m, or without a unit].
 _SAME_POSE = 1e-6
 # One of each two opposite directions to the neighbours of a cube's middle.
@@ -110,8 +111,10 @@ _WORDS = {
     Label.NEW: "new",
     Label.NEWLY_SEEN: "newly seen: A's drive did not look there",
 }
-# Longest side of a picture [pixels], and the smallest side of a pixel [m].
-_PIXELS, _FINEST = 1600, 0.2
+# Longest side of a picture [pixels].
+_LONGEST_SIDE = 1600
+# Smallest side of a pixel [m].
+_SMALLEST_PIXEL = 0.2
 # Structures in the page's table, the largest changes first.
 _MOST_ROWS = 200
 
@@ -354,7 +357,7 @@ class _Tiles:
     def __init__(self, points: np.ndarray):
         cells = np.floor(points[:, :2] / _TILE).astype(np.int64)
         # Rays to neighbours meet the same surfaces, which is fast.
-        fine = np.floor(points / _FINE).astype(np.int64)
+        fine = np.floor(points / _RAY_CUBE).astype(np.int64)
         order = np.lexsort((*fine.T, *cells.T))
         cells = cells[order]
         is_first = np.ones(len(points), bool)
@@ -520,7 +523,7 @@ def _frame(pair: Pair) -> tuple[np.ndarray, float, tuple[int, int]]:
         points = np.zeros((1, 2))
     # A few far points would make the streets small.
     low, high = np.percentile(points, (0.2, 99.8), axis=0)
-    step = max(float((high - low).max()) / _PIXELS, _FINEST)
+    step = max(float((high - low).max()) / _LONGEST_SIDE, _SMALLEST_PIXEL)
     columns, rows = np.ceil((high - low) / step).astype(int) + 1
     return low, step, (int(rows), int(columns))
 

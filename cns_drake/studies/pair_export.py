@@ -43,19 +43,25 @@ Format = Literal["pointnetvlad", "overlap"]
 
 # Added to the northing of each further city [m].
 CITY_DISTANCE = 100_000.0
-# As in PointNetVLAD (Uy and Lee, CVPR 2018): points of a cloud; radius of
-# positives, of what is no negative, and of matches in the evaluation [m].
+# As in PointNetVLAD (Uy and Lee, CVPR 2018): number of points of a cloud.
 _POINTS = 4096
-_POSITIVE, _NON_NEGATIVE, _MATCH = 10.0, 50.0, 25.0
-# Names of the sets that MinkLoc3Dv2's evaluation reads, one city each; and the
-# number of nearest places that it asks for.
+# As there: radius of positives [m].
+_POSITIVE_RADIUS = 10.0
+# As there: radius of what is no negative [m].
+_NON_NEGATIVE_RADIUS = 50.0
+# As there: radius of matches in the evaluation [m].
+_MATCH_RADIUS = 25.0
+# Names of the sets that MinkLoc3Dv2's evaluation reads, one city each.
 _LOCATIONS = ("oxford", "university", "residential", "business")
+# Number of nearest places that this evaluation asks for.
 _ASKED = 25
 # Clouds are thinned to this first, so that far walls keep points [m].
 _VOXEL = 0.3
 _GROUND = np.array(sorted(CLASS_IDS[name] for name in GROUND_CLASSES))
-# Expected time to export a drive, and to compare two [s].
-_DRIVE_COST, _PAIR_COST = 20.0, 60.0
+# Expected time to export a drive [s].
+_DRIVE_COST = 20.0
+# Expected time to compare two drives [s].
+_PAIR_COST = 60.0
 
 
 @dataclass(frozen=True)
@@ -310,7 +316,7 @@ def _write_pickles(
             # The sampler of MinkLoc3Dv2 passes over them.
             on_note(
                 f"{name}: {alone} of {len(tuples)} clouds have no other within"
-                f" {_POSITIVE:g} m; nothing is learned of them"
+                f" {_POSITIVE_RADIUS:g} m; nothing is learned of them"
             )
     every_drive = list(contents)
     by_location = {"": tested} | _locations(tested, on_note)
@@ -371,8 +377,8 @@ def _evaluation_fault(drives: Sequence[Run]) -> str | None:
         zip(names, drives, strict=True), 2
     ):
         distances, _ = cKDTree(run.positions).query(further.positions)
-        if distances.min() > _MATCH:
-            return f"{name} and {other} are never within {_MATCH:g} m"
+        if distances.min() > _MATCH_RADIUS:
+            return f"{name} and {other} are never within {_MATCH_RADIUS:g} m"
     return None
 
 
@@ -388,8 +394,8 @@ def training_tuples(runs: Sequence[Run]) -> dict[int, Any]:
     files = [file for run in runs for file in run.files]
     positions = np.concatenate([run.positions for run in runs])
     tree = cKDTree(positions)
-    near = tree.query_ball_point(positions, _POSITIVE)
-    wide = tree.query_ball_point(positions, _NON_NEGATIVE)
+    near = tree.query_ball_point(positions, _POSITIVE_RADIUS)
+    wide = tree.query_ball_point(positions, _NON_NEGATIVE_RADIUS)
     kind = _tuple_class()
     found = {number: kind() for number in range(len(files))}
     for number, one in found.items():
@@ -431,7 +437,7 @@ def evaluation_sets(runs: Sequence[Run]) -> tuple[list[dict], list[dict]]:
         enumerate(trees), enumerate(runs)
     ):
         if i != j:
-            near = tree.query_ball_point(run.positions, _MATCH)
+            near = tree.query_ball_point(run.positions, _MATCH_RADIUS)
             for number, matches in enumerate(near):
                 queries[j][number][i] = sorted(matches)
     return [entries(run) for run in runs], queries

@@ -26,10 +26,11 @@ from cns_drake.scenarios.scenario_files import world_file
 from cns_drake.simulation.simulation import simulate
 from evaluation.study.parts import Part
 
-# Expected time to load a stage, and to simulate a frame with the default LiDAR
-# [s]; assumed frames of a drive without a number.
+# Expected time to load a stage [s].
 _LOADING = 8.0
+# Expected time to simulate a frame with the default LiDAR [s].
 _FRAME = 0.014
+# Assumed number of frames of a drive that states none.
 _USUAL_FRAMES = 3000
 
 

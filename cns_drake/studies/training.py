@@ -42,28 +42,44 @@ from evaluation.methods.learned import (
 )
 from evaluation.study.parts import MakePart, Part
 
-# A batch has this many cities, clusters of queries in each, and queries in each
-# cluster; every query comes with a place near and one further along.
-_CITIES, _CLUSTERS, _QUERIES = 2, 4, 5
+# Number of cities in a batch.
+_CITIES = 2
+# Number of clusters of queries in each of these cities.
+_CLUSTERS = 4
+# Number of queries in a cluster; every query comes with a place near and one
+# further along.
+_QUERIES = 5
 # The queries of a cluster lie within this distance [m].
 _CLUSTER = 40.0
-# Greatest distance of a right place, and least distance of a wrong one [m];
-# places in between do not count.
-_RIGHT, _WRONG = 7.5, 11.0
+# Greatest distance of a right place [m].
+_RIGHT_WITHIN = 7.5
+# Least distance of a wrong place [m]; places in between do not count.
+_WRONG_FROM = 11.0
 # Greatest distance of the places further along [m].
 _ALONG = 35.0
 # Standard deviation of the Gaussian by which weights fall with distance [m].
 _DEVIATION = 4.0
-# A query counts if its best place has at least this overlap. Right places have
-# at least this share of the best place's overlap; their weights are this power
-# of the share.
-_SHARED, _NEAR_BEST, _POWER = 0.2, 0.9, 16
+# A query counts if its best place has at least this overlap.
+_LEAST_OVERLAP = 0.2
+# Right places have at least this share of the best place's overlap.
+_NEAR_BEST = 0.9
+# Their weights are this power of the share.
+_WEIGHT_POWER = 16
 _TEMPERATURE = 0.05
-# Share of the images with a hidden sector, and its angles [deg]; share of the
-# images with lost pixels, and the share of their pixels that are lost.
-_HIDDEN, _HIDDEN_DEG = 0.4, (30.0, 120.0)
-_LOST, _MOST_LOST = 0.3, 0.3
-_RATE, _LEAST_RATE, _WARM_UP = 2e-3, 2e-5, 30
+# Share of the images with a hidden sector.
+_HIDDEN_SHARE = 0.4
+# Least and greatest angle of a hidden sector.
+_HIDDEN_DEG = (30.0, 120.0)
+# Share of the images with lost pixels.
+_LOST_SHARE = 0.3
+# Greatest share of the pixels of an image that are lost.
+_MOST_LOST = 0.3
+# Rate of learning after the warm-up.
+_RATE = 2e-3
+# Rate of learning in the end.
+_LEAST_RATE = 2e-5
+# Number of steps of the warm-up.
+_WARM_UP = 30
 _DECAYS = (0.9, 0.99)
 _GRADIENT = 1.0
 _KEPT_EVERY = 50
@@ -189,13 +205,13 @@ class Sampler:
         )
         same = scans.cities[queries][:, None] == scans.cities[places]
         if scans.overlaps is None:
-            right = same & (distance <= _RIGHT)
+            right = same & (distance <= _RIGHT_WITHIN)
             weights = np.exp(-0.5 * (distance / _DEVIATION) ** 2) * right
-            counts = right | ~same | (distance >= _WRONG)
+            counts = right | ~same | (distance >= _WRONG_FROM)
         else:
             shared = scans.overlaps[np.ix_(queries, places)].astype(float)
             part = shared / shared.max(axis=1, keepdims=True)
-            weights = np.where(part >= _NEAR_BEST, part**_POWER, 0.0)
+            weights = np.where(part >= _NEAR_BEST, part**_WEIGHT_POWER, 0.0)
             counts = np.ones_like(same)
         images = scans.images[[*queries, *places]]
         _augment(images, rng)
@@ -219,10 +235,12 @@ class Sampler:
         places: list[int] = []
         for query in rng.permutation(near)[:_QUERIES].tolist():
             away = np.linalg.norm(xy[asked_of] - xy[query], axis=1)
-            is_right, is_wrong = away <= _RIGHT, away >= _WRONG
+            is_right, is_wrong = away <= _RIGHT_WITHIN, away >= _WRONG_FROM
             if self._scans.overlaps is not None:
                 shared = self._scans.overlaps[query, asked_of].astype(float)
-                is_right = shared >= max(_SHARED, _NEAR_BEST * shared.max())
+                is_right = shared >= max(
+                    _LEAST_OVERLAP, _NEAR_BEST * shared.max()
+                )
                 is_wrong = ~is_right
             right = asked_of[is_right]
             along = asked_of[is_wrong & (away <= _ALONG)]
@@ -239,11 +257,11 @@ def _augment(images: np.ndarray, rng: np.random.Generator) -> None:
         if is_mirrored:
             image = image[:, ::-1]
         image = np.roll(image, int(rng.integers(SECTORS)), axis=1)
-        if rng.random() < _HIDDEN:
+        if rng.random() < _HIDDEN_SHARE:
             width = rng.uniform(*_HIDDEN_DEG) / 360.0 * SECTORS
             image[:, : int(width)] = 0
             image = np.roll(image, int(rng.integers(SECTORS)), axis=1)
-        if rng.random() < _LOST:
+        if rng.random() < _LOST_SHARE:
             share = rng.uniform(0.0, _MOST_LOST)
             image[rng.random(image.shape[:2]) < share] = 0
         images[number] = image
@@ -434,7 +452,8 @@ def train(
     kept = Part(state)
     start = start_parameters(seed)
     zero = {name: np.zeros_like(one) for name, one in start.items()}
-    moments, curve = (start, zero, zero), []
+    moments = (start, zero, zero)
+    curve = []
     if state.exists():
         if not kept.is_current(made_of):
             raise InputError(
@@ -488,8 +507,10 @@ def write_weights(
 
 # The streets of the cities, in turn. Metropolis is kept for tests.
 MAPS = ("riverside", "suburbia", "downtown")
-# Cities and batches for each minute of one core.
-_CITIES_A_MINUTE, _STEPS_A_MINUTE = 0.3, 60
+# Cities for each minute of one core.
+_CITIES_A_MINUTE = 0.3
+# Batches for each minute of one core.
+_STEPS_A_MINUTE = 60
 
 
 @dataclass(frozen=True)

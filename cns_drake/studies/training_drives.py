@@ -39,8 +39,10 @@ from evaluation.methods.learned import polar_image
 _FIRST_SEED = 500_000
 # Distance between the seeds of successive trainings.
 _MOST_CITIES = 1000
-# Length of a route, and between two scans [m].
-_LENGTH, _SPACING = 1600.0, 6.0
+# Length of a route [m].
+_ROUTE_LENGTH = 1600.0
+# Distance between two scans [m].
+_SCAN_SPACING = 6.0
 # As in the protocol of the paper [m].
 _MAX_RANGE = 100.0
 _STAGES = ("01", "02", "03")
@@ -125,7 +127,7 @@ class DrawnCity:
         base = base.replaced(
             map=str(folder),
             stage=_STAGES[-1],
-            route=draw_route(network, _LENGTH, rng),
+            route=draw_route(network, _ROUTE_LENGTH, rng),
             waypoints=None,
             aside=0.0,
         )
@@ -195,7 +197,7 @@ def scan_city(
                 # A draw may be impossible, such as a U-turn in a narrow road.
                 reporter.note(f"{scenario.name} left out: {error}")
                 continue
-            frames = sample_frames(drive.X_WS[:, :3, 3], _SPACING)
+            frames = sample_frames(drive.X_WS[:, :3, 3], _SCAN_SPACING)
             height = next(iter(scenario.lidars.values())).xyz[2]
             for frame in track(
                 frames, f"simulating {scenario.name}", len(frames), "scans"

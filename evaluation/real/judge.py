@@ -31,13 +31,21 @@ from evaluation.drives import Drive
 
 _PATCHES = 16
 _HALF_WIDTH = 4.0
-_NEAREST, _FARTHEST = 5.0, 30.0
+# Least range of the middle of a patch [m].
+_LEAST_RANGE = 5.0
+# Greatest range of the middle of a patch [m].
+_MOST_RANGE = 30.0
 _FEWEST_POINTS = 150
-# Neighbourhoods: number per patch, and radius [m].
-_NEIGHBOURHOODS, _RADIUS = 160, 0.75
-_APART = 30.0
-# Greatest number of scans per drive, and of folds of the cross-validation.
-_MOST_SCANS, _MOST_FOLDS = 40, 3
+# Greatest number of neighbourhoods in a patch.
+_NEIGHBOURHOODS = 160
+# Radius of a neighbourhood [m].
+_RADIUS = 0.75
+# Scans closer to each other than this are from one place [m].
+_ONE_PLACE = 30.0
+# Greatest number of scans per drive.
+_MOST_SCANS = 40
+# Greatest number of folds of the cross-validation.
+_MOST_FOLDS = 3
 _TREES = 120
 _QUANTILES = (0.1, 0.5, 0.9)
 # Greatest intensity after scaling, like KITTI's, which never reaches 1.
@@ -88,7 +96,7 @@ def places_of(drives: Iterable[Drive]) -> list[list[np.ndarray]]:
                 first
                 for first in places
                 if first[0] == world
-                and np.linalg.norm(p_WS - first[1]) < _APART
+                and np.linalg.norm(p_WS - first[1]) < _ONE_PLACE
             )
             place = next(near, (world, tuple(p_WS)))
             places.setdefault(place, []).append(scan_table(drive.scan(k)))
@@ -106,7 +114,7 @@ def patches(scan: np.ndarray, rng: np.random.Generator) -> Iterator[np.ndarray]:
         rng: random generator of the positions.
     """
     ranges = np.linalg.norm(scan[:, :3], axis=1)
-    near = np.flatnonzero((ranges > _NEAREST) & (ranges < _FARTHEST))
+    near = np.flatnonzero((ranges > _LEAST_RANGE) & (ranges < _MOST_RANGE))
     found = 0
     for row in rng.permutation(near)[: 4 * _PATCHES]:
         apart = np.abs(scan[:, :2] - scan[row, :2]).max(axis=1)

@@ -61,8 +61,11 @@ from evaluation.results.table import (
 )
 from evaluation.results.table_forms import in_table_order, title
 
-# Widths [px] on a screen and on a phone.
-WIDE, NARROW = 860, 358
+# Width of a chart on a screen [px].
+WIDE = 860
+# Width of a chart on a phone [px].
+NARROW = 358
+# A pixel of a page [inches].
 _PX = 1.0 / 96.0
 # [pt]; more than 12 px, on a phone of 360 px as well.
 _FONT = 10.0
@@ -411,7 +414,8 @@ def _spread(axes: Axes, at: Sequence[float]) -> None:
 
 
 def _matrix(chart: _Chart) -> tuple[str, Figure]:
-    over, strips = chart.keys["over"], chart.keys.get("strips")
+    over = chart.keys["over"]
+    strips = chart.keys.get("strips")
     values = list(dict.fromkeys(row[over] for row in chart.rows))
     # Names of methods and the caption stand below.
     figure, panels = chart.panels(_BELOW + len(values) * _ROW)

@@ -26,10 +26,13 @@ METHOD_STYLES = {
     "learned": ("#56B4E9", "--", "P"),
 }
 
-# What belongs to no method.
-INK, PALE = "#1C2430", "#7A8594"
-# Points that are in the older of two maps alone, and in the newer one alone.
-GONE, NEW = (214, 48, 49), (38, 96, 214)
+# Colours of what belongs to no method.
+INK = "#1C2430"
+PALE = "#7A8594"
+# Colour of points that are in the older of two maps alone.
+GONE = (214, 48, 49)
+# Colour of points that are in the newer of two maps alone.
+NEW = (38, 96, 214)
 
 # Colours (red, green, blue) and what they mean.
 Legend = tuple[tuple[tuple[int, int, int], str], ...]

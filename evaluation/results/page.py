@@ -92,7 +92,8 @@ def write_page(
         InputError: a file cannot be written.
     """
     make_folder(folder)
-    shown, notes = [], list(notes)
+    shown = []
+    notes = list(notes)
     for number, chart in enumerate(charts, start=1):
         try:
             alone = drawing.draw(chart, results, alone=True, queries=queries)

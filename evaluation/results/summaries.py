@@ -39,7 +39,9 @@ from evaluation.results.table import (
     Row,
 )
 
-CAUSE, LEVEL, NO_CAUSE = "cause", "level", "none"
+CAUSE = "cause"
+LEVEL = "level"
+NO_CAUSE = "none"
 # Joins the names of causes that come together.
 _AND = "+"
 _SAMPLES = 1000
@@ -202,7 +204,9 @@ def excesses(queries: QueryRows) -> list[Summary]:
             Summary.of(
                 f"excess of {' and '.join(names)}",
                 key,
-                *(first * second - together, interval.low, interval.high),
+                first * second - together,
+                interval.low,
+                interval.high,
             )
         )
     return found
@@ -287,7 +291,9 @@ def lifetimes(
                     f"{factor} until {100.0 * share:g} % is left (of"
                     f" {times[-1]:g})",
                     some[0],
-                    *(lifetime(times, mean, share), min(single), max(single)),
+                    lifetime(times, mean, share),
+                    min(single),
+                    max(single),
                 )
             )
     return found
@@ -399,8 +405,14 @@ def correlations(
         found.append(
             Summary(
                 f"rank correlation of 1 - {metric} with {x}",
-                *("", "place", method, False, float(_spearman(known))),
-                *(interval.low, interval.high, len(known)),
+                "",
+                "place",
+                method,
+                False,
+                float(_spearman(known)),
+                interval.low,
+                interval.high,
+                len(known),
             )
         )
     return found

@@ -32,7 +32,8 @@ from evaluation.recognition.protocol import PROTOCOL_NAMES, RetrievalProtocol
 from evaluation.recognition.query_outcomes import QueryOutcomes
 from evaluation.results.ranges import Range, checked, range_of
 
-RESULTS, QUERIES = "results.csv", "queries.csv"
+RESULTS = "results.csv"
+QUERIES = "queries.csv"
 # The beginning of a factor that is a setting of a method.
 SETTINGS = "methods."
 _BEFORE = ("experiment", "map", "database", "query", "seed")
@@ -44,7 +45,8 @@ KEYS = (*_NEEDED, *_MADE)
 _MEASURED = ("metric", "value", "low", "high", "n")
 # A factor, and two of its values: a drive's own stage, or that of the query.
 STAGE = "both.stage"
-OWN, LAST = "own", "last"
+OWN = "own"
+LAST = "last"
 # The factor of the fresh versions of the shipped maps.
 FRESH = "both.fresh"
 # Names of other columns of `Key`, which no factor can have.
@@ -82,7 +84,10 @@ _TRUTH = {"0": False, "1": True, "false": False, "true": True}
 # Metrics whose intervals come from resampled queries, and may miss the value
 # itself by a little.
 _RESAMPLED = ("auc", "auc_strict", "r1")
-_OUTSIDE, _ROUNDED = 0.05, 1e-9
+# By so much, at most.
+_MOST_MISSED = 0.05
+# Rounding may lead beyond 0 and 1 by this.
+_ROUNDING = 1e-9
 # Metrics that are known for any set of queries.
 _ALWAYS_KNOWN = ("auc", "auc_strict")
 # Columns of tables of earlier versions -> the command that makes such a table
@@ -538,9 +543,9 @@ def _measured(one: _Line) -> dict[str, Any]:
     if low > high:
         raise one.fault("low", f"{low:g} is more than high ({high:g})")
     if metric in _RESAMPLED and not math.isnan(low):
-        if not (low >= -_ROUNDED and high <= 1.0 + _ROUNDED):
+        if not (low >= -_ROUNDING and high <= 1.0 + _ROUNDING):
             raise one.fault("low", "an interval from 0 to 1 at most")
-        if not low - _OUTSIDE <= value <= high + _OUTSIDE:
+        if not low - _MOST_MISSED <= value <= high + _MOST_MISSED:
             raise one.fault("value", f"{value:g} lies far off its interval")
     n = one.value("n", int)
     return {

@@ -223,7 +223,9 @@ class Table:
         return "\n".join(lines) + "\n"
 
     def _latex_groups(self) -> list[str]:
-        names, rules, column = [], "", 1
+        names = []
+        rules = ""
+        column = 1
         for name, span in self.groups:
             text = _escape_latex(name)
             names.append(rf"\multicolumn{{{span}}}{{c}}{{{text}}}")

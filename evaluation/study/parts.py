@@ -52,9 +52,10 @@ _LEVEL = 1
 _SPENT = "spent"
 # Greatest size of a line of inputs [bytes].
 _MOST_INPUTS = 1 << 24
-# Limits of the uncompressed size: this multiple of the compressed bytes, or
-# this many bytes if that is more.
-_MOST_RATIO, _ALWAYS = 200, 1 << 27
+# Limit of the uncompressed size, as a multiple of the compressed bytes.
+_MOST_RATIO = 200
+# This uncompressed size is always allowed [bytes].
+_ALWAYS_BYTES = 1 << 27
 # Errors for a tree of another form or with other fields, and for headers of
 # arrays that NumPy cannot parse.
 _FAULTS = (
@@ -231,7 +232,8 @@ def _find(module: str, name: str) -> Any:
 
 def _fits(tree: Any, hint: Any) -> bool:
     """Returns whether a tree may be of a type; arrays may hold anything."""
-    kind, inner = get_origin(hint) or hint, get_args(hint)
+    kind = get_origin(hint) or hint
+    inner = get_args(hint)
     if kind in (Union, UnionType):
         return any(_fits(tree, one) for one in inner)
     kind = NoneType if kind is None else kind
@@ -271,7 +273,7 @@ def _hints(kind: Any) -> dict[str, Any]:
 
 def _most(size: int) -> int:
     """Returns the greatest uncompressed size of some compressed bytes."""
-    return max(_MOST_RATIO * size, _ALWAYS)
+    return max(_MOST_RATIO * size, _ALWAYS_BYTES)
 
 
 @dataclass(frozen=True)
