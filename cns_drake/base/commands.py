@@ -31,13 +31,24 @@ Scheduler = Annotated[
         "DASK_SCHEDULER_ADDRESS, if it is set.",
     ),
 ]
+Methods = Annotated[
+    list[str] | None,
+    typer.Option(
+        "--method",
+        metavar="NAME|FILE.py",
+        help="Method to run, and no others: the name of a shipped one, "
+        "standard for all standard ones, or a Python file that registers your "
+        "own. May be repeated. By default the standard methods.",
+    ),
+]
 MethodSettings = Annotated[
     list[str] | None,
     typer.Option(
         "--set",
         metavar="METHOD.NAME=VALUE",
         help="Change a setting of a method, such as btc.candidates=20. "
-        "Separate the numbers of a list by commas. May be repeated.",
+        "Separate the numbers of a list by commas. If only one method runs, "
+        "you may leave out its name. May be repeated.",
     ),
 ]
 Costs = Annotated[

@@ -29,7 +29,7 @@ _EXAMPLES: dict[Callable[..., None], tuple[str, ...]] = {
         "generate metropolis_01 metropolis_04 \\",
         "    --output drives --jobs 2",
     ),
-    studying.reproduce: ("reproduce metropolis --output study --quick",),
+    studying.reproduce: ("reproduce metropolis --output study",),
     studying.study: ("study ladder suburbia --quick --output ladder",),
     learning.train: ("train --output mine.npz --minutes 10",),
     import_city: (
@@ -40,7 +40,7 @@ _EXAMPLES: dict[Callable[..., None], tuple[str, ...]] = {
         "age suburbia \\",
         "    --years 1 5 20 --seed 1 --output old_suburbia",
     ),
-    city: ("city town --start",),
+    city: ("city town --new",),
 }
 # Commands whose names differ from the names of their functions.
 _NAMES = {list_drives: "list", import_city: "import"}

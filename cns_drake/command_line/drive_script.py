@@ -34,6 +34,7 @@ def run_drive(
     recording: Path | str | None = None,
     graphviz: Path | str | None = None,
     overwrite: bool = False,
+    json: bool = False,
 ) -> Run:
     """Simulates and records a drive, and shows on stderr what it does.
 
@@ -64,6 +65,7 @@ def run_drive(
         recording: file for a web page of the drive, if any.
         graphviz: file for the Diagram as Graphviz text, if any.
         overwrite: whether to replace an existing recording.
+        json: whether to print the result as JSON.
 
     Raises:
         InputError: an argument cannot be used.
@@ -115,10 +117,18 @@ def run_drive(
             num_threads=num_cores(),
             on_note=terminal.note,
         )
-    print(
+    values = {
+        "output": str(run.folder),
+        "frames": run.num_frames,
+        "simulated_seconds": run.simulated_s,
+        "wall_seconds": run.wall_s,
+    }
+    terminal.show(
+        values,
         f"{run.folder}: {run.num_frames} frames, {run.simulated_s:.2f} s "
         f"simulated in {run.wall_s:.2f} s "
-        f"({run.real_time_factor:.1f} times real time)"
+        f"({run.real_time_factor:.1f} times real time)",
+        json=json,
     )
     terminal.next_command(
         "cns-drake",

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
+from dataclasses import asdict
 from pathlib import Path
 import shlex
 import shutil
@@ -11,11 +12,12 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
+from cns_drake.base import commands
 from cns_drake.base.csv_files import whole_number
 from cns_drake.base.errors import InputError, did_you_mean
 from cns_drake.base.interrupts import uninterrupted
 from cns_drake.base.listing import natural_key
-from cns_drake.base.terminal import next_command, note, print_rows
+from cns_drake.base.terminal import next_command, note, show
 from cns_drake.imports.options import (
     REPORT_NAME,
     DriveOn,
@@ -88,6 +90,7 @@ def list_drives(
     folders: Annotated[
         list[Path] | None, typer.Argument(metavar="FOLDER")
     ] = None,
+    json: commands.Json = False,
 ) -> None:
     """List drives with their lengths, times and sizes.
 
@@ -112,8 +115,11 @@ def list_drives(
             )
         rows += of_map
     width = shutil.get_terminal_size().columns if sys.stdout.isatty() else None
-    for line in table_lines(rows, width):
-        print(line)
+    show(
+        {"drives": [asdict(one) for one in rows]},
+        "\n".join(table_lines(rows, width)),
+        json=json,
+    )
 
 
 def table_lines(rows: list[DriveRow], width: int | None) -> Iterator[str]:
@@ -170,6 +176,7 @@ def import_city(
         float | None, typer.Option(min=0.01, max=0.9, metavar="PART")
     ] = None,
     plain: Annotated[bool, typer.Option("--plain")] = False,
+    json: commands.Json = False,
 ) -> None:
     """Make a map from data of a real city.
 
@@ -244,7 +251,16 @@ def import_city(
     )
     for line in _shortcomings(report, output, options):
         note(f"{output}: {line}")
-    print_rows(_report_rows(report, output, options.years))
+    values = {
+        "output": str(output),
+        "structures": report.kinds,
+        "triangles": report.triangles,
+        "stages": report.stages,
+        "undated": report.undated,
+        "drives": list(report.drives),
+        "faults": {kind: count for kind, count, _ in report.faults},
+    }
+    show(values, _report_rows(report, output, options.years), json=json)
 
 
 def _shortcomings(
@@ -308,9 +324,10 @@ def _shortened(kinds: Sequence[str]) -> str:
     return "; ".join([*kinds[:_SHOWN], *rest])
 
 
+@commands.former_options({"--start": "--new"})
 def city(
     folder: Annotated[Path, typer.Argument(metavar="FOLDER")],
-    start: Annotated[bool, typer.Option("--start")] = False,
+    new: Annotated[bool, typer.Option("--new")] = False,
     seed: Annotated[int | None, typer.Option(min=0, metavar="N")] = None,
     check: Annotated[bool, typer.Option("--check")] = False,
     repair_stages: Annotated[bool, typer.Option("--repair-stages")] = False,
@@ -323,10 +340,10 @@ def city(
     Args:
         folder: Folder with roads.yaml, city.yaml and stages.yaml. The stages
             are written to it, and its table of drives is updated.
-        start: First write the files that are missing in a folder with
+        new: First write the files that are missing in a folder with
             roads.yaml: a plan with a district for each block, two stages, and a
             drive for each stage. Existing files are kept.
-        seed: Seed of the random plan and drives that --start writes; by default
+        seed: Seed of the random plan and drives that --new writes; by default
             0.
         check: Write nothing. List the files that would change, and exit with
             status 1 if there are any.
@@ -343,11 +360,11 @@ def city(
         from cns_drake.city.generation.starter import start_city
         from cns_drake.scenarios.drive_table import write_table
 
-    if seed is not None and not start:
-        raise InputError("--seed: has no effect without --start")
-    if start and check:
+    if seed is not None and not new:
+        raise InputError("--seed: has no effect without --new")
+    if new and check:
         raise InputError(
-            "--start and --check exclude each other; give one of them"
+            "--new and --check exclude each other; give one of them"
         )
     if check:
         changed = differing_files(folder, note, repair_stages=repair_stages)
@@ -356,7 +373,7 @@ def city(
         if changed:
             raise typer.Exit(1)
         return
-    if start:
+    if new:
         start_city(folder, seed or 0, note)
     files = generate_city(folder, note, repair_stages=repair_stages)
     write_table(folder)
@@ -401,6 +418,7 @@ def age(
     rate: RateFactor = 1.0,
     rates: RatesFile = None,
     pictures: Annotated[bool, typer.Option("--pictures/--no-pictures")] = True,
+    json: commands.Json = False,
 ) -> None:
     """Simulate years of change in a city.
 
@@ -446,10 +464,15 @@ def age(
         for stage, year in aged.years.items()
     ]
     rows += [(event, str(number)) for event, number in aged.events.items()]
-    print_rows([*rows, ("written", str(output))])
+    values = {
+        "output": str(output),
+        "years": dict(aged.years),
+        "events": dict(aged.events),
+    }
+    show(values, [*rows, ("written", str(output))], json=json)
     _name_next(output)
 
 
 def _name_next(folder: Path) -> None:
-    words = ("reproduce", folder, "--output", "study", "--quick")
+    words = ("reproduce", folder, "--output", "study", "--no-recordings")
     next_command("cns-drake", *words)

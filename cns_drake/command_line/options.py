@@ -80,12 +80,3 @@ Maps = Annotated[
         "shipped maps.",
     ),
 ]
-
-
-MethodFiles = Annotated[
-    list[Path] | None,
-    typer.Option(
-        help="Python file that registers a method of your own, to run in "
-        "addition to the shipped methods. May be repeated."
-    ),
-]

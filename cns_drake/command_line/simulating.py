@@ -13,7 +13,7 @@ from cns_drake.base import commands
 from cns_drake.base.errors import InputError
 from cns_drake.base.interrupts import uninterrupted
 from cns_drake.base.progress import doing
-from cns_drake.base.terminal import next_command, note
+from cns_drake.base.terminal import next_command, note, show
 from cns_drake.command_line import options
 
 if TYPE_CHECKING:
@@ -150,6 +150,7 @@ def simulate(
     recording: options.Recording = None,
     graphviz: options.Graphviz = None,
     overwrite: options.Overwrite = False,
+    json: commands.Json = False,
 ) -> None:
     """Simulate a drive and record it.
 
@@ -196,6 +197,7 @@ def simulate(
         recording=recording,
         graphviz=graphviz,
         overwrite=overwrite,
+        json=json,
     )
 
 
@@ -241,6 +243,7 @@ def scan(
     model_path: Annotated[
         list[Path] | None, typer.Option(metavar="DIR")
     ] = None,
+    json: commands.Json = False,
 ) -> None:
     """Take one LiDAR scan of an SDF world.
 
@@ -289,7 +292,11 @@ def scan(
     doing("casting rays")
     points = scanning.scan_world(loaded, X_WS, pattern, model)
     scanning.save_scan(points, output)
-    typer.echo(f"{output}: {len(points)} points")
+    show(
+        {"output": str(output), "points": len(points)},
+        f"{output}: {len(points)} points",
+        json=json,
+    )
 
 
 def generate(

@@ -14,6 +14,7 @@ from evaluation.recognition.protocol import RetrievalProtocol
 from evaluation.recognition.protocol_options import with_protocol
 
 
+@commands.former_options({"--quick": "--no-recordings"})
 @with_protocol
 def reproduce(
     maps: options.Maps = None,
@@ -22,8 +23,10 @@ def reproduce(
     jobs: commands.Jobs = None,
     scheduler: commands.Scheduler = None,
     pages: Annotated[bool | None, typer.Option("--pages/--no-pages")] = None,
-    quick: Annotated[bool, typer.Option("--quick")] = False,
-    method: options.MethodFiles = None,
+    recordings: Annotated[
+        bool, typer.Option("--recordings/--no-recordings")
+    ] = True,
+    method: commands.Methods = None,
     parameter: commands.MethodSettings = None,
     costs: commands.Costs = True,
     tables: commands.Tables = False,
@@ -36,9 +39,10 @@ def reproduce(
 
     Args:
         pages: Also write a web page of each drive. This is the default, except
-            with --quick.
-        quick: Write only the report: the drives are simulated but not recorded,
-            which saves time and disk space.
+            with --no-recordings.
+        recordings: Whether to keep the recordings. Without them, the drives are
+            simulated but not recorded, which saves time and disk space; the
+            report is the same.
     """
     with uninterrupted():
         from cns_drake.base.jobs.cluster import choose_cluster
@@ -46,9 +50,9 @@ def reproduce(
         from evaluation.results.comparing import suggest_comparison
 
     cluster = choose_cluster(jobs, scheduler)
-    if quick and pages:
+    if pages and not recordings:
         raise InputError(
-            "--quick and --pages exclude each other; give one of them"
+            "--no-recordings and --pages exclude each other; give one of them"
         )
     with resumable():
         report = reproduction.reproduce_maps(
@@ -56,9 +60,9 @@ def reproduce(
             output,
             cluster,
             with_pages=pages is not False,
-            quick=quick,
+            with_recordings=recordings,
             protocol=protocol,
-            own_methods=method or (),
+            methods=method or (),
             settings=parameter or (),
             with_costs=costs,
             with_tables=tables,
@@ -76,9 +80,10 @@ def study(
     output: Annotated[Path | None, typer.Option(metavar="DIR")] = None,
     quick: Annotated[bool, typer.Option("--quick")] = False,
     task: list[str] | None = None,
-    method: list[str] | None = None,
+    method: commands.Methods = None,
     override: Annotated[
-        list[str] | None, typer.Option("--set", metavar="FIELD=VALUE")
+        list[str] | None,
+        typer.Option("--set", metavar="METHOD.NAME=VALUE|FIELD=VALUE"),
     ] = None,
     allow_code: Annotated[bool, typer.Option("--allow-code")] = False,
     jobs: commands.Jobs = None,
@@ -105,11 +110,14 @@ def study(
             experiment says what is left out.
         task: Task to measure: place, pose, localise, map, change or cost. By
             default the tasks of the experiment. May be repeated.
-        method: Method to run: the name of a shipped one, or a Python file with
-            your own. By default the methods of the experiment. May be repeated.
-        override: Replace a field of the experiment, such as seeds=[1,2]. For a
-            field inside another field, join both names by a dot, such as
-            database.years=[0,5]. May be repeated.
+        method: Method to run, and no others: the name of a shipped one,
+            standard for all standard ones, or a Python file with your own. May
+            be repeated. By default the methods of the experiment.
+        override: Change a setting of a method, such as btc.candidates=20.
+            Separate the numbers of a list by commas; a list in brackets makes
+            the setting a factor. Or replace a field of the experiment, such as
+            seeds=[1,2]. For a field inside another field, join both names by a
+            dot, such as database.years=[0,5]. May be repeated.
         allow_code: Run the Python files that the experiment names. A file that
             you name yourself, by --method or --set, runs without this option.
         list_all: List the shipped experiments, and do nothing else.
@@ -135,10 +143,16 @@ def study(
         path = shipped_experiments().get(name, Path(name))
         typer.echo(path.read_text("utf-8"), nl=False)
         return
+    with uninterrupted():
+        from evaluation.study.chosen_methods import with_standard
+
     overrides = override or ()
     experiment = load_experiment(name, overrides, quick=quick)
     chosen: list[str | tuple[str, Any]] = list(overrides)
-    for field, names in (("tasks", task), ("methods", method)):
+    for field, names in (
+        ("tasks", task),
+        ("methods", with_standard(method or ())),
+    ):
         if names:
             # Methods of the experiment keep their settings.
             given = getattr(experiment, field) or {}

@@ -358,7 +358,11 @@ def load_experiment(
         if isinstance(one, str):
             is_nested = "." in one.partition("=")[0]
             change = merged if is_nested else _chosen_anew
-            values = change(values, parse_override(one))
+            fields: Changes = parse_override(one)
+            (first,) = fields
+            if is_nested and first not in Experiment.model_fields:
+                fields, values = _of_method(one, fields, values)
+            values = change(values, fields)
         else:
             values = values | dict([one])
     experiment = validated(Experiment, values, path)
@@ -369,6 +373,33 @@ def load_experiment(
         with errors_at(f"{path}: quick", f"{path}: "):
             load_experiment(name_or_file, overrides, quick=True)
     return experiment
+
+
+def _of_method(
+    text: str, fields: Changes, values: dict[str, Any]
+) -> tuple[Changes, dict[str, Any]]:
+    """Returns an override `METHOD.NAME=VALUE` as a field `methods`.
+
+    Args:
+        text: the override.
+        fields: the same as nested fields.
+        values: fields of the experiment.
+
+    Returns:
+        The override, and the fields of the experiment, of which `methods` lists
+        all methods; both as given if there is no such method.
+    """
+    from evaluation.methods import known_methods, shipped_methods
+
+    methods = values.get("methods") or {one: {} for one in shipped_methods()}
+    name, _, value = text.partition("=")
+    method, _, setting = name.partition(".")
+    if method not in (*methods, *known_methods()):
+        return fields, values
+    if "," in value and not value.lstrip().startswith("["):
+        # One list, as on the command lines without factors.
+        fields = {method: _nested(setting, [value.split(",")])}
+    return {"methods": fields}, {**values, "methods": methods}
 
 
 def parse_override(text: str) -> dict[str, Any]:

@@ -44,9 +44,9 @@ def reproduce_maps(
     cluster: Cluster,
     *,
     with_pages: bool = True,
-    quick: bool = False,
+    with_recordings: bool = True,
     protocol: RetrievalProtocol = FAIR_PROTOCOL,
-    own_methods: Sequence[Path] = (),
+    methods: Sequence[str] = (),
     settings: Sequence[str] = (),
     with_costs: bool = False,
     with_tables: bool = False,
@@ -60,18 +60,19 @@ def reproduce_maps(
     contains the tables and figures. Finished work is not repeated. The function
     returns the path of the report's page.
 
-    With `quick`, only the report is made, and no drive is recorded. Drives that
-    are not recorded yet are evaluated while they are simulated, at the same
-    frames as a recording.
+    Without recordings, only the report is made. Drives that are not recorded
+    yet are evaluated while they are simulated, at the same frames as a
+    recording.
 
     Args:
         maps: names or folders of maps; all shipped maps if None.
         output: folder for all results.
         cluster: runs the jobs.
         with_pages: whether drives get web pages.
-        quick: whether only the report is made.
+        with_recordings: whether drives are recorded.
         protocol: protocol of place recognition.
-        own_methods: Python files of further methods.
+        methods: names or Python files of methods; by default the standard
+            methods.
         settings: settings of methods, each `METHOD.NAME=VALUE`.
         with_costs: whether times are measured.
         with_tables: whether the report has wide tables, too.
@@ -82,26 +83,26 @@ def reproduce_maps(
         InputError: a map is unknown, the folder cannot be made, or a step
             failed.
     """
-    methods = choose_methods(own_methods, settings)
+    chosen = choose_methods(methods, settings)
     folders = [recordable_map(name) for name in maps or recordable_maps()]
     drives, controls, pictures = [], [], []
     for folder in folders:
         of_map = _drives(folder)
         drives += of_map
         controls += control_drives(of_map)
-        if not quick:
+        if with_recordings:
             pictures += plan_pictures(folder, output / "pictures")
     pages = {s.name: output / "pages" / f"{s.name}.html" for s in drives}
     jobs = []
-    if not quick:
+    if with_recordings:
         jobs = plan_recordings(
             [*drives, *controls], output, pages=pages if with_pages else {}
         )
     recordings = []
     for scenario in (*drives, *controls):
         is_waiting = not is_recorded(scenario, output)
-        info = recording_info(scenario, output, is_waiting and not quick)
-        if quick and is_waiting:
+        info = recording_info(scenario, output, is_waiting and with_recordings)
+        if is_waiting and not with_recordings:
             info = replace(info, made_by=DriveSimulation(scenario))
         recordings.append(info)
     # The order is that of `cns-eval report`.
@@ -111,17 +112,17 @@ def reproduce_maps(
     study = Study(
         recordings,
         report,
-        methods,
+        chosen,
         protocol,
         with_costs,
         reference_for(folder.name for folder in folders),
     )
     doing("planning the jobs")
     planned = [*jobs, *study.jobs(), *pictures]
-    shown = len(drives) if with_pages and not quick else 0
+    shown = len(drives) if with_pages and with_recordings else 0
     frames = usual_frames([*drives, *controls])
     kept = shown * _PAGE_BYTES + frames * (
-        _KEPT_BYTES if quick else _KEPT_BYTES + _RECORDED_BYTES
+        _KEPT_BYTES + _RECORDED_BYTES if with_recordings else _KEPT_BYTES
     )
     told = forecast(
         planned, cluster, output, kept + frames * _SPENT_BYTES, kept

@@ -60,7 +60,11 @@ from evaluation.results.table import (
     RESULTS,
     STAGE,
 )
-from evaluation.study.chosen_methods import MethodChoice, choose_methods
+from evaluation.study.chosen_methods import (
+    STANDARD,
+    MethodChoice,
+    choose_methods,
+)
 from evaluation.study.collection import (
     City,
     find_recordings,
@@ -236,7 +240,7 @@ class Study:
         """Returns key -> method, with columns of its settings."""
         wanted = self.experiment.methods
         files = [Path(one) for one in wanted or () if one.endswith(".py")]
-        known = {one.name: one for one in choose_methods(files)}
+        known = {one.name: one for one in choose_methods([STANDARD, *files])}
         if wanted is None:
             wanted = {name: {} for name in known}
         known |= {name: MethodChoice(name) for name in optional_methods()}

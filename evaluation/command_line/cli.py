@@ -149,7 +149,7 @@ def pr(
     query: Annotated[Path, typer.Argument(metavar="QUERY")],
     method: options.MethodName,
     mode: Literal["all", "filtered"] = "all",
-    parameter: options.Parameters = None,
+    parameter: commands.MethodSettings = None,
     sensor_height: options.SensorHeight = 1.6,
     align: options.Align = "auto",
     lidar: commands.LidarName = None,
@@ -301,14 +301,14 @@ def pr(
     if output is not None:
         from evaluation.methods import MethodConfig
         from evaluation.results.table import QUERIES, RESULTS
-        from evaluation.study.chosen_methods import parse_setting
+        from evaluation.study.chosen_methods import method_settings
         from evaluation.study.one_pair import pair_tables
 
         results, queries = pair_tables(
             outcome,
             query_drive,
             protocol,
-            dict(map(parse_setting, parameter or [])),
+            method_settings(parameter or [], [chosen.name])[chosen.name],
             None
             if sensor_height == MethodConfig().sensor_height
             else sensor_height,
@@ -337,7 +337,7 @@ app.command(
 def report(
     recordings: Annotated[Path, typer.Argument(metavar="DIR")],
     output: Annotated[Path, typer.Option()],
-    method: options.OwnMethods = None,
+    method: commands.Methods = None,
     parameter: commands.MethodSettings = None,
     lidar: commands.LidarName = None,
     columns: commands.Columns = None,
@@ -499,12 +499,12 @@ def _chosen_method(
 ) -> Method:
     from evaluation.methods import make_method
     from evaluation.methods.method import load_method
-    from evaluation.study.chosen_methods import parse_setting
+    from evaluation.study.chosen_methods import method_settings
 
-    parameters: dict[str, object] = {"sensor_height": height}
-    parameters.update(map(parse_setting, assignments or []))
     if name.endswith(".py"):
         name = load_method(Path(name)).name
+    parameters: dict[str, object] = {"sensor_height": height}
+    parameters |= method_settings(assignments or [], [name])[name]
     return make_method(name, parameters)
 
 

@@ -35,7 +35,7 @@ def localise(
     start: float = 0.5,
     start_turn: float = 2.0,
     seed: int = 0,
-    parameter: options.Parameters = None,
+    parameter: commands.MethodSettings = None,
     query_spacing: float | None = None,
     track: Annotated[bool, typer.Option("--track")] = False,
     odometry_drift: Annotated[
@@ -108,7 +108,7 @@ def localise(
     from evaluation.drives import Drive, check_same_world
     from evaluation.localisation import estimators, tracking
     from evaluation.localisation import localise as queries
-    from evaluation.study.chosen_methods import parse_setting
+    from evaluation.study.chosen_methods import method_settings
 
     if estimate is not None:
         commands.check_only_with(context, "estimate", _WITH_ESTIMATE)
@@ -137,8 +137,10 @@ def localise(
         raise InputError(
             f"--odometry-drift: {odometry_drift:g} is not from 0 to 1"
         )
+    name = Path(method).stem
+    given = method_settings(parameter or [], [name])[name]
     settings = estimators.default_settings(method).with_values(
-        map(parse_setting, parameter or []), method
+        given.items(), method
     )
     estimator = estimators.make_estimator(method, settings)
     source = open_source(place, lidar, columns)

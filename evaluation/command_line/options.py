@@ -36,25 +36,8 @@ MethodName = Annotated[
         "file that registers your own.",
     ),
 ]
-Parameters = Annotated[
-    list[str] | None,
-    typer.Option(
-        "--set",
-        metavar="NAME=VALUE",
-        help="Change a setting of the method. Separate the numbers of a list "
-        "by commas. May be repeated.",
-    ),
-]
 SensorHeight = Annotated[
     float, typer.Option(help="Height of the LiDAR above the ground [m].")
-]
-OwnMethods = Annotated[
-    list[Path] | None,
-    typer.Option(
-        help="One more method to run, beside the standard methods. It is one "
-        "of map-closures, probe, svt-net and dpa-net, or a Python file that "
-        "registers your own. May be repeated."
-    ),
 ]
 
 

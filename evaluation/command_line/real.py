@@ -5,14 +5,14 @@ from typing import Annotated
 
 import typer
 
-from cns_drake.base import terminal
+from cns_drake.base import commands, terminal
 from cns_drake.base.errors import InputError
 
 
 def real(
     folder: Annotated[Path, typer.Argument(metavar="DIR")],
     output: Annotated[Path, typer.Option(metavar="DIR")],
-    method: list[str] | None = None,
+    method: commands.Methods = None,
     simulated: Annotated[Path | None, typer.Option(metavar="DIR")] = None,
 ) -> None:
     """Measure place recognition and registration on real scans.
@@ -26,10 +26,11 @@ def real(
     Args:
         folder: Folder with the excerpts of public data sets.
         output: Folder for the results; created if it does not exist.
-        method: Place-recognition method or registration method to run: the name
-            of a shipped one, or a Python file that registers your own method or
-            defines your own function `localise`. By default all shipped ones.
-            May be repeated.
+        method: Place-recognition method or registration method to run, and no
+            others: the name of a shipped one, standard for all standard methods
+            of place recognition, or a Python file that registers your own
+            method or defines your own function `localise`. May be repeated. By
+            default all shipped ones.
         simulated: Folder with simulated recordings. Recordings with the same
             model of LiDAR as a data set are used in two ways: their scans are
             added to the data set's database as further places, and a classifier
@@ -39,8 +40,9 @@ def real(
     from cns_drake.base.files import make_folder
     from evaluation.real.measuring import Measuring
     from evaluation.results.table import QUERIES, RESULTS
+    from evaluation.study.chosen_methods import with_standard
 
-    measuring = Measuring(method or (), terminal.note)
+    measuring = Measuring(with_standard(method or ()), terminal.note)
     make_folder(output)
     measuring.run(folder, simulated)
     if not measuring.rows:

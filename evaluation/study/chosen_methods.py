@@ -8,6 +8,7 @@ from pathlib import Path
 from cns_drake.base.errors import InputError, did_you_mean
 from cns_drake.base.jobs.file_digests import file_digests
 from cns_drake.base.jobs.fingerprint import script_digest
+from cns_drake.base.value_lists import repeated
 from evaluation.methods import (
     Method,
     known_methods,
@@ -20,6 +21,8 @@ from evaluation.methods.method import load_method
 # The value of a parameter, as text.
 Setting = str | tuple[str, ...]
 
+# The name that stands for all standard methods.
+STANDARD = "standard"
 _FORM = "METHOD.NAME=VALUE"
 
 
@@ -111,38 +114,81 @@ def parse_setting(text: str, form: str = "NAME=VALUE") -> tuple[str, Setting]:
     return name, tuple(value.split(",")) if "," in value else value
 
 
-def choose_methods(
-    files: Iterable[Path] = (),
-    settings: Iterable[str] = (),
-) -> tuple[MethodChoice, ...]:
-    """Returns the shipped methods, and further ones on request.
-
-    Args:
-        files: Python files that register a method each, or names of optional
-            methods of this package.
-        settings: `METHOD.NAME=VALUE` for parameters that differ from their
-            defaults.
+def with_standard(names: Iterable[str]) -> list[str]:
+    """Returns names of methods, with all standard ones in place of `standard`.
 
     Raises:
-        InputError: `files` contains an unknown name, a shipped method, the same
-            file twice, or a file that registers no method or one whose name is
-            taken; an optional method is not installed; or a setting is unknown
-            or its value is not valid.
+        InputError: a method is there twice.
     """
-    chosen = [MethodChoice(name) for name in shipped_methods()]
-    stems = set()
-    for file in files:
-        if str(file) in optional_methods():
-            chosen.append(MethodChoice(str(file)))
-            continue
-        path = Path(file).absolute()
-        if str(file) in shipped_methods():
-            raise InputError(f"--method: {file} runs anyway; leave it out")
-        if not path.suffix and not path.is_file():
-            known = optional_methods()
+    found: list[str] = []
+    for name in names:
+        found += shipped_methods() if name == STANDARD else [name]
+    for name in repeated(found):
+        raise InputError(f"--method: {name} is there twice")
+    return found
+
+
+def method_settings(
+    texts: Iterable[str], names: Sequence[str]
+) -> dict[str, dict[str, Setting]]:
+    """Returns name of each method -> its settings, by name.
+
+    Args:
+        texts: `METHOD.NAME=VALUE` each. If there is only one method, its name
+            may be left out.
+        names: names of the methods that run.
+
+    Raises:
+        InputError: a text has another form, or names another method.
+    """
+    found: dict[str, dict[str, Setting]] = {name: {} for name in names}
+    is_alone = len(names) == 1
+    for text in texts:
+        key, value = parse_setting(text, "NAME=VALUE" if is_alone else _FORM)
+        method, dot, name = key.rpartition(".")
+        if not dot:
+            if not is_alone:
+                raise InputError(f"--set: {text!r} is not {_FORM}")
+            method = names[0]
+        if method not in found:
             raise InputError(
-                f"--method: {file}: neither a Python file nor one of"
-                f" {', '.join(known)}{did_you_mean(str(file), known)}"
+                f"--set: no method {method!r} (known: {', '.join(found)})"
+                f"{did_you_mean(method, found)}"
+            )
+        found[method][name] = value
+    return found
+
+
+def choose_methods(
+    names: Iterable[Path | str] = (),
+    settings: Iterable[str] = (),
+) -> tuple[MethodChoice, ...]:
+    """Returns methods with their settings; by default the standard methods.
+
+    Args:
+        names: names of methods of this package, `standard` for all standard
+            ones, or Python files that register a method each.
+        settings: `METHOD.NAME=VALUE` for parameters that differ from their
+            defaults, see `method_settings`.
+
+    Raises:
+        InputError: `names` contains an unknown name, a method or a file twice,
+            or a file that registers no method or one whose name is taken; an
+            optional method is not installed; or a setting is unknown or its
+            value is not valid.
+    """
+    chosen: list[MethodChoice] = []
+    stems = set()
+    for name in with_standard(map(str, names)) or shipped_methods():
+        if name in (*shipped_methods(), *optional_methods()):
+            chosen.append(MethodChoice(name))
+            continue
+        path = Path(name).absolute()
+        if not path.suffix and not path.is_file():
+            known = (STANDARD, *shipped_methods(), *optional_methods())
+            raise InputError(
+                f"--method: {name}: neither a Python file nor one of"
+                f" {', '.join(known)}{did_you_mean(name, known)}"
             )
         # Two modules with one name would replace each other.
         if path.stem in stems:
@@ -152,20 +198,9 @@ def choose_methods(
         if choice.name in {one.name for one in chosen}:
             raise InputError(f"{path}: another method is named {choice.name!r}")
         chosen.append(choice)
-    named: dict[str, dict[str, Setting]] = {one.name: {} for one in chosen}
-    for text in settings:
-        key, value = parse_setting(text, _FORM)
-        method, dot, name = key.rpartition(".")
-        if not dot:
-            raise InputError(f"--set: {text!r} is not {_FORM}")
-        if method not in named:
-            raise InputError(
-                f"--set: no method {method!r} (known: {', '.join(named)})"
-                f"{did_you_mean(method, named)}"
-            )
-        named[method][name] = value
+    given = method_settings(settings, [one.name for one in chosen])
     chosen = [
-        replace(one, settings=tuple(named[one.name].items())) for one in chosen
+        replace(one, settings=tuple(given[one.name].items())) for one in chosen
     ]
     for one in chosen:
         # A wrong value, or a missing package, is found before anything slow.

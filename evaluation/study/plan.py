@@ -500,7 +500,7 @@ def write_report(
     recordings: Path,
     output: Path,
     cluster: Cluster,
-    own_methods: Iterable[Path] = (),
+    methods: Iterable[str] = (),
     protocol: RetrievalProtocol = FAIR_PROTOCOL,
     on_note: Callable[[str], None] = lambda text: None,
     *,
@@ -521,7 +521,7 @@ def write_report(
         recordings: the folder.
         output: folder of the report.
         cluster: runs the jobs.
-        own_methods, settings: files and settings of methods, see
+        methods, settings: names, files and settings of methods, see
             `evaluation.study.chosen_methods.choose_methods`.
         protocol: protocol of place recognition.
         on_note: is called with notes: on how recordings are read or left out,
@@ -541,15 +541,15 @@ def write_report(
         InputError: a recording cannot be read, there is nothing to compare and
             maps and stages were guessed, or the output cannot be written.
     """
-    methods = choose_methods(own_methods, settings)
+    chosen = choose_methods(methods, settings)
     found = find_recordings(recordings, on_note, lidar, columns)
-    for choice in methods:
+    for choice in chosen:
         method = choice.make()
         for note in {method.assumption(one.lidar_field) for one in found}:
             if note is not None:
                 on_note(note)
     reference = reference_for({one.map_name for one in found})
-    study = Study(found, output, methods, protocol, with_costs, reference)
+    study = Study(found, output, chosen, protocol, with_costs, reference)
     jobs = study.jobs()
     alone = nothing_to_compare(study.cities)
     # A wrong guess must not lead to an empty report.

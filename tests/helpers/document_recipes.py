@@ -112,7 +112,7 @@ RECIPES = {
         changes=(("140", "60"), ("110", "50"), ("240", "110"), ("25]", "20]")),
     ),
     "start a city": Recipe(
-        _CITY + "town --start",
+        _CITY + "town --new",
         after=("roads",),
         makes=(
             "town/city.yaml",
@@ -123,7 +123,7 @@ RECIPES = {
         prepare=shorten_drives,
     ),
     "help: city": Recipe(
-        "cns-drake city town --start\n",
+        "cns-drake city town --new\n",
         after=("start a city",),
     ),
     "own city": Recipe(
@@ -313,7 +313,7 @@ RECIPES = {
         "cns-drake reproduce metropolis",
         changes=(
             ("metropolis", "town"),
-            ("study --quick", "output"),
+            ("--output study", "--output output"),
         ),
         after=("own city",),
         all_methods=True,

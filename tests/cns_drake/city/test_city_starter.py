@@ -50,7 +50,7 @@ def town(tmp_path_factory):
     folder = tmp_path_factory.mktemp("own") / "town"
     folder.mkdir()
     (folder / "roads.yaml").write_text(ROADS)
-    done = run("city", folder, "--start")
+    done = run("city", folder, "--new")
     assert done.exit_code == 0, done.stderr
     assert done.stdout == ""
     return folder
@@ -102,7 +102,7 @@ def test_existing_files_stay(tmp_path):
 
 
 @pytest.mark.parametrize(
-    "words", [("--seed", 5), ("--seed", 0), ("--start", "--check")]
+    "words", [("--seed", 5), ("--seed", 0), ("--new", "--check")]
 )
 def test_options_without_effect_are_refused(town, words):
     done = run("city", town, *words)
@@ -150,7 +150,7 @@ def test_roads_that_cannot_be_used_are_named(tmp_path):
     roads["roads"]["east"]["end"] = "nowhere"
     (tmp_path / "roads.yaml").write_text(yaml.safe_dump(roads))
     done = subprocess.run(
-        [sys.executable, "-m", "cns_drake.city", ".", "--start"],
+        [sys.executable, "-m", "cns_drake.city", ".", "--new"],
         cwd=tmp_path,
         capture_output=True,
         text=True,

@@ -272,8 +272,8 @@ def test_diagram_script_records_and_makes_a_page(files, tmp_path, capfd):
         (["study", "ladder", "--set", "levels=[]"], "ladder.yaml: levels: "),
         (["study", "ladder", "--jobs", "0"], "--jobs"),
         (
-            ["reproduce", "--quick", "--pages"],
-            "--quick and --pages exclude each other",
+            ["reproduce", "--no-recordings", "--pages"],
+            "--no-recordings and --pages exclude each other",
         ),
         (["teleport"], "teleport"),
         (["simulat"], "Did you mean 'simulate'"),

@@ -109,7 +109,7 @@ def test_version(program, capsys):
     ("program", "begun", "completed"),
     [
         ("cns-drake", "sim", ["simulate"]),
-        ("cns-drake", "city --s", ["--start", "--seed"]),
+        ("cns-drake", "city --n", ["--new"]),
         ("cns-eval", "pr --mode f", ["filtered"]),
         ("cns-eval", "re", ["report", "real"]),
     ],

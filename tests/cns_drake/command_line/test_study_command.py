@@ -8,6 +8,7 @@ import pytest
 from cns_drake.__main__ import main
 from cns_drake.studies import study as study_module
 from cns_drake.studies.experiment import load_experiment, shipped_experiments
+from evaluation.methods import shipped_methods
 
 
 def run(capsys, *words):
@@ -141,3 +142,31 @@ def test_an_output_is_needed(capsys, asked):
     assert (status, out) == (2, "")
     assert err == "cns-drake: error: --output: missing\n"
     assert not asked
+
+
+def test_settings_of_methods_are_set_as_elsewhere(capsys, asked, tmp_path):
+    """`METHOD.NAME=VALUE`, also of two methods and of a list."""
+    words = ("study", "ladder", "--output", tmp_path)
+    settings = ("solid.sensor_height=1.7", "btc.keypoint_range=0.5,2")
+    settings = [f"--set={one}" for one in settings]
+    status, _, err = run(capsys, *words, *settings)
+    assert status == 0, err
+    (experiment, *_) = asked[0]
+    assert set(experiment.methods) == set(shipped_methods())
+    assert experiment.methods["solid"] == {"sensor_height": 1.7}
+    assert experiment.methods["btc"] == {"keypoint_range": [["0.5", "2"]]}
+    methods = ("--method", "solid", "--method", "ring++")
+    status, _, err = run(capsys, *words, *methods, settings[0])
+    assert status == 0, err
+    (experiment, *_) = asked[1]
+    assert experiment.methods == {"solid": {"sensor_height": 1.7}, "ring++": {}}
+    status, _, err = run(capsys, *words, "--set", "bow.words=3")
+    assert status == 2
+    assert "bow" in err
+
+
+def test_standard_stands_for_the_standard_methods(capsys, asked, tmp_path):
+    words = ("study", "ladder", "--output", tmp_path)
+    run(capsys, *words, "--method", "standard", "--method", "probe")
+    (experiment, *_) = asked[0]
+    assert list(experiment.methods) == [*shipped_methods(), "probe"]

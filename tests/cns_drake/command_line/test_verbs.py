@@ -170,3 +170,56 @@ def test_a_localisation_needs_query_and_method(capsys, words, missing):
     status, _, err = run(capsys, "cns-eval", *words)
     assert status == 2
     assert err.endswith(f"cns-eval: error: {missing}: missing\n")
+
+
+# Commands whose results are no numbers: recordings, a report or weights.
+WITHOUT_NUMBERS = {
+    "city",
+    "generate",
+    "study",
+    "reproduce",
+    "train",
+    "report",
+    "real",
+}
+
+
+def test_all_that_print_numbers_have_json():
+    for program, group in GROUPS.items():
+        for name in group.commands:
+            has_json = "--json" in options(program, name)
+            assert has_json == (name not in WITHOUT_NUMBERS), name
+
+
+def test_options_of_one_name_have_one_meaning():
+    """The same text explains an option in all commands of a kind."""
+    meanings = {}
+    for program, group in GROUPS.items():
+        for name in group.commands:
+            for option, one in options(program, name).items():
+                key = option, one.metavar or one.nargs
+                meanings.setdefault(key, {})[name] = one.help
+    for option in ("--json", "--jobs", "--scheduler", "--columns"):
+        texts = [t for (o, _), t in meanings.items() if o == option]
+        assert len({text for named in texts for text in named.values()}) == 1
+    # A preset where a command simulates, a name where it reads.
+    lidars = {
+        m: set(n.values()) for (o, m), n in meanings.items() if o == "--lidar"
+    }
+    assert {m: len(texts) for m, texts in lidars.items()} == {
+        "PRESET": 1,
+        "NAME": 1,
+    }
+    for option, commands in {
+        "--start": {"localise"},
+        "--quick": {"study"},
+        "--recording": {"simulate"},
+        "--sensor": set(),
+    }.items():
+        found = {
+            n
+            for (o, _), named in meanings.items()
+            for n in named
+            if o == option
+        }
+        assert found == commands, option

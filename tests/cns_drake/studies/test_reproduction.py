@@ -176,8 +176,8 @@ def test_quick_gives_the_same_tables(tmp_path, monkeypatch):
         [str(town)],
         tmp_path / "quick",
         cluster,
-        quick=True,
-        own_methods=[own],
+        with_recordings=False,
+        methods=["standard", str(own)],
         with_tables=True,
     )
     assert {path.name for path in (tmp_path / "quick").iterdir()} == {"report"}
@@ -186,7 +186,7 @@ def test_quick_gives_the_same_tables(tmp_path, monkeypatch):
         tmp_path / "full",
         cluster,
         with_pages=False,
-        own_methods=[own],
+        methods=["standard", str(own)],
         with_tables=True,
     )
     assert (tmp_path / "full" / "town_01_stage_04" / "metadata.yaml").is_file()
@@ -212,7 +212,9 @@ def test_quick_gives_the_same_tables(tmp_path, monkeypatch):
 
 def test_quick_reads_existing_recordings(town, drives, planned, tmp_path):
     simulate(drives[0], tmp_path)
-    reproduction.reproduce_maps([str(town)], tmp_path, Cluster(), quick=True)
+    reproduction.reproduce_maps(
+        [str(town)], tmp_path, Cluster(), with_recordings=False
+    )
     (jobs,) = planned
     recordings = jobs.pop("recordings")
     (control,) = control_drives(drives)

@@ -82,28 +82,31 @@ def change(file, old, new):
 
 
 def test_a_quick_study(reproduce, code, tmp_path):
-    assert reproduce(quick=True) == STUDY
-    assert reproduce(quick=True) == set()
+    assert reproduce(with_recordings=False) == STUDY
+    assert reproduce(with_recordings=False) == set()
     # The code of the report's page measures nothing.
     change(code / "evaluation/report/page_template/page.css", "{", "{ ")
-    assert reproduce(quick=True) == set()
+    assert reproduce(with_recordings=False) == set()
     change(code / "cns_drake/sensors/lidar/presets.yaml", "120.0", "10.0")
-    assert reproduce(quick=True) == STUDY
+    assert reproduce(with_recordings=False) == STUDY
     change(code / "evaluation/report/figures.py", "def ", "def  ")
-    assert reproduce(quick=True) == DRAWN
+    assert reproduce(with_recordings=False) == DRAWN
     # Results of one method on all drives, and its part of their surveys.
-    options = {"quick": True, "settings": ["solid.sensor_height=1.7"]}
+    options = {
+        "with_recordings": False,
+        "settings": ["solid.sensor_height=1.7"],
+    }
     assert reproduce(**options) == SURVEYS | COMPARED | CONTROL | EXPLAINED
     assert reproduce(**options) == set()
     # Results of each setting stay; why places are wrong is of all methods.
-    assert reproduce(quick=True) == EXPLAINED
+    assert reproduce(with_recordings=False) == EXPLAINED
     # One drive, and all comparisons with it, which need descriptions of both.
     stage = tmp_path / "town" / "stage_01.sdf"
     change(stage, "</world>", "<!-- Changed. --></world>")
     surveys = {"survey town_01", "survey town_04"}
     maps = {"change town_01 town_04", "change town_04 town_01"}
     pairs = COMPARED | EXPLAINED | maps
-    assert reproduce(quick=True) == surveys | DRAWN | pairs
+    assert reproduce(with_recordings=False) == surveys | DRAWN | pairs
 
 
 @pytest.mark.night

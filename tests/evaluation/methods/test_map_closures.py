@@ -80,15 +80,22 @@ def test_it_is_run_only_where_it_is_named(method):
     assert NAME in known_methods()
     assert NAME not in shipped_methods()
     assert NAME not in {one.name for one in choose_methods()}
-    assert NAME in {one.name for one in choose_methods([NAME])}
+    # Only what is named runs.
+    assert [one.name for one in choose_methods([NAME])] == [NAME]
+    both = [one.name for one in choose_methods(["standard", NAME])]
+    assert both == [*shipped_methods(), NAME]
+    with pytest.raises(InputError, match="--method: solid is there twice"):
+        choose_methods(["solid", "standard"])
 
 
 @pytest.mark.parametrize(
     ("name", "fault"),
     [
-        ("solid", "solid runs anyway"),
         ("map-closure", "did you mean map-closures?"),
-        ("solids", "neither a Python file nor one of dpa-net, map-closures"),
+        (
+            "solids",
+            "neither a Python file nor one of standard, .*map-cl",
+        ),
         ("nowhere.py", "nowhere.py: no such file"),
     ],
 )

@@ -445,7 +445,7 @@ def test_own_method_beside_the_others(
     monkeypatch.setattr(method, "_METHODS", dict(method._METHODS))
     path = tmp_path / "counting.py"
     path.write_text(OWN_METHOD)
-    choices = choose_methods([path])
+    choices = choose_methods(["standard", path])
     studies.report(recordings, tmp_path / "out", choices)
     rows = read_csv(tmp_path / "out" / "place_recognition.csv")
     methods = list(dict.fromkeys(row["method"] for row in rows))
