@@ -65,7 +65,7 @@ class MapTask(Task):
             *(pair.database.source, pair.query.source),
             *(tuple(methods), float(self.settings["spacing"])),
         )
-        part = jobs.files.part("map", pair.name)
+        part = jobs.files.part("map", pair.key)
         return (jobs.add(part, measure_maps, arguments, cost=_COST),)
 
     def numbers(self, found: Any, before: Any | None) -> Iterator[Number]:

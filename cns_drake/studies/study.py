@@ -70,7 +70,7 @@ from evaluation.study.collection import (
     find_recordings,
     group_cities,
 )
-from evaluation.study.engine import Engine, MeasuredPair, made_tasks
+from evaluation.study.engine import Engine, made_tasks
 from evaluation.study.recorded import (
     RecordedCondition,
     SurveyJobs,
@@ -370,7 +370,7 @@ class Study:
         )
         prints: dict[tuple[str, int], list[str]] = {}
         for some in drives:
-            found: list[MeasuredPair] = []
+            found: list[Pair] = []
             if some.city is not None:
                 found += self._recorded(some.city)
             else:
@@ -394,10 +394,10 @@ class Study:
         return engine
 
     def _distractors(
-        self, some: _Drives, found: Iterable[MeasuredPair]
+        self, some: _Drives, found: Iterable[Pair]
     ) -> list[NamedDrive]:
         """Returns the drives whose places are added to databases."""
-        most = max((one.pair.distractors for one in found), default=0)
+        most = max((one.distractors for one in found), default=0)
         if not most:
             return []
         # The same LiDARs see all places.
@@ -428,7 +428,7 @@ class Study:
 
     def _simulated(
         self, some: _Drives, *, made: bool = True
-    ) -> Iterator[tuple[MeasuredPair, str]]:
+    ) -> Iterator[tuple[Pair, str]]:
         """Yields the pairs of a map in all conditions that it allows.
 
         Each item is a comparison and the fingerprint of its drives. If `made`
@@ -462,21 +462,23 @@ class Study:
                     if key not in known:
                         known.add(key)
                         yield (
-                            MeasuredPair(
-                                some.map_name,
-                                (_base_name(database), query.name),
-                                {**some.factors, **condition.factors},
-                                seed,
-                                condition.is_baseline,
-                                self._pair(compared, query),
-                                self._protocol_of(condition),
+                            self._pair(
+                                compared,
+                                query,
+                                map_name=some.map_name,
+                                names=(_base_name(database), query.name),
+                                factors={**some.factors, **condition.factors},
+                                seed=seed,
+                                is_baseline=condition.is_baseline,
+                                stated=self._protocol_of(condition),
                             ),
                             compared.fingerprint(),
                         )
         for text in noted if made else ():
             self.on_note(f"{some.map_name}: {text}")
 
-    def _pair(self, compared: Compared, query: Scenario) -> Pair:
+    def _pair(self, compared: Compared, query: Scenario, **shown: Any) -> Pair:
+        """Returns a pair of drives, which tables show with given fields."""
         database, asked = map(self._named, (compared.database, compared.query))
         way = database
         if self.experiment.drives == "same-route":
@@ -496,18 +498,19 @@ class Study:
             **compared.protocol.to_json(),
             "radius": None,  # Queries are scored once for all radii.
         }
-        name = f"{database.name} {asked.name} {fingerprint(asked_how)[:8]}"
+        digest = fingerprint(asked_how)[:8]
         return Pair(
-            name,
-            database,
-            asked,
-            way,
-            compared.protocol,
-            compared.distractors,
-            bool(compared.asked or compared.distractors),
+            **shown,
+            key=f"{database.name} {asked.name} {digest}",
+            database=database,
+            query=asked,
+            way=way,
+            protocol=compared.protocol,
+            distractors=compared.distractors,
+            may_repeat=bool(compared.asked or compared.distractors),
         )
 
-    def _recorded(self, city: City) -> Iterator[MeasuredPair]:
+    def _recorded(self, city: City) -> Iterator[Pair]:
         """Yields the pairs of recordings; only their stage can vary."""
         self._check_recordable(city)
         return recorded_comparisons(

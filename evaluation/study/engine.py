@@ -12,9 +12,7 @@ from cns_drake.base.jobs.processes import nothing_left
 from cns_drake.base.jobs.running import Job, run_jobs
 from cns_drake.base.process import num_cores
 from cns_drake.base.progress import doing
-from evaluation.recognition.protocol import RetrievalProtocol
 from evaluation.results.table import (
-    FRESH,
     QUERIES,
     RESULTS,
     Answers,
@@ -24,48 +22,11 @@ from evaluation.results.table import (
     made_by,
 )
 from evaluation.study.chosen_methods import MethodChoice
-from evaluation.study.parts import Part, StudyFiles
+from evaluation.study.parts import StudyFiles
 from evaluation.study.tasks.task import Jobs, NamedDrive, Pair, Task
 
 # A study that takes longer is announced [s].
 _LONG = 3600.0
-
-
-@dataclass(frozen=True)
-class MeasuredPair:
-    """Two drives that are compared under a condition of an experiment.
-
-    Attributes:
-        map_name: name of the map.
-        names: names of the database drive and of the query drive in tables. All
-            conditions of the same two drives share them.
-        factors: name -> value of each factor of the condition.
-        seed: seed of everything that is random.
-        is_baseline: whether other conditions are compared with this one.
-        pair: the drives as they are under the condition.
-        protocol: protocol of the experiment, before the condition changes its
-            queries.
-        parts: task -> files of its result, for the tasks that measure the pair.
-    """
-
-    map_name: str
-    names: tuple[str, str]
-    factors: Mapping[str, Any]
-    seed: int
-    is_baseline: bool
-    pair: Pair
-    protocol: RetrievalProtocol
-    parts: dict[str, tuple[Part, ...]] = field(default_factory=dict)
-
-    @property
-    def place(self) -> tuple[object, ...]:
-        """Key of map, drives and protocol; each key has one baseline."""
-        fixed = [
-            (name, value)
-            for name, value in self.factors.items()
-            if name == FRESH or name.startswith("protocol.")
-        ]
-        return self.map_name, self.names, *fixed
 
 
 @dataclass
@@ -93,12 +54,12 @@ class Engine:
     output: Path
     on_note: Callable[[str], None] = lambda text: None
     jobs: dict[str, Job] = field(default_factory=dict)
-    measured: list[MeasuredPair] = field(default_factory=list)
+    measured: list[Pair] = field(default_factory=list)
     _notes: dict[str, None] = field(default_factory=dict)
 
     def add(
         self,
-        comparisons: Sequence[MeasuredPair],
+        comparisons: Sequence[Pair],
         distractors: Sequence[NamedDrive] = (),
         make_jobs: Callable[..., Jobs] = Jobs,
     ) -> Jobs:
@@ -117,14 +78,14 @@ class Engine:
         )
         if any(task.asks for task in self.tasks.values()):
             for one in comparisons:
-                planned.expect(one.pair)
+                planned.expect(one)
         for name, task in self.tasks.items():
             seen: set[tuple[str, str]] = set()
             for one in comparisons:
-                both = one.pair.database.name, one.pair.query.name
-                is_new = not one.pair.may_repeat or both not in seen
+                both = one.database.name, one.query.name
+                is_new = not one.may_repeat or both not in seen
                 if (task.asks or is_new) and (
-                    parts := task.measure(one.pair, planned)
+                    parts := task.measure(one, planned)
                 ):
                     one.parts[name] = parts
                 seen.add(both)
@@ -204,16 +165,16 @@ class Engine:
                     key = self._key(one, name, method, gate)
                     yield Answers(**key, columns=columns)
 
-    def found(self, one: MeasuredPair, task: str) -> Any:
+    def found(self, one: Pair, task: str) -> Any:
         """Returns a task's result for a pair; its jobs must be done.
 
         Raises:
             InputError: the file of the result cannot be read.
         """
-        return self.tasks[task].found(one.parts[task], one.pair)
+        return self.tasks[task].found(one)
 
     def _key(
-        self, one: MeasuredPair, task: str, method: str, gate: bool
+        self, one: Pair, task: str, method: str, gate: bool
     ) -> dict[str, Any]:
         factors = dict(one.factors)
         settings = self.tasks[task].changed_settings
@@ -237,7 +198,7 @@ class Engine:
             "task": task,
             "method": method,
             "gate": gate,
-            **made_by(one.protocol, settings),
+            **made_by(one.stated, settings),
         }
 
 

@@ -33,7 +33,7 @@ from evaluation.study.collection import (
     group_cities,
     nothing_to_compare,
 )
-from evaluation.study.engine import Engine, MeasuredPair, made_tasks
+from evaluation.study.engine import Engine, made_tasks
 from evaluation.study.fault_evidence import explain_faults
 from evaluation.study.measurements import measure_method
 from evaluation.study.method_costs import measure_method_costs
@@ -47,7 +47,7 @@ from evaluation.study.repeats import Repeat, repeats_of
 from evaluation.study.surveys import Further, Survey
 from evaluation.study.tasks.change import ChangeTask
 from evaluation.study.tasks.place import PlaceTask, PoseTask
-from evaluation.study.tasks.task import Task
+from evaluation.study.tasks.task import Pair, Task
 
 # Expected seconds to measure costs, and to compare two drives by a method.
 _COSTS_COST = 5.0
@@ -305,7 +305,7 @@ class _CityReport:
             jobs += self._jobs_of(pair)
         self.jobs = {**planned.jobs, **{job.name: job for job in jobs}}
 
-    def _own(self, pair: Recordings, stage: str = OWN) -> MeasuredPair | None:
+    def _own(self, pair: Recordings, stage: str = OWN) -> Pair | None:
         """Returns a pair as it is measured, or (stage `last`) its control."""
         return self._measured.get((pair[0].name, pair[1].name, stage))
 
@@ -356,7 +356,7 @@ class _CityReport:
                 ),
             )
         ]
-        needs = (f"place {own.pair.name}",)
+        needs = (f"place {own.key}",)
         jobs = [
             Job(
                 f"explain {names[0]} > {names[1]}",
@@ -451,7 +451,7 @@ class _CityReport:
                 report.evidence[own.names] = evidence
             drives = {one.name for one in pair}
             if control is not None:
-                drives |= {one.name for one, _ in control.pair.roles}
+                drives |= {one.name for one, _ in control.roles}
             for name in sorted(drives - report.tracks.keys()):
                 survey = self._files.survey(name).drive.read()
                 report.tracks[name] = result_tables.DriveTrack(

@@ -13,7 +13,6 @@ from evaluation.recognition.description import Role
 from evaluation.recognition.protocol import FAIR_PROTOCOL, RetrievalProtocol
 from evaluation.results.table import OWN
 from evaluation.study.collection import City
-from evaluation.study.engine import MeasuredPair
 from evaluation.study.measurements import DescribedSource
 from evaluation.study.parts import Part, SurveyFiles
 from evaluation.study.surveys import Further, Survey
@@ -50,7 +49,7 @@ def recorded_comparisons(
     *,
     both_ways: bool = False,
     with_itself: bool = False,
-) -> Iterator[MeasuredPair]:
+) -> Iterator[Pair]:
     """Yields the comparisons of a map's recordings in all conditions.
 
     Args:
@@ -80,20 +79,18 @@ def recorded_comparisons(
             database, query = (one.named for one in drives)
             # Queries are scored once for all radii.
             asked = condition.protocol.to_json() | {"radius": None}
-            yield MeasuredPair(
-                city.name,
-                (pair[0].name, pair[1].name),
-                condition.factors,
-                seed,
-                condition.is_baseline,
-                Pair(
-                    f"{database.name} {query.name} {fingerprint(asked)[:8]}",
-                    database,
-                    query,
-                    database,
-                    condition.protocol,
-                ),
-                condition.protocol,
+            yield Pair(
+                map_name=city.name,
+                names=(pair[0].name, pair[1].name),
+                factors=condition.factors,
+                seed=seed,
+                is_baseline=condition.is_baseline,
+                stated=condition.protocol,
+                key=f"{database.name} {query.name} {fingerprint(asked)[:8]}",
+                database=database,
+                query=query,
+                way=database,
+                protocol=condition.protocol,
             )
 
 

@@ -35,7 +35,7 @@ class ChangeTask(Task):
             jobs.mapped(drive, self.settings["spacing"], needs)
             for drive in (pair.way, pair.query)
         )
-        part = jobs.files.part("change", pair.name)
+        part = jobs.files.part("change", pair.key)
         return (jobs.add(part, measure_change, maps, needs, 2.0),)
 
     def numbers(self, found: Any, before: Any | None) -> Iterator[Number]:

@@ -86,7 +86,7 @@ class LocaliseTask(Task):
             *(pair.database.source, pair.query.source),
             *(named, texts, self._starts(self.settings["starts"]), spacing),
         )
-        part = jobs.files.part("localise", pair.name)
+        part = jobs.files.part("localise", pair.key)
         found = jobs.add(part, measure_localisation, arguments, cost=_COST)
         return (found,)
 

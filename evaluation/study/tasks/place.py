@@ -44,7 +44,7 @@ class PoseTask(Task):
 
     def measure(self, pair: Pair, jobs: Jobs) -> tuple[Part, ...]:
         needs: list[str] = []
-        radii = tuple(sorted(jobs.radii[pair.name]))
+        radii = tuple(sorted(jobs.radii[pair.key]))
         protocol = replace(pair.protocol, radius=radii[0])
         database, query = (
             jobs.described(drive, role, pair.protocol, needs)
@@ -53,7 +53,7 @@ class PoseTask(Task):
         others = jobs.elsewhere(pair, needs)
         # The task `place` reads the same files.
         if not (isinstance(database, tuple) and isinstance(query, tuple)):
-            part = jobs.files.part("place", pair.name)
+            part = jobs.files.part("place", pair.key)
             arguments = (
                 *(database, query, others, pair.distractors),
                 *(jobs.methods, protocol, radii),
@@ -61,7 +61,7 @@ class PoseTask(Task):
             return (jobs.add(part, measure_places, arguments, needs, _COST),)
         # Each method has a file, so that another method leaves it as it is.
         shown = MakePart(
-            jobs.files.part("overlaps", pair.name),
+            jobs.files.part("overlaps", pair.key),
             shown_overlaps,
             (
                 (database[0], query[0]),
@@ -71,7 +71,7 @@ class PoseTask(Task):
         )
         steps = [
             MakePart(
-                jobs.files.part("place", pair.name, choice.key),
+                jobs.files.part("place", pair.key, choice.key),
                 measure_method,
                 (
                     *(database[k], query[k]),
@@ -81,15 +81,18 @@ class PoseTask(Task):
             )
             for k, choice in enumerate(jobs.methods, start=1)
         ]
-        name = f"place {pair.name}"
+        name = f"place {pair.key}"
         whole = Steps(shown.part.path, (shown, *steps))
         jobs.jobs[name] = Job(name, whole, tuple(needs), _COST)
         return tuple(one.part for one in steps)
 
-    def found(self, parts: tuple[Part, ...], pair: Pair) -> Outcomes:
+    def found(self, pair: Pair) -> Outcomes:
         radius = pair.protocol.radius
         return [
-            one for part in parts for one in part.read() if one.radius == radius
+            one
+            for part in pair.parts[self.name]
+            for one in part.read()
+            if one.radius == radius
         ]
 
     def numbers(
@@ -128,7 +131,7 @@ class CostTask(Task):
             *(database[1:], query[1:], jobs.elsewhere(pair, needs)),
             *(pair.distractors, jobs.methods),
         )
-        part = jobs.files.part("cost", pair.name)
+        part = jobs.files.part("cost", pair.key)
         return (jobs.add(part, measure_costs, arguments, needs, _COSTS_COST),)
 
     def numbers(self, found: Any, before: Any | None) -> Iterator[Number]:

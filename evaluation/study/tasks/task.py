@@ -15,6 +15,7 @@ from cns_drake.base.value_lists import repeated
 from evaluation.recognition.description import Role
 from evaluation.recognition.place_outcome import Number
 from evaluation.recognition.protocol import RetrievalProtocol
+from evaluation.results.table import FRESH
 from evaluation.study.chosen_methods import MethodChoice
 from evaluation.study.measurements import DescribedSource
 from evaluation.study.parts import MakePart, Part, StudyFiles
@@ -49,11 +50,21 @@ class NamedDrive:
 
 @dataclass(frozen=True)
 class Pair:
-    """A database drive and a query drive that are measured together.
+    """Two drives that are measured under a condition of an experiment.
+
+    The first fields are those of the tables, the others say what is measured.
 
     Attributes:
-        name: name of the pair. Two pairs have the same name only if they are
-            equal but for the radius of a match.
+        map_name: name of the map.
+        names: names of the database drive and of the query drive in tables. All
+            conditions of the same two drives share them.
+        factors: name -> value of each factor of the condition.
+        seed: seed of everything that is random.
+        is_baseline: whether other conditions are compared with this one.
+        stated: protocol that the tables name: that of the experiment, before
+            the condition changes its queries.
+        key: name of the results. Two pairs have the same key only if the same
+            is measured, but for the radius of a match.
         database, query: the drives.
         way: drive along the query's route through the database's city, if there
             is one; otherwise the database drive. The change of the city
@@ -65,15 +76,33 @@ class Pair:
             because its condition changes the queries (turned, tilted or partly
             hidden) or adds distractors. A task whose results depend only on the
             drives then skips the pair if it has measured these drives before.
+        parts: task -> files of its result, for the tasks that measure the pair.
     """
 
-    name: str
+    map_name: str
+    names: tuple[str, str]
+    factors: Mapping[str, Any]
+    seed: int
+    is_baseline: bool
+    stated: RetrievalProtocol
+    key: str
     database: NamedDrive
     query: NamedDrive
     way: NamedDrive
     protocol: RetrievalProtocol
     distractors: int = 0
     may_repeat: bool = False
+    parts: dict[str, tuple[Part, ...]] = field(default_factory=dict)
+
+    @property
+    def place(self) -> tuple[object, ...]:
+        """Key of map, drives and protocol; each key has one baseline."""
+        fixed = [
+            (name, value)
+            for name, value in self.factors.items()
+            if name == FRESH or name.startswith("protocol.")
+        ]
+        return self.map_name, self.names, *fixed
 
     @property
     def closes_loops(self) -> bool:
@@ -102,7 +131,7 @@ class Jobs:
         jobs: name -> job.
         notes: note -> None, for each note on what is left out. A dictionary
             keeps the order and omits repetitions.
-        radii: name of a pair -> the greatest distances between a query and its
+        radii: key of a pair -> the greatest distances between a query and its
             match that are used for this pair [m].
     """
 
@@ -112,7 +141,7 @@ class Jobs:
     jobs: dict[str, Job] = field(default_factory=dict)
     notes: dict[str, None] = field(default_factory=dict)
     radii: dict[str, set[float]] = field(default_factory=dict)
-    # Description -> names of the pairs that need it.
+    # Description -> keys of the pairs that need it.
     _uses: dict[str, set[str]] = field(default_factory=dict)
 
     def expect(self, pair: Pair) -> None:
@@ -121,10 +150,10 @@ class Jobs:
         Register all pairs before you call `described`, which must know how many
         pairs need the descriptions of a drive.
         """
-        self.radii.setdefault(pair.name, set()).add(pair.protocol.radius)
+        self.radii.setdefault(pair.key, set()).add(pair.protocol.radius)
         for drive, role in pair.roles:
             name = _description_name(drive, role, pair.protocol)
-            self._uses.setdefault(name, set()).add(pair.name)
+            self._uses.setdefault(name, set()).add(pair.key)
 
     def described(
         self,
@@ -324,14 +353,9 @@ class Task(abc.ABC):
             not apply to the pair.
         """
 
-    def found(self, parts: tuple[Part, ...], pair: Pair) -> Any:
-        """Returns the task's result for a pair of drives.
-
-        Args:
-            parts: files that `measure` has returned for the pair.
-            pair: the pair.
-        """
-        (part,) = parts
+    def found(self, pair: Pair) -> Any:
+        """Returns the task's result for a pair of drives, which has it."""
+        (part,) = pair.parts[self.name]
         return part.read()
 
     @abc.abstractmethod
