@@ -8,9 +8,7 @@ from collections import defaultdict
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 import functools
-from importlib import resources
 import itertools
-import json
 from pathlib import Path
 from urllib.parse import quote
 
@@ -39,6 +37,12 @@ from evaluation.report.page_data import (
 from evaluation.report.reference import NO_REFERENCE, Reference
 from evaluation.results.charts import draw, styles
 from evaluation.results.drawing import save
+from evaluation.results.page_frame import (
+    PageSection,
+    environment,
+    framed,
+    read_asset,
+)
 from evaluation.results.table import OWN, STAGE, Results
 from evaluation.results.table_forms import (
     MISSING,
@@ -49,7 +53,7 @@ from evaluation.results.table_forms import (
     title,
 )
 
-_TEMPLATES = "page_template"
+_TITLE = "Structural change and place recognition"
 _MEDIA_TYPES = {"svg": "image/svg+xml", "webp": "image/webp"}
 # Name of a section -> its heading, in the order of the page.
 _SECTIONS = {
@@ -61,8 +65,9 @@ _SECTIONS = {
     "figures": "Figures",
     "browser": "Queries",
 }
-# Each script uses only those before it.
-_SCRIPTS = ("tables.js", "state.js", "pictures.js", "page.js")
+# The sections that are shown from the start.
+_OPEN = ("summary", "browser")
+_SCRIPTS = ("state.js", "pictures.js", "page.js")
 # Number of pieces of one colour in a drawn route.
 _NUM_PIECES = 48
 # Size of the marks of start and end, as a part of the picture.
@@ -297,23 +302,34 @@ def write_page(path: Path, report: Report) -> None:
         "figures": bool(illustrations["figures"]),
         "browser": bool(report.recognitions),
     }
-    text = _render(
-        "page.html",
+    values = {
         **_content(report, tables),
-        sections={
-            name: words
-            for name, words in _SECTIONS.items()
-            if has_section.get(name, True)
-        },
-        illustrations=illustrations,
-        survivals_by_pair=by_pair(report.survivals),
-        drives_of_maps=drives_of_maps,
-        other_forms=list(forms_of_table)[1:],
-        fault_kinds=FAULT_KINDS,
-        style=_read_asset("page.css"),
-        script=Markup("\n").join(map(_read_asset, _SCRIPTS)),
-        image_step=data["imageStep"] if data else 1,
-        data=_to_script(data),
+        "illustrations": illustrations,
+        "survivals_by_pair": by_pair(report.survivals),
+        "drives_of_maps": drives_of_maps,
+        "other_forms": list(forms_of_table)[1:],
+        "fault_kinds": FAULT_KINDS,
+        "image_step": data["imageStep"] if data else 1,
+    }
+    sections = [
+        PageSection(
+            name,
+            word,
+            Markup(_render(f"section_{name}.html", **values)),
+            is_open=name in _OPEN,
+        )
+        for name, word in _SECTIONS.items()
+        if has_section.get(name, True)
+    ]
+    text = framed(
+        _TITLE,
+        _TITLE,
+        Markup(_render("intro.html", **values)),
+        sections,
+        made_by=report.made_by,
+        style=read_asset(__package__, "page.css"),
+        scripts=[read_asset(__package__, name) for name in _SCRIPTS],
+        data=data,
     )
     write_text(path, text)
 
@@ -450,42 +466,26 @@ def _data_address(one: Illustration) -> str:
     return f"data:{_MEDIA_TYPES[one.page_kind]};base64,{data}"
 
 
-def _to_script(data: dict | None) -> Markup:
-    """Returns JSON that cannot end the script element around it."""
-    text = json.dumps(data, separators=(",", ":"), allow_nan=False)
-    return Markup(text.replace("<", "\\u003c"))
-
-
 def _render(name: str, /, **values: object) -> str:
     """Returns a template filled with values; HTML and SVG escape their text."""
     return _environment().get_template(name).render(values)
 
 
-def _read_asset(name: str) -> Markup:
-    """Returns a style sheet or a script unchanged."""
-    folder = resources.files(__package__) / _TEMPLATES
-    return Markup((folder / name).read_text("utf-8"))
-
-
 @functools.cache
 def _environment() -> jinja2.Environment:
-    found = jinja2.Environment(
-        loader=jinja2.PackageLoader(__package__, _TEMPLATES),
-        autoescape=jinja2.select_autoescape(["html", "svg"]),
-        trim_blocks=True,
-        lstrip_blocks=True,
-        undefined=jinja2.StrictUndefined,
+    found = environment(
+        __package__,
+        {
+            "captioned": _captioned,
+            "data_address": _data_address,
+            "interval_text": rows.interval_text,
+            "markdown": escape_markdown,
+            "method_title": title,
+            "percent": rows.percent,
+            "quoted": quote,
+            "route_picture": route_picture,
+        },
     )
-    found.filters |= {
-        "captioned": _captioned,
-        "data_address": _data_address,
-        "interval_text": rows.interval_text,
-        "markdown": escape_markdown,
-        "method_title": title,
-        "percent": rows.percent,
-        "quoted": quote,
-        "route_picture": route_picture,
-    }
     found.globals |= {
         "bar_length": round(_BAR_LENGTH),
         "missing": MISSING,

@@ -7,7 +7,6 @@ import re
 import tempfile
 from typing import Any
 
-import jinja2
 from markupsafe import Markup
 from matplotlib.markers import MarkerStyle
 import numpy as np
@@ -18,6 +17,7 @@ from cns_drake.base.files import make_folder, write_text
 from cns_drake.base.version import __version__
 from evaluation.results import charts as drawing
 from evaluation.results.drawing import save
+from evaluation.results.page_frame import PageSection, environment, framed
 from evaluation.results.ranges import check_all
 from evaluation.results.summaries import (
     CAUSE,
@@ -118,30 +118,59 @@ def write_page(
         for one in numbers:
             check_all(one.what, (one.value, one.low, one.high))
         write_csv(folder / _SUMMARIES, Summary._fields, numbers)
-    environment = jinja2.Environment(
-        loader=jinja2.FileSystemLoader(Path(__file__).parent),
-        autoescape=True,
-        undefined=jinja2.StrictUndefined,
-        trim_blocks=True,
-        lstrip_blocks=True,
-    )
-    environment.filters.update(shown=_shown, corners=_corners)
+    templates = environment(__package__, {"shown": _shown, "corners": _corners})
+
+    def section(
+        name: str, word: str, *, is_open: bool = False, **values: object
+    ) -> PageSection:
+        body = templates.get_template(f"{name}.html").render(values)
+        return PageSection(name, word, Markup(body), is_open)
+
     answers = queries.answers if queries else ()
-    text = environment.get_template("page.html").render(
-        title=title,
-        about=about,
-        headline=shown[0]["message"] if shown else title,
-        charts=shown,
-        summary=[_summary(results, task) for task in results.distinct("task")],
-        table=_wide_table(results),
-        numbers=numbers,
-        experiment_text=experiment_text,
+    table = _wide_table(results)
+    sections = [
+        section(
+            "means",
+            "Results",
+            is_open=True,
+            summary=[
+                _summary(results, task) for task in results.distinct("task")
+            ],
+        ),
+        section(
+            "conditions",
+            f"All {len(table['rows'])} conditions and methods",
+            table=table,
+        ),
+        section(
+            "made_by",
+            "Tables and experiment",
+            experiment_text=experiment_text,
+            queries=sum(len(one.columns["correct"]) for one in answers),
+        ),
+    ]
+    if numbers:
+        word = f"{len(numbers)} summaries"
+        sections.insert(1, section("summaries", word, numbers=numbers))
+    if shown:
+        charts_shown = section(
+            "charts",
+            "Charts",
+            is_open=True,
+            charts=shown,
+            wide=drawing.WIDE,
+            dashes=_DASHES,
+        )
+        sections.insert(0, charts_shown)
+    protocols = ", ".join(filter(None, results.distinct("protocol")))
+    about = f". {about}" if about else ""
+    text = framed(
+        title,
+        str(shown[0]["message"]) if shown else title,
+        Markup("<p><strong>{}</strong>{}</p>").format(title, about),
+        sections,
+        made_by=[f"cns-drake {__version__}", f"protocol: {protocols}"],
         notes=notes,
-        protocols=list(filter(None, results.distinct("protocol"))),
-        queries=sum(len(one.columns["correct"]) for one in answers),
-        version=__version__,
-        wide=drawing.WIDE,
-        dashes=_DASHES,
     )
     path = folder / "index.html"
     write_text(path, text)

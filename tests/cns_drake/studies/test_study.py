@@ -435,11 +435,11 @@ def test_the_sensor_of_a_place_is_no_change_of_the_city(
     jobs, measured = planned(wanted, tmp_path)
     for one in measured:
         way, query = (
-            one.pair.way.source.scenario,
-            one.pair.query.source.scenario,
+            one.way.source.scenario,
+            one.query.source.scenario,
         )
         same = one.factors["database.stage"] == "last"
-        assert (one.pair.way == one.pair.query) == same
+        assert (one.way == one.query) == same
         assert way.lidars == query.lidars
         assert way.stage == ("04" if same else "01")
         assert (way.route, way.aside) == (query.route, query.aside)
@@ -468,8 +468,7 @@ def test_pairs_of_maps_begin_with_the_first_drive(town, tmp_path):
     )
     (one,) = measured
     stages = [
-        drive.source.scenario.stage
-        for drive in (one.pair.database, one.pair.query)
+        drive.source.scenario.stage for drive in (one.database, one.query)
     ]
     assert (one.names, stages) == (("town_01", "town_04"), ["01", "04"])
 
@@ -865,13 +864,14 @@ def test_places_elsewhere_are_described_once(tmp_path):
     # query serve all sizes.
     assert 3 <= len(described) <= 4
     place = [job for name, job in jobs.items() if name.startswith("place ")]
-    assert [job.step.arguments[3] for job in place] == [0, 100, 300]
-    alone, *among = place
-    assert alone.step.arguments[2] == ()
-    assert len(among[-1].step.arguments[2]) == len(described) - 2
-    assert set(among[-1].needs) == set(described)
+    # The overlaps come first, then the one method.
+    steps = [job.step.steps[1] for job in place]
+    assert [step.arguments[3] for step in steps] == [0, 100, 300]
+    assert steps[0].arguments[2] == ()
+    assert len(steps[-1].arguments[2]) == len(described) - 2
+    assert set(place[-1].needs) == set(described)
 
 
 def test_fair_is_the_protocol_of_studies(town, tmp_path):
     _, (one,) = planned(experiment(town), tmp_path)
-    assert one.pair.protocol == FAIR_PROTOCOL
+    assert one.protocol == FAIR_PROTOCOL

@@ -493,7 +493,7 @@ def test_a_page_stands_alone(tmp_path):
     wanted = {link[1:] for link in page.links if link.startswith("#")}
     assert wanted <= set(page.ids)
     outside = {link for link in page.links if not link.startswith("#")}
-    assert outside == {"results.csv"}
+    assert outside == {"results.csv", "data:,"}
     assert "name: &lt;age&gt;" in text
     (note,) = told
     assert note.startswith(

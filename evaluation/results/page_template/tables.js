@@ -13,23 +13,25 @@ unfold(location.hash);
 addEventListener("beforeprint", () => document
   .querySelectorAll("details.part").forEach((part) => { part.open = true; }));
 
-/** Sorts by a column: numbers first, the greatest on top, then the least. */
+/** Sorts by a column: the greatest number on top, then the least.
+    Words come after numbers, and empty cells are last, both ways. */
 function sortBy(heading) {
   const body = heading.closest("table").tBodies[0];
   const down = heading.ariaSort !== "descending";
-  const key = (row) => {
-    const text = row.cells[heading.cellIndex].innerText;
-    const number = parseFloat(text);
-    return Number.isNaN(number) ? text : number;
-  };
-  const before = (a, b) => typeof a === typeof b
-    ? (a > b) - (a < b) : typeof a === "number" ? 1 : -1;
-  const rows = [...body.rows].sort((a, b) => before(key(a), key(b)));
-  body.replaceChildren(...(down ? rows.reverse() : rows));
+  const text = (row) => row.cells[heading.cellIndex].innerText.trim();
+  const kind = (value) => !value || value === "–" ? 2
+    : Number.isNaN(parseFloat(value)) ? 1 : 0;
+  const compare = (a, b) => kind(a) ? a.localeCompare(b)
+    : parseFloat(a) - parseFloat(b);
+  const order = (a, b) =>
+    kind(a) - kind(b) || (down ? -1 : 1) * compare(a, b);
+  body.replaceChildren(...[...body.rows].sort(
+    (one, other) => order(text(one), text(other))));
   for (const one of heading.parentElement.cells) one.ariaSort = null;
   heading.ariaSort = down ? "descending" : "ascending";
 }
-document.querySelectorAll(".table thead tr:last-child th, .board thead th")
+document.querySelectorAll(
+  ".table thead tr:last-child th, .board thead th, .sortable thead th")
   .forEach((heading) => {
     heading.tabIndex = 0;
     heading.addEventListener("click", () => sortBy(heading));

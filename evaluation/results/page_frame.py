@@ -1,0 +1,104 @@
+"""The frame of all pages: one style, sections to choose from, sorted tables.
+
+A page needs neither a network nor other files.
+"""
+
+from collections.abc import Callable, Iterable, Mapping
+from importlib import resources
+import json
+from typing import Any, NamedTuple
+
+import jinja2
+from markupsafe import Markup
+
+_PACKAGE = "evaluation.results"
+_TEMPLATES = "page_template"
+
+
+class PageSection(NamedTuple):
+    """A section of a page.
+
+    Attributes:
+        name: its identifier, to which links lead.
+        word: its name among the links at the top.
+        body: its contents as HTML.
+        is_open: whether it is shown from the start. Otherwise, it unfolds when
+            its name is clicked.
+    """
+
+    name: str
+    word: str
+    body: Markup
+    is_open: bool = False
+
+
+def framed(
+    title: str,
+    heading: str,
+    intro: Markup,
+    sections: Iterable[PageSection],
+    *,
+    made_by: Iterable[str] = (),
+    notes: Iterable[str] = (),
+    style: str = "",
+    scripts: Iterable[str] = (),
+    data: Mapping[str, Any] | None = None,
+) -> str:
+    """Returns a page as HTML.
+
+    Args:
+        title: title of the window.
+        heading: heading of the page.
+        intro: paragraphs below the heading, as HTML.
+        sections: its sections, in order.
+        made_by: what made the page, for its end.
+        notes: sentences on how it was made, for its end.
+        style: further style sheet.
+        scripts: further scripts. Each uses only those before it.
+        data: values for these scripts, as JSON in an element with the id
+            `data`.
+    """
+    scripts = list(scripts)
+    text = json.dumps(data, separators=(",", ":"), allow_nan=False)
+    return (
+        environment(_PACKAGE)
+        .get_template("frame.html")
+        .render(
+            title=title,
+            heading=heading,
+            intro=intro,
+            sections=list(sections),
+            made_by=list(made_by),
+            notes=list(notes),
+            style=Markup("\n").join([read_asset(_PACKAGE, "frame.css"), style]),
+            script=Markup("\n").join(
+                [read_asset(_PACKAGE, "tables.js"), *scripts]
+            ),
+            # JSON cannot end the script element around it.
+            data=Markup(text.replace("<", "\\u003c")) if scripts else None,
+        )
+    )
+
+
+def environment(
+    package: str, filters: Mapping[str, Callable[..., Any]] | None = None
+) -> jinja2.Environment:
+    """Returns the environment of a package's templates.
+
+    HTML and SVG escape their text.
+    """
+    found = jinja2.Environment(
+        loader=jinja2.PackageLoader(package, _TEMPLATES),
+        autoescape=jinja2.select_autoescape(["html", "svg"]),
+        trim_blocks=True,
+        lstrip_blocks=True,
+        undefined=jinja2.StrictUndefined,
+    )
+    found.filters |= dict(filters or {})
+    return found
+
+
+def read_asset(package: str, name: str) -> Markup:
+    """Returns a style sheet or a script of a package unchanged."""
+    folder = resources.files(package) / _TEMPLATES
+    return Markup((folder / name).read_text("utf-8"))
