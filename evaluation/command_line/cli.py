@@ -302,19 +302,18 @@ def pr(
         from evaluation.methods import MethodConfig
         from evaluation.results.table import QUERIES, RESULTS
         from evaluation.study.chosen_methods import method_settings
-        from evaluation.study.one_pair import pair_tables
+        from evaluation.study.one_pair import write_pair_tables
 
-        results, queries = pair_tables(
+        is_usual = sensor_height == MethodConfig().sensor_height
+        write_pair_tables(
+            output,
             outcome,
+            (database, query),
             query_drive,
             protocol,
             method_settings(parameter or [], [chosen.name])[chosen.name],
-            None
-            if sensor_height == MethodConfig().sensor_height
-            else sensor_height,
+            None if is_usual else sensor_height,
         )
-        results.write_csv(output / RESULTS)
-        queries.write_csv(output / QUERIES)
         terminal.note(f"wrote {output / RESULTS} and {QUERIES}")
     values = outcome.to_json(mode)
     values["parameters"] = chosen.config.model_dump(mode="json")

@@ -182,8 +182,9 @@ class Engine:
             choice, columns = self.methods[method]
             method = choice.name
             factors |= columns
+            # A text on the command line and a number in a file are the same.
             settings |= {
-                name: value
+                name: float(str(value))
                 for name, value in choice.settings
                 if name == "sensor_height"
             }

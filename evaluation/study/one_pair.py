@@ -1,68 +1,87 @@
-"""The two tables of one method on one pair of drives."""
+"""The two tables of one method on one pair of drives, which was measured."""
 
 from collections.abc import Mapping
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
 from cns_drake.base.drives.drive import Drive
 from cns_drake.base.errors import one_line
-from evaluation.recognition.place_outcome import (
-    PlaceOutcome,
-    place_numbers,
-    pose_numbers,
-)
+from evaluation.recognition.place_outcome import PlaceOutcome
 from evaluation.recognition.protocol import RetrievalProtocol
-from evaluation.results.table import (
-    SETTINGS,
-    Answers,
-    QueryRows,
-    Results,
-    Row,
-    made_by,
-)
+from evaluation.results.table import SETTINGS
+from evaluation.study.chosen_methods import MethodChoice, Setting
+from evaluation.study.engine import Engine
+from evaluation.study.surveys import RecordedDrive
+from evaluation.study.tasks.place import PlaceTask, PoseTask
+from evaluation.study.tasks.task import NamedDrive, Pair
 
 # Name of the experiment in tables of a single pair.
 _EXPERIMENT = "pr"
 
 
-def pair_tables(
+@dataclass(frozen=True)
+class _Held:
+    """A result that is in memory instead of in a file."""
+
+    value: Any
+
+    def read(self) -> Any:
+        return self.value
+
+
+def write_pair_tables(
+    output: Path,
     outcome: PlaceOutcome,
+    paths: tuple[Path, Path],
     query: Drive,
     protocol: RetrievalProtocol,
-    settings: Mapping[str, Any],
+    settings: Mapping[str, Setting],
     sensor_height: float | None = None,
-) -> tuple[Results, QueryRows]:
-    """Returns an outcome as tables, in the same form as those of studies.
+) -> None:
+    """Writes an outcome as `results.csv` and `queries.csv`.
 
     Args:
+        output: folder of the tables.
         outcome: the outcome.
+        paths: paths of the database and of the query.
         query: the drive of the queries.
         protocol: the protocol that was asked for.
         settings: name -> value of the settings of the method that were given.
         sensor_height: height of the LiDAR [m]; None for the methods' default.
+
+    Raises:
+        InputError: a table cannot be written.
     """
-    height = {} if sensor_height is None else {"sensor_height": sensor_height}
-    key: dict[str, Any] = {
-        "experiment": _EXPERIMENT,
-        "map": _map_of(query),
-        "database": outcome.database,
-        "query": outcome.query,
-        "seed": protocol.seed,
-        "factors": {
-            f"{SETTINGS}{outcome.method}.{name}": value
-            for name, value in settings.items()
-        },
-        "method": outcome.method,
-        "gate": outcome.is_gated,
-        **made_by(protocol, height),
-    }
-    rows = [
-        Row.of(number, **key, task=task)
-        for task, numbers in (("place", place_numbers), ("pose", pose_numbers))
-        for number in numbers(outcome, None)
-    ]
-    answers = Answers(**key, task="place", columns=outcome.columns)
-    return Results.of(rows), QueryRows.of([answers])
+    name = outcome.method
+    columns = {f"{SETTINGS}{name}.{key}": v for key, v in settings.items()}
+    if sensor_height is not None:
+        settings = {**settings, "sensor_height": str(sensor_height)}
+    choice = MethodChoice(name, settings=tuple(settings.items()))
+    tasks = {task.name: task({}, _EXPERIMENT) for task in (PlaceTask, PoseTask)}
+    names = outcome.database, outcome.query
+    database, asked = (
+        NamedDrive(one, RecordedDrive(path))
+        for one, path in zip(names, paths, strict=True)
+    )
+    engine = Engine(_EXPERIMENT, tasks, {name: (choice, columns)}, output)
+    engine.measured.append(
+        Pair(
+            map_name=_map_of(query),
+            names=names,
+            factors={},
+            seed=protocol.seed,
+            is_baseline=False,
+            stated=protocol,
+            key=" ".join(names),
+            database=database,
+            query=asked,
+            way=database,
+            protocol=protocol,
+            parts=dict.fromkeys(tasks, (_Held([outcome]),)),
+        )
+    )
+    engine.write_tables()
 
 
 def _map_of(drive: Drive) -> str:

@@ -47,7 +47,7 @@ from evaluation.study.repeats import Repeat, repeats_of
 from evaluation.study.surveys import Further, Survey
 from evaluation.study.tasks.change import ChangeTask
 from evaluation.study.tasks.place import PlaceTask, PoseTask
-from evaluation.study.tasks.task import Pair, Task
+from evaluation.study.tasks.task import Pair, Result, Task
 
 # Expected seconds to measure costs, and to compare two drives by a method.
 _COSTS_COST = 5.0
@@ -390,7 +390,7 @@ class _CityReport:
         return jobs
 
     def _outcomes(
-        self, pair: Recordings, parts: Iterable[Part]
+        self, pair: Recordings, parts: Iterable[Result]
     ) -> list[PlaceOutcome]:
         """Returns outcomes with the names and the gate that the page shows.
 

@@ -4,7 +4,7 @@ import abc
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any, ClassVar, TypeAlias
+from typing import Any, ClassVar, Protocol, TypeAlias
 
 import numpy as np
 
@@ -48,6 +48,17 @@ class NamedDrive:
     needs: tuple[str, ...] = ()
 
 
+class Result(Protocol):
+    """The result of a job, such as a `Part`."""
+
+    def read(self) -> Any:
+        """Returns the result.
+
+        Raises:
+            InputError: it cannot be read.
+        """
+
+
 @dataclass(frozen=True)
 class Pair:
     """Two drives that are measured under a condition of an experiment.
@@ -76,7 +87,8 @@ class Pair:
             because its condition changes the queries (turned, tilted or partly
             hidden) or adds distractors. A task whose results depend only on the
             drives then skips the pair if it has measured these drives before.
-        parts: task -> files of its result, for the tasks that measure the pair.
+        parts: task -> its results, as files or in memory, for the tasks that
+            measure the pair.
     """
 
     map_name: str
@@ -92,7 +104,7 @@ class Pair:
     protocol: RetrievalProtocol
     distractors: int = 0
     may_repeat: bool = False
-    parts: dict[str, tuple[Part, ...]] = field(default_factory=dict)
+    parts: dict[str, tuple[Result, ...]] = field(default_factory=dict)
 
     @property
     def place(self) -> tuple[object, ...]:
