@@ -26,7 +26,7 @@ from evaluation.recognition.costs import Cost
 from evaluation.recognition.fault_kinds import FAULT_KINDS, PairEvidence
 from evaluation.recognition.metrics import MODES, Mode
 from evaluation.recognition.place_outcome import PlaceOutcome
-from evaluation.report import result_tables, rows
+from evaluation.report import conclusions, result_tables
 from evaluation.report.figures import ROUTE_COLOURS
 from evaluation.report.page_data import (
     Illustration,
@@ -114,7 +114,7 @@ class Report:
 
     results: Results = field(default_factory=lambda: Results((), ()))
     changes: list[ChangeResult] = field(default_factory=list)
-    pairs: list[rows.Controlled] = field(default_factory=list)
+    pairs: list[conclusions.Controlled] = field(default_factory=list)
     recognitions: list[PlaceOutcome] = field(default_factory=list)
     differences: Sequence[result_tables.MethodDifference] = ()
     evidence: dict[tuple[str, str], PairEvidence] = field(default_factory=dict)
@@ -129,7 +129,7 @@ class Report:
     repeated: list[PlaceOutcome] = field(default_factory=list)
 
     @functools.cached_property
-    def survivals(self) -> list[rows.Survival]:
+    def survivals(self) -> list[conclusions.Survival]:
         """How much of its AUC each method keeps under change, on each pair."""
         stages = {
             name: stage
@@ -140,7 +140,7 @@ class Report:
                 strict=True,
             )
         }
-        return rows.survivals(self.results.rows, stages)
+        return conclusions.survivals(self.results.rows, stages)
 
     @property
     def compared(self) -> list[PlaceOutcome]:
@@ -236,12 +236,12 @@ def _write_tables(
     # Evidence is of the queries that the other results got wrong.
     again = result_tables.query_table(report.repeated, report.tracks, {})
     numbers = {
-        "survival": rows.survival_numbers(report.survivals),
+        "survival": conclusions.survival_numbers(report.survivals),
         "tcr": result_tables.change_table(
             report.changes, report.reference, report.evidence
         ),
         "place_recognition": result_tables.audit_table(every, report.reference),
-        "poses": result_tables.pose_numbers(results),
+        "poses": result_tables.pose_error_numbers(results),
         "metrics": result_tables.metric_numbers(every),
         "differences": result_tables.difference_numbers(report.differences),
         "why": result_tables.fault_numbers(results, report.evidence),
@@ -347,7 +347,7 @@ def _shown_tables(report: Report) -> dict[str, list[Table]]:
         report.changes, report.reference, report.evidence
     )
     return {
-        "survival": [rows.survival_table(report.survivals)],
+        "survival": [conclusions.survival_table(report.survivals)],
         "tcr": [changes.without_empty("paper")],
         "place_recognition": [
             result_tables.recognition_table(
@@ -371,18 +371,20 @@ def _content(
     report: Report, tables: Mapping[str, Sequence[Table]]
 ) -> dict[str, object]:
     """Returns the values for the templates of the text and of the page."""
-    ranked, headline = rows.ranked_methods(report.results, report.differences)
+    ranked, headline = conclusions.ranked_methods(
+        report.results, report.differences
+    )
     return {
         "report": report,
         "tables": tables,
         "ranked": ranked,
-        "beside": rows.beside(report.results),
+        "beside": conclusions.beside(report.results),
         "styles": styles(in_table_order(one.method for one in ranked)),
         "headline": headline if report.pairs else "",
         "judgements": report.reference.judge(
             [*report.recognitions, *report.repeated], report.changes
         ),
-        "survival_summary": rows.survival_summary(report.survivals),
+        "survival_summary": conclusions.survival_summary(report.survivals),
     }
 
 
@@ -478,10 +480,10 @@ def _environment() -> jinja2.Environment:
         {
             "captioned": _captioned,
             "data_address": _data_address,
-            "interval_text": rows.interval_text,
+            "interval_text": conclusions.interval_text,
             "markdown": escape_markdown,
             "method_title": title,
-            "percent": rows.percent,
+            "percent": conclusions.percent,
             "quoted": quote,
             "route_picture": route_picture,
         },
@@ -489,7 +491,7 @@ def _environment() -> jinja2.Environment:
     found.globals |= {
         "bar_length": round(_BAR_LENGTH),
         "missing": MISSING,
-        "no_control": rows.NO_CONTROL,
+        "no_control": conclusions.NO_CONTROL,
         "route_colours": _route_colours(),
     }
     return found

@@ -451,7 +451,7 @@ def pose_table(results: Sequence[PlaceOutcome]) -> Table:
     )
 
 
-def pose_numbers(results: Sequence[PlaceOutcome]) -> Table:
+def pose_error_numbers(results: Sequence[PlaceOutcome]) -> Table:
     """Returns a table of the errors of estimated poses, for `poses.csv`."""
     return Table.of(
         results,

@@ -11,13 +11,13 @@ import numpy as np
 import pytest
 
 from evaluation.recognition.fault_kinds import FAULT_KINDS
+from evaluation.report.conclusions import beside, ranked_methods
 from evaluation.report.page import route_picture, write_page
 from evaluation.report.page_data import browser_data
 from evaluation.report.result_tables import (
     MethodDifference,
     recognition_table,
 )
-from evaluation.report.rows import beside, ranked_methods
 from evaluation.results.table import LAST, OWN, STAGE, Results, Row
 
 PAIR = ("metropolis", "01", "04")

@@ -3,13 +3,13 @@ import math
 from helpers.small_page import make_content
 import pytest
 
-from evaluation.report.page import Report, write_page
-from evaluation.report.rows import (
+from evaluation.report.conclusions import (
     survival_numbers,
     survival_summary,
     survival_table,
     survivals,
 )
+from evaluation.report.page import Report, write_page
 from evaluation.results.table import Row
 
 STAGES = {f"town_{number:02d}": f"{number:02d}" for number in range(4)}

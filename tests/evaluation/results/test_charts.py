@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 
 from cns_drake.base.errors import InputError
-from evaluation.report.rows import Survival, survival_summary
+from evaluation.report.conclusions import Survival, survival_summary
 from evaluation.results import charts
 from evaluation.results import page as page_module
 from evaluation.results.drawing import save

@@ -1,10 +1,9 @@
-"""The numbers of a report as rows of a table, and conclusions from them.
+"""Conclusions from the table of results: the ranking, and what survives.
 
-The conclusions are the ranking of the methods, and the share of its result that
-each method keeps under structural change. Each pair of drives can have a
-control: the same two routes, both driven in one stage of the city. What a
-method loses from the control to the pair is therefore due to the change alone,
-and not to the routes.
+What survives is the share of its result that a method keeps under structural
+change. Each pair of drives can have a control: the same two routes,
+both driven in one stage of the city. What a method loses from the control to
+the pair is therefore due to the change alone, and not to the routes.
 """
 
 from collections import Counter
@@ -24,8 +23,6 @@ from evaluation.results.table import (
     Row,
 )
 
-EXPERIMENT = "stages"
-_SEED = 1
 NO_CONTROL = "no control"
 # A result, and that of its control, if there is one.
 Controlled = tuple[PlaceOutcome, PlaceOutcome | None]
@@ -155,7 +152,7 @@ def survivals(rows: Iterable[Row], stages: Mapping[str, str]) -> list[Survival]:
     """Pairs the results with and without a change of the city.
 
     Args:
-        rows: rows of `place_rows`: pairs of drives and their controls.
+        rows: rows of pairs of drives, and of their controls.
         stages: name of a drive -> its stage.
 
     Returns:
