@@ -53,6 +53,7 @@ from evaluation.results.table_forms import (
     title,
 )
 
+_TEMPLATES = "page_template"
 _TITLE = "Structural change and place recognition"
 _MEDIA_TYPES = {"svg": "image/svg+xml", "webp": "image/webp"}
 # Name of a section -> its heading, in the order of the page.
@@ -327,8 +328,10 @@ def write_page(path: Path, report: Report) -> None:
         Markup(_render("intro.html", **values)),
         sections,
         made_by=report.made_by,
-        style=read_asset(__package__, "page.css"),
-        scripts=[read_asset(__package__, name) for name in _SCRIPTS],
+        style=read_asset(__package__, _TEMPLATES, "page.css"),
+        scripts=[
+            read_asset(__package__, _TEMPLATES, name) for name in _SCRIPTS
+        ],
         data=data,
     )
     write_text(path, text)
@@ -477,6 +480,7 @@ def _render(name: str, /, **values: object) -> str:
 def _environment() -> jinja2.Environment:
     found = environment(
         __package__,
+        _TEMPLATES,
         {
             "captioned": _captioned,
             "data_address": _data_address,

@@ -39,6 +39,7 @@ _TASKS = {
     "cost": "Costs",
 }
 _SUMMARIES = "summaries.csv"
+_TEMPLATES = "page_template"
 # Task -> the metrics of its summary, the headline first.
 _HEADLINES = {
     "place": ("auc", "auc_strict", "r1", "kept", "kept_strict"),
@@ -118,7 +119,9 @@ def write_page(
         for one in numbers:
             check_all(one.what, (one.value, one.low, one.high))
         write_csv(folder / _SUMMARIES, Summary._fields, numbers)
-    templates = environment(__package__, {"shown": _shown, "corners": _corners})
+    templates = environment(
+        __package__, _TEMPLATES, {"shown": _shown, "corners": _corners}
+    )
 
     def section(
         name: str, word: str, *, is_open: bool = False, **values: object

@@ -11,8 +11,8 @@ from typing import Any, NamedTuple
 import jinja2
 from markupsafe import Markup
 
-_PACKAGE = "evaluation.results"
-_TEMPLATES = "page_template"
+# Package and folder of the templates of all pages.
+_FRAME = ("evaluation.results", "page_template")
 
 
 class PageSection(NamedTuple):
@@ -61,7 +61,7 @@ def framed(
     scripts = list(scripts)
     text = json.dumps(data, separators=(",", ":"), allow_nan=False)
     return (
-        environment(_PACKAGE)
+        environment(*_FRAME)
         .get_template("frame.html")
         .render(
             title=title,
@@ -70,9 +70,9 @@ def framed(
             sections=list(sections),
             made_by=list(made_by),
             notes=list(notes),
-            style=Markup("\n").join([read_asset(_PACKAGE, "frame.css"), style]),
+            style=Markup("\n").join([read_asset(*_FRAME, "frame.css"), style]),
             script=Markup("\n").join(
-                [read_asset(_PACKAGE, "tables.js"), *scripts]
+                [read_asset(*_FRAME, "tables.js"), *scripts]
             ),
             # JSON cannot end the script element around it.
             data=Markup(text.replace("<", "\\u003c")) if scripts else None,
@@ -81,14 +81,16 @@ def framed(
 
 
 def environment(
-    package: str, filters: Mapping[str, Callable[..., Any]] | None = None
+    package: str,
+    folder: str,
+    filters: Mapping[str, Callable[..., Any]] | None = None,
 ) -> jinja2.Environment:
-    """Returns the environment of a package's templates.
+    """Returns the environment of the templates in a folder of a package.
 
     HTML and SVG escape their text.
     """
     found = jinja2.Environment(
-        loader=jinja2.PackageLoader(package, _TEMPLATES),
+        loader=jinja2.PackageLoader(package, folder),
         autoescape=jinja2.select_autoescape(["html", "svg"]),
         trim_blocks=True,
         lstrip_blocks=True,
@@ -98,7 +100,7 @@ def environment(
     return found
 
 
-def read_asset(package: str, name: str) -> Markup:
-    """Returns a style sheet or a script of a package unchanged."""
-    folder = resources.files(package) / _TEMPLATES
-    return Markup((folder / name).read_text("utf-8"))
+def read_asset(package: str, folder: str, name: str) -> Markup:
+    """Returns a style sheet or a script in a folder of a package unchanged."""
+    path = resources.files(package) / folder / name
+    return Markup(path.read_text("utf-8"))
