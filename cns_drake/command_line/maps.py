@@ -399,7 +399,8 @@ def maps_and_years(
     Raises:
         InputError: a word begins like an option.
     """
-    maps, years = [], list(first)
+    maps = []
+    years = list(first)
     for word in words:
         if word.removeprefix("-").isdecimal():
             years.append(whole_number(word, "--years"))

@@ -52,8 +52,10 @@ _LISTS: Mapping[str, tuple[type, ...]] = {
     "xyz": (int, float),
     "rpy_deg": (int, float),
 }
-# Factors of experiments with cases: the name of the case, and its level.
-CAUSE, LEVEL = "cause", "level"
+# Factor of experiments with cases: the name of the case.
+CAUSE = "cause"
+# Factor of experiments with cases: the level of the case.
+LEVEL = "level"
 NO_CAUSE = "none"
 _MOST_CONDITIONS = 20_000
 

@@ -47,7 +47,8 @@ def plan_pictures(folder: Path, pictures: Path) -> list[Job]:
             a street in the first and the last stage.
     """
     # Workers may run elsewhere.
-    source, pictures = MapFolder(folder.resolve()), pictures.absolute()
+    source = MapFolder(folder.resolve())
+    pictures = pictures.absolute()
     drives = tuple(
         _ShownDrive(load_scenario(file)) for file in source.recordable_drives()
     )

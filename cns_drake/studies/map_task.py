@@ -62,8 +62,10 @@ class MapTask(Task):
                 note = "m3c2 is left out: it needs the extra map-update"
                 jobs.notes[note] = None
         arguments = (
-            *(pair.database.source, pair.query.source),
-            *(tuple(methods), float(self.settings["spacing"])),
+            pair.database.source,
+            pair.query.source,
+            tuple(methods),
+            float(self.settings["spacing"]),
         )
         part = jobs.files.part("map", pair.key)
         return (jobs.add(part, measure_maps, arguments, cost=_COST),)

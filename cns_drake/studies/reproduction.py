@@ -30,11 +30,13 @@ from evaluation.study.chosen_methods import choose_methods
 from evaluation.study.collection import RecordingInfo
 from evaluation.study.plan import Study
 
-# Mean sizes of a page, and of a frame of a drive: in the recording, and in the
-# report's folder, in the end and while the report is made [bytes].
+# Mean size of a page.
 _PAGE_BYTES = 18e6
+# Mean size of a frame in a recording.
 _RECORDED_BYTES = 170e3
+# Mean size of a frame in the report's folder, in the end.
 _KEPT_BYTES = 18e3
+# Mean size of a frame in the report's folder while the report is made.
 _SPENT_BYTES = 50e3
 
 

@@ -84,14 +84,24 @@ from evaluation.study.tasks.task import Jobs, NamedDrive, Pair, Task
 TASKS: Mapping[str, type[Task]] = {
     task.name: task
     for task in (
-        *(PlaceTask, PoseTask, LocaliseTask),
-        *(MapTask, ChangeTask, CostTask),
+        PlaceTask,
+        PoseTask,
+        LocaliseTask,
+        MapTask,
+        ChangeTask,
+        CostTask,
     )
 }
 # Tables that earlier versions wrote.
 _FORMER = (
-    *("ladder.csv", "years.csv", "lifetimes.csv", "size.csv", "trend.csv"),
-    *("map_pairs.csv", "map_update.csv", "localisation.csv"),
+    "ladder.csv",
+    "years.csv",
+    "lifetimes.csv",
+    "size.csv",
+    "trend.csv",
+    "map_pairs.csv",
+    "map_update.csv",
+    "localisation.csv",
 )
 
 

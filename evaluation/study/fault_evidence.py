@@ -31,9 +31,9 @@ from evaluation.study.surveys import KeptDrive
 
 # Points at least this high above the ground count as standing [m].
 _STANDING = 0.5
-# Edge of the cells in which a scan keeps one point for alignment, and the
-# greatest distance of two points that coincide [m].
+# Edge of the cells in which a scan keeps one point for alignment [m].
 _CELL = 0.5
+# Greatest distance of two points that coincide [m].
 _COINCIDENT = 1.0
 
 

@@ -50,7 +50,10 @@ def draw_city(
         Drive -> what the page shows of it. If a drive is recorded, this
         includes the images of its camera.
     """
-    names, views, routes, drives = [], [], [], {}
+    names = []
+    views = []
+    routes = []
+    drives = {}
     for done, (name, surveyed, fine, source) in enumerate(stages):
         doing("drawing the maps", done, len(stages), "drives")
         drive = surveyed.read()

@@ -35,9 +35,9 @@ from evaluation.study.surveys import (
 # each method.
 DescribedSource: TypeAlias = "DriveSource | tuple[Part, ...]"
 
-# Queries whose time is measured, and the longest time for all queries at a size
-# [ms].
+# Number of queries whose time is measured.
 TIMED = 9
+# Longest time for all queries at a size.
 _LONGEST_MS = 3.6e6
 # Places that no method is known to take so long for.
 _MANY = 5000
@@ -229,10 +229,9 @@ def _compare(
             and the matches (Q, D) within it.
         reporter: reports notes.
     """
-    (choice, method), (searched, drives), (protocol, radii) = (
-        *(chosen, database),
-        asked,
-    )
+    choice, method = chosen
+    searched, drives = database
+    protocol, radii = asked
     if len(searched.places.frames) > _MANY and _takes_long(
         method, searched, query
     ):

@@ -38,7 +38,8 @@ def measure_method_costs(
             the query.
         protocol: protocol of the comparison.
     """
-    drive, known = source(), surveyed.read()
+    drive = source()
+    known = surveyed.read()
     # A recording would be unpacked as a whole for its poses.
     drive = MovedDrive(drive, known.X_WS, drive.world_frame, drive.datum)
     costs = []

@@ -49,8 +49,9 @@ from evaluation.study.tasks.change import ChangeTask
 from evaluation.study.tasks.place import PlaceTask, PoseTask
 from evaluation.study.tasks.task import Pair, Result, Task
 
-# Expected seconds to measure costs, and to compare two drives by a method.
+# Expected time to measure costs [s].
 _COSTS_COST = 5.0
+# Expected time to compare two drives by a method [s].
 _RECOGNITION_COST = 3.5
 # The experiment whose rows a report writes, its tasks and its seed.
 _EXPERIMENT = "stages"
@@ -156,7 +157,8 @@ class Study:
             (places.described(one.key), queries.described(one.key))
             for one in self.methods
         )
-        source, drive = pair[1].source, queries.drive
+        source = pair[1].source
+        drive = queries.drive
         step = MakePart(
             self.files.part("costs", "costs"),
             measure_method_costs,
@@ -260,7 +262,9 @@ class _CityReport:
 
     def __init__(self, study: Study, city: City):
         """Adds the pairs of the city to the engine of the study."""
-        self._study, self._city, self._files = study, city, study.files
+        self._study = study
+        self._city = city
+        self._files = study.files
         protocol = study.protocol
         with_itself = protocol.exclude_recent is not None
         self._pairs = city.recognition_pairs(with_itself=with_itself)
@@ -340,7 +344,8 @@ class _CityReport:
 
     def _jobs_of(self, pair: Recordings) -> list[Job]:
         """Returns the jobs that explain a pair and repeat published runs."""
-        own, protocol = self._own(pair), self._study.protocol
+        own = self._own(pair)
+        protocol = self._study.protocol
         assert own is not None
         surveys = [self._files.survey(one.name) for one in pair]
         names = own.names
@@ -372,8 +377,12 @@ class _CityReport:
                 (
                     surveys[0].described(one.places),
                     surveys[1].described(one.queries),
-                    *((), 0),
-                    *(one.method, None, one.protocol, (one.protocol.radius,)),
+                    (),
+                    0,
+                    one.method,
+                    None,
+                    one.protocol,
+                    (one.protocol.radius,),
                 ),
             )
             for one in self._repeats.get(names, ())

@@ -435,7 +435,9 @@ class Survey(Step):
             if self.files.described(key) in missing
         }
         arguments = (
-            *(self.source(), self.roles, asked),
+            self.source(),
+            self.roles,
+            asked,
             self.protocol,
         )
         if self.with_map:

@@ -83,8 +83,12 @@ class LocaliseTask(Task):
         )
         spacing = self.settings["spacing"] or pair.protocol.query_spacing
         arguments = (
-            *(pair.database.source, pair.query.source),
-            *(named, texts, self._starts(self.settings["starts"]), spacing),
+            pair.database.source,
+            pair.query.source,
+            named,
+            texts,
+            self._starts(self.settings["starts"]),
+            spacing,
         )
         part = jobs.files.part("localise", pair.key)
         found = jobs.add(part, measure_localisation, arguments, cost=_COST)
@@ -149,7 +153,8 @@ def measure_localisation(
         record of `evaluation.localisation.localise.QUERY` per query. If no
         query is near the map, the list is empty.
     """
-    mapped, asked = database(), query()
+    mapped = database()
+    asked = query()
     maps: dict[tuple[float, int], estimators.LocalisationMap] = {}
     localisers = []
     for method in methods:

@@ -25,9 +25,10 @@ from evaluation.study.measurements import (
 from evaluation.study.parts import MakePart, Part
 from evaluation.study.tasks.task import Answered, Jobs, Pair, Task
 
-# Expected seconds to describe a pair and to compare it by all methods, and to
-# measure their costs.
-_COST, _COSTS_COST = 60.0, 30.0
+# Expected time to describe a pair and to compare it by all methods [s].
+_PLACES_COST = 60.0
+# Expected time to measure the costs of the methods [s].
+_COSTS_COST = 30.0
 
 Outcomes = Sequence[PlaceOutcome]
 
@@ -55,10 +56,17 @@ class PoseTask(Task):
         if not (isinstance(database, tuple) and isinstance(query, tuple)):
             part = jobs.files.part("place", pair.key)
             arguments = (
-                *(database, query, others, pair.distractors),
-                *(jobs.methods, protocol, radii),
+                database,
+                query,
+                others,
+                pair.distractors,
+                jobs.methods,
+                protocol,
+                radii,
             )
-            return (jobs.add(part, measure_places, arguments, needs, _COST),)
+            return (
+                jobs.add(part, measure_places, arguments, needs, _PLACES_COST),
+            )
         # Each method has a file, so that another method leaves it as it is.
         shown = MakePart(
             jobs.files.part("overlaps", pair.key),
@@ -66,7 +74,9 @@ class PoseTask(Task):
             (
                 (database[0], query[0]),
                 (database[1], query[1]),
-                *(jobs.methods[0], protocol, radii),
+                jobs.methods[0],
+                protocol,
+                radii,
             ),
         )
         steps = [
@@ -74,16 +84,21 @@ class PoseTask(Task):
                 jobs.files.part("place", pair.key, choice.key),
                 measure_method,
                 (
-                    *(database[k], query[k]),
+                    database[k],
+                    query[k],
                     tuple(parts[k - 1] for parts in others),
-                    *(pair.distractors, choice, shown.part, protocol, radii),
+                    pair.distractors,
+                    choice,
+                    shown.part,
+                    protocol,
+                    radii,
                 ),
             )
             for k, choice in enumerate(jobs.methods, start=1)
         ]
         name = f"place {pair.key}"
         whole = Steps(shown.part.path, (shown, *steps))
-        jobs.jobs[name] = Job(name, whole, tuple(needs), _COST)
+        jobs.jobs[name] = Job(name, whole, tuple(needs), _PLACES_COST)
         return tuple(one.part for one in steps)
 
     def found(self, pair: Pair) -> Outcomes:
@@ -128,8 +143,11 @@ class CostTask(Task):
         assert isinstance(database, tuple)
         assert isinstance(query, tuple)
         arguments = (
-            *(database[1:], query[1:], jobs.elsewhere(pair, needs)),
-            *(pair.distractors, jobs.methods),
+            database[1:],
+            query[1:],
+            jobs.elsewhere(pair, needs),
+            pair.distractors,
+            jobs.methods,
         )
         part = jobs.files.part("cost", pair.key)
         return (jobs.add(part, measure_costs, arguments, needs, _COSTS_COST),)

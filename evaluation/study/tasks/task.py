@@ -21,10 +21,12 @@ from evaluation.study.measurements import DescribedSource
 from evaluation.study.parts import MakePart, Part, StudyFiles
 from evaluation.study.surveys import DriveSource, Survey, map_city
 
-# Expected seconds to describe a drive by all methods.
+# Expected time to describe a drive by all methods [s].
 _DESCRIPTION_COST = 30.0
-# The same to map a drive with each of its scans, and for other work.
-_MAP_COST, _COST = 60.0, 20.0
+# Expected time to map a drive with each of its scans [s].
+_MAP_COST = 60.0
+# Expected time of other work [s].
+_OTHER_COST = 20.0
 
 
 # A method, whether its gate was used, and its answers to Q queries: column -> Q
@@ -227,7 +229,7 @@ class Jobs:
         name = drive.name if spacing is None else f"{drive.name} {spacing:g}"
         part = self.files.part("mapped", name)
         needs.append(f"mapped {part.path.stem}")
-        cost = _MAP_COST if spacing is None else _COST
+        cost = _MAP_COST if spacing is None else _OTHER_COST
         arguments = (drive.source, spacing)
         return self.add(part, map_city, arguments, drive.needs, cost)
 
@@ -264,7 +266,7 @@ class Jobs:
         function: Callable[..., object],
         arguments: tuple[object, ...],
         needs: Iterable[str] = (),
-        cost: float = _COST,
+        cost: float = _OTHER_COST,
     ) -> Part:
         """Adds a job that writes a file of results; returns the file.
 
