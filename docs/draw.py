@@ -217,7 +217,7 @@ def outside_shares() -> dict[str, dict[tuple[str, str], float]]:
     found: dict[str, dict[tuple[str, str], float]] = {}
     for city, after, column in (
         ("Metropolis", "### Metropolis", 2),
-        ("Suburbia", "tilted but not turned:", 4),
+        ("Suburbia", "without random yaw:", 4),
     ):
         _, *rows = _table("docs/notes/published_networks.md", after)
         for name, *cells in rows:

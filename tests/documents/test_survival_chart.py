@@ -165,7 +165,7 @@ def test_the_readme_says_how_networks_of_others_do():
     networks = [*shares["SVT-Net"].values(), *shares["DPA-Net"].values()]
     assert len(networks) == 6
     text = " ".join(documents.read("README.md").text.split())
-    assert f"keep at most {100.0 * max(networks):.0f} % of this" in text
+    assert f"retain at most {100.0 * max(networks):.0f} % of this" in text
     assert min(min(one.values()) for one in shares.values()) in networks
     # The methods that the title counts are named in the text.
     assert "layered overlap and the learned method" in text
