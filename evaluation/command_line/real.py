@@ -1,5 +1,6 @@
 """The command `real`."""
 
+from dataclasses import replace
 from pathlib import Path
 from typing import Annotated
 
@@ -39,17 +40,17 @@ def real(
     """
     from cns_drake.base.files import make_folder
     from evaluation.real.measuring import Measuring
-    from evaluation.results.table import QUERIES, RESULTS
+    from evaluation.results.table import RESULTS
     from evaluation.study.chosen_methods import with_standard
 
     measuring = Measuring(with_standard(method or ()), terminal.note)
     make_folder(output)
     measuring.run(folder, simulated)
-    if not measuring.rows:
+    results, _ = measuring.engine.tables()
+    if not results.rows:
         raise InputError(
             f"{folder}: no data set that these methods can measure; the notes"
             " say why"
         )
-    measuring.queries().write_csv(output / QUERIES)
-    measuring.results().write_csv(output / RESULTS)
+    replace(measuring.engine, output=output).write_tables()
     print(output / RESULTS)

@@ -9,8 +9,8 @@ from a random start, in a map of the scans around it. A classifier (see
 of the same model of LiDAR.
 """
 
-from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import replace
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, replace
 import importlib.util
 import math
 from pathlib import Path
@@ -42,25 +42,20 @@ from evaluation.recognition.description import (
     joined_scans,
 )
 from evaluation.recognition.overlap_truth import best_overlaps
-from evaluation.recognition.place_outcome import (
-    Number,
-    PlaceOutcome,
-    place_numbers,
-    pose_numbers,
-)
+from evaluation.recognition.place_outcome import Number, PlaceOutcome
 from evaluation.recognition.protocol import FAIR_PROTOCOL, RetrievalProtocol
 from evaluation.recognition.retrieval import compare_with_gates
-from evaluation.results.table import (
-    Answers,
-    QueryRows,
-    Results,
-    Row,
-    made_by,
-)
+from evaluation.study.engine import Engine
+from evaluation.study.parts import Part
+from evaluation.study.tasks.localise import LocaliseTask
+from evaluation.study.tasks.place import PlaceTask, PoseTask
+from evaluation.study.tasks.task import Held, Jobs, NamedDrive, Pair, Task
 
 _SIMULATED = replace(FAIR_PROTOCOL, scans_per_place=1)
 # Every real scan is a query and a place.
 _REAL = replace(_SIMULATED, query_spacing=1e-6, place_spacing=1e-6)
+# Name of the experiment.
+_NAME = "real"
 # The default starts of a study [m, deg].
 _STARTS = localise.Starts(2.0, 10.0)
 # Scans within this distance make the map of a query [m].
@@ -96,8 +91,7 @@ class Measuring:
     from simulated scans.
 
     Attributes:
-        rows: the results.
-        answers: the results for each query.
+        engine: makes the tables of what has been measured.
     """
 
     def __init__(self, names: Sequence[str], on_note: OnNote):
@@ -113,8 +107,6 @@ class Measuring:
             InputError: a method is not known, its file cannot be used, or two
                 estimators have one name.
         """
-        self.rows: list[Row] = []
-        self.answers: list[Answers] = []
         self._note = on_note
         chosen = names or (*shipped_methods(), *_ESTIMATORS)
         aligning = {
@@ -142,6 +134,13 @@ class Measuring:
                 "--method: two registration methods have one name:"
                 f" {', '.join(aligning)}"
             )
+        tasks: list[Task] = [PlaceTask({}, _NAME), PoseTask({}, _NAME)]
+        if aligning:
+            tasks.append(LocaliseTask({"methods": list(aligning)}, _NAME))
+        tasks.append(JudgeTask({}, _NAME))
+        self.engine = Engine(
+            _NAME, {one.name: one for one in tasks}, {}, Path()
+        )
 
     def _made_for(self, height: float) -> list[Method]:
         """Returns the methods for a height of the LiDAR [m]."""
@@ -177,39 +176,29 @@ class Measuring:
             if not made:
                 self._note(f"{unit}: no simulated scan of it to judge")
 
-    def results(self) -> Results:
-        return Results.of(self.rows)
-
-    def queries(self) -> QueryRows:
-        return QueryRows.of(self.answers)
-
     def _add(
-        self,
-        one: RealScans,
-        task: str,
-        method: str,
-        numbers: Iterable[Number],
-        *,
-        gate: bool = False,
-        database: str = "",
-        columns: Mapping[str, np.ndarray] | None = None,
+        self, one: RealScans, found: Mapping[str, Any], database: str = ""
     ) -> None:
-        """Adds the results of a method, and its answers if it has columns."""
-        key: dict[str, Any] = {
-            "experiment": "real",
-            "map": one.data_set.world,
-            "database": database or one.name,
-            "query": one.name,
-            "seed": _REAL.seed,
-            "factors": {},
-            "task": task,
-            "method": method,
-            "gate": gate,
-            **made_by(_REAL, _height_of(one)),
-        }
-        self.rows += [Row.of(number, **key) for number in numbers]
-        if columns is not None:
-            self.answers.append(Answers(**key, columns=columns))
+        """Adds a data set's results: task -> its result."""
+        names = database or one.name, one.name
+        drives = [NamedDrive(name, _Opened(one.drive)) for name in names]
+        self.engine.measured.append(
+            Pair(
+                map_name=one.data_set.world,
+                names=names,
+                factors={},
+                seed=_REAL.seed,
+                is_baseline=False,
+                stated=_REAL,
+                key=" ".join(names),
+                database=drives[0],
+                query=drives[1],
+                way=drives[0],
+                protocol=_REAL,
+                settings=_height_of(one),
+                parts={task: (Held(one),) for task, one in found.items()},
+            )
+        )
 
     def _recognise(
         self, sets: Sequence[RealScans], made: Sequence[Drive]
@@ -267,6 +256,7 @@ class Measuring:
         np.fill_diagonal(is_known, False)
         shown = [_REAL.query_scan(drive, k) for k in range(len(drive))]
         overlaps = None
+        outcomes = []
         for k, method in enumerate(
             track(methods, f"comparing {one.name}", len(methods), "methods")
         ):
@@ -287,8 +277,8 @@ class Measuring:
                 overlaps = best_overlaps(
                     scans, places.X_WS, shown, asked.X_WS, both[0].matches
                 )
-            for gate, found in zip((False, True), both, strict=True):
-                now = PlaceOutcome.of(
+            outcomes += [
+                PlaceOutcome.of(
                     method.name,
                     method,
                     replace(_REAL, gate=gate),
@@ -297,16 +287,9 @@ class Measuring:
                     worlds,
                     overlaps,
                 )
-                self._add(
-                    one,
-                    "place",
-                    method.name,
-                    place_numbers(now, None),
-                    gate=gate,
-                    columns=now.columns,
-                )
-                poses = pose_numbers(now, None)
-                self._add(one, "pose", method.name, poses, gate=gate)
+                for gate, found in zip((False, True), both, strict=True)
+            ]
+        self._add(one, {"place": outcomes, "pose": outcomes})
 
     def _localise(self, one: RealScans) -> None:
         """Adds a data set's results of the task `localise`.
@@ -339,14 +322,10 @@ class Measuring:
                 f"{one.name}: {number} of {len(drive)} scans localised; the"
                 f" others have no other scan within {localise.NEAR:g} m"
             )
-        for k, (name, rows) in enumerate(found.items()):
-            if rows:
-                found_rows = np.array(rows)
-                if k == 0:
-                    localise.note_sparse(one.name, found_rows, self._note)
-                numbers = localise.numbers(found_rows, name)
-                columns = localise.columns(found_rows)
-                self._add(one, "localise", name, numbers, columns=columns)
+        rows = [np.array(some) for some in found.values() if some]
+        if rows:
+            localise.note_sparse(one.name, rows[0], self._note)
+            self._add(one, {"localise": rows})
 
     def _judge(self, one: RealScans, made: Sequence[Drive]) -> None:
         """Adds how well a classifier tells a data set from simulated scans.
@@ -369,11 +348,34 @@ class Measuring:
             self._note(f"{one.name}: one place, not judged")
             return
         found = judge.judge_draws(places, judge.places_of(made), _DRAWS)
+        self._add(one, {"judge": found}, database="simulated")
+
+
+class JudgeTask(Task):
+    """Measures how well a classifier tells real scans from simulated ones."""
+
+    name = "judge"
+
+    def measure(self, pair: Pair, jobs: Jobs) -> tuple[Part, ...]:
+        return ()  # `Measuring` does it.
+
+    def numbers(self, found: Any, before: Any | None) -> Iterator[Number]:
         for group, auc in found["auc"].items():
             values = {"auc": auc, "auc_control": found["control"][group]}
-            known = [
-                Number(group, False, n, v, n=found["patches"][0])
-                for n, v in values.items()
-                if v == v
-            ]
-            self._add(one, "judge", group, known, database="simulated")
+            for name, value in values.items():
+                if not math.isnan(value):
+                    number = found["patches"][0]
+                    yield Number(group, False, name, value, n=number)
+
+
+@dataclass(frozen=True)
+class _Opened:
+    """The source of a drive that is open."""
+
+    drive: Drive
+
+    def __call__(self) -> Drive:
+        return self.drive
+
+    def identity(self) -> str:
+        return self.drive.name

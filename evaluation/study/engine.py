@@ -114,11 +114,18 @@ class Engine:
         Raises:
             InputError: a job has not been done, or a file cannot be written.
         """
-        results = Results.of(self._rows())
-        queries = QueryRows.of(self._answers())
+        results, queries = self.tables()
         results.write_csv(self.output / RESULTS)
         queries.write_csv(self.output / QUERIES)
         return results, queries
+
+    def tables(self) -> tuple[Results, QueryRows]:
+        """Returns the tables of results and of queries of finished jobs.
+
+        Raises:
+            InputError: a job has not been done.
+        """
+        return Results.of(self._rows()), QueryRows.of(self._answers())
 
     def _announce(self, cluster: Cluster) -> None:
         """Says how long a long study takes."""
@@ -177,7 +184,7 @@ class Engine:
         self, one: Pair, task: str, method: str, gate: bool
     ) -> dict[str, Any]:
         factors = dict(one.factors)
-        settings = self.tasks[task].changed_settings
+        settings = {**self.tasks[task].changed_settings, **one.settings}
         if method in self.methods:
             choice, columns = self.methods[method]
             method = choice.name

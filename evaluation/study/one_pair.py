@@ -1,9 +1,7 @@
 """The two tables of one method on one pair of drives, which was measured."""
 
 from collections.abc import Mapping
-from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
 
 from cns_drake.base.drives.drive import Drive
 from cns_drake.base.errors import one_line
@@ -14,20 +12,10 @@ from evaluation.study.chosen_methods import MethodChoice, Setting
 from evaluation.study.engine import Engine
 from evaluation.study.surveys import RecordedDrive
 from evaluation.study.tasks.place import PlaceTask, PoseTask
-from evaluation.study.tasks.task import NamedDrive, Pair
+from evaluation.study.tasks.task import Held, NamedDrive, Pair
 
 # Name of the experiment in tables of a single pair.
 _EXPERIMENT = "pr"
-
-
-@dataclass(frozen=True)
-class _Held:
-    """A result that is in memory instead of in a file."""
-
-    value: Any
-
-    def read(self) -> Any:
-        return self.value
 
 
 def write_pair_tables(
@@ -55,8 +43,7 @@ def write_pair_tables(
     """
     name = outcome.method
     columns = {f"{SETTINGS}{name}.{key}": v for key, v in settings.items()}
-    if sensor_height is not None:
-        settings = {**settings, "sensor_height": str(sensor_height)}
+    height = {} if sensor_height is None else {"sensor_height": sensor_height}
     choice = MethodChoice(name, settings=tuple(settings.items()))
     tasks = {task.name: task({}, _EXPERIMENT) for task in (PlaceTask, PoseTask)}
     names = outcome.database, outcome.query
@@ -78,7 +65,8 @@ def write_pair_tables(
             query=asked,
             way=database,
             protocol=protocol,
-            parts=dict.fromkeys(tasks, (_Held([outcome]),)),
+            settings=height,
+            parts=dict.fromkeys(tasks, (Held([outcome]),)),
         )
     )
     engine.write_tables()

@@ -62,6 +62,17 @@ class Result(Protocol):
 
 
 @dataclass(frozen=True)
+class Held:
+    """A result that is in memory instead of in a file."""
+
+    value: Any
+
+    def read(self) -> Any:
+        """Returns the result."""
+        return self.value
+
+
+@dataclass(frozen=True)
 class Pair:
     """Two drives that are measured under a condition of an experiment.
 
@@ -89,6 +100,9 @@ class Pair:
             because its condition changes the queries (turned, tilted or partly
             hidden) or adds distractors. A task whose results depend only on the
             drives then skips the pair if it has measured these drives before.
+        settings: name -> value of settings outside of the protocol that change
+            a number, such as the height of a LiDAR that differs from the
+            methods' default.
         parts: task -> its results, as files or in memory, for the tasks that
             measure the pair.
     """
@@ -106,6 +120,7 @@ class Pair:
     protocol: RetrievalProtocol
     distractors: int = 0
     may_repeat: bool = False
+    settings: Mapping[str, Any] = field(default_factory=dict)
     parts: dict[str, tuple[Result, ...]] = field(default_factory=dict)
 
     @property

@@ -54,7 +54,7 @@ def measured(tmp_path_factory):
     notes = []
     measuring = Measuring(METHODS, notes.append)
     measuring.run(fill(tmp_path_factory.mktemp("real")), None)
-    return measuring.results(), measuring.queries(), notes
+    return *measuring.engine.tables(), notes
 
 
 def values(results, **columns):
@@ -96,10 +96,13 @@ def test_an_own_registration_function(tmp_path):
     mine = str(tmp_path / "mine.py")
     measuring = Measuring((mine,), lambda note: None)
     measuring.run(fill(tmp_path / "scans"), None)
-    found = values(measuring.results(), task="localise", method="mine")
+    results, _ = measuring.engine.tables()
+    found = values(results, task="localise", method="mine")
     # The start is 2 m off.
     assert found["translation_median"] == pytest.approx(2.0)
-    assert {row.task for row in measuring.rows} == {"localise"}
+    assert {row.task for row in measuring.engine.tables()[0].rows} == {
+        "localise"
+    }
     both = ("icp", str(tmp_path / "icp.py"))
     with pytest.raises(InputError, match="two registration methods"):
         Measuring(both, lambda note: None)
@@ -116,7 +119,7 @@ def test_scans_that_are_alone_are_counted(tmp_path):
     measuring.run(fill(tmp_path, alone), None)
     (note,) = (one for one in notes if "localised" in one)
     assert note.startswith("kitti_00_revisits: 2 of 3 scans localised")
-    assert {row.n for row in measuring.rows} == {2}
+    assert {row.n for row in measuring.engine.tables()[0].rows} == {2}
 
 
 def test_what_is_missing_or_another_is_named(measured):
@@ -237,7 +240,7 @@ def test_other_formats_without_poses(tmp_path, capsys):
     # Nothing is asked of scans without poses.
     measuring = Measuring(("solid",), lambda note: None)
     measuring.run(tmp_path, None)
-    assert measuring.rows == []
+    assert measuring.engine.measured == []
     status, _, err = ask(capsys, tmp_path, tmp_path / "out", methods=["solid"])
     assert status == 2
     assert "no data set that these methods can measure" in err
@@ -270,14 +273,14 @@ def test_the_judge_tells_boxes_from_noise(tmp_path, monkeypatch):
     notes = []
     measuring = Measuring(("icp",), notes.append)
     measuring.run(tmp_path / "scans", tmp_path / "drives")
-    found = measuring.results().where(task="judge")
+    found = measuring.engine.tables()[0].where(task="judge")
     (row,) = found.where(method="all", metric="auc").rows
     assert row.value > 0.9
     assert (row.database, row.query) == ("simulated", "nuscenes_1072")
     (control,) = found.where(method="all", metric="auc_control").rows
     assert control.value < row.value
     # No scan is within 7.5 m of another one.
-    assert {one.task for one in measuring.rows} == {"judge"}
+    assert {one.task for one in measuring.engine.tables()[0].rows} == {"judge"}
 
 
 def test_scans_are_in_the_order_of_their_numbers(tmp_path):
