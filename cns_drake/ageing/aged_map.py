@@ -1,6 +1,6 @@
 """Writes the map folder of an ageing city: stages for today and each year."""
 
-from collections import Counter
+from collections import Counter, defaultdict
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import astuple, dataclass, fields, replace
 from pathlib import Path
@@ -35,6 +35,7 @@ from cns_drake.scenarios.scenario_files import (
     load_scenario,
 )
 from cns_drake.scene.labels import MAX_INSTANCE
+from cns_drake.scene.materials import OF_CLASSES, as_cell, as_word, from_cell
 from cns_drake.scene.semantics import CLASS_IDS
 
 HISTORY_NAME = "history.csv"
@@ -221,6 +222,8 @@ class _Writing:
         self.sizes: dict[str, tuple[int, int]] = {}
         self._triangles: dict[str, int] = {}
         self._past: dict[str, Structure] = {}
+        # Name of a structure -> part of it -> material, in all written stages.
+        self._materials: defaultdict[str, dict[str, str]] = defaultdict(dict)
 
     def stage(
         self, stage: str, year: int, standing: Mapping[str, Structure | None]
@@ -235,6 +238,8 @@ class _Writing:
         """
         world = self._world
         new = [one for one in standing.values() if one is not None]
+        for one in new:
+            self._materials[one.name] |= one.materials
         old = [
             line
             for name, one in standing.items()
@@ -294,7 +299,10 @@ class _Writing:
             InputError: there are more structures than instance ids.
         """
         world = self._world
-        rows: list[Mapping[str, object]] = [*world.rows.values()]
+        rows: list[Mapping[str, object]] = [
+            {**row, "material": self._cell_of_old(row)}
+            for row in world.rows.values()
+        ]
         ids = [int(row["instance"]) for row in world.rows.values()]
         others = {n: o for n, o in self._past.items() if n not in new}
         first = max(ids, default=0) + 1
@@ -313,11 +321,28 @@ class _Writing:
                     "label": CLASS_IDS[one.semantic_class],
                     **{"x": x, "y": y, "z": z, "yaw": f"{one.yaw:.5f}"},
                     "tags": " ".join(one.tags),
+                    "material": as_cell(
+                        one.semantic_class,
+                        self._materials[one.name] | one.materials,
+                    ),
                 }
             )
-        columns = world.columns
+        columns = list(dict.fromkeys([*world.columns, "material"]))
         cells = ([row.get(name, "") for name in columns] for row in rows)
         write_csv(self._draft / map_folder.STRUCTURES_NAME, columns, cells)
+
+    def _cell_of_old(self, row: Mapping[str, str]) -> str:
+        """Returns the materials of a structure of today, with its new parts."""
+        cell = row.get("material", "")
+        known = from_cell(cell)
+        usual = known.get("", OF_CLASSES[row["class"]])
+        new = self._materials.get(row["name"], {})
+        words = [
+            as_word(part, material)
+            for part, material in new.items()
+            if part not in known and material != usual
+        ]
+        return " ".join([*cell.split(), *words])
 
 
 def _copy_inputs(

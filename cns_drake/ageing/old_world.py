@@ -113,6 +113,7 @@ class OldWorld:
         X_SW = RigidTransform(RollPitchYaw(0, 0, yaw), xyz).inverse()
         parts = []
         meshes = {}
+        materials = self._world.structures[name].materials
         for visual in self._elements[name]:
             pose = np.array(visual.findtext("pose", _NO_POSE).split(), float)
             X_SP = X_SW @ RigidTransform(RollPitchYaw(*pose[3:]), pose[:3])
@@ -127,13 +128,15 @@ class OldWorld:
                     raise InputError(
                         f"{file}: not an OBJ file that ageing can change"
                     ) from None
+            part = visual.attrib["name"].partition("/")[2]
             parts.append(
                 structures.Part(
-                    visual.attrib["name"].partition("/")[2],
+                    part,
                     shape,
                     triple(X_SP.translation().round(4)),
                     triple(X_SP.rotation().ToRollPitchYaw().vector().round(5)),
                     triple(map(float, rgb[:3])),
+                    materials.get(part, materials.get("")),
                 )
             )
         model = structures.Model(

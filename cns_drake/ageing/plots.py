@@ -328,7 +328,11 @@ def storey_on(
     model = assemble(
         block("wall", (w, d, 3.2), (*middle, z + 1.5), rgb=rgb),
         block(
-            "glass", (w + 0.06, d + 0.06, 1.4), (*middle, z + 1.7), rgb=_GLASS
+            "glass",
+            (w + 0.06, d + 0.06, 1.4),
+            (*middle, z + 1.7),
+            rgb=_GLASS,
+            material="glass",
         ),
         block(
             "roof", (w + 0.5, d + 0.5, 0.25), (*middle, z + 3.2), rgb=_CONCRETE
@@ -374,7 +378,13 @@ def annex_to(
         rgb = _colour(rng)
         model = assemble(
             block("wall", (w, d, 3.6), (x, y, 1.2), rgb=rgb),
-            block("glass", (0.7 * w, d + 0.06, 1.9), (x, y, 1.3), rgb=_GLASS),
+            block(
+                "glass",
+                (0.7 * w, d + 0.06, 1.9),
+                (x, y, 1.3),
+                rgb=_GLASS,
+                material="glass",
+            ),
             block("roof", (w + 0.3, d + 0.3, 0.2), (x, y, 3.1), rgb=_CONCRETE),
         )
         return plot.thing(name, "building", model)
@@ -440,7 +450,7 @@ def renewed(
         rng: random generator for the colour.
     """
     model = building.model
-    walls = [p for p in model.parts if "glass" not in p.name and p.rgb]
+    walls = [p for p in model.parts if p.material != "glass" and p.rgb]
     if not walls:
         return building
     sizes: Counter[Rgb] = Counter()

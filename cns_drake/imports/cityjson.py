@@ -207,6 +207,8 @@ _NESTING = {
     "MultiSolid": 2,
     "CompositeSolid": 2,
 }
+# Beginnings of types that are water.
+_WATERS = ("Waterway", "WaterBody")
 # Beginning of a type -> its class, and a colour if that of the class would
 # mislead.
 _CLASSES: dict[str, tuple[str, Rgb | None]] = {
@@ -798,6 +800,7 @@ def import_structures(
                 surfaces,
                 {"body": rgb, "roof": foreign_city.RED_ROOF},
                 next((year for year in years if year is not None), None),
+                material="water" if first.kind.startswith(_WATERS) else None,
                 tags={
                     key: str(value)
                     for one in reversed(members)

@@ -233,6 +233,7 @@ def make_imported(
     until: int | None = None,
     tags: Mapping[str, str] | None = None,
     lod: float = 0.0,
+    material: str | None = None,
 ) -> Imported:
     """Returns a structure made of triangles in the world.
 
@@ -248,12 +249,18 @@ def make_imported(
         until: year in which the structure was demolished; None if unknown.
         tags: tags of the object in its file.
         lod: level of detail of the object; 0 if unknown.
+        material: name of the material; by default the usual one of the class.
     """
     filled = {part: some for part, some in surfaces.items() if len(some)}
     triangles = np.concatenate(list(filled.values()))
     model = Model(
         tuple(
-            Part(part, MeshShape(f"{name}_{part}"), rgb=colours.get(part))
+            Part(
+                part,
+                MeshShape(f"{name}_{part}"),
+                rgb=colours.get(part),
+                material=material,
+            )
             for part in filled
         ),
         {f"{name}_{part}": to_mesh(some) for part, some in filled.items()},

@@ -65,7 +65,10 @@ def write_world(
         Name of a stage -> how many structures and how many triangles it has.
     """
     structures = [*bottom, *(one.structure for one in city.kept)]
-    table = structure_table(structures)
+    versions = (
+        one.structure for some in city.standing.values() for one in some
+    )
+    table = structure_table(structures, versions)
     if dressing is not None:
         names = [one.structure.name for one in city.kept]
         origins = [dressing.origins.get(name, "file") for name in names]

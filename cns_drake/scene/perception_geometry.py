@@ -72,6 +72,13 @@ class PerceptionGeometry:
     def structure(self) -> str:
         return structure_name(self.name)
 
+    @property
+    def part(self) -> str:
+        """Name of the part of the structure, such as `storey_03`."""
+        visual = self.name.rpartition("::")[2]
+        _, slash, part = visual.partition("/")
+        return part if slash else visual
+
 
 def structure_name(geometry_name: str, *, is_scoped: bool = False) -> str:
     """Returns the name of the structure to which a geometry belongs.

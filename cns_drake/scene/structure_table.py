@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Sequence
-from dataclasses import dataclass
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, field
 import math
 from pathlib import Path
 
@@ -12,6 +12,12 @@ import numpy as np
 from cns_drake.base.csv_files import read_records, whole_number
 from cns_drake.base.errors import InputError
 from cns_drake.scene.labels import MAX_INSTANCE, Labels
+from cns_drake.scene.materials import (
+    MATERIALS,
+    OF_CLASSES,
+    Material,
+    from_cell,
+)
 from cns_drake.scene.semantics import CLASS_IDS, moving_id
 
 
@@ -25,9 +31,12 @@ class StructureEntry:
         name: name of the structure.
         semantic_class: a key of `CLASS_IDS`.
         reflectivity: reflectivity of the structure's surfaces near 900 nm, from
-            0 to 1; None if it follows from class and colours.
+            0 to 1; None if it follows from material and colour.
         causes: fields of the scenario's section `transient` that changed the
             structure; empty if it is as in the stage's file.
+        materials: name of a part -> name of its material. An empty name stands
+            for all parts that are not named; without it, they have the usual
+            material of the class.
     """
 
     instance: int
@@ -35,10 +44,16 @@ class StructureEntry:
     semantic_class: str
     reflectivity: float | None = None
     causes: tuple[str, ...] = ()
+    materials: Mapping[str, str] = field(default_factory=dict, hash=False)
 
     @property
     def label(self) -> int:
         return CLASS_IDS[self.semantic_class]
+
+    def material(self, part: str) -> Material:
+        """Returns the material of one of the structure's parts."""
+        usual = self.materials.get("", OF_CLASSES[self.semantic_class])
+        return MATERIALS[self.materials.get(part, usual)]
 
 
 class StructureTable:
@@ -102,7 +117,8 @@ class StructureTable:
 def load_structure_table(path: Path) -> StructureTable:
     """Reads a structure table: CSV with columns `instance`, `name`, `class`.
 
-    The column `reflectivity` is optional, and its cells may be empty.
+    The columns `reflectivity` and `material` are optional, and their cells may
+    be empty.
 
     Raises:
         InputError: the file lacks a column or a row is not usable.
@@ -126,11 +142,16 @@ def load_structure_table(path: Path) -> StructureTable:
         if not name or name in entries:
             raise InputError(f"{where}: name: '{name}' is not a new name")
         instances.add(instance)
+        try:
+            materials = from_cell(row.get("material", ""))
+        except ValueError as error:
+            raise InputError(f"{where}: material: {error}") from None
         entries[name] = StructureEntry(
             instance,
             name,
             semantic_class,
             _reflectivity(row.get("reflectivity", ""), where),
+            materials=materials,
         )
     return StructureTable(entries.values())
 

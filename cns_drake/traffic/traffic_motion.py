@@ -313,7 +313,9 @@ def traffic_structures(plan: TrafficPlan, first: int = 1) -> StructureTable:
             f"more than instance ids can count ({MAX_INSTANCE})"
         )
     return StructureTable(
-        StructureEntry(first + k, name, semantic_class)
+        StructureEntry(
+            first + k, name, semantic_class, materials={"trim": "trim"}
+        )
         for k, (name, semantic_class) in enumerate(names)
     )
 

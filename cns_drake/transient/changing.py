@@ -266,7 +266,7 @@ def _extent(model: Model) -> tuple[np.ndarray, np.ndarray]:
 
 _SNOW = "snow"
 # Reflectivity of snow near 900 nm: Warren, "Optical properties of snow", 1982.
-_LOOK = Look((0.93, 0.95, 0.97), 0.9)
+_LOOK = Look((0.93, 0.95, 0.97), 0.9, "snow")
 # Snow slides off steeper surfaces: cosine of 45 degrees.
 _LEAST_UP = 0.707
 # Smaller surfaces bear no snow [m^2].

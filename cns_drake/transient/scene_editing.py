@@ -44,16 +44,19 @@ Named = TypeVar("Named", bound=_Named)
 
 
 class Look(NamedTuple):
-    """Colour and reflectivity of new surfaces.
+    """Colour, reflectivity and material of new surfaces.
 
     Attributes:
         rgb: diffuse colour, from 0 to 1.
         reflectivity: reflectivity near 900 nm, from 0 to 1; None if it follows
-            from the class and the colour.
+            from the material and the colour.
+        material: name of the material; None if it is the usual one of the
+            class.
     """
 
     rgb: tuple[float, float, float]
     reflectivity: float | None = None
+    material: str | None = None
 
 
 class SceneEditing:
@@ -74,6 +77,8 @@ class SceneEditing:
         self._source = world.plant.get_source_id()
         # Name -> class and reflectivity of structures that were added.
         self._added: dict[str, tuple[str, float | None]] = {}
+        # Name of a structure -> new part of it -> material.
+        self._materials: defaultdict[str, dict[str, str]] = defaultdict(dict)
         self._causes: defaultdict[str, list[str]] = defaultdict(list)
         self._notes: list[str] = []
 
@@ -127,18 +132,21 @@ class SceneEditing:
         self.remove(thing, cause)
         old = self._world.structures[thing.name]
         self._added[name] = (old.semantic_class, old.reflectivity)
+        self._materials[name] |= old.materials
         self.blame(name, cause)
 
     def cover_part(
         self, part: StructurePart, p_W: np.ndarray, look: Look
     ) -> None:
         """Moves a part by p_W (3,) [m] in W and gives it a new look."""
+        structure, name = part.geometry.structure, f"{part.name}_covered"
         self._register(
-            f"{part.geometry.structure}/{part.name}_covered",
+            f"{structure}/{name}",
             RigidTransform(p_W) @ part.X_WG,
             self._shape(part),
             *_properties(look),
         )
+        self._note_material(structure, name, look.material)
         self._remove_part(part)
 
     def add(
@@ -166,8 +174,15 @@ class SceneEditing:
                 _model_shape(part.shape),
                 *_properties(Look(part.rgb or (0.5, 0.5, 0.5))),
             )
+            self._note_material(name, part.name, part.material)
         self._added[name] = (semantic_class, None)
         self.blame(name, cause)
+
+    def _note_material(
+        self, structure: str, part: str, material: str | None
+    ) -> None:
+        if material is not None:
+            self._materials[structure][part] = material
 
     def keep_triangles(self, part: StructurePart, kept: np.ndarray) -> None:
         """Removes all triangles of a part except those with indices `kept`."""
@@ -213,7 +228,9 @@ class SceneEditing:
         """
         R, p = part.X_WG.rotation().matrix(), part.X_WG.translation()
         mesh = _memory_mesh(product(p_WVs - p, R), triangles)
-        name = f"{part.geometry.structure}/{name}"
+        structure = part.geometry.structure
+        self._note_material(structure, name, look.material)
+        name = f"{structure}/{name}"
         self._register(name, part.X_WG, mesh, *_properties(look))
 
     def add_mesh(
@@ -243,6 +260,7 @@ class SceneEditing:
             _memory_mesh(p_WVs - middle, triangles),
             *_properties(look),
         )
+        self._note_material(name, "surface", look.material)
         self._added[name] = (semantic_class, None)
         self.blame(name, cause)
 
@@ -269,17 +287,24 @@ class SceneEditing:
         ]
         return replace(
             self._world,
-            structures=StructureTable(map(self._with_causes, entries)),
+            structures=StructureTable(map(self._changed, entries)),
             notes=(*self._world.notes, *self._notes),
         )
 
-    def _with_causes(self, entry: StructureEntry) -> StructureEntry:
+    def _changed(self, entry: StructureEntry) -> StructureEntry:
         new = [
             cause
             for cause in self._causes.get(entry.name, ())
             if cause not in entry.causes
         ]
-        return replace(entry, causes=(*entry.causes, *new)) if new else entry
+        materials = self._materials.get(entry.name, {})
+        if not (new or materials):
+            return entry
+        return replace(
+            entry,
+            causes=(*entry.causes, *new),
+            materials={**entry.materials, **materials},
+        )
 
     def _shape(self, part: StructurePart) -> geometry.Shape:
         inspector = self._world.scene_graph.model_inspector()

@@ -363,7 +363,7 @@ class WaterfrontHall(Building):
             *_dock(self, x0, x1, y0, front),
         ]  # fmt: skip
         self.add("walls", *pieces)
-        self.add("glass", walls.glass_mesh(plan, facade), rgb=self.glass_rgb)
+        self.add_glass("glass", walls.glass_mesh(plan, facade))
         self.add("roof", _roof(self, plan), rgb=self.colours["roof"])
 
 

@@ -15,6 +15,7 @@ model's meshes as OBJ files, and `model.yaml`:
       yaw: 1.5708         # heading, a multiple of pi/2 [rad]; 0 by default
       scale: [1, 1, 2]    # scale of a mesh in `object_meshes`; 1 by default
       rgb: [0.8, 0.74, 0.64]
+      material: glass     # name of the material; that of walls by default
 """
 
 from collections import defaultdict
@@ -40,6 +41,7 @@ class _Part(BaseModel):
     yaw: float = 0.0
     scale: _Triple = (1.0, 1.0, 1.0)
     rgb: Rgb
+    material: str | None = None
 
 
 class _Model(BaseModel):
@@ -95,7 +97,7 @@ class Landmark(Building):
                 scale = triple(np.round(along * part.scale, 4))
                 shape = self.shared(part.mesh, scale)
             xyz = middle + stretch * part.xyz
-            self.place(part.name, shape, xyz, part.yaw, part.rgb)
+            self.place(part.name, shape, xyz, part.yaw, part.rgb, part.material)
 
 
 @cache

@@ -170,7 +170,7 @@ def _stack(
 
     def place(z0: float, number: int) -> float:
         at, part = (0.0, 0.0, z0), f"stack_{number}"
-        p.place(f"{part}_glass", glass, at, rgb=p.glass_rgb)
+        p.place(f"{part}_glass", glass, at, rgb=p.glass_rgb, material="glass")
         p.place(f"{part}_soffit", soffit, at)
         for k in range(groups):
             z = z0 + k * step
@@ -433,12 +433,12 @@ def _add_cladding(p: UnfinishedTower, plan: np.ndarray) -> None:
     walls = [facade_mesh(outer, facade), backs, rim]
     panes = [glass_mesh(outer, facade)]
     groups, step = p.clad // p.group, p.group * p.storey
-    for part, pieces, rgb in (
-        ("cladding", walls, p.colours["clad"]),
-        ("cladding_glass", panes, p.glass_rgb),
+    for part, pieces, rgb, material in (
+        ("cladding", walls, p.colours["clad"], None),
+        ("cladding_glass", panes, p.glass_rgb, "glass"),
     ):
         mesh = _repeated(pieces, p.group, p.storey)
-        p.stack(part, mesh, 0.0, step, groups, rgb=rgb)
+        p.stack(part, mesh, 0.0, step, groups, rgb, material)
     p.add("foot", massing.foundation(outer), rgb=p.colours["clad"])
 
 

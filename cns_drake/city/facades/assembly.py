@@ -217,7 +217,12 @@ class Assembly(Dice):
         return words.split()[: self.whole(low, high)]
 
     def add(
-        self, part: str, *meshes: Mesh, z: float = 0.0, rgb: Rgb | None = None
+        self,
+        part: str,
+        *meshes: Mesh,
+        z: float = 0.0,
+        rgb: Rgb | None = None,
+        material: str | None = None,
     ) -> None:
         """Merges meshes into one part, raised by `z` [m], and adds it.
 
@@ -227,7 +232,11 @@ class Assembly(Dice):
         mesh = merge_meshes(*meshes)
         if mesh.faces:
             shape = MeshShape(self.define(part, mesh))
-            self.place(part, shape, (0.0, 0.0, z), rgb=rgb)
+            self.place(part, shape, (0.0, 0.0, z), rgb=rgb, material=material)
+
+    def add_glass(self, part: str, *meshes: Mesh, z: float = 0.0) -> None:
+        """Merges panes into one part, raised by `z` [m], and adds it."""
+        self.add(part, *meshes, z=z, rgb=self.glass_rgb, material="glass")
 
     def paint(self, **colours: Rgb) -> None:
         """Declares the building's materials: name=colour, as keywords.
@@ -265,7 +274,9 @@ class Assembly(Dice):
         `footprint` is the ground of the building in its frame S [m].
         """
         for material, pieces in self._pieces.items():
-            self.add(material, *pieces, rgb=self._colours[material])
+            rgb = self._colours[material]
+            known = "glass" if material == "glass" else None
+            self.add(material, *pieces, rgb=rgb, material=known)
         return Model(tuple(self.parts), self.meshes, footprint)
 
     def define(self, key: str, mesh: Mesh) -> str:
@@ -290,6 +301,7 @@ class Assembly(Dice):
         step: float,
         count: int,
         rgb: Rgb | None = None,
+        material: str | None = None,
     ) -> None:
         """Adds a mesh, and places several copies of it above one another.
 
@@ -301,11 +313,13 @@ class Assembly(Dice):
             step: vertical distance from one copy to the next [m].
             count: number of copies.
             rgb: colour; by default the building's.
+            material: name of the material; by default that of walls.
         """
         shape = MeshShape(self.define(part, mesh))
         for k in range(count):
             z = z0 + k * step
-            self.place(f"{part}_{k:02d}", shape, (0.0, 0.0, z), rgb=rgb)
+            name, at = f"{part}_{k:02d}", (0.0, 0.0, z)
+            self.place(name, shape, at, rgb=rgb, material=material)
 
     def shared(
         self, mesh: str, scale: tuple[float, float, float] = (1.0, 1.0, 1.0)
@@ -325,6 +339,7 @@ class Assembly(Dice):
         xyz: Iterable[float],
         yaw: float = 0.0,
         rgb: Rgb | None = None,
+        material: str | None = None,
     ) -> None:
         """Adds one part to the building: a shape at a place.
 
@@ -334,10 +349,12 @@ class Assembly(Dice):
             xyz: position of the shape in the building's frame [m].
             yaw: heading of the shape [rad].
             rgb: colour; by default the building's.
+            material: name of the material; by default that of walls.
         """
         x, y, z = (round(float(v), 3) for v in xyz)
         rpy = (0.0, 0.0, round(float(yaw), 5))
-        self.parts.append(Part(part, shape, (x, y, z), rpy, rgb or self.rgb))
+        rgb = rgb or self.rgb
+        self.parts.append(Part(part, shape, (x, y, z), rpy, rgb, material))
 
 
 class Building(Assembly, abc.ABC):

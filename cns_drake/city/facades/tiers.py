@@ -109,11 +109,12 @@ def add_storeys(
     top = round(z0 + groups * step, 3)
     if len(facade.glass) == 1:
         glass = _pane(outline, facade, z0, top)
-        out.add(f"{part}_glass", glass, rgb=out.glass_rgb)
+        out.add_glass(f"{part}_glass", glass)
     elif facade.glass:
         glass = glass_mesh(outline, facade.stacked(per_group))
-        rgb = out.glass_rgb
-        out.stack(f"{part}_glass", glass, z0, step, groups, rgb)
+        out.stack(
+            f"{part}_glass", glass, z0, step, groups, out.glass_rgb, "glass"
+        )
     return top
 
 
@@ -296,7 +297,7 @@ def _add_glass(
 ) -> None:
     if facade.glass:
         glass = glass_mesh(outline, facade)
-        out.add(f"{part}_glass", glass, z=z0, rgb=out.glass_rgb)
+        out.add_glass(f"{part}_glass", glass, z=z0)
 
 
 def cornice(

@@ -24,6 +24,7 @@ class RunKind:
         end_post: post after the last panel: its size in x, its least y, its
             greatest y, and its height [m]; None for no post.
         semantic_class: a key of `cns_drake.scene.semantics.CLASS_IDS`.
+        material: name of the material; by default the usual one of the class.
     """
 
     panel: float
@@ -31,6 +32,7 @@ class RunKind:
     colours: tuple[Rgb, ...]
     end_post: tuple[float, float, float, float] | None = None
     semantic_class: str = "fence"
+    material: str | None = None
 
 
 # Name of a kind, with which the names of its meshes begin -> the kind.
@@ -80,7 +82,11 @@ def run(
         shape = structures.MeshShape(f"{name}_x{count}", (stretch, 1.0, tall))
         x = done * kind.panel * stretch - length / 2
         part = f"run_{len(parts):02d}"
-        parts.append(structures.Part(part, shape, (x, 0.0, 0.0), rgb=rgb))
+        parts.append(
+            structures.Part(
+                part, shape, (x, 0.0, 0.0), rgb=rgb, material=kind.material
+            )
+        )
         done += count
     if kind.end_post:
         x, y0, y1, top = kind.end_post

@@ -54,7 +54,10 @@ def car(rng: np.random.Generator, *, form: str) -> structures.Model:
         colours["box"] = WHITE
     parts = [
         structures.Part(
-            name, structures.MeshShape(f"{form}_{name}", scale), rgb=rgb
+            name,
+            structures.MeshShape(f"{form}_{name}", scale),
+            rgb=rgb,
+            material="trim" if name == "trim" else None,
         )
         for name, rgb in colours.items()
     ]

@@ -50,7 +50,9 @@ def flower_bed(
     scale = (round(length / 4, 4), round(width / 1.5, 4), 1.0)
     stone, rgb = COLOURS["stone"], Dice(rng).pick(CHOICES["flowers"])
     return assemble(
-        mesh_part("edge", "flower_bed_edge", rgb=stone, scale=scale),
+        mesh_part(
+            "edge", "flower_bed_edge", rgb=stone, scale=scale, material="pot"
+        ),
         mesh_part("plants", "flower_bed_plants", rgb=rgb, scale=scale),
     )
 
@@ -64,9 +66,10 @@ def round_planter(rng: np.random.Generator) -> Model:
     rgb = _leaves(dice)
     yaw = dice.uniform(-math.pi, math.pi, 3)
     pot, wide = (size, size, size), round(0.75 * size, 3)
+    stone = COLOURS["stone"]
     at, scale = (0, 0, round(0.5 * size, 3)), (wide, wide, tall)
     return assemble(
-        mesh_part("pot", "round_pot", rgb=COLOURS["stone"], scale=pot),
+        mesh_part("pot", "round_pot", rgb=stone, scale=pot, material="pot"),
         mesh_part("leaves", mesh, at, yaw, rgb, scale),
     )
 
@@ -84,7 +87,8 @@ def box_planter(
     drawn = dice.uniform(1.6, 3.0)
     length = drawn if length is None else length
     scale, rgb = (round(length / 2, 4), 1.0, 1.0), COLOURS["planter"]
-    parts = [mesh_part("box", "planter_box", rgb=rgb, scale=scale)]
+    box = mesh_part("box", "planter_box", rgb=rgb, scale=scale, material="pot")
+    parts = [box]
     count = max(1, round(length / 0.8))
     for k in range(count):
         mesh = f"shrub_{dice.pick(_LETTERS)}"

@@ -57,7 +57,9 @@ def fountain(rng: np.random.Generator, *, radius: float | None = None) -> Model:
     marble, water = COLOURS["marble"], COLOURS["water"]
     return assemble(
         mesh_part("stone", "fountain_stone", rgb=marble, scale=scale),
-        mesh_part("water", "fountain_water", rgb=water, scale=scale),
+        mesh_part(
+            "water", "fountain_water", rgb=water, scale=scale, material="basin"
+        ),
     )
 
 
@@ -109,7 +111,9 @@ def bus_shelter(rng: np.random.Generator) -> Model:
     mesh = f"shelter_{'left' if advert > 0 else 'right'}"
     return assemble(
         mesh_part("frame", f"{mesh}_frame", rgb=COLOURS["dark"]),
-        mesh_part("panes", f"{mesh}_panes", rgb=COLOURS["pane"]),
+        mesh_part(
+            "panes", f"{mesh}_panes", rgb=COLOURS["pane"], material="glass"
+        ),
         post("stop", 0.03, 2.9, (0.9, -2.6 * advert), COLOURS["steel"]),
     )
 

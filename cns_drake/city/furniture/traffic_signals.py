@@ -25,7 +25,7 @@ from cns_drake.city.geometry import (
 
 def _signal(name: str, lamps: int, x: float, y: float, z: float) -> Part:
     mesh, at = f"signal_head_{lamps}", (x, y, z)
-    return mesh_part(name, mesh, at, rgb=COLOURS["black"])
+    return mesh_part(name, mesh, at, rgb=COLOURS["black"], material="signals")
 
 
 def traffic_light(
@@ -77,12 +77,14 @@ def sign_round(rng: np.random.Generator) -> Model:
     """Returns a round sign, red or blue."""
     dice = Dice(rng)
     height = dice.uniform(2.5, 2.9)
+    rgb = dice.pick(CHOICES["sign_round"])
     plate = Part(
         "plate",
         CylinderShape(0.32, 0.03),
         (0.05, 0.0, height - 0.32),
         (0.0, math.pi / 2, 0.0),
-        dice.pick(CHOICES["sign_round"]),
+        rgb,
+        "way_sign" if rgb == COLOURS["blue"] else "stop_sign",
     )
     return assemble(_sign_mast(height), plate)
 
@@ -91,7 +93,9 @@ def sign_triangular(rng: np.random.Generator) -> Model:
     """Returns a warning sign."""
     height = Dice(rng).uniform(2.6, 3.0)
     at, rgb = (0.05, 0, height - 0.45), COLOURS["sign_red"]
-    plate = mesh_part("plate", "sign_triangle", at, rgb=rgb)
+    plate = mesh_part(
+        "plate", "sign_triangle", at, rgb=rgb, material="yield_sign"
+    )
     return assemble(_sign_mast(height), plate)
 
 
@@ -99,7 +103,9 @@ def sign_stop(rng: np.random.Generator) -> Model:
     """Returns a stop sign."""
     height = Dice(rng).uniform(2.5, 2.9)
     at, rgb = (0.05, 0, height - 0.4), COLOURS["sign_red"]
-    plate = mesh_part("plate", "sign_octagon", at, rgb=rgb)
+    plate = mesh_part(
+        "plate", "sign_octagon", at, rgb=rgb, material="stop_sign"
+    )
     return assemble(_sign_mast(height), plate)
 
 
@@ -111,7 +117,9 @@ def sign_rectangular(rng: np.random.Generator) -> Model:
     tall = dice.uniform(0.6, 0.9)
     rgb = dice.pick(CHOICES["sign_rectangular"])
     size, center = (0.03, width, tall), (0.05, 0, height - 0.5 * tall)
-    return assemble(_sign_mast(height), block("plate", size, center, rgb=rgb))
+    material = "way_sign" if rgb == COLOURS["blue"] else "plain_sign"
+    plate = block("plate", size, center, rgb=rgb, material=material)
+    return assemble(_sign_mast(height), plate)
 
 
 def sign_street_name(rng: np.random.Generator) -> Model:
@@ -121,8 +129,8 @@ def sign_street_name(rng: np.random.Generator) -> Model:
     y_size, y_center = (0.03, 1, 0.22), (0, 0.35, height - 0.36)
     return assemble(
         post("mast", 0.03, height, rgb=COLOURS["steel"]),
-        block("blade_x", x_size, x_center, rgb=blue),
-        block("blade_y", y_size, y_center, rgb=blue),
+        block("blade_x", x_size, x_center, rgb=blue, material="name_sign"),
+        block("blade_y", y_size, y_center, rgb=blue, material="name_sign"),
     )
 
 
@@ -133,7 +141,7 @@ def sign_direction(rng: np.random.Generator) -> Model:
     return assemble(
         post("mast_0", 0.06, 4.6, (0, 0.35 * width), steel),
         post("mast_1", 0.06, 4.6, (0, -0.35 * width), steel),
-        block("plate", size, center, rgb=COLOURS["blue"]),
+        block("plate", size, center, rgb=COLOURS["blue"], material="way_sign"),
     )
 
 

@@ -13,6 +13,7 @@ from shapely.geometry.base import BaseGeometry
 
 from cns_drake.city.geometry.mesh import Mesh, box_mesh, object_mesh
 from cns_drake.city.geometry.polygons import hull_of, placed
+from cns_drake.scene.materials import OF_CLASSES
 
 
 @dataclass(frozen=True)
@@ -61,6 +62,9 @@ class Part:
         xyz: position of the shape's origin in S [m].
         rpy: roll, pitch and yaw of the shape in S, as in SDF [rad].
         rgb: colour; by default that of the structure's semantic class.
+        material: name of the material, a key of
+            `cns_drake.scene.materials.MATERIALS`; by default the usual one of
+            the structure's semantic class.
     """
 
     name: str
@@ -68,6 +72,7 @@ class Part:
     xyz: tuple[float, float, float] = (0.0, 0.0, 0.0)
     rpy: tuple[float, float, float] = (0.0, 0.0, 0.0)
     rgb: tuple[float, float, float] | None = None
+    material: str | None = None
 
 
 @dataclass(frozen=True)
@@ -115,6 +120,20 @@ class Structure:
     xyz: tuple[float, float, float]
     yaw: float = 0.0
     tags: tuple[str, ...] = field(default=())
+
+    @property
+    def materials(self) -> dict[str, str]:
+        """Name of each part -> name of its material.
+
+        Reddish walls and roofs of buildings are of brick, unless the part says
+        otherwise.
+        """
+        usual = OF_CLASSES[self.semantic_class]
+        return {
+            part.name: part.material
+            or ("brick" if usual == "plaster" and _is_brick(part) else usual)
+            for part in self.model.parts
+        }
 
     @property
     def footprint_W(self) -> BaseGeometry:
@@ -185,6 +204,11 @@ class Builder:
         return self.make(rng, **parameters)
 
 
+def _is_brick(part: Part) -> bool:
+    red, green, blue = part.rgb or (0.0, 0.0, 0.0)
+    return red > 1.35 * blue and red > 1.15 * green
+
+
 def post(
     name: str,
     radius: float,
@@ -247,6 +271,7 @@ def block(
     center: Iterable[float],
     yaw: float = 0.0,
     rgb: tuple[float, float, float] | None = None,
+    material: str | None = None,
 ) -> Part:
     """Returns a box as a part of a structure.
 
@@ -256,6 +281,8 @@ def block(
         center: (3,) centre of the box in the structure's frame [m].
         yaw: heading of the box in the structure's frame [rad].
         rgb: colour; by default that of the structure's semantic class.
+        material: name of the material; by default the usual one of the
+            structure's semantic class.
     """
     return Part(
         name,
@@ -263,6 +290,7 @@ def block(
         xyz=triple(center),
         rpy=(0.0, 0.0, float(yaw)),
         rgb=rgb,
+        material=material,
     )
 
 
@@ -299,6 +327,7 @@ def mesh_part(
     yaw: float = 0.0,
     rgb: tuple[float, float, float] | None = None,
     scale: tuple[float, float, float] = (1.0, 1.0, 1.0),
+    material: str | None = None,
 ) -> Part:
     """Returns an upright mesh of the folder `object_meshes` as a part.
 
@@ -309,9 +338,11 @@ def mesh_part(
         yaw: heading of the mesh in the structure's frame [rad].
         rgb: colour; by default that of the structure's semantic class.
         scale: factors along the mesh's own x, y and z.
+        material: name of the material; by default the usual one of the
+            structure's semantic class.
     """
     rpy = (0.0, 0.0, float(yaw))
-    return Part(name, MeshShape(mesh, scale), triple(at), rpy, rgb)
+    return Part(name, MeshShape(mesh, scale), triple(at), rpy, rgb, material)
 
 
 def in_a_row(k: int, distance: float, count: int) -> float:

@@ -66,12 +66,14 @@ class Covering(NamedTuple):
         semantic_class: a key of `cns_drake.scene.semantics.CLASS_IDS`.
         area: the area in W [m].
         rgb: colour.
+        material: name of the material; by default the usual one of the class.
     """
 
     name: str
     semantic_class: str
     area: BaseGeometry
     rgb: tuple[float, float, float]
+    material: str | None = None
 
     def tiles(self) -> Iterator[tuple[str, MultiPolygon]]:
         """Yields the name and the polygons of each square tile of the area."""
@@ -103,7 +105,7 @@ class Covering(NamedTuple):
         pieces = {part: mesh for part, mesh in pieces.items() if mesh.faces}
         meshes = {f"{self.name}_{part}": mesh for part, mesh in pieces.items()}
         parts = tuple(
-            Part(part, MeshShape(mesh), rgb=self.rgb)
+            Part(part, MeshShape(mesh), rgb=self.rgb, material=self.material)
             for part, mesh in zip(pieces, meshes, strict=True)
         )
         model, origin = Model(parts, meshes, self.area), (0.0, 0.0, 0.0)
@@ -244,7 +246,7 @@ def _kerb_structure(
     road: HeightMap | float,
     walk: HeightMap | float,
 ) -> Structure:
-    ground = Covering("kerbs", "sidewalk", kerbs, _KERB_RGB)
+    ground = Covering("kerbs", "sidewalk", kerbs, _KERB_RGB, "kerb")
     pieces = {}
     for part, piece, top, spacing in _street_tiles(ground, walk):
         # The upstand faces the carriageway. It is therefore the carriageway's
@@ -325,7 +327,8 @@ def marking_structure(network: RoadNetwork) -> Structure:
                 strips += _end_marks(road, end)
         if road.length > _LEAST_LENGTH and strips:
             pieces[name] = merge_meshes(*(_strip(road, *s) for s in strips))
-    ground = Covering("markings", "road", network.areas.lane_area, _RGB)
+    lanes = network.areas.lane_area
+    ground = Covering("markings", "road", lanes, _RGB, "markings")
     return ground.structure(pieces)
 
 

@@ -22,13 +22,14 @@ from cns_drake.city.ground.districts import District
 from cns_drake.city.ground.elevation import Ground
 from cns_drake.city.ground.streets import Covering
 
-# Kind of ground -> semantic class and colour.
+# Kind of ground -> semantic class, colour and material; None is the usual
+# material of the class.
 _LOOK = {
-    "paved": ("other-ground", (0.70, 0.67, 0.62)),
-    "lawn": ("terrain", (0.45, 0.56, 0.32)),
-    "gravel": ("other-ground", (0.63, 0.58, 0.50)),
-    "parking": ("parking", (0.38, 0.37, 0.38)),
-    "water": ("other-ground", (0.25, 0.38, 0.45)),
+    "paved": ("other-ground", (0.70, 0.67, 0.62), None),
+    "lawn": ("terrain", (0.45, 0.56, 0.32), None),
+    "gravel": ("other-ground", (0.63, 0.58, 0.50), "gravel"),
+    "parking": ("parking", (0.38, 0.37, 0.38), None),
+    "water": ("other-ground", (0.25, 0.38, 0.45), "water"),
 }
 _QUAY_RGB = (0.55, 0.53, 0.50)
 # Distance between the vertices of meshes of ground with relief [m].
@@ -131,9 +132,9 @@ def ground_structures(
         for kind, area in district.grounds.items():
             if area.is_empty:
                 continue
-            semantic_class, rgb = _LOOK[kind]
+            semantic_class, rgb, material = _LOOK[kind]
             name = f"ground_{district.plan.name}_{kind}"
-            ground = Covering(name, semantic_class, area, rgb)
+            ground = Covering(name, semantic_class, area, rgb, material)
             if kind == "water":
                 structures.append(ground.surface(water_level))
                 structures.append(
@@ -253,7 +254,9 @@ def bridge_structures(
             }
             area = MultiPolygon([deck])
             bridge = Covering(name, "other-structure", area, _BRIDGE_RGB)
-            below = Covering(f"{name}_water", "other-ground", area, _WATER_RGB)
+            below = Covering(
+                f"{name}_water", "other-ground", area, _WATER_RGB, "water"
+            )
             structures += [
                 bridge.structure(pieces),
                 below.structure({"surface": surface_mesh(deck, low)}),

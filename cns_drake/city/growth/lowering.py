@@ -75,7 +75,10 @@ def lowered(model: Model, height: float, name: str, seed: int) -> Model:
             edges.append(cut)
             if below.faces:
                 shape = MeshShape(assembly.define(part.name, below))
-                parts.append(Part(part.name, shape, rgb=part.rgb))
+                below_part = Part(
+                    part.name, shape, rgb=part.rgb, material=part.material
+                )
+                parts.append(below_part)
     plan = enclosed(np.concatenate([np.zeros((0, 2, 2)), *edges]))
     if plan.is_empty:
         return model
@@ -236,5 +239,5 @@ def _wall_rgb(placed: Sequence[tuple[Part, Mesh]]) -> Rgb | None:
     def extent(one: tuple[Part, Mesh]) -> float:
         return float(np.prod(np.ptp(one[1].vertices, axis=0)))
 
-    walls = [one for one in placed if "glass" not in one[0].name]
+    walls = [one for one in placed if one[0].material != "glass"]
     return max(walls, key=extent)[0].rgb

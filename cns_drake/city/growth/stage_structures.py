@@ -124,7 +124,7 @@ def building_site(model: Model, height: float, name: str, seed: int) -> Model:
 def _beside(part: Part, xy: tuple[float, float]) -> Part:
     x, y, z = part.xyz
     at = (round(x + xy[0], 3), round(y + xy[1], 3), z)
-    return Part(f"crane_{part.name}", part.shape, at, part.rpy, part.rgb)
+    return replace(part, name=f"crane_{part.name}", xyz=at)
 
 
 def largest_rectangle(footprint: BaseGeometry) -> Polygon:

@@ -96,7 +96,13 @@ def tree(
     rgb = np.clip(kind.leaf_rgb * tint, 0, 1)
     rpy = (0.0, 0.0, round(yaw, 3))
     return assemble(
-        Part("wood", MeshShape(wood, scale), rpy=rpy, rgb=kind.bark_rgb),
+        Part(
+            "wood",
+            MeshShape(wood, scale),
+            rpy=rpy,
+            rgb=kind.bark_rgb,
+            material="bark",
+        ),
         Part(
             "crown",
             MeshShape(crown, scale),

@@ -89,7 +89,7 @@ def with_kerb(one: Imported) -> Imported:
         structure.model,
         parts=(
             *structure.model.parts,
-            Part("kerb", MeshShape(name), rgb=_KERB),
+            Part("kerb", MeshShape(name), rgb=_KERB, material="kerb"),
         ),
         meshes={**structure.model.meshes, name: mesh},
     )
@@ -421,6 +421,7 @@ def lane_marks(
                     "Lane mark",
                     {"paint": np.concatenate(dashes)},
                     {"paint": _WHITE},
+                    material="markings",
                 )
 
 

@@ -228,6 +228,7 @@ def road_marks(
             "Road mark",
             surfaces,
             {colour: _COLOURS[colour] for colour in surfaces},
+            material="markings",
         ).structure
 
 

@@ -195,8 +195,14 @@ def _made(
 ) -> Imported:
     surfaces = {part: np.concatenate(triangles)}
     colours = {part: look.rgb}
+    material = "water" if look.kind == "WaterBody" else None
     return make_imported(
-        name, look.semantic_class, look.kind, surfaces, colours
+        name,
+        look.semantic_class,
+        look.kind,
+        surfaces,
+        colours,
+        material=material,
     )
 
 
@@ -364,6 +370,7 @@ def crossing_stripes(
                 "Crossing",
                 {"stripes": np.concatenate(surface)},
                 {"stripes": _WHITE},
+                material="markings",
             )
 
 

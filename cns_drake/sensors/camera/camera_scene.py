@@ -54,7 +54,6 @@ from cns_drake.sensors.camera.looks import (
     LOOKS,
     SUN_W,
     face_places,
-    look_of,
     texture,
     texture_places,
 )
@@ -178,8 +177,7 @@ class CameraScene(LeafSystem):
             entry = table[one.structure]
             rgb = one.rgb or _GREY
             surface = tessellate(one.surface, _SIDES)
-            corners = len(surface.p_GVset)
-            look = look_of(one.name, entry.semantic_class, rgb, corners)
+            look = entry.material(one.part).look
             for kind, group in (("colours", look), ("classes", entry.label)):
                 key = kind, None if is_anchored else frame, group
                 parts.setdefault(key, []).append((X_FG, rgb, surface))

@@ -178,6 +178,7 @@ def _signals(_rng: np.random.Generator) -> np.ndarray:
     return light
 
 
+# Name of a look, as in `cns_drake/scene/materials.yaml` -> the look.
 LOOKS = {
     "stop": Look(1.0, _face("white", _ring(0.5), "#b01818", "STOP"), 0.6, True),
     "yield": Look(
@@ -220,57 +221,6 @@ LOOKS = {
     "leaves": Look(2.0, _leaves),
     "hedge": Look(2.0, lambda rng: np.maximum(_leaves(rng)[:, :, :3], 0.3)),
 }
-_OF_CLASSES = {
-    "car": "paint",
-    "bus": "paint",
-    "truck": "paint",
-    "road": "asphalt",
-    "parking": "asphalt",
-    "sidewalk": "paving",
-    "other-ground": "paving",
-    "terrain": "grass",
-    "vegetation": "leaves",
-    "trunk": "bark",
-}
-
-
-def look_of(
-    name: str,
-    semantic_class: str,
-    rgb: tuple[float, float, float],
-    corners: int,
-) -> str:
-    """Returns the name of the `Look` of a geometry, a key of `LOOKS`.
-
-    Args:
-        name: name of the geometry in Drake, which may end in `/` and the name
-            of a part.
-        semantic_class: class of the structure.
-        rgb: colour of the geometry, from 0 to 1.
-        corners: number of the geometry's vertices.
-    """
-    red, green, blue = rgb
-    part = name.rpartition("/")[2]
-    if part.startswith("signal"):
-        return "signals"
-    if part.startswith("blade"):
-        return "name"
-    if part == "plate" and blue > 1.3 * red:
-        return "way"
-    if part == "plate" and red > 2.0 * blue:
-        return "stop" if corners > 8 else "yield"
-    if "marking" in name or "kerb" in name or "gravel" in name:
-        return "plaster"
-    if "hedge" in name:
-        return "hedge"
-    if "wood" in name:
-        return "bark"
-    # Snow is the whitest of all, and hides what lies below.
-    if semantic_class != "building" and min(rgb) < 0.925:
-        return _OF_CLASSES.get(semantic_class, "plaster")
-    if "glass" in name or (red < green < blue < 0.4):
-        return "panes"
-    return "brick" if red > 1.35 * blue and red > 1.15 * green else "plaster"
 
 
 @functools.cache

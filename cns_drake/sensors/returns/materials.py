@@ -1,20 +1,11 @@
-"""Reflection of surfaces near 900 nm.
-
-The material of a geometry follows from the class of its structure or, if a part
-consists of another material, from the name of the part; the brightness follows
-from the colour. Reflectivities of diffuse materials are those of the ECOSTRESS
-spectral library (Meerdink et al., 2019) near 0.9 um, rounded; those of
-markings, signs and plates follow from the minimum coefficients of EN 1436 (R_L
-150 mcd/m2/lx at 30 m) and EN 12899-1 (class RA1, 70 cd/lx/m2), times pi.
-"""
+"""Reflection of surfaces near 900 nm, for the beams of a LiDAR."""
 
 from collections.abc import Sequence
-from pathlib import Path
 from typing import NamedTuple
 
 import numpy as np
 
-from cns_drake.base.yaml_files import parse_yaml
+from cns_drake.scene.materials import Material
 from cns_drake.scene.perception_geometry import PerceptionGeometry
 from cns_drake.scene.structure_table import StructureEntry, StructureTable
 from cns_drake.scene.surfaces import HalfSpaceSurface, Surface, TriangleSurface
@@ -22,23 +13,7 @@ from cns_drake.scene.surfaces import HalfSpaceSurface, Surface, TriangleSurface
 # Kinds of materials.
 LAMBERT, RETRO, GLASS, LEAVES, BEADS, SPRAYS = range(6)
 
-# Class -> its fields; the YAML file explains them.
-_CLASSES = parse_yaml(Path(__file__).with_name("materials.yaml").read_bytes())
-# Diffuse reflectivity of the dust on a pane.
-_GLASS_DUST = 0.02
-# Diffuse reflectivity of water.
-_WATER = 0.02
-# Diffuse reflectivity of bark.
-_BARK = 0.30
-# Diffuse reflectivity of road markings, without their beads.
-_MARKINGS = 0.47
-# Reflectivity of the retro-reflective sheeting of a traffic sign.
-_SHEETING = 220.0
-# Reflectivity of a retro-reflective number plate.
-_PLATE = 160.0
-# Leaf area in a volume of leaves [1/m]: crowns have 0.5 to 2.5 (Hosoi and
-# Omasa, 2006), clipped hedges more. Fitted to the first place of KITTI.
-_LEAF_AREA_DENSITY = 3.0
+_KINDS = {"lambert": LAMBERT, "retro": RETRO, "glass": GLASS, "beads": BEADS}
 # Reflection of wet ground: a film of n = 1.33 reflects scattered light back to
 # the rough surface (Angstrom, 1925).
 _FILM_INNER = 1.0 - (1.0 - 0.066) / 1.33**2
@@ -92,8 +67,9 @@ def find_materials(
     The reflectivity of a geometry is its perception property ("lidar",
     "reflectivity") or, without this property, the value for its structure in
     the column `reflectivity` of `structures`. In both cases, the geometry is a
-    smooth Lambertian reflector. Without either value, the material follows from
-    the class and the colour, and from words in the names.
+    smooth Lambertian reflector. Without either value, the reflectivity follows
+    from the material of the part, see `cns_drake.scene.materials`, and from the
+    colour.
 
     Args:
         geometries: the geometries.
@@ -119,59 +95,45 @@ def _material(
     geometry: PerceptionGeometry, entry: StructureEntry, is_wet: bool
 ) -> tuple[float, ...]:
     """Returns the values of the fields of `Materials` for one geometry."""
-    kind, reflectivity, density = _reflection(geometry, entry)
-    fields = _CLASSES[entry.semantic_class]
-    if is_wet and kind == LAMBERT and fields.get("gets_wet"):
+    material = entry.material(geometry.part)
+    given = geometry.reflectivity
+    if given is None:
+        given = entry.reflectivity
+    if given is not None:
+        kind, reflectivity, density = LAMBERT, given, 0.0
+    else:
+        kind = _kind(material, geometry.surface)
+        dark, bright = material.reflectivity
+        reflectivity = dark + (bright - dark) * _brightness(geometry.rgb)
+        density = material.leaf_area_density
+    if is_wet and kind == LAMBERT and material.gets_wet:
         reflectivity = _wet(reflectivity)
-    given = geometry.reflectivity, entry.reflectivity
-    if kind not in (LAMBERT, LEAVES, SPRAYS) or given != (None, None):
+    if kind not in (LAMBERT, LEAVES, SPRAYS) or given is not None:
         return kind, reflectivity, density, *[0.0] * 7
     return (
         kind,
         reflectivity,
         density,
-        fields["rough"],
-        fields["contrast"],
+        material.rough,
+        material.contrast,
         # A volume of leaves needs no relief: it has depth anyway.
-        0.0 if kind == LEAVES else fields["relief"],
-        fields.get("tufts", 0.0),
-        fields.get("swell", 0.0),
-        fields.get("fittings", 0.0),
-        fields.get("stains", 0.0),
+        0.0 if kind == LEAVES else material.relief,
+        material.tufts,
+        material.swell,
+        material.fittings,
+        material.stains,
     )
 
 
-def _reflection(
-    geometry: PerceptionGeometry, entry: StructureEntry
-) -> tuple[int, float, float]:
-    """Returns kind, reflectivity and leaf area density of a geometry."""
-    given = geometry.reflectivity
-    if given is None:
-        given = entry.reflectivity
-    if given is not None:
-        return LAMBERT, given, 0.0
-    fields = _CLASSES[entry.semantic_class]
-    dark, bright = fields["reflectivity"]
-    part = geometry.name.rpartition("/")[2]
-    words = set(part.split("_"))
-    if words & {"glass", "panes", "windows"}:
-        return GLASS, _GLASS_DUST, 0.0
-    if geometry.structure.startswith("markings"):
-        return BEADS, _MARKINGS, 0.0
-    if entry.semantic_class == "traffic-sign" and words & {"plate", "blade"}:
-        return RETRO, _SHEETING, 0.0
-    if "plate" in words:
-        return RETRO, _PLATE, 0.0
-    if "water" in words or geometry.structure.endswith("_water"):
-        return LAMBERT, _WATER, 0.0
-    if entry.semantic_class == "vegetation":
-        if words & {"wood", "trunk", "box", "pot", "edge"}:
-            return LAMBERT, _BARK, 0.0
-        kind = LEAVES if is_closed(geometry.surface) else SPRAYS
-        return kind, bright, _LEAF_AREA_DENSITY
-    if "trim" in words and "trim" in fields:
-        return LAMBERT, fields["trim"], 0.0
-    return LAMBERT, dark + (bright - dark) * _brightness(geometry.rgb), 0.0
+def _kind(material: Material, surface: Surface) -> int:
+    """Returns the kind of a material; leaves depend on the surface.
+
+    A closed surface of leaves is a volume of leaves. An open one is a sheet
+    that stands for leaves on a twig.
+    """
+    if material.kind == "leaves":
+        return LEAVES if is_closed(surface) else SPRAYS
+    return _KINDS[material.kind]
 
 
 def _brightness(rgb: tuple[float, float, float] | None) -> float:

@@ -9,6 +9,7 @@ from pydrake.math import RigidTransform, RotationMatrix
 from pydrake.systems.sensors import CameraInfo, ImageRgba8U
 import pytest
 
+from cns_drake.scene.materials import MATERIALS
 from cns_drake.sensors.camera import camera_scene, looks
 
 
@@ -117,27 +118,5 @@ def test_the_sky_is_brighter_below_and_brightest_at_the_sun():
     assert (colours[:, 2] >= colours[:, 0]).all()
 
 
-@pytest.mark.parametrize(
-    ("name", "semantic_class", "rgb", "look"),
-    [
-        ("m::carriageway/tile_1", "road", (0.3, 0.3, 0.32), "asphalt"),
-        ("m::markings/tile_1", "road", (0.9, 0.9, 0.9), "plaster"),
-        ("m::office_1/storey_1", "building", (0.56, 0.33, 0.27), "brick"),
-        ("m::office_1/storey_1", "building", (0.8, 0.79, 0.74), "plaster"),
-        ("m::office_1/storey_glass", "building", (0.2, 0.26, 0.31), "panes"),
-        ("m::tree_1/crown", "vegetation", (0.3, 0.5, 0.2), "leaves"),
-        ("m::tree_1/wood", "vegetation", (0.4, 0.3, 0.2), "bark"),
-        ("m::hedge_1/run_1", "vegetation", (0.3, 0.5, 0.2), "hedge"),
-        ("m::sign_1/plate", "traffic-sign", (0.75, 0.15, 0.15), "stop"),
-        ("m::sign_1/plate", "traffic-sign", (0.15, 0.32, 0.65), "way"),
-        ("m::light_1/signal_2", "pole", (0.1, 0.1, 0.1), "signals"),
-        ("thing", "unlabeled", (0.5, 0.5, 0.5), "plaster"),
-        # Snow on a lawn, and a white car.
-        ("m::lawn_1/top", "terrain", (0.93, 0.95, 0.97), "plaster"),
-        ("m::car_1/body", "car", (0.92, 0.92, 0.92), "paint"),
-    ],
-)
-def test_looks_are_chosen_by_name_class_and_colour(
-    name, semantic_class, rgb, look
-):
-    assert looks.look_of(name, semantic_class, rgb, 16) == look
+def test_each_material_has_a_look_and_each_look_a_material():
+    assert {one.look for one in MATERIALS.values()} == set(looks.LOOKS)

@@ -21,7 +21,7 @@ from cns_drake.sensors.returns.unit_sheets import UNIT_SHEETS
 TREE = StructureTable([StructureEntry(1, "tree", "vegetation")])
 HOUSE = StructureTable(
     [
-        StructureEntry(1, "house", "building"),
+        StructureEntry(1, "house", "building", materials={"glass": "glass"}),
         StructureEntry(2, "behind", "building", 0.5),
         StructureEntry(3, "side", "building", 0.5),
     ]
@@ -179,7 +179,9 @@ def test_a_pane_at_right_angles_blinds():
 
 
 def test_retro_reflectors_shine_at_any_angle():
-    signs = StructureTable([StructureEntry(1, "sign_001", "traffic-sign")])
+    sheeting = {"plate": "stop_sign"}
+    sign = StructureEntry(1, "sign_001", "traffic-sign", materials=sheeting)
+    signs = StructureTable([sign])
     bright = []
     for tilt in (0.0, 0.6):
         X_WG = RigidTransform(RollPitchYaw(0.0, 0.0, tilt), [30.0, 0.0, 0.0])
@@ -194,7 +196,7 @@ def test_markings_shine_however_flat_they_are_seen(above_deg):
     """pi times 150 mcd/m2/lx, which EN 1436 asks for 1.24 deg above them."""
     road = StructureTable(
         [
-            StructureEntry(1, "markings", "road"),
+            StructureEntry(1, "markings", "road", materials={"": "markings"}),
             StructureEntry(2, "asphalt", "road"),
         ]
     )
@@ -241,7 +243,10 @@ def test_every_class_has_a_material():
 
 def test_panes_of_vehicles_are_darker_than_trim_of_houses():
     table = StructureTable(
-        [StructureEntry(1, "a", "car"), StructureEntry(2, "b", "building")]
+        [
+            StructureEntry(1, "a", "car", materials={"trim": "trim"}),
+            StructureEntry(2, "b", "building"),
+        ]
     )
     things = [
         PerceptionGeometry(

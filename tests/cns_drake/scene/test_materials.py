@@ -1,0 +1,133 @@
+import numpy as np
+import pytest
+from shapely.geometry import box
+
+from cns_drake.city.buildings import ARCHETYPES, sample
+from cns_drake.city.geometry.structures import (
+    Model,
+    Part,
+    SphereShape,
+    Structure,
+)
+from cns_drake.city.placement.objects import OBJECTS
+from cns_drake.scene.materials import (
+    MATERIALS,
+    OF_CLASSES,
+    as_cell,
+    from_cell,
+)
+from cns_drake.scene.semantics import CLASS_IDS
+from cns_drake.scene.structure_table import StructureEntry
+
+
+def built(name, seed=0):
+    model = OBJECTS[name].build(np.random.default_rng(seed))
+    kind = OBJECTS[name].semantic_class
+    return Structure("one", kind, model, (0.0, 0.0, 0.0)).materials
+
+
+def test_every_class_has_a_material_and_every_material_a_range():
+    assert OF_CLASSES.keys() == CLASS_IDS.keys()
+    assert set(OF_CLASSES.values()) <= MATERIALS.keys()
+    for one in MATERIALS.values():
+        dark, bright = one.reflectivity
+        assert 0.0 < dark <= bright
+        # Only retro-reflectors are brighter than a white target.
+        assert (bright > 1.0) == (one.kind == "retro")
+        assert (one.leaf_area_density > 0.0) == (one.kind == "leaves")
+
+
+@pytest.mark.parametrize(
+    ("semantic_class", "parts", "cell"),
+    [
+        ("building", {"wall": "plaster", "roof": "plaster"}, ""),
+        ("building", {"wall": "brick", "roof": "brick"}, "brick"),
+        (
+            "building",
+            {"wall": "brick", "roof": "brick", "pane": "glass"},
+            "brick pane=glass",
+        ),
+        (
+            "building",
+            {"pane_1": "glass", "pane_2": "glass", "wall": "plaster"},
+            "glass wall=plaster",
+        ),
+        ("vegetation", {"crown": "leaves", "wood": "bark"}, "wood=bark"),
+        ("terrain", {}, ""),
+        ("pole", {"a b=c/1": "sheet", "d": "metal"}, "sheet d=metal"),
+        ("pole", {"d": "metal", "a b": "sheet"}, "a%20b=sheet"),
+    ],
+)
+def test_a_cell_has_the_materials_of_all_parts(semantic_class, parts, cell):
+    assert as_cell(semantic_class, parts) == cell
+    entry = StructureEntry(1, "one", semantic_class, materials=from_cell(cell))
+    for part, material in parts.items():
+        assert entry.material(part) is MATERIALS[material]
+
+
+@pytest.mark.parametrize(
+    ("cell", "fault"),
+    [
+        ("gold", "'gold' is none of asphalt,"),
+        ("wall=", "'' is none of"),
+        ("wall=brick wall=glass", "'wall=glass': a second material"),
+        ("brick plaster", "'plaster': a second material"),
+    ],
+)
+def test_wrong_cells_are_refused(cell, fault):
+    with pytest.raises(ValueError, match=fault):
+        from_cell(cell)
+
+
+def test_a_structure_without_materials_has_those_of_its_class():
+    for name, usual in OF_CLASSES.items():
+        entry = StructureEntry(1, "a_glass", name)
+        assert entry.material("glass") is MATERIALS[usual]
+
+
+def test_objects_know_what_they_are_made_of():
+    assert built("palm") == {"wood": "bark", "crown": "leaves"}
+    assert set(built("hedge").values()) == {"hedge"}
+    assert built("van") == {"body": "paint", "trim": "trim"}
+    assert built("fountain") == {"stone": "boards", "water": "basin"}
+    assert built("bus_shelter")["panes"] == "glass"
+    assert built("round_planter") == {"pot": "pot", "leaves": "leaves"}
+    assert built("sign_stop") == {"mast": "sheet", "plate": "stop_sign"}
+    assert built("sign_triangular")["plate"] == "yield_sign"
+    assert built("sign_direction")["plate"] == "way_sign"
+    assert built("pedestrian_light")["signal"] == "signals"
+    plates = {built("sign_round", seed)["plate"] for seed in range(20)}
+    assert plates == {"stop_sign", "way_sign"}
+
+
+@pytest.mark.parametrize("name", ["office", "row_house", "church"])
+def test_windows_of_buildings_are_of_glass(name):
+    kind = ARCHETYPES[name]
+    side, height = sum(kind.widths) / 3, sum(kind.heights) / 2
+    rng = np.random.default_rng(3)
+    model = sample(name, box(0, 0, side, side), height, rng)
+    building = Structure("one", "building", model, (0.0, 0.0, 0.0))
+    panes = {p for p, m in building.materials.items() if m == "glass"}
+    assert panes
+    assert all("glass" in name for name in panes)
+    assert set(building.materials.values()) <= {"glass", "plaster", "brick"}
+
+
+@pytest.mark.parametrize(
+    ("rgb", "material"),
+    [
+        ((0.56, 0.33, 0.27), "brick"),
+        ((0.80, 0.79, 0.74), "plaster"),
+        (None, "plaster"),
+    ],
+)
+def test_reddish_walls_are_of_brick(rgb, material):
+    parts = (
+        Part("wall", SphereShape(1.0), rgb=rgb),
+        Part("door", SphereShape(1.0), rgb=rgb, material="metal"),
+    )
+    model = Model(parts, {}, box(0, 0, 1, 1))
+    house = Structure("house", "building", model, (0.0, 0.0, 0.0))
+    assert house.materials == {"wall": material, "door": "metal"}
+    shed = Structure("shed", "fence", model, (0.0, 0.0, 0.0))
+    assert shed.materials == {"wall": "metal", "door": "metal"}
