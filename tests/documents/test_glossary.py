@@ -13,6 +13,7 @@ EVERYDAY = {
     "correct pose",
     "description",
     "drawn",
+    "fit",
     "hidden",
     "history",
     "judge",
