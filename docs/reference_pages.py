@@ -24,7 +24,7 @@ from cns_drake.command_line import cli
 from cns_drake.roads import road
 from cns_drake.roads.lane_path import Speeds
 from cns_drake.roads.route import Route, RouteLeg
-from cns_drake.scenarios import variation
+from cns_drake.scenarios.losses import Losses
 from cns_drake.scenarios.scenario import (
     DriverConfig,
     RideConfig,
@@ -36,6 +36,7 @@ from cns_drake.sensors.camera.config import CameraSection
 from cns_drake.sensors.imu.config import ImuSection
 from cns_drake.sensors.lidar.config import LidarSection, WeatherConfig
 from cns_drake.sensors.odometry.config import OdometrySection
+from cns_drake.studies.comparisons import DrawnRoute
 from cns_drake.studies.experiment import Experiment, MadeMap
 from evaluation.command_line import cli as evaluation_cli
 from evaluation.methods import MethodConfig, make_method, shipped_methods
@@ -58,10 +59,6 @@ SCENARIO: Sections = {
     "Weather": WeatherConfig,
     "Odometry": OdometrySection,
 }
-FAMILY: Sections = {
-    "Family": variation.Family,
-    "Routes at random": variation.DrawnRoutes,
-}
 CITY: Sections = {
     "roads.yaml": road.RoadsFile,
     "A road's style": road.RoadStyle,
@@ -81,7 +78,12 @@ CITY: Sections = {
     "A stage": stages.Stage,
     "A growth": stages.Growth,
 }
-EXPERIMENT: Sections = {"Experiment": Experiment, "A map to make": MadeMap}
+EXPERIMENT: Sections = {
+    "Experiment": Experiment,
+    "A map to make": MadeMap,
+    "What is missing": Losses,
+    "A route at random": DrawnRoute,
+}
 METHODS: Sections = {
     "All methods": MethodConfig,
     **{
@@ -110,11 +112,6 @@ def pages() -> dict[str, str]:
             "[Drives](../scenarios.md) explains these fields with examples. "
             "Relative paths start at the folder of the file.",
             SCENARIO,
-        ),
-        "family.md": _fields_page(
-            "Fields of a family of drives",
-            "[Families](../scenarios.md#families) shows an example.",
-            FAMILY | {"Ride": RideConfig, "IMU": ImuSection},
         ),
         "city.md": _fields_page(
             "Fields of a city",

@@ -13,7 +13,7 @@ from cns_drake.base.errors import InputError
 from cns_drake.base.interrupts import uninterrupted
 from cns_drake.base.terminal import next_command, note, show
 from cns_drake.command_line import options
-from cns_drake.command_line.simulating import family_members
+from cns_drake.command_line.simulating import varied_drives
 from evaluation.recognition.protocol import RetrievalProtocol
 
 
@@ -329,7 +329,8 @@ def _export_pairs(
         names = list(recordable_drives())
     learned = [load_scenario(name) for name in names]
     if values["vary"] is not None:
-        learned += family_members(values["vary"], output, cluster)
+        varied = varied_drives(values["vary"], output, cluster)
+        learned += [one for one in varied if one not in learned]
     if layout == Format.OVERLAP_TABLE:
         if len(learned) != 2:
             raise InputError(

@@ -63,13 +63,13 @@ Overwrite = Annotated[
     ),
 ]
 Vary = Annotated[
-    Path | None,
+    str | None,
     typer.Option(
-        metavar="FAMILY.yaml",
-        help="File of a family of drives (one drive and what varies in it), "
-        "whose members are taken in addition to the named drives. Their "
-        "scenario files are written to <output>/scenarios, and cities that are "
-        "generated for them to <output>/cities.",
+        metavar="NAME|FILE.yaml",
+        help="Experiment whose drives are taken in addition to the named "
+        "drives: the name of a shipped one, or a file. Their scenario files "
+        "are written to <output>/scenarios, and cities that are made for them "
+        "to <output>/cities.",
     ),
 ]
 Maps = Annotated[

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable
 from pathlib import Path
 import re
 from typing import TYPE_CHECKING, Annotated, Literal
@@ -63,33 +63,40 @@ Snowfall = Annotated[
 ]
 
 
-def family_members(
-    vary: Path, output: Path, cluster: Cluster
-) -> list[Scenario]:
-    """Reads a family of drives, writes its scenario files and returns them.
+def varied_drives(vary: str, output: Path, cluster: Cluster) -> list[Scenario]:
+    """Returns the drives of an experiment, and writes their scenario files.
 
-    The scenario files are written to `<output>/scenarios`, and cities that are
-    generated for the family to `<output>/cities`.
+    The scenario files are written to `<output>/scenarios`, and cities that the
+    experiment makes to `<output>/cities`.
 
     Args:
-        vary: the family's file.
+        vary: name of a shipped experiment, or the file of one.
         output: folder of the recordings.
-        cluster: runs the jobs that generate cities.
+        cluster: runs the jobs that make cities.
 
     Raises:
-        InputError: the family cannot be used.
+        InputError: the experiment cannot be used.
     """
-    from cns_drake.scenarios.variation import load_family, write_scenarios
-    from cns_drake.studies.redrawing import redraw_cities
+    from cns_drake.base.yaml_files import read_yaml
+    from cns_drake.scenarios.losses import write_scenarios
+    from cns_drake.studies.experiment import (
+        load_experiment,
+        shipped_experiments,
+    )
+    from cns_drake.studies.study import Study
 
-    def redraw(
-        map_folder: Path, stage: str, seeds: Sequence[int]
-    ) -> dict[int, Path]:
-        return redraw_cities(
-            map_folder, stage, seeds, output / "cities", cluster
-        )
-
-    members = load_family(vary, redraw)
+    if vary not in shipped_experiments():
+        values = read_yaml(Path(vary))
+        if isinstance(values, dict) and "base" in values:
+            raise InputError(
+                f"{vary}: base: --vary reads an experiment now, with `maps`,"
+                " and the fields that vary below `database` and `query`"
+            )
+    # Nothing is measured, and no program of the experiment runs.
+    unused = {"tasks": {"place": {}}, "methods": {"solid": {}}, "charts": []}
+    experiment = load_experiment(vary, list(unused.items()))
+    study = Study(experiment, output.absolute(), vary, cluster, note)
+    members = study.drives()
     write_scenarios(members, output / "scenarios")
     return members
 
@@ -325,7 +332,8 @@ def generate(
         names = list(recordable_drives())
     scenarios = [load_scenario(name) for name in names or ()]
     if vary is not None:
-        scenarios += family_members(vary, output, cluster)
+        varied = varied_drives(vary, output, cluster)
+        scenarios += [one for one in varied if one not in scenarios]
     if frames is not None:
         scenarios = [s.replaced(frames=frames) for s in scenarios]
     record_all(scenarios, output, cluster, overwrite=overwrite)

@@ -7,10 +7,16 @@ from pathlib import Path
 import re
 from typing import Any
 
+import numpy as np
+from pydantic import Field
+
 from cns_drake.base.csv_files import read_records, whole_number
 from cns_drake.base.errors import InputError, errors_at, validated
 from cns_drake.base.jobs.fingerprint import fingerprint
 from cns_drake.base.listing import natural_key
+from cns_drake.roads.network import load_road_network
+from cns_drake.roads.route import draw_route
+from cns_drake.scenarios.losses import Losses, lost_structures
 from cns_drake.scenarios.planning import count_frames, plan_drive
 from cns_drake.scenarios.scenario import Scenario
 from cns_drake.scenarios.scenario_files import (
@@ -19,9 +25,9 @@ from cns_drake.scenarios.scenario_files import (
     world_file,
 )
 from cns_drake.scenarios.shipped import worlds_folder
-from cns_drake.scenarios.variation import Family, vary
 from cns_drake.scene.world import load_world
 from cns_drake.sensors.lidar.config import WeatherConfig
+from cns_drake.sensors.sensor_config import Section
 from cns_drake.simulation.loaded_drive import load_ways
 from cns_drake.studies.experiment import (
     CAUSE,
@@ -37,7 +43,7 @@ from evaluation.recognition.protocol import RetrievalProtocol
 from evaluation.results.table import LAST, OWN
 
 # Fields of a side (`both`, `database`, `query`) that no scenario has.
-FAMILY_FIELDS = ("missing", "scattered", "towards")
+LOSS_FIELDS = tuple(Losses.model_fields)
 # Fields that only the database, or only the query, can have.
 _QUERY_FIELDS = ("turn_queries", "tilt_queries", "hide_sector")
 _DATABASE_FIELDS = ("distractors", "lateral")
@@ -65,6 +71,18 @@ _MOST_ROOM = 0.5
 _FOLLOWED_ROOM = 0.25
 # Columns of a table of frozen drives.
 _FROZEN = ("map", "level", "drives")
+
+
+class DrawnRoute(Section):
+    """A route that is sampled at random.
+
+    Attributes:
+        length: smallest length of the route [m].
+        seed: seed of the random draw.
+    """
+
+    length: float = Field(gt=0.0, le=100_000.0)
+    seed: int = Field(default=0, ge=0)
 
 
 class MissingError(Exception):
@@ -363,9 +381,20 @@ class PairOfDrives:
         if "redraw" in left:
             wanted = left.pop("redraw")
             drive = self._elsewhere(side, drive, self.redraw, wanted)
-        family = {n: left.pop(n) for n in FAMILY_FIELDS if n in left}
-        if family:
-            drive = self._decayed(side, drive, family, seed)
+        lost = {n: left.pop(n) for n in LOSS_FIELDS if n in left}
+        if lost:
+            where = f"{self.source}: {side}"
+            losses = validated(Losses, lost, where)
+            names = lost_structures(drive, losses, seed, where)
+            drive = drive.replaced(without=names)
+        if isinstance(left.get("route"), Mapping):
+            where = f"{self.source}: {side}.route"
+            drawn = validated(DrawnRoute, left.pop("route"), where)
+            roads = load_road_network(map_folder(drive).roads)
+            rng = np.random.default_rng(drawn.seed)
+            route = draw_route(roads, drawn.length, rng)
+            drive = drive.replaced(route=route, waypoints=None)
+            self._check_map(side, drive, {"route": route})
         for name in _SEEDED:
             if isinstance(left.get(name), dict):
                 left[name] = {"seed": seed, **left[name]}
@@ -442,18 +471,6 @@ class PairOfDrives:
             f" {map_folder(drive).name} has {', '.join(stages)}; or give"
             f" {OWN}, {LAST}, {FIRST} or '{EARLIER}1' to '{EARLIER}{_STEPS}'"
         )
-
-    def _decayed(
-        self, side: str, drive: Scenario, fields: Changes, seed: int
-    ) -> Scenario:
-        """Returns a drive through a city with some structures missing."""
-        values = {**fields, "base": drive.name, "stage": drive.stage}
-        values["missing"] = [fields.get("missing", 0.0)]
-        family = validated(
-            Family, {**values, "seeds": [seed]}, f"{self.source}: {side}"
-        )
-        (member,) = vary(drive, family, self.source)
-        return drive.replaced(without=member.without)
 
     def _fit(self, drive: Scenario, fields: dict[str, Any]) -> None:
         """Reduces traffic to what roads hold; drops impossible lane changes."""

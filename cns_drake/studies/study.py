@@ -244,6 +244,34 @@ class Study:
             on_note=self.on_note,
         )
 
+    def drives(self, maps: Sequence[str] = ()) -> list[Scenario]:
+        """Returns each drive that the study compares; makes their maps.
+
+        Args:
+            maps: names or folders of maps that replace those of the experiment.
+
+        Raises:
+            InputError: a map cannot be used, or its drives are recordings.
+        """
+        found = list(self._drives(maps))
+        for some in found:
+            if some.city is not None:
+                raise InputError(
+                    f"{self.source}: {some.map_name}: its drives are recorded"
+                )
+            for _ in self._built(some, made=False):
+                pass
+        self._made.make(self.cluster)
+        drives: dict[str, Scenario] = {}
+        for some in found:
+            for _, _, compared, _, _ in self._built(some, made=True):
+                for drive in (compared.database, compared.query):
+                    if drives.setdefault(drive.name, drive) != drive:
+                        raise InputError(
+                            f"{self.source}: two drives are named {drive.name}"
+                        )
+        return list(drives.values())
+
     def _choose_methods(
         self,
     ) -> Mapping[str, tuple[MethodChoice, Mapping[str, Any]]]:
@@ -444,6 +472,27 @@ class Study:
         Each item is a comparison and the fingerprint of its drives. If `made`
         is false, the maps that conditions need are only noted.
         """
+        for names, query, compared, condition, seed in self._built(
+            some, made=made
+        ):
+            yield (
+                self._pair(
+                    compared,
+                    query,
+                    map_name=some.map_name,
+                    names=names,
+                    factors={**some.factors, **condition.factors},
+                    seed=seed,
+                    is_baseline=condition.is_baseline,
+                    stated=self._protocol_of(condition),
+                ),
+                compared.fingerprint(),
+            )
+
+    def _built(
+        self, some: _Drives, *, made: bool
+    ) -> Iterator[tuple[tuple[str, str], Scenario, Compared, Condition, int]]:
+        """Yields names, query, changed drives, condition and seed of pairs."""
         noted: dict[str, None] = {}
         age, redraw = self._made.want_age, self._made.want_redrawn
         if made:
@@ -458,6 +507,7 @@ class Study:
                 redraw,
                 noted.setdefault,
             )
+            names = _base_name(database), query.name
             known: set[str] = set()
             for condition in self._conditions:
                 for seed in self.experiment.seeds:
@@ -471,19 +521,7 @@ class Study:
                     key = f"{condition.factors} {compared.fingerprint()}"
                     if key not in known:
                         known.add(key)
-                        yield (
-                            self._pair(
-                                compared,
-                                query,
-                                map_name=some.map_name,
-                                names=(_base_name(database), query.name),
-                                factors={**some.factors, **condition.factors},
-                                seed=seed,
-                                is_baseline=condition.is_baseline,
-                                stated=self._protocol_of(condition),
-                            ),
-                            compared.fingerprint(),
-                        )
+                        yield names, query, compared, condition, seed
         for text in noted if made else ():
             self.on_note(f"{some.map_name}: {text}")
 

@@ -9,14 +9,11 @@ from helpers import documents
 from mcap.reader import make_reader
 import pytest
 import typer
-import yaml
 
 from cns_drake import load_scenario
 from cns_drake.city.plan.stages import load_stages
 from cns_drake.command_line import cli
 from cns_drake.scenarios.scenario_files import map_folder
-from cns_drake.scenarios.variation import Family
-from cns_drake.sensors.lidar.presets import LIDAR_PRESETS
 from evaluation.command_line import cli as evaluation_cli
 from evaluation.drives import open_drive
 
@@ -97,24 +94,6 @@ def test_names_in_modules_exist():
     assert named
     for code in named:
         assert pydoc.locate(code.partition("(")[0]) is not None, code
-
-
-def test_examples_of_options_that_multiply_families():
-    page = documents.read("docs/scenarios.md")
-    codes = [piece.text for piece in documents.inline(page)]
-    routes = yaml.safe_load(next(c for c in codes if c.startswith("routes: {")))
-    fields = documents.read("docs/reference/family.md")
-    cells = {
-        row[0].strip("`"): row[3]
-        for row in documents.table(fields, "## Family")
-    }
-    lidars = yaml.safe_load(cells["lidars"].split("`")[1])
-    parts = yaml.safe_load(cells["missing"].split("`")[1])
-    values = routes | {"lidars": lidars, "missing": parts}
-    family = Family.model_validate({"base": "riverside_01"} | values)
-    assert family.routes.count == 10
-    assert len(family.missing) == 20
-    assert set(family.lidars) <= LIDAR_PRESETS.keys()
 
 
 @pytest.mark.slow

@@ -8,14 +8,14 @@ from cns_drake.city.placement.objects import OBJECTS
 from cns_drake.scenarios.scenario import Scenario
 from cns_drake.sensors.lidar.presets import LIDAR_PRESETS
 from docs import reference_pages
-from docs.reference_pages import CITY, EXPERIMENT, FAMILY, METHODS, SCENARIO
+from docs.reference_pages import CITY, EXPERIMENT, METHODS, SCENARIO
 
 PAGES = reference_pages.pages()
 # Each once, in one order for all processes of a run.
 MODELS = [
     *dict.fromkeys(
         model
-        for sections in (SCENARIO, FAMILY, CITY, EXPERIMENT)
+        for sections in (SCENARIO, CITY, EXPERIMENT)
         for model in sections.values()
     )
 ]

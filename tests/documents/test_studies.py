@@ -8,6 +8,7 @@ from helpers import documents
 import pytest
 import yaml
 
+from cns_drake.scenarios.losses import Losses
 from cns_drake.scenarios.scenario import Scenario
 from cns_drake.studies import comparisons
 from cns_drake.studies.experiment import (
@@ -64,7 +65,9 @@ def test_what_can_vary_exists():
         annotation = Scenario.model_fields[section].annotation
         assert field in annotation.model_fields, name
     source = inspect.getsource(comparisons)
-    for name in set(named) - {*scenario, "protocol", "crop"}:
+    lost = Losses.model_fields.keys()
+    assert lost <= set(named)
+    for name in set(named) - {*scenario, *lost, "protocol", "crop"}:
         assert f'"{name}"' in source, name
     fields = RetrievalProtocol.__dataclass_fields__
     (values,) = (

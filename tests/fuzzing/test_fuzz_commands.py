@@ -29,8 +29,8 @@ COMMANDS = {
     ),
     "vary": (
         "family",
-        ("family.yaml",),
-        (_DRAKE, "generate", "--vary", "family.yaml", "--output", "out"),
+        ("vary.yaml",),
+        (_DRAKE, "generate", "--vary", "vary.yaml", "--output", "out"),
         1,
     ),
     "scan": (

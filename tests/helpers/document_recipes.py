@@ -553,28 +553,27 @@ RECIPES = {
         prints=("before.pcd: ", "after.pcd: ", "TCR_sym"),
         makes=("before.pcd", "after.pcd"),
     ),
-    "family": Recipe(
-        "base: riverside_01      # its route",
+    "varied drives": Recipe(
+        "drives: stages          # riverside_01",
         changes=(
-            ("riverside_01", "town/sequence_01.yaml"),
+            ("maps: riverside", "maps: town"),
             ("count: 20", "count: 2"),
             ("0, 1, 2", "0"),
         ),
-        file="family.yaml",
+        file="vary.yaml",
     ),
-    "family drives": Recipe(
-        ".venv/bin/cns-drake generate riverside_02 --vary",
+    "recording varied drives": Recipe(
+        ".venv/bin/cns-drake generate --vary vary.yaml",
         changes=(
-            ("generate riverside_02", "generate town/sequence_02.yaml"),
             ("--vary", "--frames 40 --vary"),
             ("riverside_01", "town_01"),
             ("riverside_02", "town_02"),
         ),
-        after=("family", "start a city"),
-        prints=("family/town_01_m600_s0", "AUC"),
-        makes=("family/scenarios/town_01_m600_s0.yaml",),
+        after=("varied drives", "start a city"),
+        prints=("varied/town_01_missing_0p6_0", "AUC"),
+        makes=("varied/scenarios/town_01_missing_0p6_0.yaml",),
     ),
-    "family trend": Recipe(
+    "trend": Recipe(
         ".venv/bin/cns-drake study trend --output",
         changes=(
             (
@@ -675,17 +674,13 @@ RECIPES = {
         makes=("pictured/history.csv", "pictured/pictures/film.jpg"),
     ),
     "scattered losses": Recipe(
-        ".venv/bin/cns-drake generate --vary worlds/downtown/hard_database",
+        ".venv/bin/cns-drake generate --vary worlds/downtown/hard",
         changes=(
-            ("worlds/downtown/hard_database.yaml", "family.yaml --frames 40"),
-            (
-                "--vary worlds/downtown/hard_query.yaml",
-                "town/sequence_02.yaml --frames 40",
-            ),
-            ("downtown_01_m000_s1", "town_01_m000_s0"),
-            ("downtown_04_m000_s2", "town_02"),
+            ("worlds/downtown/hard.yaml", "vary.yaml --frames 40"),
+            ("downtown_01_1", "town_01_missing_0p6_0"),
+            ("downtown_04_1", "town_02"),
         ),
-        after=("family", "start a city"),
+        after=("varied drives", "start a city"),
         prints=("hard/town_02", "AUC"),
     ),
     "cleared city": Recipe(
@@ -702,17 +697,17 @@ RECIPES = {
         after=("start a city",),
         prints=("stress/town_01", "AUC"),
     ),
-    "query family": Recipe(
-        "base: riverside_02",
-        changes=(("riverside_02", "town/sequence_02.yaml"), ("1, 2, 3", "1")),
-        file="queries.yaml",
+    "redrawn cities": Recipe(
+        "both: {redraw: [1, 2, 3]}\nmaps: riverside",
+        changes=(("riverside", "town"), ("1, 2, 3", "1")),
+        file="redrawn.yaml",
     ),
-    "other cities": Recipe(
-        ".venv/bin/cns-drake generate --vary queries.yaml",
+    "drives through redrawn cities": Recipe(
+        ".venv/bin/cns-drake generate --vary redrawn.yaml",
         changes=(("--vary", "--frames 3 --vary"),),
-        after=("query family", "start a city"),
-        prints=("family/town_02_c1_m000_s0",),
-        makes=("family/cities/town_c1/stage_02.sdf",),
+        after=("redrawn cities", "start a city"),
+        prints=("redrawn/town_02_",),
+        makes=("redrawn/cities/town_c1/stage_*.sdf",),
     ),
     "scheduler": Recipe(
         ".venv/bin/dask scheduler",
@@ -745,7 +740,7 @@ RECIPES = {
             ("tcp://$(hostname):8786", "{scheduler}"),
             (".venv/bin/dask scheduler --port 8786", "sleep 0"),
             ("srun ", ""),
-            ("--vary family.yaml", "tour.yaml --frames 2"),
+            ("--vary vary.yaml", "tour.yaml --frames 2"),
             ("output output", "output slurm"),
         ),
         after=(
@@ -958,7 +953,7 @@ NOT_RUN = {
     ".venv/bin/cns-drake study map-pairs": "ages and surveys a whole city, for "
     "minutes; the recipe map truth has a small one",
     ".venv/bin/cns-drake study trend --set": "measures 58 versions of a "
-    "shipped city; the recipe family trend has two of a small one",
+    "shipped city; the recipe trend has two of a small one",
     ".venv/bin/cns-drake study size": "describes shipped drives, for many "
     "minutes",
     ".venv/bin/cns-drake study fresh": "draws shipped cities and drives "

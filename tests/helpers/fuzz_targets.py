@@ -12,6 +12,7 @@ import yaml
 
 from cns_drake.base.errors import InputError
 from cns_drake.base.errors import InputError as ReadingError
+from cns_drake.base.jobs.cluster import Cluster
 from cns_drake.city.generation.city_structures import make_city, meshes_of
 from cns_drake.city.plan.city_plan import load_plan
 from cns_drake.city.plan.stages import load_stages
@@ -25,16 +26,18 @@ from cns_drake.recording.schedule import FRAME_PERIOD
 from cns_drake.roads.network import load_road_network
 from cns_drake.roads.route import Route, make_lane_path
 from cns_drake.scenarios.drive_table import drive_rows
+from cns_drake.scenarios.losses import write_scenarios
 from cns_drake.scenarios.planning import plan_drive
 from cns_drake.scenarios.scenario import Scenario
 from cns_drake.scenarios.scenario_files import load_scenario
-from cns_drake.scenarios.variation import load_family, write_scenarios
 from cns_drake.scene.perception_geometry import read_perception_geometry
 from cns_drake.scene.world import load_world
 from cns_drake.sensors.lidar.config import make_pattern
 from cns_drake.sensors.lidar.presets import make_beam_pattern
 from cns_drake.simulation.scanning import save_scan, scan_world
 from cns_drake.simulation.simulation import simulate
+from cns_drake.studies.experiment import conditions, load_experiment
+from cns_drake.studies.study import Study
 from evaluation import drives
 from evaluation.clouds.cloud_files import read_cloud
 from helpers import (
@@ -116,15 +119,16 @@ def _write_town(folder: Path) -> None:
             "seed": 3,
         }
         (folder / f"{name}.yaml").write_text(yaml.safe_dump(values | shared))
-    family = {
-        "base": "sequence_01.yaml",
-        "stage": "01",
-        "missing": {"from": 0.0, "to": 0.5, "count": 2},
+    experiment = {
+        "maps": str(folder),
+        "both": {
+            "missing": {"from": 0.0, "to": 0.5, "count": 2},
+            "route": {"length": 60.0, "seed": [1, 2]},
+            "lidar": ["cns", "vlp-16"],
+        },
         "seeds": [0, 1],
-        "routes": {"count": 2, "length": 60.0, "seed": 1},
-        "lidars": ["cns", "vlp-16"],
     }
-    (folder / "family.yaml").write_text(yaml.safe_dump(family))
+    (folder / "vary.yaml").write_text(yaml.safe_dump(experiment))
     (folder / "views.yaml").write_text(_VIEWS)
 
 
@@ -147,9 +151,10 @@ def _is_small(scenario: Scenario) -> bool:
 
 
 def _vary(folder: Path) -> None:
-    members = load_family(folder / "family.yaml")
-    if len(members) < 100:
-        write_scenarios(members, folder / "out" / "scenarios")
+    experiment = load_experiment(folder / "vary.yaml")
+    if len(conditions(experiment)) * len(experiment.seeds) < 100:
+        study = Study(experiment, folder / "out", "vary.yaml", Cluster(1))
+        write_scenarios(study.drives(), folder / "out" / "scenarios")
 
 
 def _load_roads(folder: Path) -> None:
@@ -367,7 +372,7 @@ TARGETS = (
     Target(
         "waypoints", 6, _write_town, ("tour.yaml", "tour.csv"), _plan("tour")
     ),
-    Target("family", 2, _write_town, ("family.yaml", "structures.csv"), _vary),
+    Target("family", 2, _write_town, ("vary.yaml", "structures.csv"), _vary),
     Target(
         "world", 3, _write_town,
         ("stage_01.sdf", "structures.csv", "wedge.obj"), _scan,

@@ -223,3 +223,26 @@ def test_options_of_one_name_have_one_meaning():
             if o == option
         }
         assert found == commands, option
+
+
+@pytest.mark.parametrize(
+    "text",
+    [
+        "base: riverside_01\nmissing: [0, 0.5]\n",
+        "base: a.yaml\ncity_seeds: 3\n",
+    ],
+)
+@pytest.mark.parametrize("command", ["generate", "export"])
+def test_former_files_of_families_are_named(capsys, tmp_path, command, text):
+    path = tmp_path / "family.yaml"
+    path.write_text(text)
+    words = [command, "--vary", path, "--output", tmp_path / "out"]
+    if command == "export":
+        words += ["--format", "pointnetvlad"]
+    status, out, err = run(capsys, "cns-drake", *words)
+    assert (status, out) == (2, "")
+    assert err.startswith(
+        f"cns-drake: error: {path}: base: --vary reads an experiment now"
+    )
+    assert err.count("\n") == 1
+    assert not (tmp_path / "out").exists()

@@ -172,7 +172,7 @@ def town(tmp_path_factory):
     return folder
 
 
-def test_families_on_other_cities_share_them(
+def test_drives_of_experiments_share_other_cities(
     town, tmp_path, monkeypatch, capsys
 ):
     output = tmp_path / "output"
@@ -184,45 +184,50 @@ def test_families_on_other_cities_share_them(
             lambda jobs, cluster, unit="": done.extend(studies.do(jobs)),
         )
 
-    def generate(stage, **values):
-        family = tmp_path / f"family_{stage}.yaml"
-        base = {"base": str(town / f"sequence_{stage}.yaml")}
-        family.write_text(yaml.safe_dump(base | values))
-        words = ("generate", "--vary", family, "--output", output)
+    def generate(**values):
+        path = tmp_path / "vary.yaml"
+        path.write_text(yaml.safe_dump({"maps": str(town)} | values))
+        words = ("generate", "--vary", path, "--output", output)
         status, out, err = run_program(capsys, "cns-drake", main, *words)
         assert status == 0, err
         return [Path(result) for result in out.splitlines()]
 
-    databases = generate("01", city_seeds=[7], missing=[0.0, 0.6])
-    names = [path.name for path in databases]
-    assert names == ["town_01_c7_m000_s0", "town_01_c7_m600_s0"]
-    assert done == ["city town_c7", *names]
-    stage = output / "cities" / "town_c7" / "stage_02.sdf"
+    redrawn = {"drives": "stages", "both": {"redraw": [7]}}
+    drives = generate(**redrawn, database={"stage": "02", "missing": [0, 0.6]})
+    names = [path.name for path in drives]
+    assert len(names) == 3
+    city, *recorded = done
+    assert city.startswith("city town")
+    assert recorded == names
+    stage = next((output / "cities").glob("town_c7/stage_*.sdf"))
     drawn = stage.stat()
+    plain, query, less = drives
 
     done.clear()
-    other, query = generate("02", city_seeds=[8, 7])
-    assert query == output / "town_02_c7_m000_s0"
-    assert done == ["city town_c8", other.name, query.name]
+    redrawn["both"] = {"redraw": [8, 7]}
+    others = generate(**redrawn, database={"stage": "02"})
+    assert sum(one.startswith("city ") for one in done) == 1
     assert stage.stat() == drawn
+    other = next(one for one in others if "redraw_8" in one.name)
+    databases = [plain, less]
 
     # Each city is another place.
-    with pytest.raises(InputError, match=r"through town_c8, .* town_c7"):
+    with pytest.raises(InputError, match=r"through town\w*8\w*, .* town\w*7"):
         compare_maps(survey(query), survey(other))
     changes = {
         path.name: compare_maps(survey(path), survey(query)).change.symmetric
         for path in databases
     }
     assert changes[names[0]] == 0.0  # The very same drive.
-    assert changes[names[1]] > 0.1
+    assert changes[names[2]] > 0.1
 
     # Each member is complete, also after it has been moved.
     moved = tmp_path / "moved"
     output.rename(moved)
-    member = load_scenario(moved / "scenarios" / f"{names[1]}.yaml")
+    member = load_scenario(moved / "scenarios" / f"{names[2]}.yaml")
     assert is_recorded(member.model_copy(update={"frames": FRAMES}), moved)
     again = open_drive(simulate(member, tmp_path).folder)
-    before = open_drive(moved / names[1])
+    before = open_drive(moved / names[2])
     assert len(again) == len(before) == FRAMES
     for scan, scan_before in zip(again, before, strict=True):
         np.testing.assert_array_equal(scan, scan_before)

@@ -26,7 +26,7 @@ def run(*arguments):
 
 
 @pytest.mark.night
-def test_simulated_and_recorded_families_agree(tmp_path, monkeypatch):
+def test_simulated_and_recorded_drives_agree(tmp_path, monkeypatch):
     studies.run_here(monkeypatch, recording, engine)
     town = write_small_city(tmp_path / "town")
     generate_city(town)
@@ -48,12 +48,9 @@ def test_simulated_and_recorded_families_agree(tmp_path, monkeypatch):
             "frames": 40,
         }
         (town / f"sequence_{stage}.yaml").write_text(yaml.safe_dump(drive))
-    ride = {"roughness": "C", "seed": 4}
-    base = {"base": "town/sequence_01.yaml", "missing": [0.0, 0.5]}
-    family = tmp_path / "family.yaml"
-    family.write_text(yaml.safe_dump(base | {"seeds": [4], "ride": ride}))
     experiment = tmp_path / "mine.yaml"
     fields = {
+        "maps": str(town),
         "drives": "stages",
         "database": {
             "stage": "last",
@@ -66,11 +63,13 @@ def test_simulated_and_recorded_families_agree(tmp_path, monkeypatch):
     }
     experiment.write_text(yaml.safe_dump(fields))
     recorded, simulated = tmp_path / "recorded", tmp_path / "simulated"
-    run("study", experiment, town, "--output", simulated)
-    query = town / "sequence_02.yaml"
-    run("generate", query, "--vary", family, "--output", recorded)
+    run("study", experiment, "--output", simulated)
+    run("generate", "--vary", experiment, "--output", recorded)
     results = Results.read(simulated / "results.csv")
-    for part, member in ((0.0, "town_01_m000_s4"), (0.5, "town_01_m500_s4")):
+    for part, member in (
+        (0.0, "town_01_missing_0p0_4"),
+        (0.5, "town_01_missing_0p5_4"),
+    ):
         here = results.where(**{"database.missing": part, "gate": False})
         change = compare_maps(
             survey(recorded / member), survey(recorded / "town_02")

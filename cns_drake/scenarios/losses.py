@@ -1,0 +1,193 @@
+"""Structures that are missing from the city of a drive, as experiments say.
+
+A share of the buildings and plants is missing, namely those nearest to a random
+place: a drive with a greater share lacks everything that a drive with a smaller
+share lacks. The removed structures can also be limited to those that an earlier
+stage lacks; the city is then between the two stages. In addition, structures of
+chosen classes can be missing at random.
+"""
+
+from collections.abc import Mapping, Sequence, Set
+import os
+from pathlib import Path
+from typing import Annotated
+
+import numpy as np
+from pydantic import Field
+import yaml
+
+from cns_drake.base.csv_files import read_records
+from cns_drake.base.errors import InputError
+from cns_drake.base.files import make_folder, write_text
+from cns_drake.scenarios import scenario_files
+from cns_drake.scenarios.scenario import Scenario
+from cns_drake.scene.world import load_world, structures_in
+from cns_drake.sensors.sensor_config import Section
+
+# Classes of structures that can be missing; streets, ground and street
+# furniture always stay.
+_REMOVABLE = ("building", "vegetation")
+# Farther than any city reaches [m].
+_FARTHEST = 1e6
+# The key of `scattered` that is no class.
+_SEED = "seed"
+
+_Part = Annotated[float, Field(ge=0.0, le=1.0)]
+
+
+class Losses(Section):
+    """What is missing from the city of a drive.
+
+    Attributes:
+        missing: share of the buildings and plants to remove, from 0 to 1: those
+            nearest to a place that the seed of the condition selects.
+        scattered: name of a class -> share of its structures to remove at
+            random all over the map, besides those of `missing`, such as
+            `{pole: 0.3}`. Its key `seed` replaces the seed of the condition, so
+            that the two drives can lack different structures.
+        towards: another stage of the map, usually an earlier one. Only
+            structures that do not exist in this other stage are removed.
+            Structures that are lower there keep their height.
+    """
+
+    missing: _Part = 0.0
+    scattered: dict[str, float] = Field(default_factory=dict)
+    towards: str | None = None
+
+
+def lost_structures(
+    drive: Scenario, losses: Losses, seed: int, source: str
+) -> tuple[str, ...]:
+    """Returns the names of the structures that a drive's city loses, sorted.
+
+    Args:
+        drive: a drive through a stage of a map.
+        losses: what is missing.
+        seed: seed of the random samples.
+        source: file and section of the losses, for error messages.
+
+    Raises:
+        InputError: the drive has no map, a stage or class does not exist, or a
+            share is not from 0 to 1.
+    """
+    if drive.map is None:
+        raise InputError(
+            f"{source}: missing: {drive.name} has no map with structures"
+        )
+    scattered = dict(losses.scattered)
+    drawn_by = scattered.pop(_SEED, seed)
+    if drawn_by < 0 or drawn_by != int(drawn_by):
+        raise InputError(
+            f"{source}: scattered.seed: {drawn_by} is no whole number from 0"
+        )
+    for kind, part in scattered.items():
+        if not 0.0 <= part <= 1.0:
+            raise InputError(
+                f"{source}: scattered.{kind}: {part} is not from 0 to 1"
+            )
+    removable = None
+    if losses.towards is not None:
+        stage = str(drive.stage)
+        removable = _difference(drive, stage, losses.towards, source)
+    table = scenario_files.map_folder(drive).structures
+    order = _decay_order(table, seed, removable)
+    missing = _draw_losses(table, scattered, int(drawn_by), source)
+    return tuple(
+        sorted(missing.union(order[: round(losses.missing * len(order))]))
+    )
+
+
+def write_scenarios(scenarios: Sequence[Scenario], folder: Path) -> list[Path]:
+    """Writes scenarios as `<folder>/<name>.yaml`.
+
+    If a map lies next to `folder`, its path is written as a relative path, so
+    that map and folder can be moved together.
+
+    Raises:
+        InputError: if a file cannot be written.
+    """
+    make_folder(folder)
+    here = folder.resolve()
+    paths = []
+    for scenario in scenarios:
+        path = folder / f"{scenario.name}.yaml"
+        values = scenario.model_dump(mode="json", exclude_none=True)
+        if Path(values.get("map", "")).is_relative_to(here.parent):
+            values["map"] = os.path.relpath(values["map"], here)
+        write_text(path, yaml.safe_dump(values, sort_keys=False))
+        paths.append(path)
+    return paths
+
+
+def _difference(
+    base: Scenario, stage: str, other: str, source: str
+) -> frozenset[str]:
+    """Returns the structures of a stage that another one lacks."""
+    names = []
+    for one in (stage, other):
+        scenario = base.replaced(stage=one)
+        scenario_files.check_files(scenario, source)
+        world = load_world(scenario_files.world_file(scenario))
+        names.append(structures_in(world))
+    difference = names[0] - names[1]
+    if not difference:
+        raise InputError(
+            f"{source}: towards: stage {other} lacks nothing of stage {stage}"
+        )
+    return frozenset(difference)
+
+
+def _decay_order(
+    table: Path, seed: int, removable: Set[str] | None
+) -> list[str]:
+    """Returns structures that can be missing, in the order of removal."""
+    rows = [
+        row
+        for _, row in read_records(table, ("name", "class"))
+        if (
+            row["class"] in _REMOVABLE and not _is_on_a_lot(row)
+            if removable is None
+            else row["name"] in removable
+        )
+    ]
+    if not rows:
+        raise InputError(f"{table}: none of its structures can be missing")
+    try:
+        xy = np.array([(float(row["x"]), float(row["y"])) for row in rows])
+        if not (np.abs(xy) <= _FARTHEST).all():  # NaN fails, too.
+            raise ValueError
+    except (KeyError, ValueError):
+        raise InputError(
+            f"{table}: x, y: every structure needs finite numbers"
+        ) from None
+    rng = np.random.default_rng(seed)
+    low, high = xy.min(axis=0), xy.max(axis=0)
+    distance = np.linalg.norm(xy - rng.uniform(low, high), axis=1)
+    return [rows[k]["name"] for k in np.argsort(distance, kind="stable")]
+
+
+def _is_on_a_lot(row: Mapping[str, str]) -> bool:
+    """Returns whether a structure occupies a lot only until it is built on."""
+    tags = (row.get("tags") or "").split()
+    return "_lot_" in row["name"] and "lot" in tags
+
+
+def _draw_losses(
+    table: Path, parts: Mapping[str, float], seed: int, source: str
+) -> frozenset[str]:
+    """Draws the missing structures, each class independently.
+
+    `parts` maps classes to shares from 0 to 1. The structures of a smaller
+    share are among those of a greater share.
+    """
+    records = [row for _, row in read_records(table, ("name", "class"))]
+    rows = [row for row in records if not _is_on_a_lot(row)]
+    missing: set[str] = set()
+    for kind, part in parts.items():
+        names = sorted(row["name"] for row in rows if row["class"] == kind)
+        if not names:
+            raise InputError(f"{source}: scattered: no {kind!r} in {table}")
+        rng = np.random.default_rng([seed, *kind.encode()])
+        order = rng.permutation(len(names))
+        missing.update(names[k] for k in order[: round(part * len(names))])
+    return frozenset(missing)
