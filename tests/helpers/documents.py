@@ -117,7 +117,8 @@ def inline(page: Page) -> list[Piece]:
 
 def pieces(page: Page) -> list[Piece]:
     """Returns the blocks and the commands in sentences and tables."""
-    return [piece for piece in fenced(page) if piece.language != "math"] + [
+    drawn = ("math", "text")  # Formulas and diagrams.
+    return [piece for piece in fenced(page) if piece.language not in drawn] + [
         piece for piece in inline(page) if _is_command(piece)
     ]
 
