@@ -82,7 +82,8 @@ class _FamilyHouse(Building):
 
 def _window_rows(p: _FamilyHouse, wing: Wing, storeys: int) -> Openings:
     """Returns the windows of a wing; those of its sides are further apart."""
-    openings, width = Openings(p, wing, p.boxes), p.window_width
+    openings = Openings(p, wing, p.boxes)
+    width = p.window_width
     for edges, step in (((0, 2), p.window_pitch), ((1, 3), _SIDE_PITCH_M)):
         openings.add_rows(edges, p.floor, STOREY_M, storeys, step, width)
     return openings
@@ -104,7 +105,8 @@ def _garage_wing(
 
     Its roof, `kind`, is `flat`, `gable`, `shed` or `hip`.
     """
-    wall_top, span = 2.65, x1 - x0
+    wall_top = 2.65
+    span = x1 - x0
     rise = {"flat": 0.5, "gable": 0.3 * span, "shed": 0.2 * span,
             "hip": 0.25 * span}[kind]  # fmt: skip
     shape = Roof(kind, True, 0.3, 0.25, ROOF_M)
@@ -220,11 +222,13 @@ class DetachedHouse(_FamilyHouse):
                 main_back - 0.4, self.height,
             ))  # fmt: skip
         taken = left + wide if "front" in _WING_ENDS[self.plan] else left
-        self.free, self.storeys = (taken, split), n
+        self.free = (taken, split)
+        self.storeys = n
         if self.mirrored:
             boxes = [box.mirrored(x0 + x1) for box in boxes]
             self.free = (x0 + x1 - split, x0 + x1 - taken)
-        self.boxes, self.main = tuple(boxes), boxes[0]
+        self.boxes = tuple(boxes)
+        self.main = boxes[0]
         self.garage_box = boxes[-1] if has_garage else None
         self.wings = boxes[1 : -1 if has_garage else None]
 
@@ -260,7 +264,8 @@ def _add_porch(p: DetachedHouse, free: bays.Span) -> None:
     room = p.ahead - reach - 0.02
     details.add_steps(p, wall, door - 0.7, door + 0.7, reach, p.floor, room)
     if full and p.floor > 0.3:
-        y, rgb = reach - 0.15, p.colours["trim"]
+        y = reach - 0.15
+        rgb = p.colours["trim"]
         runs = ((x0 + 0.15, door - 0.8), (door + 0.8, x1 - 0.15))
         for k, (a, b) in enumerate(runs):
             part = f"railing_{k}"
@@ -373,7 +378,8 @@ class Bungalow(_FamilyHouse):
         wide = max(3.4, self.wing_width * (right - left))
         end = min(top - 0.2, main.wall_top + ROOF_M + slope * wide / 2)
         cross = Roof(self.roof, True, 0.5, 0.4, ROOF_M)
-        boxes, taken = [main], [left, right]
+        boxes = [main]
+        taken = [left, right]
         for k in range(count):
             a = left - 0.02 if k == 0 else right - wide
             area = (a, front - reach, a + wide + 0.02, front + deep / 2)
@@ -386,7 +392,9 @@ class Bungalow(_FamilyHouse):
             if carport is not None:
                 a, c, b, d = carport
                 carport = (both - b, c, both - a, d)
-        self.boxes, self.carport, self.free = boxes, carport, taken
+        self.boxes = boxes
+        self.carport = carport
+        self.free = taken
 
 
 def _add_bungalow_main(p: Bungalow, main: Wing, openings: Openings) -> None:

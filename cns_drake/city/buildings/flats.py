@@ -69,7 +69,8 @@ class CourtBlock(Building):
         size = (self.window_width, 0.8, storey - 0.55, self.recess)
         windows = bays.rhythm(self.pitch, [bays.window(*size)], 0.8)
         framed = bays.rhythm(self.pitch, [bays.window(*size, ledge=0.1)], 0.8)
-        band, layout = Band(storey - 0.15, storey, -0.07), {0: framed}
+        band = Band(storey - 0.15, storey, -0.07)
+        layout = {0: framed}
         walls = Facade(
             storey, (band,), bays.by_edge(layout, windows), (self.recess,)
         )
@@ -97,7 +98,8 @@ def _add_oriels(
     p: CourtBlock, plan: np.ndarray, z0: float, count: int, storey: float
 ) -> None:
     """Adds bay windows to the street front, from the first floor upwards."""
-    half, r = 0.75, p.oriel_reach
+    half = 0.75
+    r = p.oriel_reach
     outline = [(-half - 0.5, 0.0), (-half, -r), (half, -r), (half + 0.5, 0.0)]
     floor = Facade(storey, (Band(0.9, storey - 0.5, 0.14),))
     height = count * storey
@@ -327,7 +329,8 @@ def _add_top(
         x, y = ax + share * (bx - ax), ay + 0.5 * (by - ay)
         if by - ay > bx - ax:
             x, y = ax + 0.5 * (bx - ax), ay + share * (by - ay)
-        spot, brick = (x, y, p.height - 1.4), p.kind.choices["bricks"][k]
+        spot = (x, y, p.height - 1.4)
+        brick = p.kind.choices["bricks"][k]
         add_chimney(p, f"chimney_{k}", spot, brick, item="chimney_row")
 
 
@@ -388,7 +391,8 @@ class GardenFlats(Building):
         boxes = []
         for k in range(count):
             y = front + self.stagger * (k % 2)
-            top, cross = self.height, False
+            top = self.height
+            cross = False
             if k % 2 and self.crossed:
                 cross = True
                 run = (bounds[1] - bounds[0]) / 2
@@ -431,7 +435,8 @@ def _add_house(
     openings.enclose((glass,), bands, attic=attic)
     if not wing.roof.along_y:
         x, y = wing.x0 + 0.3 * wall.length, wing.center[1]
-        spot, brick = (x, y, wing.top - 1.3), p.kind.choices["bricks"][0]
+        spot = (x, y, wing.top - 1.3)
+        brick = p.kind.choices["bricks"][0]
         add_chimney(p, f"chimney_{number}", spot, brick)
 
 
@@ -443,7 +448,8 @@ def _add_verandas(
     width = min(p.veranda_width, wall.length / 2 - 2.2)
     if width < 2.0:
         return
-    reach, top = p.veranda_reach, wing.wall_top - 0.1
+    reach = p.veranda_reach
+    top = wing.wall_top - 0.1
     pieces, frame = [], []
     for x in (0.9 + width / 2, wall.length - 0.9 - width / 2):
         a, b = round(x - width / 2, 2), round(x + width / 2, 2)
@@ -453,7 +459,8 @@ def _add_verandas(
             frame.append(wall.standing(*spot, top - 0.1))
         lid = (a - 0.1, b + 0.1, -0.05, reach + 0.1, top - 0.25, top)
         frame.append(wall.box(*lid))
-    part, rgb = f"house_{number}", p.colours["trim"]
+    part = f"house_{number}"
+    rgb = p.colours["trim"]
     mesh = merge_meshes(*pieces)
     shape = MeshShape(p.define(f"{part}_verandas", mesh))
     for k in range(1, storeys):

@@ -54,7 +54,8 @@ class Barn(Building):
         x0, y0, x1, y1 = self.site.bounds
         along_y = y1 - y0 >= x1 - x0
         left, right = x0 + _MARGIN, x1 - _MARGIN
-        front, back = y0 + _MARGIN + self.deck, y1 - _MARGIN
+        front = y0 + _MARGIN + self.deck
+        back = y1 - _MARGIN
         a, b, low, high = left, right, front, back
         if along_y:
             a += self.aisle * self.aisle_left
@@ -67,7 +68,8 @@ class Barn(Building):
         eaves = 0.35
         if self.roof == "barrel":
             # A vault is at most half a circle.
-            eaves, wall_top = 0.0, max(wall_top, top - 0.8 * half)
+            eaves = 0.0
+            wall_top = max(wall_top, top - 0.8 * half)
         roof = Roof(self.roof, along_y, eaves, 0.35, 0.18)
         main = Wing.at((a, low, b, high), wall_top, top, roof)
         boxes = [main]
@@ -129,7 +131,8 @@ def _add_doors(p: Barn, wing: Wing, openings: Openings, edge: int) -> None:
         spots = (x - width, x + width / 2 + 0.05)
         half = width / 2 - 0.05
     else:
-        spots, half = (x - width / 2, x + 0.03), width / 2 - 0.03
+        spots = (x - width / 2, x + 0.03)
+        half = width / 2 - 0.03
     for a in spots:
         b = a + half
         brace = (a + 0.1, 0.1, 0.2), (b - 0.1, 0.1, height - 0.1)
@@ -179,7 +182,8 @@ def _add_ridge(p: Barn, main: Wing) -> None:
 
 def _add_jetty(p: Barn, xs: bays.Span, y0: float, front: float) -> None:
     """Adds a plank deck on posts in front of a boat house."""
-    (a, b), y = xs, y0 + 0.1
+    a, b = xs
+    y = y0 + 0.1
     p.add_to("doors", massing.box(a, b, y, front, 0.05, 0.3))
     for x in np.linspace(a + 0.2, b - 0.2, 4).tolist():
         spot = (x - 0.12, x + 0.12, y + 0.02, y + 0.26)
@@ -257,7 +261,8 @@ def _halls(p: SportsHall, area: massing.Area, along_y: bool) -> list[Wing]:
 
 def _add_hall(p: SportsHall, hall: Wing, halls: list[Wing]) -> None:
     openings = Openings(p, hall, halls)
-    high, width = hall.wall_top, p.bay - 0.9
+    high = hall.wall_top
+    width = p.bay - 0.9
     band = bays.window(width, high - 2.4, high - 0.6, _DEEP, mullions=1)
     low = max(0.5 if p.annex == 0.0 else p.annex_height + 0.4, 0.3 * high)
     tall = bays.window(
@@ -296,17 +301,20 @@ def _add_frames(p: SportsHall, hall: Wing, halls: list[Wing]) -> None:
 def _add_annex(p: SportsHall, halls: list[Wing], y0: float) -> None:
     """Adds the low front part: an entrance between changing rooms."""
     x0, x1 = min(w.x0 for w in halls), max(w.x1 for w in halls)
-    margin, h = 0.06 * (x1 - x0), p.annex_height
+    margin = 0.06 * (x1 - x0)
+    h = p.annex_height
     area = (x0 + margin, y0 + 1.6, x1 - margin, halls[0].y0 + 0.05)
     annex = Wing.flat(area, h, 0.4)
     openings = Openings(p, annex, halls)
     small = bays.window(1.6, 1.5, 2.5, _DEEP)
     openings.row((0, 1, 3), 1.0, 3.6, [small], 0.8)
-    middle, wide = annex.width / 2, min(7.0, 0.35 * annex.width)
+    middle = annex.width / 2
+    wide = min(7.0, 0.35 * annex.width)
     glazing = bays.window(wide - 0.6, 0.05, h - 0.8, _DEEP, mullions=3)
     openings.put(0, middle, wide, glazing)
     openings.enclose((_DEEP,), (walls.Band(0.0, 0.3, -0.05),))
-    z, half = h - 0.65, wide / 2 + 1.0
+    z = h - 0.65
+    half = wide / 2 + 1.0
     lid = (middle - half, middle + half, -0.02, 1.5, z, z + 0.25)
     p.add_to("frames", annex.wall(0).box(*lid))
     equip_roof(p, annex.outline, annex.floor, p.roof_items, clear=0.5)

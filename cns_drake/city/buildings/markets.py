@@ -96,7 +96,8 @@ def _add_unit(p: ShopStrip, wing: Wing, tall: bool) -> None:
     glass = (wings.GLASS_M, *wings.SHOP_GLASS_M)
     openings.enclose(glass, (Band(0.0, 0.3, -0.05),), cladding)
     if p.canopy:
-        z, reach = p.ground - 0.95, p.canopy_reach
+        z = p.ground - 0.95
+        reach = p.canopy_reach
         lid = (0.05, wall.length - 0.05, -0.02, reach, z, z + 0.22)
         p.add_to("awning", wall.box(*lid))
     _add_parapet(p, wing, cladding)
@@ -104,7 +105,8 @@ def _add_unit(p: ShopStrip, wing: Wing, tall: bool) -> None:
 
 def _add_parapet(p: ShopStrip, wing: Wing, cladding: str) -> None:
     """Adds a coping along the parapet's front, or piers at its ends."""
-    wall, top = wing.wall(0), wing.top
+    wall = wing.wall(0)
+    top = wing.top
     length = wall.length
     if p.chance(0.5):
         coping = (0.02, length - 0.02, -0.05, 0.12, top - 0.2, top - 0.02)
@@ -175,7 +177,8 @@ def _stalls(p: KioskRow, left: float, right: float, front: float) -> list[Wing]:
     if p.roof == "shed":
         roof = Roof("shed", False, 0.25, 0.0, 0.15, falling=True)
     top = p.height - (1.1 if p.tower else 0.0)
-    boxes, x = [], left
+    boxes = []
+    x = left
     for k in range(count):
         high = top - (0.25 * (k % 2) if k != count // 2 else 0.0)
         wall = max(2.2, high - 0.32 * min(width, p.depth))
@@ -188,7 +191,8 @@ def _stalls(p: KioskRow, left: float, right: float, front: float) -> list[Wing]:
 def _add_stall(p: KioskRow, wing: Wing, boxes: list[Wing], k: int) -> None:
     """Adds a stall: a counter under an awning, or closed shutters."""
     openings = Openings(p, wing, boxes)
-    wall, material = wing.wall(0), ("stalls", "others")[k % 2]
+    wall = wing.wall(0)
+    material = ("stalls", "others")[k % 2]
     a, b = 0.3, wall.length - 0.3
     head = min(2.15, wing.wall_top - 0.25)
     if p.chance(0.75):
@@ -211,7 +215,8 @@ def _add_stall(p: KioskRow, wing: Wing, boxes: list[Wing], k: int) -> None:
 
 def _add_lantern(p: KioskRow, wing: Wing) -> None:
     """Adds a small square lantern with its own roof."""
-    low, top = wing.wall_top, p.height
+    low = wing.wall_top
+    top = p.height
     body = massing.square(*wing.center, 0.6)
     eaves = massing.inset(body, -0.25)
     p.add_to("others", massing.skirt(body, body, low, top - 0.7))
@@ -221,7 +226,8 @@ def _add_lantern(p: KioskRow, wing: Wing) -> None:
 def _add_arcade(p: KioskRow, xs: bays.Span, front: float) -> None:
     """Adds a lean-to roof on posts along the whole row."""
     a, b = xs
-    low, y = 2.35, front - p.arcade
+    low = 2.35
+    y = front - p.arcade
     top = min(2.9, p.height - 0.4)
     line = [(y - 0.15, low + 0.15), (front + 0.05, top)]
     p.add_to("roof", roofs.shell(line, a, b, 0.12))
@@ -309,7 +315,8 @@ class Supermarket(Building):
 
 def _add_canopy(p: Supermarket, wall: details.WallFrame) -> None:
     """Adds a flat canopy on posts along the front."""
-    z, reach = 3.45, p.canopy
+    z = 3.45
+    reach = p.canopy
     lid = wall.box(0.3, wall.length - 0.3, -0.05, reach, z, z + 0.4)
     p.add_to("brand", lid)
     for a, _ in bays.stretches(wall.length - 1.0, p.pitch, 0.5):
@@ -320,11 +327,13 @@ def _add_canopy(p: Supermarket, wall: details.WallFrame) -> None:
 
 def _add_entrance(p: Supermarket, hall: Wing) -> None:
     """Adds a porch with sliding doors, higher than the hall."""
-    length, w = hall.width, p.entrance_width
+    length = hall.width
+    w = p.entrance_width
     x = float(
         np.clip(p.entrance_at * length, w / 2 + 0.5, length - w / 2 - 0.5)
     )
-    top, y0 = p.height, hall.y0 - p.canopy - 0.3
+    top = p.height
+    y0 = hall.y0 - p.canopy - 0.3
     kind, rise = {
         "tower": ("flat", 0.1),
         "gable": ("gable", 0.22 * w),

@@ -169,7 +169,8 @@ def _stack(
     )
 
     def place(z0: float, number: int) -> float:
-        at, part = (0.0, 0.0, z0), f"stack_{number}"
+        at = (0.0, 0.0, z0)
+        part = f"stack_{number}"
         p.place(f"{part}_glass", glass, at, rgb=p.glass_rgb, material="glass")
         p.place(f"{part}_soffit", soffit, at)
         for k in range(groups):
@@ -370,7 +371,8 @@ def _columns(p: UnfinishedTower, plan: np.ndarray) -> list[massing.Point]:
 
 def _add_frame(p: UnfinishedTower, plan: np.ndarray) -> None:
     """Adds the columns and the slab of every storey."""
-    columns, low = _columns(p, plan), p.storey - _SLAB_M
+    columns = _columns(p, plan)
+    low = p.storey - _SLAB_M
     top = p.storeys * p.storey
     pieces = [massing.post(x, y, 0.25, low + 0.02, 0.0) for x, y in columns]
     pieces.append(massing.prism(plan, low, p.storey, bottom=True))
@@ -389,7 +391,8 @@ def _add_frame(p: UnfinishedTower, plan: np.ndarray) -> None:
         for u in np.linspace(0.1, wall.length - 0.1, 6).tolist():
             post = (u - 0.03, u + 0.03, -0.09, -0.03)
             stubs.append(wall.box(*post, top, top + 1.1))
-    group, step = _repeated(pieces, p.group, p.storey), p.group * p.storey
+    group = _repeated(pieces, p.group, p.storey)
+    step = p.group * p.storey
     p.stack("frame", group, 0.0, step, p.storeys // p.group)
     p.add("stubs", *stubs)
 
@@ -403,7 +406,8 @@ def _add_core(p: UnfinishedTower, plan: np.ndarray) -> None:
     door = bays.alone(bays.window(1.2, 0.05, 2.2, 0.35), 2.0)
     layout = bays.by_edge({0: door, 2: door}, bays.plain)
     facade = Facade(p.storey, (), layout).stacked(p.storeys)
-    top, high = round(p.storeys * p.storey, 3), p.height
+    top = round(p.storeys * p.storey, 3)
+    high = p.height
     p.add(
         "core",
         facade_mesh(core, facade),
@@ -492,7 +496,8 @@ def _add_scaffolds(p: UnfinishedTower, plan: np.ndarray) -> None:
 def _add_hoist(p: UnfinishedTower, plan: np.ndarray) -> None:
     """Adds a hoist's mast and cage at the back."""
     wall = details.WallFrame(plan, 2)
-    x, top = 0.5 * wall.length, p.storeys * p.storey - 1.0
+    x = 0.5 * wall.length
+    top = p.storeys * p.storey - 1.0
     pieces = [
         wall.standing(u - 0.05, u + 0.05, v - 0.05, v + 0.05, top)
         for u in (x - 0.3, x + 0.3)
@@ -514,7 +519,9 @@ def _repeated(pieces: list[Mesh], count: int, step: float) -> Mesh:
 
 def _scaffold_level(xs: list[float]) -> Mesh:
     """Returns one platform of a scaffold: boards, a guard rail and braces."""
-    a, b, top = xs[0], xs[-1], _LIFT_M
+    a = xs[0]
+    b = xs[-1]
+    top = _LIFT_M
     pieces = [massing.box(a, b, 0.55, 1.5, top - 0.12, top - 0.05)]
     for z in (0.5, 1.0):
         pieces.append(massing.box(a, b, 1.5, 1.54, z, z + 0.06))

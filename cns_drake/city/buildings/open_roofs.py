@@ -79,7 +79,8 @@ def _rows(p: GasStation, canopy: np.ndarray) -> list[float]:
 def _add_canopy(p: GasStation, canopy: np.ndarray) -> None:
     """Adds the roof on its columns, lights on its underside."""
     x0, y0, x1, y1 = massing.extent(canopy)
-    top, low = p.canopy_top, p.canopy_top - p.fascia
+    top = p.canopy_top
+    low = p.canopy_top - p.fascia
     if p.sloped:
         middle = (y0 + y1) / 2
         line = [(y0, top - 0.3), (middle, top - 0.9), (y1, top - 0.3)]
@@ -152,7 +153,8 @@ def _add_wash(p: GasStation, xs: bays.Span, ys: bays.Span) -> None:
 def _add_sign(p: GasStation, xs: bays.Span, y0: float) -> None:
     """Adds the price sign at a front corner."""
     x = xs[0] + 1.2 if p.mirrored else xs[1] - 1.2
-    y, top = y0 + 0.9, p.height
+    y = y0 + 0.9
+    top = p.height
     for u in (x - 0.7, x + 0.7):
         p.add_to("steel", massing.post(u, y, 0.1, top - 0.5))
     for k, z in enumerate(np.arange(top - 1.2, 1.9, -0.75).tolist()):
@@ -223,7 +225,8 @@ def _add_round(p: ParkPavilion, center: massing.Point, reach: float) -> None:
     plan = np.roll(plan, 1, axis=0)
     p.add_to("stone", massing.prism(plan, -massing.FOUNDATION_M, p.floor))
     wall = details.WallFrame(plan, 0)
-    x, half = wall.length / 2, min(0.9, 0.4 * wall.length)
+    x = wall.length / 2
+    half = min(0.9, 0.4 * wall.length)
     flight = details.steps(x - half, x + half, 0.26 * count, p.floor, count)
     p.add_to("stone", wall.place(flight))
     z = p.floor + p.eaves
@@ -286,12 +289,14 @@ def _add_round_roof(
         levels.append((neck, head))
     for (a, za), (b, zb) in itertools.pairwise(levels):
         pieces.append(massing.skirt(ring(a), ring(b), za, zb))
-    hat, low = ring(levels[-1][0]), levels[-1][1]
+    hat = ring(levels[-1][0])
+    low = levels[-1][1]
     if p.lantern:
         drum = ring(0.8 * neck)
         pieces.append(massing.flat(hat, head))
         p.add_to("timber", massing.skirt(drum, drum, head, top - 0.4))
-        hat, low = ring(1.15 * neck), top - 0.4
+        hat = ring(1.15 * neck)
+        low = top - 0.4
         pieces.append(massing.flat(hat, low, up=False))
     p.add_to("roof", *pieces, massing.spire(hat, center, low, top))
     finial = massing.regular_polygon(0.07, 6, center)
@@ -303,7 +308,8 @@ def _add_shelter(p: ParkPavilion, area: massing.Area) -> None:
     x0, y0, x1, y1 = area
     a, b = x0 + _EAVES_M + 0.1, x1 - _EAVES_M - 0.1
     c, d = y0 + _EAVES_M + 0.1, y1 - _EAVES_M - 0.1
-    floor, z = 0.12, 0.12 + p.eaves
+    floor = 0.12
+    z = 0.12 + p.eaves
     slab = (a - 0.3, b + 0.3, c - 0.3, d + 0.3, floor)
     p.add_to("stone", massing.standing(*slab, bottom=True))
     plan = massing.rectangle(a, c, b, d)

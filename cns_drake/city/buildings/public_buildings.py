@@ -109,7 +109,8 @@ def _add_entrance(p: School, bar: np.ndarray, top: float) -> None:
     """Adds a glazed stair hall with steps and a canopy on posts."""
     wall = details.WallFrame(bar, 0)
     share = 0.72 if p.mirrored else 0.28
-    x, half = share * wall.length, min(p.entrance, 0.4 * wall.length) / 2
+    x = share * wall.length
+    half = min(p.entrance, 0.4 * wall.length) / 2
     x = float(np.clip(x, half + 0.4, wall.length - half - 0.4))
     high = p.height if p.roof == "flat" else min(top + 0.5, p.height)
     x0, y0 = wall.point(x - half, 1.2)
@@ -343,7 +344,9 @@ def _add_tower(p: Chapel, tower: Wing, boxes: list[Wing]) -> None:
 
 
 def _spire(p: Chapel, tower: Wing) -> list[Mesh]:
-    z, tip, center = tower.wall_top, p.height - 1.0, tower.center
+    z = tower.wall_top
+    tip = p.height - 1.0
+    center = tower.center
     eaves = massing.inset(tower.outline, -0.3)
     pieces = [
         massing.flat(eaves, z - 0.02, up=False),
@@ -390,7 +393,8 @@ def _add_cote(p: Chapel, nave: Wing) -> None:
         massing.flat(rim, high - 0.75, up=False),
         *_cross(x, y, p.height - 1.0, p.height),
     )
-    eaves, z = massing.square(x, y, 0.95), high - 0.02
+    eaves = massing.square(x, y, 0.95)
+    z = high - 0.02
     p.add_to("roof", massing.tent(eaves, (x, y), z, p.height - 0.8))
 
 
@@ -411,7 +415,8 @@ def _add_small(
 
 
 def _porch(nave: Wing) -> Wing:
-    middle, half = nave.center[0], 1.3
+    middle = nave.center[0]
+    half = 1.3
     roof = Roof("gable", True, 0.25, 0.25, 0.15)
     area = (middle - half, nave.y0 - 1.7, middle + half, nave.y0 + 0.1)
     top = min(4.2, nave.wall_top + 0.8)
@@ -438,7 +443,8 @@ def _annex(nave: Wing, width: float) -> Wing | None:
 
 
 def _cross(x: float, y: float, z0: float, z1: float) -> list[Mesh]:
-    arm, ys = z1 - 0.4, (y - 0.06, y + 0.06)
+    arm = z1 - 0.4
+    ys = (y - 0.06, y + 0.06)
     return [
         massing.box(x - 0.06, x + 0.06, *ys, z0, z1),
         massing.box(x - 0.35, x + 0.35, *ys, arm, arm + 0.12),

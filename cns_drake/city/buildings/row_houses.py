@@ -125,7 +125,8 @@ def _unit_box(
     x0, y0, x1, y1 = area
     across = p.roof in ("front", "stepped")
     span = (x1 - x0) if across else (y1 - y0)
-    top, rise = p.height, p.rise * span / 2
+    top = p.height
+    rise = p.rise * span / 2
     if p.roof == "flat":
         rise = 0.5
     elif p.roof == "stepped":
@@ -183,9 +184,13 @@ def _add_bay(
     if p.bay == "none" or width < 1.7 or (p.bay == "oriel" and storeys < 2):
         return
     count = min(p.bay_storeys, storeys)
-    x, low, foot = (a + b) / 2, 0.0, p.floor
+    x = (a + b) / 2
+    low = 0.0
+    foot = p.floor
     if p.bay == "oriel":
-        low, foot, count = p.floor + step, 0.0, min(count, storeys - 1)
+        low = p.floor + step
+        foot = 0.0
+        count = min(count, storeys - 1)
     high = min(foot + low + count * step - 0.1, wing.wall_top - 0.6)
     reach = min(0.6, 0.5 * p.stoop)
     openings.clear(0, x - width / 2 - 0.1, x + width / 2 + 0.1, low, high + 0.5)
@@ -254,7 +259,8 @@ def _add_stack(p: _HouseInARow, wing: Wing, name: str) -> None:
     x = wing.x0 + 0.45 if p.door_left else wing.x1 - 0.45
     y = wing.y0 + 0.55 * wing.depth
     spot = (x, y, roofs.line_height(wing.line, y) - 0.8)
-    row, scale = "chimney_row", (0.8, 0.85, 1.0)
+    row = "chimney_row"
+    scale = (0.8, 0.85, 1.0)
     add_chimney(p, name, spot, p.brick, item=row, yaw=yaw, scale=scale)
 
 
@@ -338,7 +344,8 @@ class Terrace(_HouseInARow):
         # Bay of the houses that have one.
         self.house_bay = self.bay
         if self.bay == "none":
-            self.house_bay, self.bay_storeys = "canted", 1
+            self.house_bay = "canted"
+            self.bay_storeys = 1
         # Height by which every other pair of houses is lower.
         self.step = self.pick((0.0, 0.4, 0.8))
         # Distance by which every other pair stands back.
@@ -424,12 +431,14 @@ class ShopHouse(_HouseInARow):
         left, right, blind = _front_site(self)
         area = (left, y0 + self.stoop, right, y1 - 0.35)
         wing, storeys = _unit_box(self, area, blind)
-        openings, ground = Openings(self, wing), self.floor
+        openings = Openings(self, wing)
+        ground = self.floor
         room = wing.wall_top - 0.25 - ground
         upper = storeys if room > 2.4 else 0
         step = room / max(upper, 1)
         sides = [k for k in (1, 3) if k not in blind]
-        head, width = min(2.25, step - 0.4), self.window_width
+        head = min(2.25, step - 0.4)
+        width = self.window_width
         for edges, pitch in (((0, 2), self.window_pitch), (sides, 4.0)):
             openings.add_rows(
                 edges, ground, step, upper, pitch, width, head=head
@@ -453,7 +462,8 @@ class ShopHouse(_HouseInARow):
 def _add_ground(p: ShopHouse, wing: Wing, openings: Openings) -> None:
     """Adds the shops, the door to the flats, service doors at the back."""
     wall = wing.wall(0)
-    door, length = 1.7 * (p.floor < p.height - 3.0), wall.length
+    door = 1.7 * (p.floor < p.height - 3.0)
+    length = wall.length
     left = p.door_left
     start, end = (door, length) if left else (0.0, length - door)
     openings.add_shops(0, start, end, p.floor,

@@ -187,7 +187,8 @@ class BalconyFlats(Building):
         common = count * per_group
         _add_balconies(self, walls, ground.height, (count, per_group, exact))
         for k, section in enumerate(sections):
-            part, high = f"section_{k}", top
+            part = f"section_{k}"
+            high = top
             if lower and k % 2 == 0:
                 rows = bays.rhythm(self.pitch, [_window(self, exact)], 0.5)
                 attic = Facade(exact, (), rows, (self.recess,))
@@ -201,7 +202,8 @@ class BalconyFlats(Building):
             )  # fmt: skip
             items = self.roof_items[k :: self.sections]
             equip_roof(self, section, roof, items, prefix=f"{part}_")
-        high, stairs = ground.height + common * exact, []
+        high = ground.height + common * exact
+        stairs = []
         for k, wall in enumerate(walls):
             stairs += _stair(self, wall, high, k == 0)
         self.add("stairs", *stairs, rgb=self.colours["rail"])
@@ -275,7 +277,8 @@ def _add_balconies(
                 front.wall.place(balcony, k * storey) for k in range(per_group)
             ]
     if pieces:
-        mesh, step = merge_meshes(*pieces), per_group * storey
+        mesh = merge_meshes(*pieces)
+        step = per_group * storey
         p.stack("balconies", mesh, z0, step, groups, rgb=p.colours["rail"])
 
 
@@ -455,7 +458,8 @@ def _add_galleries(
 ) -> None:
     """Adds a gallery to each storey, with continuous posts, and screens."""
     wall = details.WallFrame(slab, edge)
-    end, reach = wall.length, p.gallery - 0.05
+    end = wall.length
+    reach = p.gallery - 0.05
     groups, per_group, storey = stack
     storeys, step = groups * per_group, per_group * storey
     gallery = wall.place(details.balcony(0.02, end - 0.02, reach, 0.0, p.rail))

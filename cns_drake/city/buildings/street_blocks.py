@@ -103,7 +103,8 @@ def _add_shops(p: BrickBlock) -> float:
     entry = bays.with_middle(shops, bays.entrance(1.8, 3.0), 3.4)
     layout = bays.by_edge({0: entry}, shops if len(outline) > 4 else back)
     bands = (Band(0.0, 0.4, -0.08), Band(h - 1.0, h - 0.1, -0.15))
-    glass, blind = (0.35, p.recess), p.site.blind_edges
+    glass = (0.35, p.recess)
+    blind = p.site.blind_edges
     middle = front.length / 2
     cells = [
         (a, b)
@@ -264,8 +265,10 @@ def _center(p: CornerBuilding, plan: np.ndarray) -> np.ndarray:
 
 def _dome(p: CornerBuilding, plan: np.ndarray, z0: float) -> list[Mesh]:
     """Returns a drum over the corner with a dome, cone or open lantern."""
-    center, r = _center(p, plan), 0.62 * p.radius
-    top, height = p.height, p.height - z0
+    center = _center(p, plan)
+    r = 0.62 * p.radius
+    top = p.height
+    height = p.height - z0
     drum_top = round(z0 + 0.4 * height, 2)
 
     def ring(radius: float) -> np.ndarray:
@@ -284,9 +287,11 @@ def _dome(p: CornerBuilding, plan: np.ndarray, z0: float) -> list[Mesh]:
     heights = drum_top + share * rise * np.sin(angles)
     profile = list(zip(radii, heights, strict=True))
     pieces.append(massing.revolved(profile, 12, center))
-    lid, tip = heights[-1], ring(radii[-1])
+    lid = heights[-1]
+    tip = ring(radii[-1])
     if p.dome == "lantern":
-        core, middle = ring(0.6 * radii[-1]), lid + 0.55 * (top - lid)
+        core = ring(0.6 * radii[-1])
+        middle = lid + 0.55 * (top - lid)
         pieces.append(massing.prism(core, lid, middle))
         pieces.append(massing.flat(tip, middle, up=False))
         lid = middle
@@ -477,8 +482,10 @@ def _add_shop(
     streets: tuple[int, int, int],
     blind: frozenset[int],
 ) -> float:
-    h, pitch = p.ground, 2 * p.pitch
-    head, front = round(h - 1.0, 2), streets[1]
+    h = p.ground
+    pitch = 2 * p.pitch
+    head = round(h - 1.0, 2)
+    front = streets[1]
     shop = bays.shop_front(head, 0.3, door=False)
     glazed = bays.rhythm(pitch, [shop], margin=0.5)
     entry = bays.alone(bays.entrance(1.6, 2.4, 0.7, surround=0.1), p.cut)

@@ -69,13 +69,15 @@ class ArtDecoTower(Building):
                 self, plan, self.grooves, top, goal, part, 1.7
             )
             edges = (Band(0.0, 0.3, -0.12), Band(1.0, 1.3, -0.1))
-            parapet, part = Facade(1.3, edges), f"terrace_{k}"
+            parapet = Facade(1.3, edges)
+            part = f"terrace_{k}"
             tiers.add_crown(self, plan, parapet, top, 1.1, part=part)
             across, along = across + a, along + b
             step = (round(across, 1), round(along, 1)) * 2
             plan = massing.inset(base, step)
             plan = massing.notched(plan, self.notch) if self.notch else plan
-        goal, part = round(self.height - crown_height, 1), f"tier_{k + 1}"
+        goal = round(self.height - crown_height, 1)
+        part = f"tier_{k + 1}"
         top = tiers.add_grooved(self, plan, self.grooves, top, goal, part, 1.7)
         _add_crown(self, plan, top)
 
@@ -127,7 +129,8 @@ class GlassSkyscraper(Building):
         ]
         walls, glass = (self.kind.choices[part] for part in ("walls", "glass"))
         tint = self.whole(0, len(walls))
-        self.rgb, self.glass_rgb = walls[tint], glass[tint]
+        self.rgb = walls[tint]
+        self.glass_rgb = glass[tint]
         wanted = self.pick(("plain", "chamfered", "notched", "rounded"))
         self.corners = wanted if edges == 4 else "plain"
         self.lobby_height = self.uniform(6.0, 9.0, 2)
@@ -156,7 +159,8 @@ class GlassSkyscraper(Building):
         base = self.site.outline
         plan = _shaped(self, base)
         top = _add_lobby(self, plan)
-        reach, total = massing.shortest_side(base), np.zeros(len(base))
+        reach = massing.shortest_side(base)
+        total = np.zeros(len(base))
         if len(base) != 4:
             reach = min(0.08 * reach, 0.5 * massing.inset_limit(base))
         for k, (start, share, jitter) in enumerate(self.setbacks):
@@ -292,7 +296,9 @@ def _add_hotel_lobby(p: Hotel, plan: np.ndarray, y0: float) -> float:
     # The canopy of the drive stands on four pillars in the forecourt.
     middle = float(np.mean(plan[:2, 0]))
     front = float(plan[0, 1])
-    left, right, z = middle - 6.0, middle + 6.0, 4.2
+    left = middle - 6.0
+    right = middle + 6.0
+    z = 4.2
     roof = massing.box(left, right, y0 + 0.3, front + 0.2, z, z + 0.7)
     pillars = [
         massing.standing(x, x + 0.7, y, y + 0.7, z)
@@ -316,9 +322,11 @@ def _add_rooms(p: Hotel, plan: np.ndarray, z0: float, goal: float) -> float:
     layout = bays.by_edge(front_rooms, others)
     band = Band(storey - 0.12, storey, -0.08)
     walls = Facade(storey, (band,), layout, (p.recess,))
-    front, balconies = details.WallFrame(plan, 0), []
+    front = details.WallFrame(plan, 0)
+    balconies = []
     for a, b in bays.stretches(front.length, p.pitch, 0.4):
-        half, x = p.balcony_width / 2, (a + b) / 2
+        half = p.balcony_width / 2
+        x = (a + b) / 2
         ends = round(x - half, 2), round(x + half, 2)
         rail = details.balcony(*ends, p.balcony_reach, 0.0, p.rail)
         balconies.append(front.place(rail))
@@ -356,7 +364,8 @@ class PodiumTower(Building):
             self.kind.choices[part] for part in ("podium", "tower")
         )
         cladding = self.whole(0, len(podium))
-        self.rgb, self.tower_rgb = podium[cladding], tower[cladding]
+        self.rgb = podium[cladding]
+        self.tower_rgb = tower[cladding]
         # Share of the podium that the tower covers along x and y.
         self.tower = self.rng.uniform(0.5, 0.68, 2).tolist()
         run = 2 * (self.tower[0] * site.width + self.tower[1] * site.depth)
@@ -402,7 +411,8 @@ class PodiumTower(Building):
 
 def _add_shops(p: PodiumTower) -> float:
     outline, h = p.site.outline, p.ground_height
-    front, pitch = details.WallFrame(outline, 0), p.shop_pitch
+    front = details.WallFrame(outline, 0)
+    pitch = p.shop_pitch
     choices = [bays.shop_front(h - 0.6, 0.45, door=d) for d in (True, False)]
     shops = bays.rhythm(pitch, choices, margin=0.8)
     gates = [bays.gate(4.0, 3.4), bays.blank]

@@ -318,7 +318,8 @@ class Assembly(Dice):
         shape = MeshShape(self.define(part, mesh))
         for k in range(count):
             z = z0 + k * step
-            name, at = f"{part}_{k:02d}", (0.0, 0.0, z)
+            name = f"{part}_{k:02d}"
+            at = (0.0, 0.0, z)
             self.place(name, shape, at, rgb=rgb, material=material)
 
     def shared(
@@ -375,7 +376,8 @@ class Building(Assembly, abc.ABC):
     ) -> None:
         """Draws sizes and style, and then the colours of the building."""
         super().__init__(site, rng)
-        self.kind, self.height = kind, height
+        self.kind = kind
+        self.height = height
         self.draw()
         self.colours: dict[str, Rgb] = {}
         for part, rgbs in kind.colours.items():

@@ -153,7 +153,8 @@ def awnings(
             default there is no such stretch.
     """
     narrower, reach, z0, z1 = shape
-    middle, pieces = wall.length / 2, []
+    middle = wall.length / 2
+    pieces = []
     for a, b in cells:
         free = b < middle - door or a > middle + door
         if rng.random() < share and free:
@@ -176,7 +177,9 @@ def balcony(
         z: height of its floor [m].
         rail: height of the balustrade above the floor [m].
     """
-    t, low, high = 0.12, z - 0.2, z + rail
+    t = 0.12
+    low = z - 0.2
+    high = z + rail
     outer = [(x0, 0.0), (x0, reach), (x1, reach), (x1, 0.0)]
     inner = [(x0 + t, 0.0), (x0 + t, reach - t)]
     inner += [(x1 - t, reach - t), (x1 - t, 0.0)]

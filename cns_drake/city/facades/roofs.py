@@ -56,7 +56,8 @@ def gambrel_line(
             its height as a share of the rise.
     """
     half = (b - a) / 2
-    run, up = knee[0] * half, z + knee[1] * (top - z)
+    run = knee[0] * half
+    up = z + knee[1] * (top - z)
     return [(a, z), (a + run, up), (a + half, top), (b - run, up), (b, z)]
 
 
@@ -72,7 +73,9 @@ def barrel_line(
         top: height of the crown [m].
         count: number of chords, an even number.
     """
-    half, middle, rise = (b - a) / 2, (a + b) / 2, top - z
+    half = (b - a) / 2
+    middle = (a + b) / 2
+    rise = top - z
     radius = (half**2 + rise**2) / (2 * rise)
     span = math.atan2(half, radius - rise)
     return [
@@ -131,8 +134,10 @@ def shell(
     )
     faces = []
     for k in range(n - 1):
-        top, far = k, 2 * n + k
-        under, far_under = n + k, 3 * n + k
+        top = k
+        far = 2 * n + k
+        under = n + k
+        far_under = 3 * n + k
         faces += [
             (top, far, far + 1, top + 1),
             (under, under + 1, far_under + 1, far_under),
@@ -172,7 +177,8 @@ def gable_wall(
             if hole.x0 <= x0 and x1 <= hole.x1:
                 rows += [hole.z0, hole.z1]
         for k in range(0, len(rows), 2):
-            low, is_last = rows[k], k + 1 == len(rows)
+            low = rows[k]
+            is_last = k + 1 == len(rows)
             z0, z1 = (top(x0), top(x1)) if is_last else (rows[k + 1],) * 2
             faces.add((x0, 0, low), (x0, 0, z0), (x1, 0, z1), (x1, 0, low))
     for h in holes:
@@ -291,7 +297,8 @@ def equip_roof(
         clear: least distance to the edge of the roof [m].
         prefix: beginning of the names of the parts.
     """
-    room, rng = Polygon(roof), out.rng
+    room = Polygon(roof)
+    rng = out.rng
     x0, y0, x1, y1 = room.bounds
     along = np.subtract(roof[1], roof[0])
     heading = math.atan2(along[1], along[0])

@@ -191,7 +191,8 @@ def add_grooved(
         bands.append(Band(0.0, 0.2, -grooves.ledge))
     facade = Facade(storey, tuple(bands), glass=(depth,), plain=plain)
     top = add_storeys(out, outline, facade, z0, groups, per_group, part=part)
-    pieces, into = [], depth + 0.05
+    pieces = []
+    into = depth + 0.05
     if grooves.solid_corner > 0:
         size = (grooves.solid_corner, grooves.pier_reach, into)
         pieces.append(

@@ -307,7 +307,8 @@ def _arch_outline(arch: Arch) -> tuple[list[float], list[float]]:
 
 def _arch_reveals(arch: Arch) -> Quads:
     """Yields the faces of an arch between the wall and its back."""
-    (x, z), d = _arch_outline(arch), arch.depth
+    x, z = _arch_outline(arch)
+    d = arch.depth
     head = list(zip(x, z, strict=True))
     for a, b in itertools.pairwise(head):
         over_a, over_b = (a[0], arch.z1), (b[0], arch.z1)
@@ -321,7 +322,8 @@ def _arch_reveals(arch: Arch) -> Quads:
 
 def _arch_back(arch: Arch) -> Quads:
     """Yields the back wall of an arch, in horizontal slices."""
-    (x, z), d = _arch_outline(arch), arch.depth
+    x, z = _arch_outline(arch)
+    d = arch.depth
     n = len(x) - 1
     slices = [((x[0], arch.z0), (x[n], arch.z0), (x[n], z[n]), (x[0], z[0]))]
     for k in range(n // 2):

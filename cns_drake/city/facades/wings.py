@@ -200,7 +200,8 @@ def add_roof(
         )
         return
     if roof.kind == "hip":
-        reach, z = np.where(is_free, roof.eaves, 0.0), wing.wall_top - _SEAT
+        reach = np.where(is_free, roof.eaves, 0.0)
+        z = wing.wall_top - _SEAT
         solid = roofs.hip(outline, z, wing.top, reach, roof.thickness)
         out.add_to("roof", solid)
         return
@@ -389,13 +390,17 @@ def add_dormers(
         pitch: greatest distance from the middle of one dormer to the next [m].
     """
     (u0, z0), (u1, z1) = wing.line[:2]
-    slope, room = (z1 - z0) / (u1 - u0), z1 - z0
+    slope = (z1 - z0) / (u1 - u0)
+    room = z1 - z0
     if count == 0 or slope < 0.35:
         return
     if wing.roof.kind == "gambrel":
-        roof, setback, height = "flat", 0.12 / slope, min(room - 0.35, 1.8)
+        roof = "flat"
+        setback = 0.12 / slope
+        height = min(room - 0.35, 1.8)
     else:
-        setback, height = 0.2 * room / slope, min(1.4, 0.55 * room)
+        setback = 0.2 * room / slope
+        height = min(1.4, 0.55 * room)
     step = min((end - start) / count, pitch)
     for a, b in bays.stretches(end - start, step, 0.4)[:count]:
         width = min(1.5, b - a - 0.5)
@@ -453,7 +458,9 @@ class Openings:
     def __init__(
         self, out: Assembly, wing: Wing, others: Sequence[Wing] = ()
     ) -> None:
-        self._out, self._wing, self._others = out, wing, others
+        self._out = out
+        self._wing = wing
+        self._others = others
         self._reliefs: dict[int, list[walls.Relief]] = {k: [] for k in range(4)}
 
     def row(
@@ -640,7 +647,8 @@ class Openings:
             lights: width of the window on each side; 0 for none [m].
             material: material of the leaf.
         """
-        half, top = width / 2, round(floor + height, 2)
+        half = width / 2
+        top = round(floor + height, 2)
 
         def bay(x0: float, x1: float) -> list[walls.Relief]:
             a, b = round(x - half, 2), round(x + half, 2)
@@ -730,7 +738,8 @@ class Openings:
             if self._out.chance(0.5):
                 shop = _reversed(shop)
             self.put(edge, (x0 + x1) / 2, x1 - x0, shop)
-            z, tall = head + 0.08, self._out.uniform(0.55, 0.8, 2)
+            z = head + 0.08
+            tall = self._out.uniform(0.55, 0.8, 2)
             fascia = wall.box(x0 + 0.15, x1 - 0.15, -0.02, 0.14, z, z + tall)
             self._out.add_to("sign", fascia)
             if self._out.chance(awnings):

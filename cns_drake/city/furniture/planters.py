@@ -48,7 +48,8 @@ def flower_bed(
         width: length along y [m].
     """
     scale = (round(length / 4, 4), round(width / 1.5, 4), 1.0)
-    stone, rgb = COLOURS["stone"], Dice(rng).pick(CHOICES["flowers"])
+    stone = COLOURS["stone"]
+    rgb = Dice(rng).pick(CHOICES["flowers"])
     return assemble(
         mesh_part(
             "edge", "flower_bed_edge", rgb=stone, scale=scale, material="pot"
@@ -65,7 +66,8 @@ def round_planter(rng: np.random.Generator) -> Model:
     tall = dice.uniform(0.7, 1.1, 3)
     rgb = _leaves(dice)
     yaw = dice.uniform(-math.pi, math.pi, 3)
-    pot, wide = (size, size, size), round(0.75 * size, 3)
+    pot = (size, size, size)
+    wide = round(0.75 * size, 3)
     stone = COLOURS["stone"]
     at, scale = (0, 0, round(0.5 * size, 3)), (wide, wide, tall)
     return assemble(
@@ -86,7 +88,8 @@ def box_planter(
     dice = Dice(rng)
     drawn = dice.uniform(1.6, 3.0)
     length = drawn if length is None else length
-    scale, rgb = (round(length / 2, 4), 1.0, 1.0), COLOURS["planter"]
+    scale = (round(length / 2, 4), 1.0, 1.0)
+    rgb = COLOURS["planter"]
     box = mesh_part("box", "planter_box", rgb=rgb, scale=scale, material="pot")
     parts = [box]
     count = max(1, round(length / 0.8))

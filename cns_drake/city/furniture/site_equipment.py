@@ -41,8 +41,10 @@ def site_cabin(rng: np.random.Generator, *, storeys: int = 1) -> Model:
 def skip(rng: np.random.Generator) -> Model:
     """Returns a skip half full of rubble."""
     dice = Dice(rng)
-    at, yaw = (0, 0, dice.uniform(0.7, 0.95, 3)), dice.uniform(0.0, 0.2, 3)
-    earth, scale = COLOURS["earth"], (0.3, 0.2, 0.25)
+    at = (0, 0, dice.uniform(0.7, 0.95, 3))
+    yaw = dice.uniform(0.0, 0.2, 3)
+    earth = COLOURS["earth"]
+    scale = (0.3, 0.2, 0.25)
     return assemble(
         mesh_part("shell", "skip_shell", rgb=COLOURS["machine"]),
         mesh_part("load", "heap", at, yaw, earth, scale),
@@ -72,14 +74,16 @@ def brick_pallets(rng: np.random.Generator) -> Model:
         at = (dice.uniform(-0.2, 0.2, 3), in_a_row(k, 1.5, count), 0)
         yaw = dice.uniform(-0.15, 0.15, 3)
         scale = (1.0, 1.0, 0.6 if k % 2 == 0 else 1.0)
-        name, brick = f"pallet_{k}", COLOURS["brick"]
+        name = f"pallet_{k}"
+        brick = COLOURS["brick"]
         parts.append(mesh_part(name, "brick_pallet", at, yaw, brick, scale))
     return assemble(*parts)
 
 
 def excavator(rng: np.random.Generator) -> Model:
     """Returns an excavator whose arm is stretched out, roughly along +x."""
-    yaw, rgb = Dice(rng).uniform(-0.6, 0.6, 3), COLOURS["machine"]
+    yaw = Dice(rng).uniform(-0.6, 0.6, 3)
+    rgb = COLOURS["machine"]
     return assemble(
         mesh_part("tracks", "excavator_tracks", rgb=COLOURS["rubber"]),
         mesh_part("upper", "excavator_upper", yaw=yaw, rgb=rgb),

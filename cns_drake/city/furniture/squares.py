@@ -40,7 +40,8 @@ def obelisk(rng: np.random.Generator, *, height: float | None = None) -> Model:
     drawn = Dice(rng).uniform(9.0, 14.0)
     tall = round((drawn if height is None else height) / 10, 3)
     wide = round(tall**0.5, 3)
-    scale, marble = (wide, wide, tall), COLOURS["marble"]
+    scale = (wide, wide, tall)
+    marble = COLOURS["marble"]
     return assemble(mesh_part("body", "obelisk", rgb=marble, scale=scale))
 
 
@@ -123,7 +124,8 @@ def cafe_table(rng: np.random.Generator) -> Model:
     dice = Dice(rng)
     height = dice.uniform(2.5, 2.75)
     yaw = dice.uniform(-math.pi, math.pi, 3)
-    rgb, top = dice.pick(CHOICES["cafe_umbrella"]), (0, 0, height)
+    rgb = dice.pick(CHOICES["cafe_umbrella"])
+    top = (0, 0, height)
     return assemble(
         mesh_part("table", "cafe_set", yaw=yaw, rgb=COLOURS["cafe_table"]),
         post("pole", 0.025, height, rgb=COLOURS["steel"]),
@@ -135,7 +137,8 @@ def market_stall(rng: np.random.Generator) -> Model:
     """Returns a market stall under an awning."""
     dice = Dice(rng)
     scale = (1.0, dice.uniform(0.9, 1.2, 3), 1.0)
-    stall, awning = COLOURS["stall"], dice.pick(CHOICES["market_awning"])
+    stall = COLOURS["stall"]
+    awning = dice.pick(CHOICES["market_awning"])
     return assemble(
         mesh_part("stall", "market_stall", rgb=stall, scale=scale),
         mesh_part("awning", "market_awning", rgb=awning, scale=scale),
@@ -144,8 +147,10 @@ def market_stall(rng: np.random.Generator) -> Model:
 
 def basketball_hoop(rng: np.random.Generator) -> Model:
     """Returns a basketball hoop on a post; its board faces +x."""
-    height, grey = Dice(rng).uniform(3.4, 3.7), COLOURS["grey"]
-    red, board = CHOICES["play"][0], (0.05, 1.8, 1.05)
+    height = Dice(rng).uniform(3.4, 3.7)
+    grey = COLOURS["grey"]
+    red = CHOICES["play"][0]
+    board = (0.05, 1.8, 1.05)
     return assemble(
         post("post", 0.07, height, rgb=grey),
         block("arm", (0.9, 0.1, 0.1), (0.4, 0, height - 0.3), rgb=grey),

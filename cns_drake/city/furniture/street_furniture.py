@@ -25,7 +25,8 @@ _PLAIN: Rgb = (1.0, 1.0, 1.0)
 
 def stone_bench(rng: np.random.Generator) -> Model:
     """Returns a slab of stone on two feet, along y."""
-    length, stone = Dice(rng).uniform(1.6, 2.4), COLOURS["stone"]
+    length = Dice(rng).uniform(1.6, 2.4)
+    stone = COLOURS["stone"]
     feet = (
         pillar(f"foot_{k}", 0.4, 0.35, 0.4, (0.0, y), rgb=stone)
         for k, y in enumerate((-0.35 * length, 0.35 * length))
@@ -54,7 +55,8 @@ def recycling_bins(rng: np.random.Generator) -> Model:
 
 def bollard(rng: np.random.Generator) -> Model:
     """Returns a bollard with a round head."""
-    height, dark = Dice(rng).uniform(0.8, 0.95), COLOURS["dark"]
+    height = Dice(rng).uniform(0.8, 0.95)
+    dark = COLOURS["dark"]
     head = Part("head", SphereShape(0.08), (0.0, 0.0, height), rgb=dark)
     return assemble(post("shaft", 0.06, height, rgb=dark), head)
 
@@ -110,7 +112,8 @@ def parking_meter(rng: np.random.Generator) -> Model:
 def ticket_machine(rng: np.random.Generator) -> Model:
     """Returns a ticket machine under a small roof, turned a little."""
     yaw = Dice(rng).uniform(-0.1, 0.1)
-    rgb, size = COLOURS["ticket_machine"], (0.5, 0.46, 0.06)
+    rgb = COLOURS["ticket_machine"]
+    size = (0.5, 0.46, 0.06)
     return assemble(
         pillar("case", 0.28, 0.36, 1.5, yaw=yaw, rgb=rgb),
         block("roof", size, (0.05, 0, 1.56), yaw, COLOURS["dark"]),

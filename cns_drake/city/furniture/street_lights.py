@@ -34,7 +34,8 @@ def lamp_post(
     parts = [post("base", 0.14, 0.9, rgb=steel)] if arms != 2 else []
     parts.append(post("mast", 0.085, height, rgb=steel))
     for k in range(arms):
-        side, top = 1 - 2 * k, height + 0.25
+        side = 1 - 2 * k
+        top = height + 0.25
         start, end = (0, 0, height - 0.15), (side * 1.9, 0, top)
         parts.append(bar(f"arm_{k}", start, end, 0.045, steel))
         size, center = (0.75, 0.3, 0.12), (side * 2.1, 0, top)
@@ -54,7 +55,8 @@ def lamp_post_curved(
     """
     drawn = Dice(rng).uniform(7.0, 8.5)
     height = drawn if height is None else height
-    dark, at = COLOURS["dark"], (0, 0, height - 1.2)
+    dark = COLOURS["dark"]
+    at = (0, 0, height - 1.2)
     return assemble(
         post("base", 0.13, 1.1, rgb=dark),
         post("mast", 0.075, height - 1.2, rgb=dark),
@@ -74,7 +76,8 @@ def lantern(rng: np.random.Generator, *, height: float | None = None) -> Model:
     """
     drawn = Dice(rng).uniform(3.8, 4.4)
     height = drawn if height is None else height
-    green, at = COLOURS["lamp_green"], (0, 0, height - 0.75)
+    green = COLOURS["lamp_green"]
+    at = (0, 0, height - 0.75)
     return assemble(
         post("base", 0.11, 0.7, rgb=green),
         post("mast", 0.05, height - 0.7, rgb=green),

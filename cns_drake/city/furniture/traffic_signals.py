@@ -24,7 +24,8 @@ from cns_drake.city.geometry import (
 
 
 def _signal(name: str, lamps: int, x: float, y: float, z: float) -> Part:
-    mesh, at = f"signal_head_{lamps}", (x, y, z)
+    mesh = f"signal_head_{lamps}"
+    at = (x, y, z)
     return mesh_part(name, mesh, at, rgb=COLOURS["black"], material="signals")
 
 
@@ -92,7 +93,8 @@ def sign_round(rng: np.random.Generator) -> Model:
 def sign_triangular(rng: np.random.Generator) -> Model:
     """Returns a warning sign."""
     height = Dice(rng).uniform(2.6, 3.0)
-    at, rgb = (0.05, 0, height - 0.45), COLOURS["sign_red"]
+    at = (0.05, 0, height - 0.45)
+    rgb = COLOURS["sign_red"]
     plate = mesh_part(
         "plate", "sign_triangle", at, rgb=rgb, material="yield_sign"
     )
@@ -102,7 +104,8 @@ def sign_triangular(rng: np.random.Generator) -> Model:
 def sign_stop(rng: np.random.Generator) -> Model:
     """Returns a stop sign."""
     height = Dice(rng).uniform(2.5, 2.9)
-    at, rgb = (0.05, 0, height - 0.4), COLOURS["sign_red"]
+    at = (0.05, 0, height - 0.4)
+    rgb = COLOURS["sign_red"]
     plate = mesh_part(
         "plate", "sign_octagon", at, rgb=rgb, material="stop_sign"
     )
@@ -124,7 +127,8 @@ def sign_rectangular(rng: np.random.Generator) -> Model:
 
 def sign_street_name(rng: np.random.Generator) -> Model:
     """Returns the names of two streets on a post, along x and along y."""
-    height, blue = Dice(rng).uniform(3.0, 3.3), COLOURS["blue"]
+    height = Dice(rng).uniform(3.0, 3.3)
+    blue = COLOURS["blue"]
     x_size, x_center = (1.1, 0.03, 0.22), (0.4, 0, height - 0.12)
     y_size, y_center = (0.03, 1, 0.22), (0, 0.35, height - 0.36)
     return assemble(
@@ -136,7 +140,8 @@ def sign_street_name(rng: np.random.Generator) -> Model:
 
 def sign_direction(rng: np.random.Generator) -> Model:
     """Returns a large sign with directions on two masts."""
-    width, steel = Dice(rng).uniform(2.4, 3.4), COLOURS["steel"]
+    width = Dice(rng).uniform(2.4, 3.4)
+    steel = COLOURS["steel"]
     size, center = (0.05, width, 1.7), (0.09, 0, 3.75)
     return assemble(
         post("mast_0", 0.06, 4.6, (0, 0.35 * width), steel),

@@ -100,7 +100,8 @@ class Mesh:
 
 def merge_meshes(*meshes: Mesh) -> Mesh:
     """Returns one mesh that contains the faces of all given meshes."""
-    vertices, offset = [np.zeros((0, 3))], 0
+    vertices = [np.zeros((0, 3))]
+    offset = 0
     faces: list[tuple[int, ...]] = []
     for mesh in meshes:
         vertices.append(mesh.vertices)

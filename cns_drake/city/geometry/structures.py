@@ -435,7 +435,8 @@ def part_mesh(part: Part, meshes: Mapping[str, Mesh]) -> Mesh:
     shape = part.shape
     scale = np.ones(3)
     if isinstance(shape, MeshShape):
-        mesh, scale = meshes[shape.mesh], np.asarray(shape.scale)
+        mesh = meshes[shape.mesh]
+        scale = np.asarray(shape.scale)
     elif isinstance(shape, BoxShape):
         mesh = box_mesh(shape.size)
     elif isinstance(shape, CylinderShape):

@@ -59,7 +59,8 @@ def share_out(
             area = _polygon(district.area, f"{field}.area").intersection(free)
             fault = "area: on ground that another district has taken"
         else:
-            area, fault = free, "no ground is left for it"
+            area = free
+            fault = "no ground is left for it"
         pieces = MultiPolygon(polygons_of(snap(area)))
         if pieces.is_empty:
             raise InputError(f"{field}.{fault}")

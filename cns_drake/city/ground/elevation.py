@@ -278,7 +278,8 @@ def _segments(area: BaseGeometry) -> np.ndarray:
 
 def _foot_points(p: np.ndarray, segments: np.ndarray) -> np.ndarray:
     """Returns the point (N, 2) of each segment (N, 2, 2) nearest to p."""
-    start, along = segments[:, 0], segments[:, 1] - segments[:, 0]
+    start = segments[:, 0]
+    along = segments[:, 1] - segments[:, 0]
     part = ((p - start) * along).sum(axis=1) / (along**2).sum(axis=1)
     return start + np.clip(part, 0.0, 1.0)[:, None] * along
 

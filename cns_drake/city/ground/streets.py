@@ -108,7 +108,8 @@ class Covering(NamedTuple):
             Part(part, MeshShape(mesh), rgb=self.rgb, material=self.material)
             for part, mesh in zip(pieces, meshes, strict=True)
         )
-        model, origin = Model(parts, meshes, self.area), (0.0, 0.0, 0.0)
+        model = Model(parts, meshes, self.area)
+        origin = (0.0, 0.0, 0.0)
         return Structure(
             self.name, self.semantic_class, model, origin, tags=(GROUND_TAG,)
         )

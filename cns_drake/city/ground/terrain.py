@@ -244,8 +244,10 @@ def bridge_structures(
         for number, deck in enumerate(decks, start=1):
             name = f"bridge_{district.plan.name}_{number:02d}"
             middle = np.array([deck.centroid.coords[0]])
-            bottom, low = float(shape(*middle.T)[0]) - _DEPTH, water_level
-            beside, piers = deck.buffer(_NEAR), snap(deck.intersection(ring))
+            bottom = float(shape(*middle.T)[0]) - _DEPTH
+            low = water_level
+            beside = deck.buffer(_NEAR)
+            piers = snap(deck.intersection(ring))
             pieces = {
                 "sides": wall_mesh(open_water, bottom, shape, along=beside),
                 "underside": surface_mesh(deck, bottom).turned(),

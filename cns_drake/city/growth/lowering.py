@@ -136,7 +136,8 @@ def cut_at(mesh: Mesh, height: float) -> tuple[Mesh, np.ndarray]:
                 edges.append(crossing if right > 0 else crossing[::-1])
         # The lower part of a quadrilateral may have five corners.
         while len(ring) >= 3:
-            piece, ring = ring[:4], [ring[0], *ring[3:]]
+            piece = ring[:4]
+            ring = [ring[0], *ring[3:]]
             faces.append(tuple(range(len(corners), len(corners) + len(piece))))
             corners.extend(piece)
     below = Mesh(np.array(corners, dtype=float).reshape(-1, 3), tuple(faces))

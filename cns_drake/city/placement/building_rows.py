@@ -89,7 +89,8 @@ def _build(
     with value_errors(fault_at):
         model = sample(*what, rng, name, house.blind_edges)
     x, y = (round(float(value), 3) for value in house.xy)
-    xyz, tags = (x, y, _floor(draft, house)), (district, house.archetype)
+    xyz = (x, y, _floor(draft, house))
+    tags = (district, house.archetype)
     yaw = round(house.yaw, 5)
     draft.add_building(Structure(name, "building", model, xyz, yaw, tags))
 
@@ -147,24 +148,28 @@ def _row_houses(
     limit = area.buffer(0.05)
     houses: list[_House] = []
     for line in lines_along(draft.frontage, area, row.setback):
-        start, previous = 0.0, None
+        start = 0.0
+        previous = None
         while start < line.length - row.width[0]:
             house = _fitting_house(
                 draft, limit, row, line, start, previous, rng
             )
             if house is None:
-                start, previous = start + _STEP, None
+                start += _STEP
+                previous = None
                 continue
             x0, _, x1, _ = house.footprint.bounds
             if rng.uniform() > row.fill:
-                start, previous = start + (x1 - x0), None
+                start += x1 - x0
+                previous = None
                 continue
             draft.take(house.taken)
             houses.append(house)
             gap = float(rng.uniform(*row.gap))
             if gap < _PARTY_WALL:
                 house.blind_edges.add(_RIGHT_EDGE)
-            start, previous = start + (x1 - x0) + gap, house
+            start = start + (x1 - x0) + gap
+            previous = house
     return houses
 
 

@@ -72,7 +72,9 @@ class Draft:
         plan: CityPlan,
         source: str,
     ):
-        self.areas, self.plan, self.source = areas, plan, source
+        self.areas = areas
+        self.plan = plan
+        self.source = source
         parts = [areas.carriageway, areas.sidewalks, areas.medians]
         self.streets: BaseGeometry = snap(unary_union(parts))
         self.frontage = self.streets

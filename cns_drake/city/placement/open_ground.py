@@ -186,7 +186,8 @@ def _scatter(
         chosen.append(dart)
         # Two numbers are drawn for every place, kept or not, so that another
         # fill does not move the objects.
-        keep, yaw = rng.uniform() < plan.fill, rng.uniform(-math.pi, math.pi)
+        keep = rng.uniform() < plan.fill
+        yaw = rng.uniform(-math.pi, math.pi)
         name = pick(plan.objects, rng)
         if keep:
             xy = float(dart[0]), float(dart[1])

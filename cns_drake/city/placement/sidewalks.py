@@ -66,7 +66,8 @@ def _furnish_arm(
             if not shapely.contains_xy(carriageway, x, y):
                 break
         yaw = (heading if starts else heading + math.pi) + turn
-        tags, model = ("junction", junction.name), OBJECTS[name].build(rng)
+        tags = ("junction", junction.name)
+        model = OBJECTS[name].build(rng)
         draft.place(name, model, (x, y), yaw, tags, clearance=0.1)
 
     if road.lanes[incoming]:
