@@ -192,7 +192,8 @@ def group_geometries(
     for index, geometry in geometries:
         frame_id, X_FG = geometry.frame_id, geometry.X_FG
         if frame_id in anchored_frames:
-            frame_id, X_FG = None, calc_X_WF(frame_id) @ X_FG
+            X_FG = calc_X_WF(frame_id) @ X_FG
+            frame_id = None
         if isinstance(geometry.surface, surfaces.HalfSpaceSurface):
             plane: Member = (index, RigidTransform(), geometry.surface)
             half_spaces.append(RayGroup(frame_id, X_FG.GetAsMatrix4(), [plane]))

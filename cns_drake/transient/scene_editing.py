@@ -139,7 +139,8 @@ class SceneEditing:
         self, part: StructurePart, p_W: np.ndarray, look: Look
     ) -> None:
         """Moves a part by p_W (3,) [m] in W and gives it a new look."""
-        structure, name = part.geometry.structure, f"{part.name}_covered"
+        structure = part.geometry.structure
+        name = f"{part.name}_covered"
         self._register(
             f"{structure}/{name}",
             RigidTransform(p_W) @ part.X_WG,

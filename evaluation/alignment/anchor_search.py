@@ -108,7 +108,8 @@ def optimise(
         num_held: number of fixed poses; these are the last ones.
     """
     information = [np.linalg.inv(ties.covariance) for ties in all_ties]
-    V, free = V.copy(), slice(0, len(V) - num_held)
+    V = V.copy()
+    free = slice(0, len(V) - num_held)
     for width in _WIDTHS:
         for _ in range(_STEPS):
             step = _solve(V, free, all_ties, information, width)

@@ -35,7 +35,8 @@ class School(Building):
         # Height of the walls below the roof.
         body = self.height - (self.rise if self.roof == "hip" else 2.4)
         if body < 3.6:
-            self.roof, body = "flat", self.height - 1.0
+            self.roof = "flat"
+            body = self.height - 1.0
         # Width of the gymnasium; 0 for none.
         self.gym = 0.0
         if site.width > 34.0 and site.depth > 16.0:

@@ -100,7 +100,9 @@ def _material(
     if given is None:
         given = entry.reflectivity
     if given is not None:
-        kind, reflectivity, density = LAMBERT, given, 0.0
+        kind = LAMBERT
+        reflectivity = given
+        density = 0.0
     else:
         kind = _kind(material, geometry.surface)
         dark, bright = material.reflectivity
