@@ -133,7 +133,7 @@ Redraw = Callable[[Scenario, int], tuple[str, str]]
 
 
 @dataclass
-class PairOfDrives:
+class PairMaker:
     """Changes two drives of a map as the conditions of an experiment say.
 
     Attributes:

@@ -23,7 +23,7 @@ from cns_drake.simulation.simulated_drive import DriveSimulation
 from cns_drake.studies.comparisons import (
     Compared,
     MissingError,
-    PairOfDrives,
+    PairMaker,
     beside,
     check_frozen,
     frozen_drives,
@@ -498,7 +498,7 @@ class Study:
         if made:
             age, redraw = self._made.aged, self._made.redrawn
         for database, query in some.pairs:
-            pair = PairOfDrives(
+            pair = PairMaker(
                 database,
                 query,
                 self.experiment.drives == "same-route",

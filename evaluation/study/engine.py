@@ -23,6 +23,7 @@ from evaluation.results.table import (
 )
 from evaluation.study.chosen_methods import MethodChoice
 from evaluation.study.parts import StudyFiles
+from evaluation.study.spending import restore, spend
 from evaluation.study.tasks.task import Jobs, NamedDrive, Pair, Task
 
 # A study that takes longer is announced [s].
@@ -103,10 +104,14 @@ class Engine:
         for text in self._notes:
             self.on_note(text)
         make_folder(self.output)
+        jobs = list(self.jobs.values())
+        restore(jobs)
         self._announce(cluster)
-        run_jobs(self.jobs.values(), cluster)
+        run_jobs(jobs, cluster)
         doing("writing the tables and the page")
-        return self.write_tables()
+        tables = self.write_tables()
+        spend(jobs)
+        return tables
 
     def write_tables(self) -> tuple[Results, QueryRows]:
         """Writes both tables of finished jobs, and returns them.

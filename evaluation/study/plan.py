@@ -11,7 +11,6 @@ from pathlib import Path
 from cns_drake.base.errors import InputError
 from cns_drake.base.files import make_folder
 from cns_drake.base.jobs.cluster import Cluster
-from cns_drake.base.jobs.processes import nothing_left
 from cns_drake.base.jobs.running import Job, run_jobs
 from cns_drake.base.jobs.step import Steps
 from cns_drake.base.progress import doing
@@ -44,7 +43,8 @@ from evaluation.study.recorded import (
     recorded_comparisons,
 )
 from evaluation.study.repeats import Repeat, repeats_of
-from evaluation.study.surveys import Further, Survey
+from evaluation.study.spending import restore, spend
+from evaluation.study.surveys import Further
 from evaluation.study.tasks.change import ChangeTask
 from evaluation.study.tasks.place import PlaceTask, PoseTask
 from evaluation.study.tasks.task import Pair, Result, Task
@@ -138,7 +138,7 @@ class Study:
         if self._costed_pairs:
             needs = tuple(job.name for job in jobs)
             jobs.append(self._cost_job(self._costed_pairs[0], needs))
-        _restore(jobs)
+        restore(jobs)
         return jobs
 
     @property
@@ -246,9 +246,7 @@ class Study:
             report, self.output, with_tables=with_tables
         )
         for one in self._cities:
-            for job in one.jobs.values():
-                if isinstance(job.step, Survey):
-                    job.step.files.spend()
+            spend(one.jobs.values())
         return written
 
 
@@ -474,35 +472,6 @@ class _CityReport:
         report.illustrations += figures.illustrations(
             city, self._files.figures, with_curves=bool(compared)
         )
-
-
-def _restore(jobs: Sequence[Job]) -> None:
-    """Has removed descriptions made again that results to come need.
-
-    Args:
-        jobs: all jobs of a study, each behind those that it needs.
-    """
-    names = {job.name for job in jobs}
-    # Files that will be written, and folders of surveys of new recordings.
-    stale: set[Path] = set()
-    needed: list[Part] = []
-    for job in jobs:
-        if isinstance(job.step, Survey):
-            stale.update(part.path for part in job.step.missing())
-            if not names.issuperset(job.needs):
-                stale.add(job.step.files.folder)
-            continue
-        steps = job.step.steps if isinstance(job.step, Steps) else [job.step]
-        for step in steps:
-            if isinstance(step, MakePart):
-                inputs = list(step.parts())
-                read = {one.path for one in inputs}
-                read |= {one.path.parent for one in inputs}
-                if not stale.isdisjoint(read) or not nothing_left(step):
-                    stale.add(step.part.path)
-                    needed += inputs
-    for part in needed:
-        part.restore()
 
 
 def write_report(

@@ -166,6 +166,7 @@ class SurveyJobs(Jobs):
                 with_scans=bool(roles),
                 with_map=self.with_map,
                 further=self.further.get(drive.name, ()),
+                spends=True,
             )
             cost = self.with_map * _MAP_COST + _ROLE_COST * len(roles)
             self.jobs[name] = Job(name, step, drive.needs, cost)

@@ -397,6 +397,8 @@ class Survey(Step):
         with_map: whether to make a map; otherwise only the scans of places and
             queries are read.
         further: methods with descriptions by a second protocol, if any.
+        spends: whether descriptions are removed once results were made from
+            them. If new results need them, they are made again.
     """
 
     source: DriveSource
@@ -407,6 +409,7 @@ class Survey(Step):
     with_scans: bool = False
     with_map: bool = True
     further: tuple[Further, ...] = ()
+    spends: bool = False
 
     @property
     def output(self) -> Path:

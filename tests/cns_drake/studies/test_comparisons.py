@@ -18,7 +18,7 @@ from cns_drake.simulation.loaded_drive import (
     plan_scenario_traffic,
 )
 from cns_drake.simulation.simulated_drive import DriveSimulation
-from cns_drake.studies.comparisons import MissingError, PairOfDrives
+from cns_drake.studies.comparisons import MissingError, PairMaker
 from cns_drake.studies.experiment import (
     Experiment,
     conditions,
@@ -72,7 +72,7 @@ class Conditions:
         self.notes = []
         self.made = []
         self.missing = []
-        pair = PairOfDrives(
+        pair = PairMaker(
             database or query.replaced(name=f"{query.name}_database"),
             query,
             same_route,

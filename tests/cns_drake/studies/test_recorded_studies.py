@@ -18,6 +18,7 @@ from evaluation.recognition.protocol import FAIR_PROTOCOL, RetrievalProtocol
 from evaluation.results.table import Results
 from evaluation.study import engine
 from evaluation.study.chosen_methods import MethodChoice
+from evaluation.study.parts import Part
 
 
 @pytest.fixture(scope="module")
@@ -56,6 +57,7 @@ def values(results, **columns):
     return {row.metric: row.value for row in found}
 
 
+@pytest.mark.slow
 def test_the_numbers_are_those_of_the_single_commands(folder, tmp_path):
     results = measure(
         tmp_path,
@@ -196,3 +198,51 @@ def test_folders_without_two_stages(folder, tmp_path):
 def test_a_folder_given_twice(folder, tmp_path):
     with pytest.raises(InputError, match=r"another map, .* metropolis, too"):
         measure(tmp_path / "out", folder, f"{folder}/.")
+
+
+@pytest.mark.slow
+def test_a_recording_is_surveyed_once_and_its_descriptions_are_removed(
+    folder, tmp_path
+):
+    """They are made again for a further method, as in a study of its own."""
+    fields = {
+        "drives": "both-ways",
+        "both": {"stage": ["last", "own"]},
+        "tasks": ["place", "change"],
+    }
+    both = ["solid", "scan-context++"]
+    whole = measure(tmp_path / "whole", folder, **{**fields, "methods": both})
+    measure(tmp_path / "later", folder, **fields)
+    parts = tmp_path / "later" / "parts"
+    surveys = sorted(path.name for path in (parts / "surveys").iterdir())
+    assert surveys == sorted(path.name for path in folder.iterdir())
+    assert not (parts / "mapped").exists()
+    described = list(parts.rglob("described_*.data"))
+    assert len(described) == len(surveys)
+    for path in described:
+        with pytest.raises(InputError, match="its value was removed"):
+            Part(path).read()
+    kept = {
+        path: path.read_bytes() for path in sorted((parts / "place").iterdir())
+    }
+    later = measure(tmp_path / "later", folder, **{**fields, "methods": both})
+    assert later == whole
+    assert all(path.read_bytes() == data for path, data in kept.items())
+
+
+def test_drives_are_read_anew_for_another_protocol(folder, tmp_path):
+    """Surveys describe by the first protocol; results are those of each."""
+    spacings = [10.0, 20.0]
+    fields = {"protocol": {"base": "recorded", "query_spacing": spacings}}
+    found = measure(tmp_path, folder, tasks=["place"], **fields)
+    for spacing in spacings:
+        alone = run(
+            open_drive(folder / "metropolis_01"),
+            open_drive(folder / "metropolis_04"),
+            make_method("solid", {}),
+            RetrievalProtocol(query_spacing=spacing),
+        ).by_mode["all"]
+        here = {"protocol.query_spacing": spacing, "gate": False}
+        shown = values(found, **here)
+        assert shown["auc"] == pytest.approx(alone.auc, abs=1e-9)
+        assert shown["with_match"] == alone.num_with_match

@@ -1,0 +1,60 @@
+"""Removes descriptions that no result needs any more, and makes them again.
+
+Descriptions take three quarters of the space of a study. They are needed only
+until results were made from them.
+"""
+
+from collections.abc import Collection, Iterable
+from pathlib import Path
+
+from cns_drake.base.jobs.processes import nothing_left
+from cns_drake.base.jobs.running import Job
+from cns_drake.base.jobs.step import Steps
+from evaluation.study.parts import MakePart, Part
+from evaluation.study.surveys import Survey
+
+
+def spend(jobs: Iterable[Job]) -> None:
+    """Removes the descriptions of surveys that say so, see `Survey.spends`.
+
+    All jobs must be done.
+
+    Raises:
+        InputError: a file cannot be written.
+    """
+    for job in jobs:
+        if isinstance(job.step, Survey) and job.step.spends:
+            job.step.files.spend()
+
+
+def restore(jobs: Collection[Job]) -> None:
+    """Has removed descriptions made again that results to come need.
+
+    Args:
+        jobs: all jobs of a study, each behind those that it needs.
+    """
+    if not any(
+        isinstance(one.step, Survey) and one.step.spends for one in jobs
+    ):
+        return
+    names = {job.name for job in jobs}
+    # Files that will be written, and folders of surveys of new recordings.
+    stale: set[Path] = set()
+    needed: list[Part] = []
+    for job in jobs:
+        if isinstance(job.step, Survey):
+            stale.update(part.path for part in job.step.missing())
+            if not names.issuperset(job.needs):
+                stale.add(job.step.files.folder)
+            continue
+        steps = job.step.steps if isinstance(job.step, Steps) else [job.step]
+        for step in steps:
+            if isinstance(step, MakePart):
+                inputs = list(step.parts())
+                read = {one.path for one in inputs}
+                read |= {one.path.parent for one in inputs}
+                if not stale.isdisjoint(read) or not nothing_left(step):
+                    stale.add(step.part.path)
+                    needed += inputs
+    for part in needed:
+        part.restore()
