@@ -483,7 +483,6 @@ _TURN = 0.15  # [rad]
 # between [m].
 _KERB = 0.1
 _TRIES = 24
-_LEAVES = ("crown", "lea", "foliage", "canopy", "plants", "hedge")
 # Of a shrub without wood of its own, this share of the surface stays as twigs.
 _TWIGS = 0.1
 
@@ -582,7 +581,12 @@ def _thin_leaves(around: Surroundings, share: float) -> None:
     """
     changed = False
     for plant in around.of_classes({"vegetation"}):
-        leafy = [part for part in plant.parts if _is_leafy(part)]
+        leafy = [
+            part
+            for part in plant.parts
+            if part.material.kind == "leaves"
+            and isinstance(part.geometry.surface, TriangleSurface)
+        ]
         left = share
         if len(leafy) == len(plant.parts):
             left = max(share, _TWIGS)
@@ -604,14 +608,3 @@ def _thin_leaves(around: Surroundings, share: float) -> None:
             "leaves: no structure of class vegetation has leaves that are "
             "triangles"
         )
-
-
-def _is_leafy(part: StructurePart) -> bool:
-    """Returns whether a part is leaves, not wood, by its name or colour."""
-    if not isinstance(part.geometry.surface, TriangleSurface):
-        return False
-    name = part.name.lower()
-    if any(word in name for word in _LEAVES):
-        return True
-    r, g, b = part.geometry.rgb or (0.0, 0.0, 0.0)
-    return g > 1.1 * r and g > 1.1 * b

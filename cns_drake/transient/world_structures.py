@@ -23,6 +23,7 @@ from cns_drake.city.geometry import (
     unit_normals,
 )
 from cns_drake.scene import surfaces
+from cns_drake.scene.materials import Material
 from cns_drake.scene.perception_geometry import (
     GeometryReader,
     PerceptionGeometry,
@@ -51,15 +52,17 @@ class StructurePart:
     Attributes:
         geometry: the geometry G.
         X_WG: its pose in W.
+        material: its material.
     """
 
     geometry: PerceptionGeometry
     X_WG: RigidTransform
+    material: Material
 
     @property
     def name(self) -> str:
         """The part's name within its structure."""
-        return self.geometry.name.rpartition("::")[2].rpartition("/")[2]
+        return self.geometry.part
 
     @cached_property
     def p_WPs(self) -> np.ndarray:
@@ -163,7 +166,9 @@ def read_structures(
         if one.frame_id in X_WFs and wanted(structure_name(one.name))
     ):
         X_WG = X_WFs[geometry.frame_id] @ geometry.X_FG
-        found[geometry.structure].append(StructurePart(geometry, X_WG))
+        entry = world.structures[geometry.structure]
+        part = StructurePart(geometry, X_WG, entry.material(geometry.part))
+        found[geometry.structure].append(part)
     return {
         name: Structure(
             name, world.structures[name].semantic_class, tuple(found[name])

@@ -158,8 +158,12 @@ def write_world(folder, visuals, rows, origin=ORIGIN):
     """Writes a world of visuals, and the classes of its structures."""
     text = _WORLD.format(origin=_numbers(origin), visuals="".join(visuals))
     (folder / "street.sdf").write_text(text)
-    lines = ["instance,name,class"]
-    lines += [f"{k},{n},{c}" for k, (n, c) in enumerate(rows.items(), 1)]
+    materials = {"vegetation": "wood=bark", "car": "trim=trim"}
+    lines = ["instance,name,class,material"]
+    lines += [
+        f"{k},{n},{c},{materials.get(c, '')}"
+        for k, (n, c) in enumerate(rows.items(), 1)
+    ]
     (folder / "structures.csv").write_text("\n".join(lines) + "\n")
     return folder / "street.sdf"
 
