@@ -216,7 +216,7 @@ def test_headers_that_are_none(part, header):
 
 
 def test_a_part_neither_fills_the_memory_nor_waits(part, monkeypatch):
-    monkeypatch.setattr(parts, "_ALWAYS", 1 << 16)
+    monkeypatch.setattr(parts, "_ALWAYS_BYTES", 1 << 16)
     bomb = zstandard.compress(bytes(1 << 24))
     assert len(bomb) < 2_000
     _replaced(part, data=bomb)
@@ -247,7 +247,7 @@ def npy_header(shape):
 def test_a_part_of_zeros_is_read_however_small_it_could_be(
     tmp_path, monkeypatch
 ):
-    monkeypatch.setattr(parts, "_ALWAYS", 1 << 16)
+    monkeypatch.setattr(parts, "_ALWAYS_BYTES", 1 << 16)
     part = Part(tmp_path / "zeros.data")
     part.write(INPUTS, np.zeros(1 << 20))
     assert not part.read().any()
