@@ -511,7 +511,7 @@ def street(path: Path, rows: Sequence[dict[str, Any]]) -> None:
     Other keys of a row are changed fields of the drive.
     """
     camera = CameraSection(
-        width=1280, height=720, rate=1, fov_y=0.85, xyz=(0.5, 0.0, 1.6)
+        width=1280, height=720, rate=1, fov_y_deg=48.7, xyz=(0.5, 0.0, 1.6)
     )
     pictures = []
     for row in rows:
@@ -580,7 +580,7 @@ def quarter(path: Path, file: str, time: float, options: str = "") -> None:
         X_WB = trajectory.pose(time)
         eye = X_WB.translation() + np.array([0.0, 0.0, 2.0])
         target = eye + 30.0 * X_WB.rotation().matrix()[:, 0]
-        view = View(position=tuple(eye), target=tuple(target), fov_y=55)
+        view = View(position=tuple(eye), target=tuple(target), fov_y_deg=55)
         for axes, (stage, world) in zip(
             streets, folder.stages().items(), strict=True
         ):

@@ -59,7 +59,7 @@ def street_views(aged: AgedMap) -> dict[str, View]:
         views[f"street_{n}"] = View(
             position=(x, y, z + _EYE_HEIGHT),
             target=(u, v, w + _EYE_HEIGHT + 1.0),
-            fov_y=60,
+            fov_y_deg=60,
         )
     return views
 
@@ -70,7 +70,7 @@ def air_view(aged: AgedMap) -> View:
     x, y, z = (p.min(axis=0) + p.max(axis=0)) / 2
     half = float(np.ptp(p, axis=0)[:2].max()) / 2
     up = (x - 0.9 * half, y - 1.1 * half, z + 1.2 * half)
-    return View(position=up, target=(x, y, z), fov_y=52)
+    return View(position=up, target=(x, y, z), fov_y_deg=52)
 
 
 def draw_pictures(folder: Path, aged: AgedMap) -> None:

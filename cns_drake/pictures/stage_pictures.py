@@ -139,7 +139,7 @@ def view_from_above(positions: np.ndarray) -> View:
     return View(
         position=(x, y, z + _CAMERA_HEIGHT),
         target=(x, y, z),
-        fov_y=float(np.rad2deg(2 * np.arctan2(half, _CAMERA_HEIGHT))),
+        fov_y_deg=float(np.rad2deg(2 * np.arctan2(half, _CAMERA_HEIGHT))),
     )
 
 

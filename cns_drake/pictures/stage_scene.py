@@ -7,7 +7,7 @@ from __future__ import annotations
 
 from collections.abc import Collection, Sequence
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, Any
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -41,14 +41,21 @@ class View(BaseModel):
     Attributes:
         position: position of the camera in W [m].
         target: point in W that is in the centre of the picture [m].
-        fov_y: vertical field of view [deg].
+        fov_y_deg: vertical field of view [deg].
     """
 
     model_config = ConfigDict(extra="forbid", frozen=True)
 
     position: Place
     target: Place
-    fov_y: float = Field(default=50.0, ge=0.1, le=179.0)
+    fov_y_deg: float = Field(default=50.0, ge=0.1, le=179.0)
+
+    @model_validator(mode="before")
+    @classmethod
+    def _names_its_unit(cls, values: Any) -> Any:
+        if isinstance(values, dict) and "fov_y" in values:
+            raise ValueError("fov_y: this field is now fov_y_deg")
+        return values
 
     @model_validator(mode="after")
     def _looks_somewhere(self) -> View:
@@ -76,7 +83,7 @@ class View(BaseModel):
             (M, 2) positions in the picture, from its upper left corner
             [pixels]; the indices (M,) of these points.
         """
-        scale = height / 2 / np.tan(np.deg2rad(self.fov_y) / 2)
+        scale = height / 2 / np.tan(np.deg2rad(self.fov_y_deg) / 2)
         p_C = (self.pose().inverse() @ p_WQset.T).T
         ahead = np.flatnonzero(p_C[:, 0] > 0.1)
         slopes = p_C[ahead, 1:] / p_C[ahead, :1]
@@ -129,7 +136,7 @@ class StageScene:
             view.pose(),
             width=width,
             height=height,
-            fov_y_deg=view.fov_y,
+            fov_y_deg=view.fov_y_deg,
             haze_length=haze_length,
         )
 

@@ -1,9 +1,10 @@
 """Scenario files, and the files that a scenario names."""
 
-from collections.abc import Collection
+from collections.abc import Collection, Mapping
 import os
 from pathlib import Path
 import re
+from typing import Any
 
 from cns_drake.base.errors import (
     InputError,
@@ -12,9 +13,11 @@ from cns_drake.base.errors import (
     value_errors,
 )
 from cns_drake.base.map_folder import MapFolder, drive_name
+from cns_drake.base.terminal import note
 from cns_drake.base.yaml_files import read_yaml
 from cns_drake.scenarios.scenario import Scenario
 from cns_drake.scenarios.shipped import shipped_drives, shipped_maps
+from cns_drake.sensors.camera.config import FORMER_ANGLES
 from cns_drake.sensors.imu.config import KALIBR_FILE
 
 
@@ -99,6 +102,7 @@ def read_scenario_file(path: Path) -> Scenario:
                 " digits and underscores; give a name"
             )
         find_files(values, file)
+        _note_radians(values, file)
         files[file] = values
         file = _find_base(values.pop("base", None), file, files)
     scenario = None
@@ -110,6 +114,18 @@ def read_scenario_file(path: Path) -> Scenario:
         scenario._files = (file, *scenario.files)
     assert scenario is not None  # There is at least one file.
     return scenario
+
+
+def _note_radians(values: Mapping[str, Any], file: Path) -> None:
+    """Notes angles of cameras that have the unit of earlier versions."""
+    cameras = values.get("cameras")
+    for name, fields in cameras.items() if isinstance(cameras, dict) else ():
+        for old, new in FORMER_ANGLES.items():
+            if isinstance(fields, dict) and old in fields:
+                note(
+                    f"{file}: cameras.{name}.{old}: read in radians; this field"
+                    f" is now {new}, in degrees"
+                )
 
 
 def _find_base(
@@ -132,7 +148,7 @@ def _find_base(
 
 
 def find_files(values: dict, path: Path) -> None:
-    """Makes the paths in a scenario's or family's fields absolute, in place.
+    """Makes the paths in a scenario's fields absolute, in place.
 
     Names of shipped maps stay as they are.
 

@@ -2,6 +2,7 @@
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+import math
 from pathlib import Path
 import pickle
 import shutil
@@ -41,8 +42,12 @@ from cns_drake.traffic.walkers import room_for_walkers
 RATE = 10
 # Cameras behind and above the car, in its frame; both look ahead and down.
 _VIEWS = {
-    "film_street": CameraSection(xyz=(-9.0, 0.0, 3.6), rpy=(0.0, 0.12, 0.0)),
-    "film_above": CameraSection(xyz=(-28.0, 0.0, 40.0), rpy=(0.0, 0.8, 0.0)),
+    "film_street": CameraSection(
+        xyz=(-9.0, 0.0, 3.6), rpy_deg=(0.0, math.degrees(0.12), 0.0)
+    ),
+    "film_above": CameraSection(
+        xyz=(-28.0, 0.0, 40.0), rpy_deg=(0.0, math.degrees(0.8), 0.0)
+    ),
 }
 # A point is drawn unless it lies farther than this behind the visible surface
 # [m].
@@ -289,7 +294,9 @@ def _draw_points(
 ) -> None:
     """Draws the points that a camera sees, coloured by height."""
     # Drake renders with this K if pixel (0, 0) begins at the origin.
-    K = CameraInfo(camera.width, camera.height, camera.fov_y).intrinsic_matrix()
+    K = CameraInfo(
+        camera.width, camera.height, math.radians(camera.fov_y_deg)
+    ).intrinsic_matrix()
     x, y, z = K @ (X_WC.inverse() @ p_WQset.T)
     column, row = np.floor([x, y] / np.maximum(z, 0.1)).astype(int)
     seen = (z > 0.1) & (column >= 0) & (row >= 0)

@@ -90,7 +90,7 @@ _TABLE = (
     "4,tree_001,vegetation,70,0.0,0.0,0.0,0.0,\n"
 )
 _VIEWS = (
-    "street: {position: [1, 2, 3], target: [10, 20, 3], fov_y: 60}\n"
+    "street: {position: [1, 2, 3], target: [10, 20, 3], fov_y_deg: 60}\n"
     "park: {position: [5.5, 0, 30], target: [0, 0, 0]}\n"
 )
 

@@ -2,6 +2,7 @@
 
 from collections.abc import Callable, Mapping
 import logging
+import math
 from typing import Any
 
 import numpy as np
@@ -55,7 +56,10 @@ def optical_pose(config: CameraSection) -> RigidTransform:
 
     The axes of C are those of an image: x right, y down, z forward.
     """
-    return RigidTransform(RollPitchYaw(config.rpy), config.xyz) @ _OPTICAL
+    return (
+        RigidTransform(RollPitchYaw(np.radians(config.rpy_deg)), config.xyz)
+        @ _OPTICAL
+    )
 
 
 def add_cameras(
@@ -83,7 +87,9 @@ def add_cameras(
     # recorded.
     logging.getLogger("drake").addFilter(_is_told)
     for name, config in cameras.items():
-        info = CameraInfo(config.width, config.height, config.fov_y)
+        info = CameraInfo(
+            config.width, config.height, math.radians(config.fov_y_deg)
+        )
         clipping = ClippingRange(_NEAR, _FAR)
         core = RenderCameraCore(RENDERER, info, clipping, RigidTransform())
         X_BC = optical_pose(config)

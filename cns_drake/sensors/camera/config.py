@@ -1,15 +1,17 @@
 """The description of a camera."""
 
+from collections.abc import Mapping
 import math
-from typing import Annotated
+from typing import Annotated, Any
 
-from pydantic import Field
+from pydantic import Field, model_validator
 
-from cns_drake.sensors.sensor_config import Section, Triple
+from cns_drake.sensors.sensor_config import Angle, Section, Triple
 
 # In Drake, the principal point of a single pixel lies on its edge: an error.
 _Pixels = Annotated[int, Field(ge=2, le=4096)]
-_Angle = Annotated[float, Field(ge=-7.0, le=7.0)]
+# Field of earlier versions, in radians -> the field that replaces it.
+FORMER_ANGLES: Mapping[str, str] = {"fov_y": "fov_y_deg", "rpy": "rpy_deg"}
 
 
 class CameraSection(Section):
@@ -20,10 +22,10 @@ class CameraSection(Section):
         height: height of the image in pixels, at least 2.
         rate: images per second [Hz]. The scan rate of the first LiDAR must be a
             multiple of this rate, because each image has the stamp of a scan.
-        fov_y: vertical field of view [rad].
+        fov_y_deg: vertical field of view [deg]; by default one radian.
         xyz: position in `base_link` [m].
-        rpy: roll, pitch, yaw in `base_link` [rad]; with zeros the camera looks
-            straight ahead.
+        rpy_deg: roll, pitch, yaw in `base_link` [deg]; with zeros the camera
+            looks straight ahead.
         depth: whether to record depth images as well.
         label: whether to record images of the semantic classes as well.
     """
@@ -31,8 +33,33 @@ class CameraSection(Section):
     width: _Pixels = 640
     height: _Pixels = 480
     rate: int = Field(default=2, ge=1, le=100)
-    fov_y: float = Field(default=1.0, gt=0.0, lt=math.pi)
+    fov_y_deg: float = Field(default=math.degrees(1.0), gt=0.0, lt=180.0)
     xyz: Triple = (0.0, 0.0, 1.6)
-    rpy: tuple[_Angle, _Angle, _Angle] = (0.0, 0.0, 0.0)
+    rpy_deg: tuple[Angle, Angle, Angle] = (0.0, 0.0, 0.0)
     depth: bool = False
     label: bool = False
+
+    @model_validator(mode="before")
+    @classmethod
+    def _read_radians(cls, values: Any) -> Any:
+        """Reads the fields of earlier versions, whose angles are in radians."""
+        if not isinstance(values, Mapping):
+            return values
+        found = dict(values)
+        for old, new in FORMER_ANGLES.items():
+            if old not in found:
+                continue
+            if new in found:
+                raise ValueError(f"{old}: give only {new}")
+            angle = found.pop(old)
+            if isinstance(angle, list | tuple):
+                found[new] = [_degrees(one) for one in angle]
+            else:
+                found[new] = _degrees(angle)
+        return found
+
+
+def _degrees(angle: Any) -> Any:
+    """Returns an angle in degrees; what is no number as it is."""
+    is_number = isinstance(angle, int | float) and not isinstance(angle, bool)
+    return math.degrees(angle) if is_number else angle

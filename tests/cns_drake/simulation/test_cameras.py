@@ -5,6 +5,7 @@ Oracle: the points of an exact LiDAR, projected by the messages alone.
 
 import base64
 import io
+import math
 import re
 import shutil
 
@@ -15,6 +16,7 @@ from PIL import Image
 import pytest
 from rosbags.highlevel import AnyReader
 from scipy.spatial.transform import Rotation
+import yaml
 
 from cns_drake.base.drives.mcap_drive import McapDrive
 from cns_drake.base.errors import InputError
@@ -32,13 +34,13 @@ CAMERAS = {
         "width": 320,
         "height": 240,
         "rate": 5,
-        "fov_y": 1.2,
+        "fov_y_deg": math.degrees(1.2),
         "xyz": [0.5, 0.2, 1.9],
-        "rpy": [0.05, 0.1, -0.2],
+        "rpy_deg": [3.0, 6.0, -11.0],
         "depth": True,
         "label": True,
     },
-    "left": {"width": 64, "height": 32, "rate": 10, "rpy": [0, 0, 1.5708]},
+    "left": {"width": 64, "height": 32, "rate": 10, "rpy_deg": [0, 0, 90]},
 }
 FRAMES = 5
 
@@ -104,7 +106,9 @@ def test_topics_and_stamps(messages):
 def test_optical_frames_lie_where_the_scenario_says(messages):
     """z is ahead, x to the right, y down."""
     X_BC = frames_of(messages)["front"]
-    R = Rotation.from_euler("xyz", CAMERAS["front"]["rpy"]).as_matrix()
+    R = Rotation.from_euler(
+        "xyz", CAMERAS["front"]["rpy_deg"], degrees=True
+    ).as_matrix()
     np.testing.assert_allclose(X_BC[:3, 3], CAMERAS["front"]["xyz"])
     for column, axis in ((2, R[:, 0]), (0, -R[:, 1]), (1, -R[:, 2])):
         np.testing.assert_allclose(X_BC[:3, column], axis, atol=1e-9)
@@ -203,8 +207,12 @@ def test_other_messages_are_those_without_cameras(recording, tmp_path):
         ({"rate": 3}, r"cameras\.c\.rate: 3 does not divide 10"),
         ({"rate": 20}, r"cameras\.c\.rate: 20 does not divide 10"),
         ({"rate": 0}, r"cameras\.c\.rate: "),
-        ({"fov_y": 3.2}, r"cameras\.c\.fov_y: "),
-        ({"fov_y": 0.0}, r"cameras\.c\.fov_y: "),
+        ({"fov_y_deg": 180.0}, r"cameras\.c\.fov_y_deg: "),
+        ({"fov_y_deg": 0.0}, r"cameras\.c\.fov_y_deg: "),
+        ({"rpy_deg": [0, 0, 3601]}, r"cameras\.c\.rpy_deg"),
+        ({"fov_y": 3.2}, r"cameras\.c\.fov_y_deg: "),
+        ({"rpy": [0, 0]}, r"cameras\.c\.rpy_deg"),
+        ({"rpy": [0, 0, 0], "rpy_deg": [0, 0, 0]}, "rpy: give only rpy_deg"),
         ({"xyz": [0, 0, float("nan")]}, r"cameras\.c\.xyz"),
     ],
 )
@@ -212,6 +220,32 @@ def test_cameras_that_cannot_be(tmp_path, camera, fault):
     with pytest.raises(InputError, match=fault) as error:
         tiny_scenario(tmp_path, lidars=LIDARS, cameras={"c": camera})
     assert "\n" not in str(error.value)
+
+
+@pytest.mark.parametrize(
+    ("former", "now"),
+    [
+        ({"rpy": [0.1, -0.2, 3]}, {"rpy_deg": np.degrees([0.1, -0.2, 3])}),
+        ({"fov_y": 0.8}, {"fov_y_deg": np.degrees(0.8)}),
+    ],
+)
+def test_radians_of_earlier_versions_are_read_with_a_note(
+    tmp_path, capsys, former, now
+):
+    path = tmp_path / "mine.yaml"
+    values = {"base": "riverside_01", "cameras": {"front": former}}
+    path.write_text(yaml.safe_dump(values))
+    camera = load_scenario(path).cameras["front"]
+    (old,), ((new, value),) = former, now.items()
+    np.testing.assert_allclose(getattr(camera, new), value, rtol=1e-15)
+    assert capsys.readouterr().err == (
+        f"{path}: cameras.front.{old}: read in radians; this field is now"
+        f" {new}, in degrees\n"
+    )
+    values["cameras"]["front"] = {new: np.asarray(value).tolist()}
+    path.write_text(yaml.safe_dump(values))
+    assert load_scenario(path).cameras["front"] == camera
+    assert not capsys.readouterr().err
 
 
 @pytest.mark.parametrize("name", ["lidar", "imu", "base_link", "map"])

@@ -85,7 +85,7 @@ def test_car_is_seen(tmp_path):
         _VIEWS, _VIEWS.values(), (images[:5], images[5:]), strict=True
     ):
         p_C = optical_pose(view).inverse() @ np.array([0.6, 0.0, 1.0])
-        scale = size[1] / 2 / np.tan(view.fov_y / 2)
+        scale = size[1] / 2 / np.tan(np.radians(view.fov_y_deg) / 2)
         x, y = np.array(size) / 2 + scale * p_C[:2] / p_C[2]
         near = shots[:, int(y) - 1 : int(y) + 2, int(x) - 1 : int(x) + 2]
         assert (near[..., 2] - near[..., 0]).mean() > 15.0, name
@@ -94,7 +94,7 @@ def test_car_is_seen(tmp_path):
 
 
 def test_points_are_drawn_where_a_camera_sees_them():
-    camera = CameraSection(width=41, height=31, fov_y=np.pi / 2)
+    camera = CameraSection(width=41, height=31, fov_y_deg=90.0)
     X_WC = RigidTransform([1.0, 2.0, 3.0]) @ optical_pose(
         CameraSection(xyz=(0.0, 0.0, 0.0))
     )
