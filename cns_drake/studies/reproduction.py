@@ -28,7 +28,7 @@ from evaluation.paper import reference_for
 from evaluation.recognition.protocol import FAIR_PROTOCOL, RetrievalProtocol
 from evaluation.study.chosen_methods import choose_methods
 from evaluation.study.collection import RecordingInfo
-from evaluation.study.plan import Study
+from evaluation.study.stages_report import StagesReport
 
 # Mean size of a page.
 _PAGE_BYTES = 18e6
@@ -111,7 +111,7 @@ def reproduce_maps(
     recordings.sort(key=lambda recording: recording.name)
     report = output / "report"
     make_folder(output)
-    study = Study(
+    study = StagesReport(
         recordings,
         report,
         chosen,

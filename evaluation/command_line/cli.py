@@ -361,10 +361,10 @@ def report(
     from cns_drake.base.jobs.cluster import choose_cluster
     from evaluation.paper import reference_for
     from evaluation.results.comparing import suggest_comparison
-    from evaluation.study import plan
+    from evaluation.study import stages_report
 
     cluster = choose_cluster(jobs, scheduler)
-    path = plan.write_report(
+    path = stages_report.write_report(
         recordings,
         output,
         cluster,

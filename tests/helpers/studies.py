@@ -16,7 +16,7 @@ from evaluation.paper import reference_for
 from evaluation.recognition.protocol import FAIR_PROTOCOL
 from evaluation.study.chosen_methods import choose_methods
 from evaluation.study.collection import find_recordings
-from evaluation.study.plan import Study
+from evaluation.study.stages_report import StagesReport
 
 
 def do(jobs):
@@ -46,7 +46,7 @@ def report(recordings, output, methods=None, protocol=FAIR_PROTOCOL):
     found = find_recordings(recordings)
     reference = reference_for({one.map_name for one in found})
     chosen = choose_methods() if methods is None else tuple(methods)
-    study = Study(found, output, chosen, protocol, reference=reference)
+    study = StagesReport(found, output, chosen, protocol, reference=reference)
     do(study.jobs())
     return study.assemble(with_tables=True)
 

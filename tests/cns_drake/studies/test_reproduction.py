@@ -58,7 +58,7 @@ def planned(monkeypatch):
         runs[-1]["pages"] = pages
         return study.output / "report.html"
 
-    monkeypatch.setattr(reproduction.Study, "assemble", assemble)
+    monkeypatch.setattr(reproduction.StagesReport, "assemble", assemble)
     return runs
 
 

@@ -8,7 +8,7 @@ from helpers.drive_files import make_scan, write_recording, yaw_pose
 from helpers.eval_program import assert_refused, make_block_scene, run
 import pytest
 
-from evaluation.study import plan
+from evaluation.study import stages_report
 
 
 @pytest.fixture(scope="module")
@@ -41,7 +41,7 @@ def test_pairs(capsys, roofs, command):
 @pytest.mark.slow
 @pytest.mark.usefixtures("unrendered_figures")
 def test_folders(capsys, roofs, tmp_path, few_methods, monkeypatch):
-    studies.run_here(monkeypatch, plan)
+    studies.run_here(monkeypatch, stages_report)
     output = tmp_path / "out"
     report = ["report", roofs, "--output", output, "--no-costs", "--jobs", "1"]
     report.append("--tables")

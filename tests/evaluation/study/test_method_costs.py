@@ -11,7 +11,7 @@ from evaluation.methods import shipped_methods
 from evaluation.recognition import costs
 from evaluation.study.collection import find_recordings
 from evaluation.study.parts import StudyFiles
-from evaluation.study.plan import Study
+from evaluation.study.stages_report import StagesReport
 
 pytestmark = pytest.mark.slow
 
@@ -25,7 +25,7 @@ def test_costs_in_the_report(tmp_path, monkeypatch):
         drive(tmp_path / "in" / f"town_{stage}", stage, route, city="town")
     found = find_recordings(tmp_path / "in")
     output = tmp_path / "out"
-    study = Study(found, output, with_costs=True)
+    study = StagesReport(found, output, with_costs=True)
     jobs = study.jobs()
     # The job runs alone on the machine.
     assert set(jobs[-1].needs) == {job.name for job in jobs[:-1]}

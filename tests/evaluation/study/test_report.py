@@ -26,7 +26,7 @@ from evaluation.recognition.protocol import (
 from evaluation.study import chosen_methods
 from evaluation.study.chosen_methods import choose_methods
 from evaluation.study.collection import find_recordings, group_cities
-from evaluation.study.plan import Study, write_report
+from evaluation.study.stages_report import StagesReport, write_report
 
 pytestmark = pytest.mark.slow
 
@@ -425,7 +425,7 @@ def test_report_is_the_same_for_any_number_of_workers(
 
 
 def test_finished_jobs_start_no_process(recordings, report, monkeypatch):
-    jobs = Study(find_recordings(recordings), report).jobs()
+    jobs = StagesReport(find_recordings(recordings), report).jobs()
     monkeypatch.setattr(Cluster, "connect", None)
     run_jobs(jobs, Cluster())
     (report / "figures" / "routes_metropolis.webp").rename(report / "aside")

@@ -11,7 +11,7 @@ from cns_drake.base.errors import InputError
 from evaluation.study.chosen_methods import choose_methods
 from evaluation.study.collection import find_recordings
 from evaluation.study.parts import Part
-from evaluation.study.plan import Study
+from evaluation.study.stages_report import StagesReport
 from evaluation.study.surveys import Survey
 
 pytestmark = pytest.mark.slow
@@ -21,7 +21,7 @@ def measuring_jobs(recordings, output):
     """Returns the jobs without drawing, which takes most of the time."""
     return [
         job
-        for job in Study(find_recordings(recordings), output).jobs()
+        for job in StagesReport(find_recordings(recordings), output).jobs()
         if isinstance(job.step, Survey)
         or job.name.startswith(("place", "explain"))
     ]
@@ -90,7 +90,7 @@ def test_values_that_no_result_needs_are_removed(tmp_path, few_methods):
     methods = choose_methods()
 
     def run(folder, methods):
-        study = Study(found, tmp_path / folder, methods)
+        study = StagesReport(found, tmp_path / folder, methods)
         done = studies.do(study.jobs())
         study.assemble(with_tables=True)
         return done

@@ -62,7 +62,7 @@ _SEED = 1
 
 
 @dataclass(frozen=True)
-class Study:
+class StagesReport:
     """A report on recordings, which need not exist yet.
 
     It is the experiment `stages` on these recordings: its engine measures all
@@ -258,7 +258,7 @@ class _CityReport:
             draw, explain wrong answers and repeat published runs.
     """
 
-    def __init__(self, study: Study, city: City):
+    def __init__(self, study: StagesReport, city: City):
         """Adds the pairs of the city to the engine of the study."""
         self._study = study
         self._city = city
@@ -491,9 +491,9 @@ def write_report(
 ) -> Path:
     """Measures all recordings in a folder, and writes a report on them.
 
-    The files of the report are described in `Study.assemble`. Results of an
-    earlier run, finished or not, are used if they belong to the same recordings
-    and methods.
+    The files of the report are described in `StagesReport.assemble`. Results of
+    an earlier run, finished or not, are used if they belong to the same
+    recordings and methods.
 
     Args:
         recordings: the folder.
@@ -527,7 +527,7 @@ def write_report(
             if note is not None:
                 on_note(note)
     reference = reference_for({one.map_name for one in found})
-    study = Study(found, output, chosen, protocol, with_costs, reference)
+    study = StagesReport(found, output, chosen, protocol, with_costs, reference)
     jobs = study.jobs()
     alone = nothing_to_compare(study.cities)
     # A wrong guess must not lead to an empty report.

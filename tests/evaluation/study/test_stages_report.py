@@ -8,7 +8,7 @@ import pytest
 from cns_drake.base.errors import InputError
 from evaluation.paper import reference_for
 from evaluation.study.collection import RecordingInfo, group_cities
-from evaluation.study.plan import Study
+from evaluation.study.stages_report import StagesReport
 
 
 def info(name, stage, route="a", city="metropolis", needs=()):
@@ -27,7 +27,7 @@ FAMILY = [
 
 
 def test_every_recording_is_surveyed_when_it_is_made(tmp_path):
-    jobs = {job.name: job for job in Study(FAMILY, tmp_path).jobs()}
+    jobs = {job.name: job for job in StagesReport(FAMILY, tmp_path).jobs()}
     surveys = {n: j for n, j in jobs.items() if n.startswith("survey ")}
     assert {name: job.needs for name, job in surveys.items()} == {
         "survey metropolis_01": ("metropolis_01",),
@@ -46,7 +46,7 @@ def test_every_recording_is_surveyed_when_it_is_made(tmp_path):
 
 
 def test_pairs_wait_for_their_surveys(tmp_path):
-    jobs = {job.name: job for job in Study(FAMILY, tmp_path).jobs()}
+    jobs = {job.name: job for job in StagesReport(FAMILY, tmp_path).jobs()}
     both = ("survey metropolis_01", "survey metropolis_04")
     for task in ("place", "change"):
         assert (
@@ -112,7 +112,7 @@ def test_a_control_serves_both_ways(tmp_path):
     ]
     jobs = {
         job.name: job
-        for job in Study(
+        for job in StagesReport(
             drives, tmp_path, reference=reference_for({"riverside"})
         ).jobs()
     }
@@ -128,7 +128,7 @@ def test_a_control_serves_both_ways(tmp_path):
 def test_jobs_can_go_anywhere(tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     river = [info(f"riverside_{s}", s, s, "riverside") for s in ("01", "02")]
-    jobs = Study(
+    jobs = StagesReport(
         FAMILY + river, Path("out"), reference=reference_for({"riverside"})
     ).jobs()
     names = [job.name for job in jobs]
@@ -152,7 +152,7 @@ def test_names_of_files_stay_apart(tmp_path):
         info("a,b", "2", city="x"),
         info("a%2Cb", "3", city="x"),
     ]
-    outputs = [job.step.output for job in Study(odd, tmp_path).jobs()]
+    outputs = [job.step.output for job in StagesReport(odd, tmp_path).jobs()]
     assert len({str(path).lower() for path in outputs}) == len(outputs)
     depths = {len(path.relative_to(tmp_path).parts) for path in outputs}
     assert depths == {3}
@@ -161,4 +161,4 @@ def test_names_of_files_stay_apart(tmp_path):
 def test_one_name_for_two_recordings(tmp_path):
     twice = [info("town_01", "01", city="a"), info("town_01", "01", city="b")]
     with pytest.raises(InputError, match=r"town_01 is there twice"):
-        Study(twice, tmp_path).jobs()
+        StagesReport(twice, tmp_path).jobs()
