@@ -71,6 +71,7 @@ def test_it_is_small_and_has_its_notices(wheel):
 
 
 @pytest.mark.slow
+@pytest.mark.night
 def test_it_runs_the_main_job_without_the_checkout(wheel, tmp_path):
     venv.create(tmp_path / "venv", symlinks=True)
     (site,) = (tmp_path / "venv").glob("lib/*/site-packages")

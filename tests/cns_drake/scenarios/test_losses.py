@@ -21,7 +21,7 @@ from cns_drake.scenarios.scenario_files import (
 )
 from cns_drake.scenarios.shipped import shipped_maps
 from cns_drake.scene.world import load_world, structures_in
-from cns_drake.studies.comparisons import PairOfDrives
+from cns_drake.studies.comparisons import PairMaker
 from cns_drake.studies.experiment import conditions, load_experiment
 
 SOURCE = "mine.yaml: database"
@@ -231,7 +231,7 @@ def test_shipped_drives_with_losses(name):
     def none(*_):
         pytest.fail("another city")
 
-    pair = PairOfDrives(
+    pair = PairMaker(
         *map(load_scenario, ("downtown_01", "downtown_04")),
         False,
         name,

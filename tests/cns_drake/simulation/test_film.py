@@ -74,6 +74,7 @@ def test_stages_come_in_turn_from_both_views(tmp_path):
 
 
 @pytest.mark.slow
+@pytest.mark.night
 def test_car_is_seen(tmp_path):
     path = tmp_path / "tiny.webp"
     scenario = tiny_scenario(tmp_path, lidars=LIDARS)
