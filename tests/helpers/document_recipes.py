@@ -64,6 +64,7 @@ class Recipe:
         makes: globs of files that exist afterwards.
         prepare: called afterwards with the folder.
         all_methods: whether a study compares all shipped methods.
+        by_night: whether it takes too long for each run of the tests.
     """
 
     start: str
@@ -76,6 +77,7 @@ class Recipe:
     makes: tuple[str, ...] = ()
     prepare: Callable[[Path], None] | None = None
     all_methods: bool = False
+    by_night: bool = False
 
 
 def shorten_drives(folder: Path) -> None:
@@ -248,6 +250,7 @@ RECIPES = {
         "kiss_icp_pipeline output/odometry",
         after=("KISS-ICP settings", "odometry drive"),
         prints=("compared          19 poses", "ATE"),
+        by_night=True,
     ),
     "RKO-LIO settings": Recipe("voxel_size: 2.0\n", file="rko.yaml"),
     "RKO-LIO": Recipe(
@@ -275,6 +278,7 @@ RECIPES = {
         ),
         after=("own city",),
         makes=("film.webp", "drive.webp"),
+        by_night=True,
     ),
     "help: generate": Recipe(
         "cns-drake generate metropolis_01 metropolis_04",

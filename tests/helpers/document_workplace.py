@@ -38,7 +38,8 @@ def daily() -> set[str]:
     """Returns the names of the recipes that each run of the tests follows.
 
     They hold the first use of each command, in the order of the recipes, and
-    what uses no command. A server alone shows nothing.
+    what uses no command. A server alone shows nothing. Recipes for the night
+    are left out.
     """
     texts = {
         name: piece.text
@@ -51,7 +52,8 @@ def daily() -> set[str]:
     for name, recipe in RECIPES.items():
         runs = recipe.file is None or recipe.command is not None
         uses = set(_USE.findall(f"{texts[name]} {recipe.command}" * runs))
-        if recipe.ready is None and not (uses and uses <= used):
+        is_daily = recipe.ready is None and not recipe.by_night
+        if is_daily and not (uses and uses <= used):
             found.add(name)
             used |= uses
     return found

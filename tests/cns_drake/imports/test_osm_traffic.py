@@ -369,6 +369,7 @@ def test_nobody_meets_anybody(blocks):
 
 
 @pytest.mark.slow
+@pytest.mark.night
 def test_an_import_carries_traffic(tmp_path):
     path = write_blocks(tmp_path / "a.osm")
     folder = tmp_path / "town"

@@ -160,6 +160,7 @@ def write_ffmpeg(folder, script, monkeypatch):
 
 
 @pytest.mark.slow
+@pytest.mark.night
 def test_mp4_has_the_images_as_ffmpeg_gets_them(tmp_path, monkeypatch):
     programs = tmp_path / "programs"
     programs.mkdir()

@@ -98,6 +98,7 @@ def test_the_field_of_view_and_the_ranges_count(tmp_path):
 
 
 @pytest.mark.slow
+@pytest.mark.night
 def test_the_estimate_from_scans_is_close(short_recording):
     drive = DriveSimulation(load_scenario(short_recording / "scenario.yaml"))()
     protocol = RetrievalProtocol(query_spacing=0.1, place_spacing=0.3)

@@ -90,6 +90,7 @@ def test_the_numbers_are_those_of_the_single_commands(folder, tmp_path):
 
 
 @pytest.mark.slow
+@pytest.mark.night
 def test_a_report_writes_the_tables_of_the_stages(folder, tmp_path):
     """Rows and answers, with and without the gate, of both ways."""
     for names in (["btc", "solid"], ["solid"]):

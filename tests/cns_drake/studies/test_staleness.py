@@ -81,6 +81,7 @@ def change(file, old, new):
     file.write_text(text.replace(old, new))
 
 
+@pytest.mark.night
 def test_a_quick_study(reproduce, code, tmp_path):
     assert reproduce(with_recordings=False) == STUDY
     assert reproduce(with_recordings=False) == set()

@@ -82,6 +82,7 @@ def test_a_new_recording_under_an_old_name(tmp_path, few_methods):
     assert len(kept) == 3 + len(few_methods)
 
 
+@pytest.mark.night
 def test_values_that_no_result_needs_are_removed(tmp_path, few_methods):
     """They are made again for new results, which are as of one run."""
     for stage, route in (("01", "a"), ("04", "b")):

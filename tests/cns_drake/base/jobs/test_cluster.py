@@ -167,6 +167,7 @@ def certificates(tmp_path_factory):
 
 
 @pytest.mark.skipif(shutil.which("openssl") is None, reason="no openssl")
+@pytest.mark.night
 def test_a_scheduler_that_asks_for_certificates(certificates, tmp_path):
     """A command's environment names the certificates as Dask's settings do."""
     ca_file, cert, key = (certificates[k] for k in ("ca-file", "cert", "key"))
