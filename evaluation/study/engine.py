@@ -1,6 +1,6 @@
 """Runs pairs of drives x tasks x methods, and turns results into two tables."""
 
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
@@ -130,7 +130,22 @@ class Engine:
         Raises:
             InputError: a job has not been done.
         """
-        return Results.of(self._rows()), QueryRows.of(self._answers())
+        rows: list[Row] = []
+        answers: list[Answers] = []
+        baselines = self._baselines()
+        for one in self.measured:
+            before = baselines.get(one.place, {})
+            base = before.get(one.seed) or next(iter(before.values()), {})
+            for name in one.parts:
+                task = self.tasks[name]
+                found = self.found(one, name)
+                for number in task.numbers(found, base.get(name)):
+                    key = self._key(one, name, number.method, number.gate)
+                    rows.append(Row.of(number, **key))
+                for method, gate, columns in task.answers(found):
+                    key = self._key(one, name, method, gate)
+                    answers.append(Answers(**key, columns=columns))
+        return Results.of(rows), QueryRows.of(answers)
 
     def _announce(self, cluster: Cluster) -> None:
         """Says how long a long study takes."""
@@ -149,33 +164,17 @@ class Engine:
                 " an interruption"
             )
 
-    def _rows(self) -> Iterator[Row]:
-        """Yields all rows of the table of results."""
-        # The results of the baseline of a map, its drives and protocol, by
-        # seed and task.
+    def _baselines(self) -> dict[tuple, dict[int, dict[str, Any]]]:
+        """Returns the baseline's results by map, drives and protocol.
+
+        Below that, they are by seed and task.
+        """
         baselines: dict[tuple, dict[int, dict[str, Any]]] = {}
         for one in self.measured:
             if one.is_baseline:
                 values = {name: self.found(one, name) for name in one.parts}
                 baselines.setdefault(one.place, {})[one.seed] = values
-        for one in self.measured:
-            before = baselines.get(one.place, {})
-            base = before.get(one.seed) or next(iter(before.values()), {})
-            for name in one.parts:
-                found = self.found(one, name)
-                for number in self.tasks[name].numbers(found, base.get(name)):
-                    key = self._key(one, name, number.method, number.gate)
-                    yield Row.of(number, **key)
-
-    def _answers(self) -> Iterator[Answers]:
-        """Yields the answers to all queries."""
-        for one in self.measured:
-            for name in one.parts:
-                for method, gate, columns in self.tasks[name].answers(
-                    self.found(one, name)
-                ):
-                    key = self._key(one, name, method, gate)
-                    yield Answers(**key, columns=columns)
+        return baselines
 
     def found(self, one: Pair, task: str) -> Any:
         """Returns a task's result for a pair; its jobs must be done.

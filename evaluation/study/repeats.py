@@ -68,7 +68,7 @@ def repeats_of(
             published != ours
             and ours.asked_like(published).of(method) == published
         ):
-            places = (one.described(queries=False) for one in (ours, published))
-            shares_places = next(places) == next(places)
+            places = ours.described(queries=False)
+            shares_places = places == published.described(queries=False)
             found.append(Repeat(choice, published, shares_places))
     return found
