@@ -7,10 +7,33 @@ from time import process_time_ns
 from typing import Any
 
 import numpy as np
+from threadpoolctl import threadpool_limits
 
 from evaluation.methods.method import Method
-from evaluation.recognition.description import DescribedDrive, DescribedScans
-from evaluation.recognition.scoring import ranked_places, score_places
+from evaluation.recognition.description import DescribedScans
+from evaluation.recognition.scoring import score_places
+
+# Number of clouds, or of queries, whose time is measured; the time of the first
+# does not count, because it includes loading and compiling.
+NUM_TRIALS = 12
+
+
+@dataclass(frozen=True)
+class QueryCost:
+    """The cost of searching a database by one method, on one core.
+
+    Attributes:
+        places: number of places.
+        place_bytes: mean size of a place's pickled descriptor.
+        build_ms: CPU time to build the database from descriptors [ms].
+        query_ms: median CPU time to compare a query with all places [ms], see
+            `query_ms`.
+    """
+
+    places: int
+    place_bytes: float
+    build_ms: float
+    query_ms: float
 
 
 @dataclass(frozen=True)
@@ -24,12 +47,9 @@ class Cost:
         scans_per_place: number of scans that are merged into a cloud.
         points: mean number of points in a cloud.
         describe_ms: time to describe a query's cloud [ms].
-        query_ms: time to compare a query with all places [ms]. It includes the
-            method's second stage, the rejection of far places (the gate, see
-            `evaluation.recognition.scoring.gated`), if used, and the pose of
-            the best place.
+        query_ms: time to compare a query with all places [ms], see `query_ms`.
         places: number of places.
-        place_bytes: mean size of a place's pickled description.
+        place_bytes: mean size of a place's pickled descriptor.
     """
 
     method: str
@@ -41,83 +61,85 @@ class Cost:
     place_bytes: float
 
 
+def measure_search(
+    method: Method, places: DescribedScans, queries: DescribedScans
+) -> QueryCost:
+    """Returns the time and memory that a search in a database needs.
+
+    Args:
+        method: method to measure.
+        places: described places.
+        queries: described queries.
+    """
+    sizes = [len(pickle.dumps(one, protocol=5)) for one in places.descriptors]
+    return QueryCost(
+        places=len(places.frames),
+        place_bytes=float(np.mean(sizes)),
+        build_ms=cpu_ms(method.build_database, places.descriptors),
+        query_ms=query_ms(method, places, queries),
+    )
+
+
 def measure_cost(
     method: Method,
     clouds: Sequence[np.ndarray],
     scans_per_place: int,
-    database: DescribedDrive,
-    query: DescribedDrive,
-    gate_radius: float | None = None,
+    search: QueryCost,
 ) -> Cost:
     """Returns the time and memory that a method needs.
 
     Args:
         method: method to measure.
-        clouds: C clouds to describe, C >= 2; the time of the first is not
-            counted, since it includes loading and compiling.
+        clouds: clouds to describe, two or more; the time of the first does not
+            count.
         scans_per_place: number of scans that are merged into each cloud.
-        database: described drive with places.
-        query: described drive with queries; C of them are measured.
-        gate_radius: radius of a match [m], with which far places are rejected
-            (see `evaluation.recognition.scoring.gated`); None to reject none.
+        search: cost of searching a database.
     """
-    describing = [cpu_ms(method.describe, cloud) for cloud in clouds]
-    places = database.places
-    sizes = [len(pickle.dumps(one, protocol=5)) for one in places.descriptors]
+    with threadpool_limits(limits=1):
+        describing = [cpu_ms(method.describe, cloud) for cloud in clouds]
     return Cost(
         method=method.name,
         scans_per_place=scans_per_place,
         points=float(np.mean([len(cloud) for cloud in clouds])),
         describe_ms=float(np.median(describing[1:])),
-        query_ms=query_ms(
-            method, places, query.queries, len(clouds), gate_radius
-        ),
-        places=len(places.frames),
-        place_bytes=float(np.mean(sizes)),
+        query_ms=search.query_ms,
+        places=search.places,
+        place_bytes=search.place_bytes,
     )
 
 
 def query_ms(
-    method: Method,
-    places: DescribedScans,
-    queries: DescribedScans,
-    number: int,
-    gate_radius: float | None = None,
-    *,
-    with_pose: bool = True,
+    method: Method, places: DescribedScans, queries: DescribedScans
 ) -> float:
-    """Returns the median time of several queries [ms].
+    """Returns the median CPU time of several queries, on one core [ms].
 
-    The first query does not count.
+    A query is compared with all places, including the method's second stage if
+    it has one. Geometric verification (the gate) and the pose of the best place
+    do not count: not each method has them, and they take the same time however
+    many places there are. The first query does not count.
 
     Args:
         method: method to measure.
         places: described places, all of them candidates.
         queries: described queries.
-        number: number of queries to measure, two or more.
-        gate_radius: radius of a match [m], with which far places are rejected
-            (see `evaluation.recognition.scoring.gated`); None to reject none.
-        with_pose: whether the pose of the best place is estimated, too.
     """
     indexed = method.build_database(places.descriptors)
     is_known = np.ones(len(places.frames), dtype=bool)
-    rows = np.linspace(0, len(queries.frames) - 1, number).astype(int)
+    rows = np.linspace(0, len(queries.frames) - 1, NUM_TRIALS).astype(int)
 
     def ask(row: int) -> None:
-        found = score_places(
+        score_places(
             method,
             queries.descriptors[: row + 1],
             queries.clouds[row] if queries.clouds else None,
             indexed,
             places.clouds,
             is_known,
-            gate_radius=gate_radius,
         )
-        if with_pose and not np.isnan(found).all():
-            best = int(ranked_places(found)[0])
-            method.relative_pose(queries.descriptors[row], indexed, best)
 
-    return float(np.median([cpu_ms(ask, row) for row in rows.tolist()][1:]))
+    with threadpool_limits(limits=1):
+        times = [cpu_ms(ask, row) for row in rows.tolist()]
+    return float(np.median(times[1:]))
 
 
 def cpu_ms(function: Callable[[Any], object], argument: object) -> float:

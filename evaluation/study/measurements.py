@@ -35,8 +35,6 @@ from evaluation.study.surveys import (
 # each method.
 DescribedSource: TypeAlias = "DriveSource | tuple[Part, ...]"
 
-# Number of queries whose time is measured.
-TIMED = 9
 # Longest time for all queries at a size.
 _LONGEST_MS = 3.6e6
 # Places that no method is known to take so long for.
@@ -264,9 +262,7 @@ def _takes_long(
     database: DescribedDrive,
     query: DescribedDrive,
 ) -> bool:
-    one_ms = query_ms(
-        method, database.places, query.queries, TIMED + 1, with_pose=False
-    )
+    one_ms = query_ms(method, database.places, query.queries)
     return one_ms * len(query.queries.frames) > _LONGEST_MS
 
 

@@ -1,21 +1,16 @@
 """Measures the costs of methods for a report, after all its other jobs."""
 
 import numpy as np
-from threadpoolctl import threadpool_limits
 
 from cns_drake.base.jobs.step import Reporter
-from cns_drake.base.progress import track
 from evaluation.drives.drive_views import MovedDrive
 from evaluation.drives.sampling import gather
-from evaluation.recognition.costs import Cost, measure_cost
+from evaluation.recognition.costs import NUM_TRIALS, Cost, measure_cost
 from evaluation.recognition.protocol import RetrievalProtocol
 from evaluation.study.chosen_methods import MethodChoice
 from evaluation.study.parts import Part
 from evaluation.study.surveys import DriveSource
-
-# Number of clouds and of queries whose costs are measured; the time of the
-# first does not count.
-_NUM_TRIALS = 12
+from evaluation.study.tasks.place import measure_costs
 
 
 def measure_method_costs(
@@ -23,10 +18,13 @@ def measure_method_costs(
     source: DriveSource,
     surveyed: Part,
     methods: tuple[MethodChoice, ...],
-    described: tuple[tuple[Part, Part], ...],
+    described: tuple[tuple[Part, ...], tuple[Part, ...]],
     protocol: RetrievalProtocol,
 ) -> list[Cost]:
     """Returns the time and memory that each method needs on one core.
+
+    The cost of a search is that of the task `cost`; the time to describe a
+    cloud is added.
 
     Args:
         reporter: reports progress.
@@ -34,46 +32,31 @@ def measure_method_costs(
         surveyed: file with the `SurveyedDrive` of the query drive, from which
             the drive's poses are read.
         methods: the methods.
-        described: files with each method's descriptions of a database and of
-            the query.
+        described: files with the descriptions of a database, and of the
+            queries, one for each method.
         protocol: protocol of the comparison.
     """
+    searches = measure_costs(reporter, *described, (), 0, methods)
     drive = source()
     known = surveyed.read()
     # A recording would be unpacked as a whole for its poses.
     drive = MovedDrive(drive, known.X_WS, drive.world_frame, drive.datum)
     costs = []
-    with threadpool_limits(limits=1):
-        for choice, parts in track(
-            zip(methods, described, strict=True),
-            "measuring costs",
-            len(methods),
-            "methods",
-        ):
-            method = choice.make()
-            number = protocol.scans(method)
-            last = max(len(drive) - number, 0)
-            frames = np.linspace(0, last, _NUM_TRIALS).astype(int).tolist()
-            clouds = [
-                gather(
-                    drive,
-                    frame,
-                    number,
-                    protocol.max_range,
-                    method.point_fields,
-                    protocol.scans_before(method),
-                )
-                for frame in frames
-            ]
-            (_, database), (_, query) = (part.read() for part in parts)
-            costs.append(
-                measure_cost(
-                    method,
-                    clouds,
-                    number,
-                    database,
-                    query,
-                    protocol.gate_radius,
-                )
+    for choice in methods:
+        method = choice.make()
+        number = protocol.scans(method)
+        last = max(len(drive) - number, 0)
+        clouds = [
+            gather(
+                drive,
+                frame,
+                number,
+                protocol.max_range,
+                method.point_fields,
+                protocol.scans_before(method),
             )
+            for frame in np.linspace(0, last, NUM_TRIALS).astype(int).tolist()
+        ]
+        search = searches[choice.key]
+        costs.append(measure_cost(method, clouds, number, search))
     return costs

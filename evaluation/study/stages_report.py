@@ -154,8 +154,8 @@ class StagesReport:
         """Returns the job that measures costs, after all other jobs."""
         places, queries = (self.files.survey(one.name) for one in pair)
         described = tuple(
-            (places.described(one.key), queries.described(one.key))
-            for one in self.methods
+            tuple(survey.described(one.key) for one in self.methods)
+            for survey in (places, queries)
         )
         source = pair[1].source
         drive = queries.drive

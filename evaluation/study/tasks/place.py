@@ -7,7 +7,7 @@ from typing import Any
 from cns_drake.base.jobs.running import Job
 from cns_drake.base.jobs.step import Reporter, Steps
 from cns_drake.base.progress import track
-from evaluation.recognition.costs import cpu_ms, query_ms
+from evaluation.recognition.costs import QueryCost, measure_search
 from evaluation.recognition.place_outcome import (
     Number,
     PlaceOutcome,
@@ -16,7 +16,6 @@ from evaluation.recognition.place_outcome import (
 )
 from evaluation.study.chosen_methods import MethodChoice
 from evaluation.study.measurements import (
-    TIMED,
     crowded,
     measure_method,
     measure_places,
@@ -153,9 +152,10 @@ class CostTask(Task):
         return (jobs.add(part, measure_costs, arguments, needs, _COSTS_COST),)
 
     def numbers(self, found: Any, before: Any | None) -> Iterator[Number]:
-        for method, (places, values) in found.items():
-            for name, value in values.items():
-                yield Number(method, False, name, value, n=places)
+        for method, cost in found.items():
+            for name in ("build_ms", "query_ms"):
+                value = getattr(cost, name)
+                yield Number(method, False, name, value, n=cost.places)
 
 
 def measure_costs(
@@ -165,8 +165,8 @@ def measure_costs(
     distractors: tuple[tuple[Part, ...], ...],
     num_distractors: int,
     methods: tuple[MethodChoice, ...],
-) -> dict[str, tuple[int, dict[str, float]]]:
-    """Returns the CPU times of methods, and the sizes of their databases.
+) -> dict[str, QueryCost]:
+    """Returns the cost of searching a database: key of a method -> cost.
 
     Args:
         reporter: reports progress.
@@ -177,12 +177,6 @@ def measure_costs(
         num_distractors: number of places of the drives through other cities
             that are added to the database.
         methods: methods to measure.
-
-    Returns:
-        Key of a method -> number of places in its database; and a dictionary of
-        CPU times [ms]. `query_ms` is the median time to compare a query with
-        all places; `build_ms` is the time to build the database from
-        descriptions.
     """
     found = {}
     for k, choice in enumerate(
@@ -193,15 +187,7 @@ def measure_costs(
         others = [parts[k] for parts in distractors]
         places = crowded(mapped, others, num_distractors)[0].places
         asked = query[k].read()[1].queries
-        found[choice.key] = (
-            len(places.frames),
-            {
-                "build_ms": cpu_ms(method.build_database, places.descriptors),
-                "query_ms": query_ms(
-                    method, places, asked, TIMED + 1, with_pose=False
-                ),
-            },
-        )
+        found[choice.key] = measure_search(method, places, asked)
     return found
 
 
