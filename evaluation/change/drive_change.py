@@ -219,8 +219,6 @@ def compare_maps(
     if source.drive is not None and target.drive is not None:
         check_same_world(source.drive, target.drive)
     change, clouds = _change(source, target)
-    values = [change.symmetric]
-    values += [_change(source, target, at)[0].symmetric for at in grids]
     masked = None
     if source.positions is not None and target.positions is not None:
         both = (source.positions, target.positions)
@@ -234,12 +232,30 @@ def compare_maps(
         source.name,
         target.name,
         change,
-        (float(np.min(values)), float(np.max(values))),
+        spread_over_grids(source, target, change, grids),
         masked,
         control_change,
         control_names,
         alignment,
     )
+
+
+def spread_over_grids(
+    source: Surveyed,
+    target: Surveyed,
+    change: TemporalChange,
+    grids: Sequence[tuple[float, float, float]] = GRIDS,
+) -> tuple[float, float]:
+    """Returns the least and the greatest TCR_sym if the grid is shifted.
+
+    Args:
+        source, target: the two maps.
+        change: their change on the grid as it is, which counts, too.
+        grids: shifts of the grid [m].
+    """
+    values = [change.symmetric]
+    values += [_change(source, target, at)[0].symmetric for at in grids]
+    return float(np.min(values)), float(np.max(values))
 
 
 def _change(

@@ -23,7 +23,6 @@ from evaluation.change.tcr import (
     HULL_MARGIN,
     TAU,
     in_convex_hull,
-    temporal_change,
 )
 from evaluation.maps.voxel_maps import VoxelMap
 from evaluation.results.drawing import PIXELS, Legend, plain, save, unit
@@ -256,10 +255,8 @@ def _draw_sets(
 ) -> None:
     change = result.report.change
     sides = (change.source_to_target, change.target_to_source)
-    shown = temporal_change(*(one.centroids_W for one in maps))
-    labels = (shown.source_to_target, shown.target_to_source)
     colours = []
-    for cloud, coarse, side in zip(clouds, maps, labels, strict=True):
+    for cloud, coarse, side in zip(clouds, maps, sides, strict=True):
         rgb = np.full((len(coarse), 3), _OUTSIDE_H, dtype=np.uint8)
         rgb[side.in_hull] = _ONLY_IN_H
         rgb[side.unchanged] = _IN_O

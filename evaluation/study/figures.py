@@ -1,12 +1,17 @@
 """Draws the figures of a study's cities, and names their files."""
 
+from dataclasses import replace
 from pathlib import Path
 
 from cns_drake.base.files import file_name, make_folder
 from cns_drake.base.jobs.running import Job
 from cns_drake.base.jobs.step import Reporter
 from cns_drake.base.progress import doing
-from evaluation.change.drive_change import ChangeResult, compare_maps
+from evaluation.change.drive_change import (
+    ChangeReport,
+    ChangeResult,
+    spread_over_grids,
+)
 from evaluation.recognition.metrics import MODES
 from evaluation.report import figures
 from evaluation.report.page_data import (
@@ -24,6 +29,7 @@ from evaluation.study.surveys import (
     RecordedDrive,
     SurveyedDrive,
 )
+from evaluation.study.tasks.task import job_name
 
 # Format of pictures on the page.
 _PAGE_KIND = PIXELS[-1]
@@ -74,32 +80,40 @@ def draw_city(
     return drives
 
 
-def compare_stages(
+def draw_stages(
     reporter: Reporter,
     map_name: str,
     stages: tuple[str, str],
-    drives: tuple[Part, ...],
+    changes: tuple[Part, ...],
+    drives: tuple[Part, Part],
     clouds: tuple[Part, Part],
     stems: tuple[Path, Path],
 ) -> ChangeResult:
-    """Returns the change between two drives, and draws it.
+    """Draws the change between two drives, and returns it with its spread.
 
     Args:
         reporter: reports progress.
         map_name: name of the map.
         stages: the earlier stage, and the later one.
-        drives: the earlier drive, the later one, and optionally a control. Each
-            is a file with a `SurveyedDrive`; all are in one world frame.
+        changes: files with the results of the task `change`: of the earlier and
+            the later drive, and, if there is one, of their control.
+        drives: the earlier drive and the later one. Each is a file with a
+            `SurveyedDrive`; both are in one world frame.
         clouds: files with the clouds of the earlier and the later drive.
         stems: paths of the two figures, without ending. The first figure shows
             what changed, the second figure shows the sets of points from which
             TCR is computed.
     """
-    doing("comparing the maps")
+    doing("comparing the maps on other grids")
+    report: ChangeReport
+    report, *controls = (part.read() for part in changes)
     read: list[SurveyedDrive] = [part.read() for part in drives]
-    earlier, later, *controls = (one.surveyed for one in read)
-    control = controls[0] if controls else None
-    report = compare_maps(earlier, later, control)
+    earlier, later = (one.surveyed for one in read)
+    spread = spread_over_grids(earlier, later, report.change)
+    report = replace(report, spread=spread)
+    for control in controls:
+        names = control.source, control.target
+        report = replace(report, control=control.change, control_names=names)
     result = ChangeResult(map_name, stages, report)
     doing("drawing the change")
     make_folder(stems[0].parent)
@@ -139,30 +153,35 @@ def drawing_job(
 
 
 def change_job(
-    city: City, pair: Recordings, files: StudyFiles, planned: SurveyJobs
+    city: City,
+    pair: Recordings,
+    changes: tuple[Part, ...],
+    files: StudyFiles,
+    planned: SurveyJobs,
 ) -> tuple[Part, Job]:
     """Returns the job that draws a change, and the file of its result.
 
     Args:
         city: the city.
         pair: recordings in the earlier and in the later stage of the city.
+        changes: files with the change of the pair, and with that of its
+            control, if there is one; see `ChangeTask`.
         files: files of the study.
-        planned: adds the surveys that are compared.
+        planned: adds the surveys that are drawn.
     """
-    both = city.unchanged_pair(*pair) or ()
-    drives = [*pair, *(one for one in both if one not in pair)]
-    needs: list[str] = []
-    surveys = [planned.survey(one.named, needs) for one in drives]
+    needs = [job_name(one) for one in changes]
+    surveys = [planned.survey(one.named, needs) for one in pair]
     earlier, later = pair
     stems = tuple(files.figures / name for name in change_stems(city, pair))
     part = files.part("changes", earlier.name, later.name)
     step = MakePart(
         part,
-        compare_stages,
+        draw_stages,
         (
             city.name,
             (earlier.stage, later.stage),
-            tuple(one.drive for one in surveys),
+            changes,
+            (surveys[0].drive, surveys[1].drive),
             (surveys[0].fine, surveys[1].fine),
             stems,
         ),

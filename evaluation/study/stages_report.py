@@ -300,7 +300,16 @@ class _CityReport:
         jobs = [job]
         self._changes = []
         for pair in city.change_pairs():
-            change, job = figures.change_job(city, pair, self._files, planned)
+            parts = tuple(
+                part
+                for stage in (OWN, LAST)
+                if (one := self._own(pair, stage)) is not None
+                for part in one.parts["change"]
+                if isinstance(part, Part)
+            )
+            change, job = figures.change_job(
+                city, pair, parts, self._files, planned
+            )
             self._changes.append(change)
             jobs.append(job)
         for pair in self._pairs:

@@ -243,7 +243,7 @@ class Jobs:
         """
         name = drive.name if spacing is None else f"{drive.name} {spacing:g}"
         part = self.files.part("mapped", name)
-        needs.append(f"mapped {part.path.stem}")
+        needs.append(job_name(part))
         cost = _MAP_COST if spacing is None else _OTHER_COST
         arguments = (drive.source, spacing)
         return self.add(part, map_city, arguments, drive.needs, cost)
@@ -295,10 +295,15 @@ class Jobs:
             needs: names of jobs that must be finished before.
             cost: approximate cost of the job [s].
         """
-        name = f"{part.path.parent.name} {part.path.stem}"
+        name = job_name(part)
         step = MakePart(part, function, arguments)
         self.jobs[name] = Job(name, step, tuple(needs), cost)
         return part
+
+
+def job_name(part: Part) -> str:
+    """Returns the name of the job that `Jobs.add` adds for a file."""
+    return f"{part.path.parent.name} {part.path.stem}"
 
 
 def _description_name(
