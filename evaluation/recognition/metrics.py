@@ -520,9 +520,28 @@ class PlaceRecognitionMetrics:
     recall_at_1_interval: Interval
 
     @property
+    def areas(self) -> dict[str, float]:
+        """AUC, R@1 and strict AUC, by their names in tables."""
+        return {
+            "auc": self.auc,
+            "r1": self.recall_at_1,
+            "auc_strict": self.auc_strict,
+        }
+
+    @property
     def recall_at_1(self) -> float:
         """R@1: share of right best places among the queries with a match."""
         return float(self.recall_at_n[0])
+
+
+def areas(outcomes: QueryOutcomes) -> dict[str, float]:
+    """Returns AUC, R@1 and strict AUC, by their names in tables."""
+    curve = pr_curve(outcomes)
+    return {
+        "auc": curve.auc,
+        "r1": outcomes.recall_at(1),
+        "auc_strict": curve.strict_auc(int(outcomes.has_match.sum())),
+    }
 
 
 def evaluate(
@@ -548,11 +567,12 @@ def evaluate(
     num_with_match = int(outcomes.has_match.sum())
     best = int(curve.f1.argmax()) if len(curve.thresholds) else None
     auc_interval, recall_interval = bootstrap_intervals(counted, seed)
+    values = areas(counted)
     return PlaceRecognitionMetrics(
         mode=mode,
         curve=curve,
-        auc=curve.auc,
-        auc_strict=curve.strict_auc(num_with_match),
+        auc=values["auc"],
+        auc_strict=values["auc_strict"],
         f1_max=0.0 if best is None else float(curve.f1[best]),
         f1_max_index=best,
         recall_at_n=np.array(

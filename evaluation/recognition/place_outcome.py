@@ -29,7 +29,6 @@ from evaluation.recognition.pose_errors import (
     PoseMetrics,
     is_accepted,
     pose_metrics,
-    pose_success,
 )
 from evaluation.recognition.protocol import RetrievalProtocol
 from evaluation.recognition.query_outcomes import QueryOutcomes, judge
@@ -407,7 +406,7 @@ def place_numbers(
             `visible_change_added`, see the function.
     """
     outcomes = now.outcomes
-    values = areas(outcomes)
+    values = now.by_mode["all"].areas
     samples = own_samples(outcomes)
     for (name, value), drawn in zip(values.items(), samples, strict=True):
         yield now.number(name, value, percentile_interval(drawn))
@@ -417,7 +416,7 @@ def place_numbers(
             drawn_then = paired_samples(before.outcomes, outcomes)
         for name, then, today, drawn, other in zip(
             ("kept", "kept_r1", "kept_strict"),
-            areas(before.outcomes).values(),
+            before.by_mode["all"].areas.values(),
             values.values(),
             samples,
             drawn_then,
@@ -438,7 +437,8 @@ def place_numbers(
     yield now.number("with_match", float(outcomes.has_match.sum()))
     yield now.number("places", float(outcomes.num_places))
     yield now.number(
-        "recall_at_full_precision", pr_curve(outcomes).recall_at_full_precision
+        "recall_at_full_precision",
+        now.by_mode["all"].curve.recall_at_full_precision,
     )
     overlaps = now.columns["overlap"]
     for name in FAULTS:
@@ -461,23 +461,21 @@ def pose_numbers(
             results include the metric `kept`: the success rate in the condition
             divided by the success rate in the baseline.
     """
-    errors = now.pose_errors
-    value = pose_success(errors, now.outcomes)
+    value = now.pose.success
     if math.isnan(value):
         return
     number = int(now.outcomes.has_match.sum())
     yield now.number("pose_success", value, n=number)
     if before is not None:
-        then = pose_success(before.pose_errors, before.outcomes)
-        yield now.number("kept", float(kept_share(value, then)), n=number)
-    # The same queries as in the report's table of poses.
-    known = is_accepted(now.outcomes) & ~np.isnan(errors.translation)
-    for name, some in (
-        ("translation_median", errors.translation[known]),
-        ("rotation_median_deg", errors.rotation_deg[known]),
+        kept = float(kept_share(value, before.pose.success))
+        yield now.number("kept", kept, n=number)
+    known = is_accepted(now.outcomes) & ~np.isnan(now.pose_errors.translation)
+    for name, median in (
+        ("translation_median", now.pose.translation_median),
+        ("rotation_median_deg", now.pose.rotation_median_deg),
     ):
-        if len(some):
-            yield now.number(name, float(np.median(some)), n=len(some))
+        if not math.isnan(median):
+            yield now.number(name, median, n=int(known.sum()))
 
 
 def kept_share(
@@ -491,13 +489,3 @@ def kept_share(
     with np.errstate(invalid="ignore", divide="ignore"):
         share = np.divide(changed, unchanged)
     return np.where(np.asarray(unchanged) > 0.0, share, math.nan)
-
-
-def areas(outcomes: QueryOutcomes) -> dict[str, float]:
-    """Returns AUC, R@1 and strict AUC, by their names in tables."""
-    curve = pr_curve(outcomes)
-    return {
-        "auc": curve.auc,
-        "r1": outcomes.recall_at(1),
-        "auc_strict": curve.strict_auc(int(outcomes.has_match.sum())),
-    }

@@ -20,12 +20,12 @@ from cns_drake.base.terminal import next_command
 from evaluation.recognition.metrics import (
     Difference,
     Interval,
+    areas,
     compared_by_auc,
     percentile_interval,
     resampled_metrics,
     weights_by_drive,
 )
-from evaluation.recognition.place_outcome import areas
 from evaluation.recognition.protocol import PROTOCOL_NAMES, PROTOCOLS
 from evaluation.results.summaries import (
     Ranked,

@@ -5,10 +5,14 @@ from __future__ import annotations
 from collections.abc import Iterable
 from dataclasses import dataclass, replace
 
+from evaluation.recognition.description import Role
 from evaluation.recognition.protocol import RetrievalProtocol
 from evaluation.report.reference import Reference
 from evaluation.study.chosen_methods import MethodChoice
+from evaluation.study.measurements import DescribedSource
+from evaluation.study.parts import StudyFiles
 from evaluation.study.surveys import described_key
+from evaluation.study.tasks.task import Jobs, NamedDrive, Pair
 
 
 @dataclass(frozen=True)
@@ -29,15 +33,55 @@ class Repeat:
     protocol: RetrievalProtocol
     shares_places: bool
 
-    @property
-    def queries(self) -> str:
-        """Key of the method's descriptions of the queries."""
+    def described(self, role: Role) -> str:
+        """Returns the key of the method's descriptions of places or queries."""
+        if role == "places" and self.shares_places:
+            return self.method.key
         return described_key(self.method.key, self.protocol)
 
-    @property
-    def places(self) -> str:
-        """Key of the method's descriptions of the places."""
-        return self.method.key if self.shares_places else self.queries
+    def of(self, pair: Pair) -> Pair:
+        """Returns a pair of drives as the second run measures it."""
+        return replace(
+            pair,
+            stated=self.protocol,
+            protocol=self.protocol,
+            key=f"{pair.key} {self.protocol.name} {self.method.key}",
+            parts={},
+        )
+
+    def jobs(
+        self,
+        files: StudyFiles,
+        methods: tuple[MethodChoice, ...],
+        distractors: Iterable[NamedDrive],
+    ) -> Jobs:
+        """Returns the jobs of the second run, see `Engine.add`."""
+        return _RepeatJobs(files, (self.method,), repeat=self)
+
+
+@dataclass
+class _RepeatJobs(Jobs):
+    """Jobs that read descriptions, which surveys of the first runs make.
+
+    The overlaps of queries with their matches stay unknown.
+    """
+
+    repeat: Repeat | None = None
+    shows_overlaps = False
+
+    def described(
+        self,
+        drive: NamedDrive,
+        role: Role,
+        protocol: RetrievalProtocol,
+        needs: list[str],
+        *,
+        kept: bool = False,
+    ) -> DescribedSource:
+        assert self.repeat is not None
+        needs.append(f"survey {drive.name}")
+        files = self.files.survey(drive.name)
+        return files.scans, files.described(self.repeat.described(role))
 
 
 def repeats_of(

@@ -12,7 +12,6 @@ from cns_drake.base.errors import InputError
 from cns_drake.base.files import make_folder
 from cns_drake.base.jobs.cluster import Cluster
 from cns_drake.base.jobs.running import Job, run_jobs
-from cns_drake.base.jobs.step import Steps
 from cns_drake.base.progress import doing
 from cns_drake.base.version import __version__
 from evaluation.recognition.description import Role
@@ -34,7 +33,6 @@ from evaluation.study.collection import (
 )
 from evaluation.study.engine import Engine, made_tasks
 from evaluation.study.fault_evidence import explain_faults
-from evaluation.study.measurements import measure_method
 from evaluation.study.method_costs import measure_method_costs
 from evaluation.study.parts import MakePart, Part, StudyFiles
 from evaluation.study.recorded import (
@@ -113,6 +111,19 @@ class StagesReport:
                 for one in self.methods
             },
             self.output.absolute(),
+        )
+
+    @cached_property
+    def published(self) -> Engine:
+        """The engine of second runs, by the protocol of published numbers.
+
+        Its pairs are not in the tables, whose rows are those of `stages`.
+        """
+        return Engine(
+            self.reference.title,
+            made_tasks({PlaceTask.name: {}}, _TASKS, _EXPERIMENT),
+            self.engine.methods,
+            self.engine.output,
         )
 
     @property
@@ -312,9 +323,18 @@ class _CityReport:
             )
             self._changes.append(change)
             jobs.append(job)
-        for pair in self._pairs:
-            jobs += self._jobs_of(pair)
+        jobs += map(self._explaining, self._pairs)
         self.jobs = {**planned.jobs, **{job.name: job for job in jobs}}
+        # Drives -> the pairs of second runs.
+        self._repeated: dict[tuple[str, str], list[Pair]] = {}
+        for pair in self._pairs:
+            own = self._own(pair)
+            assert own is not None
+            for again in self._repeats.get(own.names, ()):
+                one = again.of(own)
+                added = study.published.add([one], make_jobs=again.jobs)
+                self.jobs |= added.jobs
+                self._repeated.setdefault(own.names, []).append(one)
 
     def _own(self, pair: Recordings, stage: str = OWN) -> Pair | None:
         """Returns a pair as it is measured, or (stage `last`) its control."""
@@ -343,67 +363,23 @@ class _CityReport:
         """Returns the file with evidence on why best places are wrong."""
         return self._files.part("why", *(one.name for one in pair))
 
-    def _repeated(self, pair: Recordings, one: Repeat) -> Part:
-        """Returns the file with the outcomes of a second run."""
-        return self._files.part(
-            "repeated", *(drive.name for drive in pair), one.method.key
-        )
-
-    def _jobs_of(self, pair: Recordings) -> list[Job]:
-        """Returns the jobs that explain a pair and repeat published runs."""
+    def _explaining(self, pair: Recordings) -> Job:
+        """Returns the job that finds out why answers of a pair are wrong."""
         own = self._own(pair)
-        protocol = self._study.protocol
         assert own is not None
         surveys = [self._files.survey(one.name) for one in pair]
-        names = own.names
-        steps = [
-            MakePart(
-                self._evidence(pair),
-                explain_faults,
-                (
-                    (surveys[0].scans, surveys[1].scans),
-                    self._study.methods,
-                    own.parts["place"],
-                    protocol,
-                ),
-            )
-        ]
-        needs = (f"place {own.key}",)
-        jobs = [
-            Job(
-                f"explain {names[0]} > {names[1]}",
-                steps[0],
-                needs,
-                _RECOGNITION_COST,
-            )
-        ]
-        steps = [
-            MakePart(
-                self._repeated(pair, one),
-                measure_method,
-                (
-                    surveys[0].described(one.places),
-                    surveys[1].described(one.queries),
-                    (),
-                    0,
-                    one.method,
-                    None,
-                    one.protocol,
-                    (one.protocol.radius,),
-                ),
-            )
-            for one in self._repeats.get(names, ())
-        ]
-        if steps:
-            jobs.append(
-                Job(
-                    f"repeat {names[0]} > {names[1]}",
-                    Steps(steps[0].output, tuple(steps)),
-                    tuple(f"survey {name}" for name in names),
-                    _RECOGNITION_COST * len(steps),
-                )
-            )
-        return jobs
+        step = MakePart(
+            self._evidence(pair),
+            explain_faults,
+            (
+                (surveys[0].scans, surveys[1].scans),
+                self._study.methods,
+                own.parts["place"],
+                self._study.protocol,
+            ),
+        )
+        name = f"explain {own.names[0]} > {own.names[1]}"
+        return Job(name, step, (f"place {own.key}",), _RECOGNITION_COST)
 
     def _outcomes(
         self, pair: Recordings, parts: Iterable[Result]
@@ -454,11 +430,8 @@ class _CityReport:
                 )
             if pair[0] is not pair[1]:
                 report.pairs += [(one, before.get(one.method)) for one in found]
-            repeated = [
-                self._repeated(pair, one)
-                for one in self._repeats.get(own.names, ())
-            ]
-            report.repeated += self._outcomes(pair, repeated)
+            for one in self._repeated.get(own.names, ()):
+                report.repeated += self._outcomes(pair, one.parts["place"])
             evidence = self._evidence(pair).read()
             if evidence is not None and before:
                 unchanged = next(iter(before.values())).columns["overlap"]

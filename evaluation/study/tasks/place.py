@@ -78,6 +78,7 @@ class PoseTask(Task):
                 radii,
             ),
         )
+        overlaps = (shown,) if jobs.shows_overlaps else ()
         steps = [
             MakePart(
                 jobs.files.part("place", pair.key, choice.key),
@@ -88,7 +89,7 @@ class PoseTask(Task):
                     tuple(parts[k - 1] for parts in others),
                     pair.distractors,
                     choice,
-                    shown.part,
+                    shown.part if overlaps else None,
                     protocol,
                     radii,
                 ),
@@ -96,7 +97,7 @@ class PoseTask(Task):
             for k, choice in enumerate(jobs.methods, start=1)
         ]
         name = f"place {pair.key}"
-        whole = Steps(shown.part.path, (shown, *steps))
+        whole = Steps((*overlaps, *steps)[0].part.path, (*overlaps, *steps))
         jobs.jobs[name] = Job(name, whole, tuple(needs), _PLACES_COST)
         return tuple(one.part for one in steps)
 

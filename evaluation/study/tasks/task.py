@@ -162,7 +162,11 @@ class Jobs:
             keeps the order and omits repetitions.
         radii: key of a pair -> the greatest distances between a query and its
             match that are used for this pair [m].
+        shows_overlaps: whether results contain how much of each query's scan
+            its best match shows, which takes time.
     """
+
+    shows_overlaps: ClassVar[bool] = True
 
     files: StudyFiles
     methods: tuple[MethodChoice, ...]
