@@ -6,6 +6,7 @@ import fcntl
 import functools
 import hashlib
 from pathlib import Path
+import tempfile
 from typing import TypeVar
 
 import numba
@@ -20,9 +21,11 @@ _Function = TypeVar("_Function", bound=Callable)
 def compiled(function: _Function) -> _Function:
     """Compiles a function of arrays to machine code, on its first call.
 
-    The machine code is kept between runs in the user's cache folder. If that
-    folder cannot be written, each process compiles anew. If several processes
-    need the same function at once, one of them compiles it and the others wait.
+    The machine code is kept between runs in the user's cache folder, by the
+    content of the source: an installation and a checkout with the same source
+    share it, and so do two releases. If that folder cannot be written, each
+    process compiles anew. If several processes need the same function at once,
+    one of them compiles it and the others wait.
 
     A compiled function may call only compiled functions of its own folder. If
     any file in that folder changes, all of its functions are compiled again;
@@ -32,22 +35,60 @@ def compiled(function: _Function) -> _Function:
     assigned to a slice of another, numba also compiles an error message about
     shapes, which takes seconds.
     """
-    # Numba reads the cache folder while it decorates, and only from here.
-    before = numba.config.CACHE_DIR
-    own_folder = Path(function.__code__.co_filename).parent
-    kept = Path(before or cache_folder() / "compiled") / _state_of(own_folder)
-    numba.config.CACHE_DIR = str(kept)
+    # Numba reads this setting while it decorates, and only from here.
+    before = numba.config.CACHE_LOCATOR_CLASSES
+    numba.config.CACHE_LOCATOR_CLASSES = f"{__name__}.{_ByContent.__name__}"
     # No C code calls these functions.
     options = {"nogil": True, "no_cfunc_wrapper": True}
     try:
         dispatcher = numba.njit(cache=True, **options)(function)
         name = f"{function.__module__}.{function.__qualname__}.lock"
+        kept = Path(dispatcher.stats.cache_path)
         dispatcher.compile = _for_all(dispatcher.compile, kept / name)
         return dispatcher
     except RuntimeError:
         return numba.njit(**options)(function)
     finally:
-        numba.config.CACHE_DIR = before
+        numba.config.CACHE_LOCATOR_CLASSES = before
+
+
+class _ByContent:
+    """Where Numba keeps a function: by what its folder says, wherever it lies.
+
+    Numba's own locators name the place by the path of the source. This one has
+    the methods that Numba calls; see NUMBA_CACHE_LOCATOR_CLASSES in its manual.
+    """
+
+    def __init__(self, function: Callable, folder: Path) -> None:
+        self._line = function.__code__.co_firstlineno
+        self._content = _content_of(folder)
+        root = Path(numba.config.CACHE_DIR or cache_folder() / "compiled")
+        self._place = root / self._content
+
+    @classmethod
+    def from_function(
+        cls, function: Callable, file: str
+    ) -> "_ByContent | None":
+        """Returns the place of a function; none if it cannot be written to."""
+        place = cls(function, Path(file).parent)
+        try:
+            place.ensure_cache_path()
+        except OSError:
+            return None
+        return place
+
+    def ensure_cache_path(self) -> None:
+        self._place.mkdir(parents=True, exist_ok=True)
+        tempfile.TemporaryFile(dir=self._place).close()
+
+    def get_cache_path(self) -> str:
+        return str(self._place)
+
+    def get_source_stamp(self) -> str:
+        return self._content
+
+    def get_disambiguator(self) -> str:
+        return str(self._line)
 
 
 def _for_all(
@@ -85,8 +126,9 @@ def start_compiler() -> None:
 
 
 @functools.cache
-def _state_of(folder: Path) -> str:
+def _content_of(folder: Path) -> str:
     """Returns a short hash that changes when a module in the folder changes."""
-    files = sorted(folder.glob("*.py"))
-    stamps = [(f.name, f.stat().st_size, f.stat().st_mtime_ns) for f in files]
-    return hashlib.sha256(repr(stamps).encode()).hexdigest()[:16]
+    content = hashlib.sha256()
+    for file in sorted(folder.glob("*.py")):
+        content.update(repr((file.name, file.read_bytes())).encode())
+    return content.hexdigest()[:16]

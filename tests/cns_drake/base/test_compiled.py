@@ -15,9 +15,9 @@ from cns_drake.base import compiled
 _SCRIPT = """
 import numba
 import numpy as np
-before = numba.config.CACHE_DIR
+before = numba.config.CACHE_LOCATOR_CLASSES
 from evaluation.methods.btc_planes import group_alike
-assert numba.config.CACHE_DIR == before
+assert numba.config.CACHE_LOCATOR_CLASSES == before
 print(len(group_alike(np.zeros((1, 3)), np.zeros((1, 3)), 0.1, 0.3)))
 """
 
@@ -109,6 +109,45 @@ def test_nothing_is_compiled_twice(tmp_path):
         check=True,
     )
     assert result.stdout == "4 1 Counter()\n7 [(int64, int64)]\n"
+
+
+_THRICE = """
+from cns_drake.base.compiled import compiled
+
+@compiled
+def thrice(number):
+    return 3 * number
+
+print(thrice(2), thrice.stats.cache_misses.total())
+"""
+
+
+@pytest.mark.slow
+def test_equal_sources_share_the_code_wherever_they_lie(tmp_path):
+    """Age and place of the source do not count; content of a sibling does."""
+
+    def run(folder):
+        result = subprocess.run(
+            [sys.executable, folder / "thrice.py"],
+            env={
+                **os.environ,
+                "PYTHONPATH": str(documents.ROOT),
+                "XDG_CACHE_HOME": str(tmp_path / "cache"),
+            },
+            capture_output=True,
+            text=True,
+            check=True,
+        )
+        return result.stdout
+
+    for name in ("checkout", "installed", "changed"):
+        (tmp_path / name).mkdir()
+        (tmp_path / name / "thrice.py").write_text(_THRICE)
+    os.utime(tmp_path / "installed/thrice.py", (1e9, 1e9))
+    (tmp_path / "changed/sibling.py").write_text("# Another folder.\n")
+    assert run(tmp_path / "checkout") == "6 1\n"
+    assert run(tmp_path / "installed") == "6 0\n"
+    assert run(tmp_path / "changed") == "6 1\n"
 
 
 def test_an_interrupt_waits_until_a_function_is_compiled(tmp_path):
