@@ -49,6 +49,18 @@ PLANS = {
     "suburbia": Plan("02", (70, 110), (300, 500), (500, 900), (330, 420)),
 }
 
+# To draw one of these takes over ten seconds of processor time.
+_BY_NIGHT = ("downtown", "riverside")
+
+
+def by_day_or_night() -> list:
+    """Returns a parameter for each map; the larger ones are for the night."""
+    night = pytest.mark.night
+    return [
+        pytest.param(name, marks=night) if name in _BY_NIGHT else name
+        for name in PLANS
+    ]
+
 
 def world_of(name: str) -> Path:
     """Returns the folder of a map."""

@@ -11,6 +11,7 @@ from helpers.city_checks import (
 )
 from helpers.shipped_cities import (
     PLANS,
+    by_day_or_night,
     city,
     drawn,
     network_of,
@@ -46,7 +47,7 @@ def files(world) -> dict[str, bytes]:
     return {str(p.relative_to(world)): p.read_bytes() for p in found}
 
 
-@pytest.fixture(scope="module", params=PLANS)
+@pytest.fixture(scope="module", params=by_day_or_night())
 def name(request):
     return request.param
 

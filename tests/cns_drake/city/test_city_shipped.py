@@ -9,7 +9,13 @@ from helpers.city_checks import (
     check_things_stand_on_the_ground,
     is_ground,
 )
-from helpers.shipped_cities import PLANS, city, drawn, network_of
+from helpers.shipped_cities import (
+    PLANS,
+    by_day_or_night,
+    city,
+    drawn,
+    network_of,
+)
 import numpy as np
 import pytest
 import shapely
@@ -20,7 +26,7 @@ from cns_drake.scene.semantics import CLASS_IDS
 pytestmark = pytest.mark.slow
 
 
-@pytest.fixture(scope="module", params=PLANS)
+@pytest.fixture(scope="module", params=by_day_or_night())
 def name(request):
     return request.param
 
