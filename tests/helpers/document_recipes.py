@@ -625,6 +625,7 @@ RECIPES = {
         file="seasons.py",
         command=".venv/bin/python seasons.py",
         makes=("seasons.png",),
+        by_night=True,
     ),
     "study of recordings": Recipe(
         ".venv/bin/cns-drake study stages output",

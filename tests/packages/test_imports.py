@@ -46,6 +46,7 @@ def modules_imported(package: str) -> set[str]:
     return tops - sys.stdlib_module_names - set(PACKAGES)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("package", PACKAGES)
 def test_all_that_is_imported_is_required(package):
     """What another package happens to install may be gone tomorrow."""

@@ -323,6 +323,7 @@ def run(*arguments):
     return CliRunner().invoke(app, [str(a) for a in arguments])
 
 
+@pytest.mark.night
 @pytest.mark.slow
 def test_the_command_from_end_to_end(source, town, tmp_path):
     output = tmp_path / "town"

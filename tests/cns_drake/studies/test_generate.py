@@ -172,6 +172,7 @@ def town(tmp_path_factory):
     return folder
 
 
+@pytest.mark.night
 def test_drives_of_experiments_share_other_cities(
     town, tmp_path, monkeypatch, capsys
 ):

@@ -144,6 +144,7 @@ def followed(follows=True, vehicles=40, walkers=10):
     return scenario, trajectory, world, plan
 
 
+@pytest.mark.night
 @pytest.mark.slow
 def test_a_drive_among_others():
     scenario, plain, world, plan = followed()
